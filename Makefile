@@ -1,0 +1,72 @@
+# Every target makes .venv by itself when it is missing or older than the lock.
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.installed
+# uv installs in seconds what pip does in minutes; pip, which the venv brings, only installs uv.
+INSTALL = $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python $(INDEX)
+# A mirror that pip is configured for serves uv too.
+INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-url 2>/dev/null))
+
+.DEFAULT_GOAL := help
+.PHONY: demo up test check cover lint format types docs lock clean help
+
+docs: $(STAMP) ## renew the tables of docs/bus.md and the JSON schemas
+	$(BIN)/python -m cli.docs
+
+help: ## what can be made
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+$(STAMP): requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "T2 needs Python 3.11 or newer; say make PYTHON=/path/to/python3.11")'
+	$(PYTHON) -m venv --clear .venv
+	awk '/^[^ #]/{on = /^uv==/} on' requirements.lock > .venv/uv.lock
+	$(BIN)/pip install --quiet --require-hashes -r .venv/uv.lock
+	$(INSTALL) --require-hashes -r requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation -e .
+	touch $@
+
+demo: $(STAMP) ## a simulated T2 drives a lap through the real services
+	$(BIN)/t2 demo
+
+up: $(STAMP) ## router, simulated vehicle, bridge, safety and odometry, until ctrl-c
+	$(BIN)/t2 up
+
+test: $(STAMP) ## all tests
+	$(BIN)/pytest
+
+check: lint types cover ## what CI runs: format, lint, types, import rules, tests, coverage
+
+lint: $(STAMP)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports
+
+cover: $(STAMP) ## all tests, with what they cover
+	$(BIN)/coverage erase
+	$(BIN)/pytest --cov --cov-report=
+	$(BIN)/coverage report --fail-under=85
+	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
+
+# The cores that decide, as the import rules name them: not a branch of theirs is untested.
+PURE = $(BIN)/python -c 'import tomllib; \
+  rules = tomllib.load(open("pyproject.toml", "rb"))["tool"]["importlinter"]["contracts"]; \
+  cores = rules[-1]["source_modules"]; \
+  print(",".join(c.replace(".", "/") + e for c in cores for e in (".py", "/*")))'
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+format: $(STAMP) ## let ruff write the format
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+  --custom-compile-command 'make lock' pyproject.toml
+
+lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, laptop
+	$(LOCK) --upgrade --all-extras -o requirements.lock
+	$(LOCK) --constraint requirements.lock -o requirements-robot.lock
+	$(LOCK) --constraint requirements.lock --extra teleop -o requirements-laptop.lock
+
+clean: ## remove what was made
+	rm -rf .venv out .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
