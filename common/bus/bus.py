@@ -1,0 +1,247 @@
+"""One Zenoh session of one process, with the declarations that live on it."""
+
+import contextlib
+import secrets
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import zenoh
+import zenoh.ext
+from msgspec import Struct
+
+from common import codec
+from common.bus.calls import Answers, Caller
+from common.bus.publisher import Publisher, qos
+from common.bus.ring import Ring
+from common.bus.session import LEASE_S, Opener
+from common.errors import MessageError
+from common.keys import ESTOP_CLASS, Call, Topic, estop_key
+from common.messages import Message
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Struct)
+R = TypeVar("R", bound=Struct)
+
+Post = Callable[[Callable[[], None]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival(Generic[M]):
+    """A message as it came in, with the local receive time and the raw frame when there is one."""
+
+    message: M
+    key: str
+    received_ns: int
+    raw: bytes | None
+
+
+class Bus:
+    """One Zenoh session of one process.
+
+    Declare first, then ``open``: a thread looks for a router until there is one, and the
+    declarations are made as soon as the session stands. Zenoh renews them by itself after a
+    router's restart.
+    """
+
+    def __init__(
+        self, endpoints: Sequence[str], robot: str, post: Post, lease_s: float = LEASE_S
+    ) -> None:
+        self.robot = robot
+        self.boot = secrets.randbits(63)
+        self.counts: Counter[str] = Counter()  # messages by key, both ways
+        # What went wrong, by name; named here, because a new name must not appear on a thread of
+        # Zenoh's while the loop reads them.
+        self.counters: Counter[str] = Counter(overrun=0, undecodable=0)
+        self.publishers: list[Publisher[Any]] = []
+        self._post = post
+        self._declarations: list[Callable[[zenoh.Session], Any]] = []
+        self._declared: list[Any] = []  # references keep them alive
+        self._session: zenoh.Session | None = None
+        self._closed = False
+        self._opener = Opener(
+            endpoints, lease_s, lambda session: post(lambda: self._adopt(session))
+        )
+
+    # --- declarations ---------------------------------------------------------------------
+
+    def publisher(self, topic: Topic[M], **names: str) -> Publisher[M]:
+        """Return a publisher for a topic of this robot."""
+        publisher = Publisher(topic, topic.on(self.robot, **names), self.boot, self.counts)
+        self.publishers.append(publisher)
+        self._declare(publisher.declare)
+        return publisher
+
+    def subscribe(
+        self,
+        topic: Topic[M],
+        handler: Callable[[Arrival[M]], None],
+        *,
+        depth: int = 1,
+        refused: Callable[[str, MessageError], None] | None = None,
+        **names: str,
+    ) -> None:
+        """Call the handler for each message, at most ``depth`` of which may wait.
+
+        A newer one pushes the oldest out. ``refused`` gets the key and the error of what is no such
+        message; it is counted in any case.
+        """
+
+        def take(sample: zenoh.Sample, received_ns: int) -> None:
+            key = str(sample.key_expr)
+            self.counts[key] += 1
+            try:
+                message = codec.decode(sample.payload.to_bytes(), topic.message)
+            except MessageError as error:
+                self.counters["undecodable"] += 1
+                if refused:
+                    refused(key, error)
+                return
+            raw = sample.attachment.to_bytes() if sample.attachment else None
+            handler(Arrival(message, key, received_ns, raw))
+
+        self._subscribe(topic.on(self.robot, **names), take, depth, topic.service.history)
+
+    def on_any(self, key: str, handler: Callable[[int], None]) -> None:
+        """Call the handler with the receive time for any PUT or DELETE on a key."""
+        self._subscribe(key, lambda _, received_ns: handler(received_ns), depth=1, history=0)
+
+    def serve(self, call: Call[Q, R], handler: Callable[[Q, Caller[R]], None]) -> None:
+        """Answer a call: the handler replies or refuses, at once or later."""
+        key = call.on(self.robot)
+
+        def take(query: zenoh.Query) -> None:
+            self.counts[key] += 1
+            caller: Caller[R] = Caller(query, key)
+            payload = query.payload.to_bytes() if query.payload else codec.EMPTY
+            try:
+                request = codec.decode(payload, call.request)
+            except MessageError as error:
+                self.counters["undecodable"] += 1
+                caller.refuse(str(error))
+                return
+            handler(request, caller)
+
+        self._queryable(key, take)
+
+    def answer(self, key: str, make: Callable[[], bytes], encoding: str) -> None:
+        """Answer any query on a key with bytes made on the spot."""
+
+        def take(query: zenoh.Query) -> None:
+            with contextlib.suppress(zenoh.ZError):
+                query.reply(key, make(), encoding=encoding)
+            query.drop()
+
+        self._queryable(key, take)
+
+    def live(self, key: str) -> None:
+        """Hold a liveliness token while the session lives."""
+        self._declare(lambda session: session.liveliness().declare_token(key))
+
+    def watch_live(self, expression: str, handler: Callable[[str, bool], None]) -> None:
+        """Call the handler with each liveliness key that appears or goes."""
+
+        def queue(sample: zenoh.Sample) -> None:
+            key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._hand_over(lambda: handler(key, alive))
+
+        self._declare(
+            lambda session: session.liveliness().declare_subscriber(expression, queue, history=True)
+        )
+
+    def ask(
+        self,
+        call: Call[Q, R],
+        request: Q,
+        on_reply: Callable[[R], None],
+        on_refusal: Callable[[str], None],
+        timeout_s: float = 2.0,
+    ) -> None:
+        """Make a call; exactly one of the two handlers follows."""
+        if self._session is None:
+            self._hand_over(lambda: on_refusal("there is no router"))
+            return
+        answers = Answers(call, on_reply, on_refusal, self._hand_over)
+        self._session.get(
+            call.on(self.robot),
+            zenoh.handlers.Callback(answers.queue, answers.end),
+            payload=codec.encode(request),
+            timeout=timeout_s,
+        )
+
+    def estop(self) -> None:
+        """Stop this robot; latches in safety."""
+        if self._session is not None:
+            self._session.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
+
+    # --- life -----------------------------------------------------------------------------
+
+    def open(self) -> None:
+        """Begin to look for a router; returns at once."""
+        self._opener.start()
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a router at the other end right now."""
+        session = self._session
+        return session is not None and bool(session.info.routers_zid())
+
+    def close(self) -> None:
+        """End the session; no handler is called any more."""
+        self._closed = True
+        for publisher in self.publishers:
+            publisher.withdraw()
+        self._session = None
+        self._opener.close()
+
+    def _adopt(self, session: zenoh.Session) -> None:
+        if self._closed:
+            return
+        self._declared += [declare(session) for declare in self._declarations]
+        self._session = session
+
+    def _declare(self, declare: Callable[[zenoh.Session], Any]) -> None:
+        self._declarations.append(declare)
+        if self._session is not None:
+            self._declared.append(declare(self._session))
+
+    def _hand_over(self, call: Callable[[], None]) -> None:
+        """Let the owner's thread make the call, unless the bus has closed by then."""
+        self._post(lambda: None if self._closed else call())
+
+    def _subscribe(
+        self, key: str, take: Callable[[zenoh.Sample, int], None], depth: int, history: int
+    ) -> None:
+        ring: Ring[tuple[zenoh.Sample, int]] = Ring(depth)
+
+        def drain() -> None:
+            came = ring.take()
+            if came:
+                take(*came)
+
+        def queue(sample: zenoh.Sample) -> None:
+            if ring.add((sample, time.monotonic_ns())):
+                self.counters["overrun"] += 1
+            else:
+                self._hand_over(drain)
+
+        def declare(session: zenoh.Session) -> Any:
+            if not history:
+                return session.declare_subscriber(key, queue)
+            return zenoh.ext.declare_advanced_subscriber(
+                session,
+                key,
+                queue,
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            )
+
+        self._declare(declare)
+
+    def _queryable(self, key: str, take: Callable[[zenoh.Query], None]) -> None:
+        def queue(query: zenoh.Query) -> None:
+            self._hand_over(lambda: take(query))
+
+        self._declare(lambda session: session.declare_queryable(key, queue))

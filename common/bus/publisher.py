@@ -1,0 +1,85 @@
+"""Typed publishing, in the class of service that the key table names."""
+
+import time
+from collections import Counter, deque
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import zenoh
+import zenoh.ext
+
+from common import codec
+from common.keys import ClassOfService, Topic
+from common.messages import Message
+
+M = TypeVar("M", bound=Message)
+
+
+class Publisher(Generic[M]):
+    """Puts the header on a topic's messages and sends them.
+
+    While there is no bus it drops them, but for those of a class with a history: these wait.
+    """
+
+    def __init__(self, topic: Topic[M], key: str, boot: int, counts: Counter[str]) -> None:
+        self.key = key
+        self.last: M | None = None
+        self.topic = topic
+        self._boot = boot
+        self._seq = 0
+        self._counts = counts
+        self._declared: Any = None
+        self._waiting: deque[tuple[M, bytes | None]] = deque(maxlen=topic.service.history)
+
+    @property
+    def next_seq(self) -> int:
+        """The ``seq`` that the next message will carry."""
+        return self._seq + 1
+
+    def put(self, message: M, raw: bytes | None = None) -> M:
+        """Send the message with a header of its own, ``raw`` beside it; return what was sent."""
+        self._seq += 1
+        stamped = msgspec.structs.replace(
+            message,
+            seq=self._seq,
+            boot=self._boot,
+            t_ns=time.time_ns(),
+            mono_ns=time.monotonic_ns(),
+        )
+        self.last = stamped
+        if self._declared is None:
+            self._waiting.append((stamped, raw))
+        else:
+            self._send(stamped, raw)
+        return stamped
+
+    def withdraw(self) -> None:
+        """Send no more; the bus calls this before it ends its session."""
+        self._declared = None
+
+    def declare(self, session: zenoh.Session) -> None:
+        """Make it known; the bus calls this once it has a session."""
+        service = self.topic.service
+        options = qos(service) | {"encoding": codec.encoding(self.topic.message)}
+        if service.history:
+            cache = zenoh.ext.CacheConfig(max_samples=service.history)
+            self._declared = zenoh.ext.declare_advanced_publisher(
+                session, self.key, cache=cache, publisher_detection=True, **options
+            )
+        else:
+            self._declared = session.declare_publisher(self.key, **options)
+        while self._waiting:
+            self._send(*self._waiting.popleft())
+
+    def _send(self, message: M, raw: bytes | None) -> None:
+        self._counts[self.key] += 1
+        self._declared.put(codec.encode(message), attachment=raw)
+
+
+def qos(service: ClassOfService) -> dict[str, Any]:
+    """Return a class of service in Zenoh's own words."""
+    return {
+        "priority": getattr(zenoh.Priority, service.priority),
+        "congestion_control": zenoh.CongestionControl.DROP,
+        "express": service.express,
+    }

@@ -1,0 +1,50 @@
+"""``zenoh --decoder t2 --encoder t2``: our messages as JSON on zenoh-cli's command line.
+
+Decoding needs nothing of ours but MessagePack, so that it shows what is there, right or wrong.
+Encoding fills in the header that a hand-typed message lacks; requests to srv/ have none.
+"""
+
+import json
+import secrets
+import time
+from itertools import count
+
+import msgpack
+
+_BOOT = secrets.randbits(63)
+_seq = count(1)
+
+
+def decode(key: object, value: bytes) -> str:
+    """Return a payload as one line of JSON; empty ones and others say what they are."""
+    if not value:
+        return "null"
+    try:
+        return json.dumps(msgpack.unpackb(value), ensure_ascii=False, default=_shown)
+    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+        return json.dumps({"not_msgpack": value.hex()})
+
+
+def encode(key: str, value: str) -> bytes:
+    """Return a JSON object as a message, with header; raise ``ValueError`` for anything else."""
+    message = json.loads(value)
+    if not isinstance(message, dict):
+        raise ValueError('a message is a JSON object, such as {"linear": 0.1, "angular": 0}')
+    if "/srv/" in key:  # a request has no header
+        return _packed(message)
+    header = {
+        "seq": next(_seq),
+        "boot": _BOOT,
+        "t_ns": time.time_ns(),
+        "mono_ns": time.monotonic_ns(),
+    }
+    return _packed({**header, **message})
+
+
+def _packed(message: dict[str, object]) -> bytes:
+    packed: bytes = msgpack.packb(message)
+    return packed
+
+
+def _shown(value: object) -> str:
+    return value.hex() if isinstance(value, bytes) else str(value)

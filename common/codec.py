@@ -1,0 +1,46 @@
+"""Messages to MessagePack and back; ``msgspec`` checks every type on the way in."""
+
+import math
+from functools import cache
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from common.errors import MessageError
+
+S = TypeVar("S", bound=Struct)
+
+ENCODING = "application/msgpack"
+EMPTY = b"\x80"  # an empty map: every field at its default
+
+_encoder = msgspec.msgpack.Encoder()
+
+
+def encode(message: Struct) -> bytes:
+    """Return the message as a MessagePack map."""
+    return _encoder.encode(message)
+
+
+def decode(payload: bytes, kind: type[S]) -> S:
+    """Read a MessagePack map; raise ``MessageError`` naming the field when it is no ``kind``."""
+    try:
+        message: S = _decoder(kind).decode(payload)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise MessageError(f"not a {kind.__name__}: {error}") from None
+    return message
+
+
+def encoding(kind: type[Struct]) -> str:
+    """Return the encoding string that goes with a message, ``application/msgpack;t2.v1.Kind``."""
+    return f"{ENCODING};t2.v1.{kind.__name__}"
+
+
+def finite(*values: float) -> bool:
+    """Tell whether all are numbers: NaN and infinity pass a typed decode."""
+    return all(math.isfinite(value) for value in values)
+
+
+@cache
+def _decoder(kind: type[Struct]) -> msgspec.msgpack.Decoder[Any]:
+    return msgspec.msgpack.Decoder(kind)

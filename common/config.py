@@ -1,0 +1,244 @@
+"""TOML, environment and command line to frozen structs; the later wins.
+
+A setting is named by its path, ``board.port``. It is looked for in the files, then in the
+environment (``T2__BOARD__PORT``, in any case), then in ``--set board.port=4002``. A table adds to
+what was given before, whatever it came in. Sections of other services are left alone; unknown
+sections and unknown fields are refused, because a setting that is misspelt is a setting that is
+lost.
+"""
+
+import difflib
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Struct
+
+from common.errors import ConfigError
+
+C = TypeVar("C", bound=Struct)
+
+DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
+ENV_PREFIX = "T2__"
+
+# Whose sections may stand in a file; a service reads its own and the shared ones.
+SECTIONS = (
+    "robot", "bus", "board", "wire", "log", "vehicle",
+    "bridge", "safety", "odom", "teleop", "sim",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """Where settings come from, weakest first."""
+
+    files: Sequence[Path] = (DEFAULT_FILE,)
+    environ: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
+    sets: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One value and where it came from."""
+
+    value: Any
+    origin: str
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded(Generic[C]):
+    """A valid configuration, and every setting in it by path."""
+
+    config: C
+    settings: dict[str, Setting]
+
+
+def load(root: type[C], sources: Sources) -> Loaded[C]:
+    """Read the sections of ``root``; raise ``ConfigError`` naming origin, field, value, allowed."""
+    given: dict[str, Setting] = {}
+    for file in sources.files:
+        given |= _from_file(file)
+    given |= _from_environ(root, sources.environ)
+    given |= _from_sets(root, sources.sets)
+    names = {part.name for part in msgspec.structs.fields(root)}
+    for path, setting in given.items():
+        _check_section(path.split(".")[0], path, setting, names)
+    ours = {path: setting for path, setting in given.items() if path.split(".")[0] in names}
+    tree = _nest(ours)
+    try:
+        config = msgspec.convert(tree, root)
+    except msgspec.ValidationError as error:
+        raise _explain(str(error), root, tree, ours) from None
+    defaults = {path: Setting(value, "default") for path, value in flatten(config)}
+    return Loaded(config, defaults | {path: given[path] for path in given if path in defaults})
+
+
+def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
+    """Yield every leaf of nested tables with its path; an empty table is a leaf."""
+    table = msgspec.structs.asdict(value) if isinstance(value, Struct) else value
+    if not isinstance(table, dict) or not table:
+        yield path, value
+        return
+    for key, part in table.items():
+        yield from flatten(part, f"{path}.{key}" if path else str(key))
+
+
+def _from_file(file: Path) -> dict[str, Setting]:
+    origin = _nearby(file)
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{origin}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ConfigError(f"{origin}: is no TOML: {error}") from None
+    return _leaves("", table, origin)
+
+
+def _nearby(file: Path) -> str:
+    """Return a file's name as a person in the working directory would say it."""
+    whole = file.absolute()
+    return str(whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else file)
+
+
+def _leaves(path: str, value: Any, origin: str) -> dict[str, Setting]:
+    """Return every setting in a value; an empty file has none."""
+    return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
+
+
+def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> dict[str, Setting]:
+    given: dict[str, Setting] = {}
+    for name in sorted(name for name in environ if name.upper().startswith(ENV_PREFIX)):
+        path = name[len(ENV_PREFIX) :].lower().replace("__", ".")
+        given |= _leaves(path, _parse(root, path, environ[name]), f"environment {name}")
+    return given
+
+
+def _from_sets(root: type[Struct], sets: Sequence[str]) -> dict[str, Setting]:
+    given: dict[str, Setting] = {}
+    for text in sets:
+        path, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not path:
+            raise ConfigError(f"--set {text}: should look like board.port=4002")
+        given |= _leaves(path, _parse(root, path, value), f"--set {text}")
+    return given
+
+
+def _parse(root: type[Struct], path: str, text: str) -> Any:
+    """Read a value as its field wants it: text as it stands, the rest as TOML, lists by commas."""
+    wanted = _type_at(root, path)
+    if wanted is str:
+        return text
+    if get_origin(wanted) is tuple and not text.startswith("["):
+        return [_toml(part.strip()) for part in text.split(",")] if text else []
+    return _toml(text)
+
+
+def _toml(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _type_at(root: type[Struct], path: str) -> Any:
+    kind: Any = root
+    for name in path.split("."):
+        if not (isinstance(kind, type) and issubclass(kind, Struct)):
+            return None
+        kind = get_type_hints(kind).get(name)
+    return kind
+
+
+def _nest(settings: Mapping[str, Setting]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for path, setting in settings.items():
+        *tables, leaf = path.split(".")
+        branch = tree
+        for name in tables:
+            inner = branch.setdefault(name, {})
+            if not isinstance(inner, dict):
+                raise ConfigError(f"{setting.origin}: {path}: {name} is a value, not a table")
+            branch = inner
+        # An empty table says nothing, so it takes nothing away.
+        if setting.value != {} or not isinstance(branch.get(leaf), dict):
+            branch[leaf] = setting.value
+    return tree
+
+
+def _check_section(section: str, path: str, setting: Setting, names: set[str]) -> None:
+    known = names | set(SECTIONS)
+    if section not in known:
+        raise ConfigError(
+            f"{setting.origin}: {path}: no section {section!r}{_meant(section, known)}"
+        )
+
+
+def _meant(word: str, known: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, sorted(known), n=1)
+    return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(sorted(known))}"
+
+
+def _explain(
+    error: str, root: type[Struct], tree: Any, given: Mapping[str, Setting]
+) -> ConfigError:
+    """Turn msgspec's sentence into origin, field, value and what is allowed."""
+    what, _, at = error.partition(" - at `$")
+    path, kind = _locate(at.rstrip("`"), root, tree)
+    unknown = re.search(r"unknown field `(.*)`", what)
+    if unknown:
+        known = [part.name for part in kind.fields]
+        path = f"{path}.{unknown[1]}"
+        return ConfigError(f"{_origin(path, given)}: {path}: unknown{_meant(unknown[1], known)}")
+    shown = f" = {given[path].value!r}" if path in given else ""
+    return ConfigError(f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}")
+
+
+def _locate(at: str, root: type[Struct], tree: Any) -> tuple[str, Any]:
+    """Return the path of what msgspec complains about, and its type.
+
+    msgspec writes ``[...]`` for some key of a table of tables; it is the first that is wrong.
+    """
+    path: list[str] = []
+    kind: Any = msgspec.inspect.type_info(root)
+    for name in re.findall(r"\w+|\[\.\.\.\]", at):
+        if isinstance(kind, msgspec.inspect.DictType):
+            kind = kind.value_type
+            name = next(key for key, row in tree.items() if not _fits(row, kind.cls))
+        elif isinstance(kind, msgspec.inspect.VarTupleType):
+            kind = kind.item_type
+            continue
+        else:
+            kind = next(part.type for part in kind.fields if part.name == name)
+        path.append(name)
+        tree = tree[name]
+    return ".".join(path), kind
+
+
+def _fits(row: Any, kind: type[Struct]) -> bool:
+    try:
+        msgspec.convert(row, kind)
+    except msgspec.ValidationError:
+        return False
+    return True
+
+
+def _origin(path: str, given: Mapping[str, Setting]) -> str:
+    inside = [s.origin for p, s in given.items() if p == path or p.startswith(f"{path}.")]
+    return ", ".join(dict.fromkeys(inside)) or "defaults"
+
+
+def _allowed(kind: Any) -> str:
+    """Say the words or the range; msgspec's own sentence names one end of a range only."""
+    words = getattr(kind, "values", ())
+    if words:
+        return f"; allowed is {', '.join(map(repr, words))}"
+    low, high = getattr(kind, "ge", None), getattr(kind, "le", None)
+    over = getattr(kind, "gt", None)
+    if high is None or (low is None and over is None):
+        return ""
+    return f"; allowed is {low}..{high}" if over is None else f"; allowed is over {over}..{high}"

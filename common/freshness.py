@@ -1,0 +1,25 @@
+"""The newest value of a stream and when it came, on the receiver's own clock."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+S = 1_000_000_000  # nanoseconds in a second
+
+
+@dataclass(frozen=True, slots=True)
+class Latest(Generic[T]):
+    """A value with its local receive time; make a new one for each sample."""
+
+    value: T
+    received_ns: int
+
+    def age_s(self, now_ns: int) -> float:
+        """Return how long ago it came, in seconds."""
+        return (now_ns - self.received_ns) / S
+
+
+def fresh(latest: Latest[T] | None, now_ns: int, limit_s: float) -> bool:
+    """Tell whether there is a value at most ``limit_s`` old."""
+    return latest is not None and latest.age_s(now_ns) <= limit_s

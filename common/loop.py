@@ -1,0 +1,111 @@
+"""A service's one thread: sockets, timers, and what other threads hand over.
+
+Everything that a service decides happens in here, one thing at a time, so that its cores need no
+locks. Zenoh's threads only ``post``.
+"""
+
+import contextlib
+import selectors
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from common.freshness import S
+
+Handler = Callable[[int], None]  # takes the monotonic time in nanoseconds
+
+
+@dataclass(slots=True)
+class Timer:
+    """A call that is due every period; a late one is made once, never caught up in a burst."""
+
+    period_ns: int
+    due_ns: int
+    handler: Handler
+
+
+class Loop:
+    """Waits for what is due next and does it, until ``stop``."""
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._timers: list[Timer] = []
+        self._posted: deque[Callable[[], None]] = deque()
+        self._wake_in, self._wake_out = socket.socketpair()
+        self._wake_in.setblocking(False)
+        self._wake_out.setblocking(False)
+        self._selector.register(self._wake_out, selectors.EVENT_READ, self._drain)
+        self._late_ns = 0
+        self._stopped = False
+
+    def watch(self, sock: socket.socket, handler: Handler) -> None:
+        """Call the handler whenever the socket can be read."""
+        self._selector.register(sock, selectors.EVENT_READ, handler)
+
+    def every(self, period_s: float, handler: Handler) -> None:
+        """Call the handler every ``period_s`` seconds, the first time at once.
+
+        Like ``watch`` it is for the loop's own thread; another thread posts it.
+        """
+        self._timers.append(Timer(round(period_s * S), time.monotonic_ns(), handler))
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Hand a call over from any thread; it is made in the loop's own."""
+        self._posted.append(call)
+        # A full pipe already holds a wake-up; a closed one has nobody left to wake.
+        with contextlib.suppress(OSError):
+            self._wake_in.send(b"\0")
+
+    def stop(self) -> None:
+        """Let ``run`` return after the current call; safe in a signal handler."""
+        self._stopped = True
+        self.post(lambda: None)
+
+    def run(self) -> None:
+        """Serve until ``stop``, which may have been said before; may be run again after that."""
+        while not self._stopped:
+            for key, _ in self._selector.select(self._until_due_s()):
+                key.data(time.monotonic_ns())
+            # Handed over before the timers look: they judge how old things are.
+            self._make_posted()
+            self._call_due()
+        self._stopped = False
+
+    def close(self) -> None:
+        """Give the descriptors back."""
+        self._selector.close()
+        self._wake_in.close()
+        self._wake_out.close()
+
+    def take_lateness_s(self) -> float:
+        """Return how late the latest timer was since the last call, in seconds."""
+        late, self._late_ns = self._late_ns, 0
+        return late / S
+
+    def _until_due_s(self) -> float | None:
+        if not self._timers:
+            return None
+        due = min(timer.due_ns for timer in self._timers)
+        return max(0, due - time.monotonic_ns()) / S
+
+    def _call_due(self) -> None:
+        for timer in self._timers:
+            now = time.monotonic_ns()
+            late = now - timer.due_ns
+            if late < 0:
+                continue
+            self._late_ns = max(self._late_ns, late)
+            timer.due_ns += timer.period_ns * (late // timer.period_ns + 1)
+            timer.handler(now)
+
+    def _drain(self, _: int) -> None:
+        with contextlib.suppress(BlockingIOError):
+            while self._wake_out.recv(4096):
+                pass
+        self._make_posted()
+
+    def _make_posted(self) -> None:
+        for _ in range(len(self._posted)):
+            self._posted.popleft()()

@@ -1,0 +1,240 @@
+"""What travels on the bus: frozen structs, SI units and radians, ``None`` for unknown.
+
+Frames follow REP-103 and REP-105: x forward, y left, counter-clockwise positive; ``odom`` is where
+odometry started, ``base_link`` is the vehicle. Every message carries the header of ``Message``, put
+there by the publisher. A reader ignores fields that it does not know.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+# In the manual's order: counted clockwise from the left.
+SONAR_NAMES = (
+    "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",
+)  # fmt: skip
+
+RangeStatus = Literal["ok", "fault", "too_near", "no_echo"]
+FaultName = Literal["over_current", "over_voltage", "encoder", "under_voltage", "overload"]
+LinkState = Literal["up", "lost", "never"]
+Verdict = Literal["run", "slow", "stop", "brake", "inhibited"]
+Action = Literal["slow", "stop", "brake"]
+Command = Literal["run", "stop", "brake"]
+Level = Literal["info", "warning", "error"]
+
+Ranges = Annotated[tuple[float | None, ...], Meta(min_length=8, max_length=8)]
+Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
+Covariance3 = Annotated[tuple[float, ...], Meta(min_length=9, max_length=9)]
+Covariance2 = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+
+
+class Message(Struct, frozen=True, kw_only=True):
+    """The header of every message."""
+
+    seq: int = 0  # rises by one per publisher; starts anew with ``boot``
+    boot: int = 0  # random per start of the sender
+    t_ns: int = 0  # the sender's wall clock, for records only
+    mono_ns: int = 0  # the sender's monotonic clock
+
+
+# --- tel/bridge -----------------------------------------------------------------------------
+
+
+class Velocity(Message, frozen=True, kw_only=True):
+    """Measured by the board (manual 2.2)."""
+
+    linear: float  # m/s, forward positive
+    angular: float  # rad/s, counter-clockwise positive
+
+
+class Mileage(Message, frozen=True, kw_only=True):
+    """Counted by the board since it was powered on (manual 2.3)."""
+
+    distance: float  # m, forward positive
+    heading: float  # rad, wrapped to -pi..pi
+    epoch: int  # how often the bridge has seen the board start anew
+
+
+class Ultrasonic(Message, frozen=True, kw_only=True):
+    """Eight ranges, counted clockwise from the left (manual 2.3, its second of that number)."""
+
+    ranges: Ranges  # m; None where the status is not "ok"
+    status: Statuses
+
+
+class Bumper(Message, frozen=True, kw_only=True):
+    """The bumper strip, one bit for the whole vehicle (manual 2.4)."""
+
+    pressed: bool
+
+
+class Driver(Message, frozen=True, kw_only=True):
+    """Faults of one motor driver (manual 2.7)."""
+
+    faults: tuple[str, ...]  # names of the known bits, "bit_N" for reserved ones
+    bits: int  # all 32, as the board sent them
+
+
+class Switches(Message, frozen=True, kw_only=True):
+    """The board's own emergency brakes (manual 2.5 and 2.6); None until it has echoed."""
+
+    ultrasonic_brake: bool | None = None
+    bumper_brake: bool | None = None
+
+
+class Link(Message, frozen=True, kw_only=True):
+    """The way to the board, as the bridge sees it."""
+
+    state: LinkState
+    board: str  # address:port
+    epoch: int
+    armed: bool  # whether the bridge would obey a RUN now
+    waiting: str  # why it would not, in words; empty when armed
+    rates: dict[str, float]  # frames per second by name, over the last second
+    rejected: dict[str, int]  # frames and datagrams refused since start, by reason
+    round_trip: float | None  # s, the median of the last queries
+    latched_by: int | None = None  # ``boot`` of the safety service whose latch nobody has reset
+
+
+# --- tel/odom, tel/safety -------------------------------------------------------------------
+
+
+class Odometry(Message, frozen=True, kw_only=True):
+    """Pose in ``odom`` and twist in ``base_link``."""
+
+    x: float  # m
+    y: float  # m
+    heading: float  # rad, wrapped to -pi..pi
+    linear: float  # m/s
+    angular: float  # rad/s
+    pose_covariance: Covariance3  # 3x3 row by row over x, y, heading
+    twist_covariance: Covariance2  # 2x2 row by row over linear, angular
+    epoch: int  # how often the pose started anew
+    residual: float | None  # m, counters less integrated velocity over the last second
+    slip: bool
+    frame_id: str = "odom"
+    child_frame_id: str = "base_link"
+
+
+class Cause(Struct, frozen=True, kw_only=True):
+    """One reason why the vehicle may not move as asked."""
+
+    name: str
+    action: Action
+    age: float  # s since it became active
+    text: str  # in words, for the operator
+
+
+class Limits(Struct, frozen=True, kw_only=True):
+    """What safety allows at this moment."""
+
+    forward: float  # m/s
+    backward: float  # m/s, as a positive number
+    angular: float  # rad/s, either way
+
+
+class SafetyState(Message, frozen=True, kw_only=True):
+    """What safety decided and why."""
+
+    verdict: Verdict
+    latched: tuple[str, ...]  # names of the causes that want a reset
+    causes: tuple[Cause, ...]  # all active ones, the worst first
+    source: str | None  # who drives
+    limits: Limits
+    heartbeat: int  # echoed by whoever drives, see ``Drive.echo``
+    text: str  # one sentence: why the vehicle does or does not move
+
+
+# --- @cmd -----------------------------------------------------------------------------------
+
+
+class Drive(Message, frozen=True, kw_only=True):
+    """A request to move; holds for its source's lease."""
+
+    linear: float  # m/s
+    angular: float  # rad/s
+    echo: int  # the newest ``SafetyState.heartbeat`` that the source saw
+
+
+class Motion(Message, frozen=True, kw_only=True):
+    """What safety lets through; the bridge obeys nothing else, and for 200 ms."""
+
+    command: Command
+    linear: float = 0.0  # m/s
+    angular: float = 0.0  # rad/s
+    source: str | None = None
+    judged: int = 0  # ``seq`` of the newest bumper sample that the verdict knows
+    judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
+    latched: bool = False  # whether an operator's reset is due
+
+
+# --- evt, health ----------------------------------------------------------------------------
+
+
+class Event(Message, frozen=True, kw_only=True):
+    """A transition: contact, stop, release, fault, board restarted, link lost."""
+
+    name: str
+    level: Level
+    text: str
+    about: dict[str, str | int | float | bool | None] = {}
+
+
+class Health(Message, frozen=True, kw_only=True):
+    """How a service fares, once a second."""
+
+    service: str
+    version: str
+    uptime: float  # s
+    rates: dict[str, float]  # messages per second by key, in and out, over the last second
+    counters: dict[str, int]  # since start
+    lateness: float  # s, how late the loop's latest timer was in the last second
+    rss: int  # bytes
+
+
+# --- srv ------------------------------------------------------------------------------------
+
+
+class SwitchesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set the board's emergency brakes; None leaves one as it is."""
+
+    ultrasonic_brake: bool | None = None
+    bumper_brake: bool | None = None
+
+
+class LedRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set one lamp channel; times and speed in the board's own units."""
+
+    channel: Annotated[int, Meta(ge=0, le=255)]
+    mode: Annotated[int, Meta(ge=0, le=255)]
+    on_lightness: Annotated[int, Meta(ge=0, le=10)] = 10
+    on_time: Annotated[int, Meta(ge=0, le=255)] = 0
+    off_time: Annotated[int, Meta(ge=0, le=255)] = 0
+    flash_lightness: Annotated[int, Meta(ge=0, le=255)] = 0
+    speed: Annotated[int, Meta(ge=0, le=255)] = 0
+    lightness_min: Annotated[int, Meta(ge=0, le=255)] = 0
+    lightness_max: Annotated[int, Meta(ge=0, le=255)] = 0
+
+
+class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Ask safety to clear its latches."""
+
+
+class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Creep off a pressed bumper while the operator holds; repeat within the lease."""
+
+    held: bool = True  # False ends it
+
+
+class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Start odometry anew at this pose in ``odom``."""
+
+    x: float = 0.0  # m
+    y: float = 0.0  # m
+    heading: float = 0.0  # rad
+
+
+class Done(Struct, frozen=True, kw_only=True):
+    """A call was carried out."""
+
+    text: str

@@ -1,0 +1,221 @@
+"""A service's life: arguments, settings, logs, signals, presence, health, the loop, the end.
+
+``run`` reads the settings (exit code 78 names what is wrong, before anything opens), builds the
+service around a ``Node``, and serves until SIGINT or SIGTERM. The first signal lets the service
+come to rest; a second one ends the process at once.
+"""
+
+import argparse
+import os
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import FrameType
+from typing import Generic, TypeVar
+
+import msgspec
+import structlog
+
+from common import keys, log
+from common.bus.bus import Bus
+from common.config import DEFAULT_FILE, Loaded, Sources, load
+from common.errors import ConfigError, LinkError
+from common.freshness import S
+from common.loop import Loop
+from common.messages import Event, Health, Level
+from common.schema import schemas
+from common.settings import Shared
+
+EXIT_CONFIG = 78  # EX_CONFIG: a restart will not help
+EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
+REST_S = 2.0  # how long a service may take to come to rest
+
+
+C = TypeVar("C", bound=Shared)
+
+
+class Node(Generic[C]):
+    """What a service is built on: its settings, its loop, its bus, its events and counters."""
+
+    def __init__(self, name: str, loaded: Loaded[C]) -> None:
+        self.name = name
+        self.config: C = loaded.config
+        self.loop = Loop()
+        self.log = structlog.get_logger()
+        self.bus = self.open_bus()
+        self.counters: Counter[str] = Counter()
+        self.at_rest: Callable[[], bool] = lambda: True  # asked while stopping
+        self.last_words: Callable[[], None] = lambda: None  # on every way out, a crash too
+        self._loaded = loaded
+        self._events = self.bus.publisher(keys.EVENTS, service=name)
+        self._health = self.bus.publisher(keys.HEALTH, service=name)
+        self._started_ns = self._reported_ns = time.monotonic_ns()
+        self._counted: Counter[str] = Counter()
+
+    def open_bus(self) -> Bus:
+        """Return a bus of its own session, not yet open; the first one is ``bus``."""
+        bus = self.config.bus
+        return Bus(bus.endpoints, self.config.robot.id, self.loop.post, bus.lease)
+
+    def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
+        """Publish and log a transition."""
+        self._events.put(Event(name=name, level=level, text=text, about=about))
+        getattr(self.log, level)(text, event_name=name, **about)
+
+    def present(self) -> None:
+        """Say on the bus that the service is there, and answer what a newcomer asks."""
+        robot, bus = self.config.robot.id, self.bus
+        bus.live(keys.live_key(robot, self.name, f"{bus.boot:x}"))
+        for part, make in (
+            ("schema", self._schema),
+            ("config", self._settings),
+            ("last", self._last),
+        ):
+            bus.answer(keys.info_key(robot, self.name, part), make, "application/json")
+        self.loop.every(1.0, self._report)
+
+    def _report(self, now_ns: int) -> None:
+        counts = Counter(self.bus.counts)
+        past_s = (now_ns - self._reported_ns) / S
+        rates = {key: (n - self._counted[key]) / past_s for key, n in sorted(counts.items())}
+        self._counted, self._reported_ns = counts, now_ns
+        self._health.put(
+            Health(
+                service=self.name,
+                version=package_version(),
+                uptime=(now_ns - self._started_ns) / S,
+                rates=rates,
+                counters=dict(self.bus.counters + self.counters),
+                lateness=self.loop.take_lateness_s(),
+                rss=resident_bytes(),
+            )
+        )
+
+    def _schema(self) -> bytes:
+        mine = {publisher.topic for publisher in self.bus.publishers}
+        return msgspec.json.encode(schemas(mine))
+
+    def _settings(self) -> bytes:
+        settings = {
+            path: {"value": setting.value, "origin": setting.origin}
+            for path, setting in self._loaded.settings.items()
+        }
+        return msgspec.json.encode(settings)
+
+    def _last(self) -> bytes:
+        return msgspec.json.encode({p.key: p.last for p in self.bus.publishers if p.last})
+
+
+def run(
+    name: str,
+    root: type[C],
+    build: Callable[[Node[C]], object],
+    argv: Sequence[str] | None = None,
+) -> int:
+    """Live a service's life and return its exit code."""
+    try:
+        loaded = load(root, sources(arguments(name).parse_args(argv)))
+    except ConfigError as error:
+        print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
+        return EXIT_CONFIG
+    log.configure(loaded.config.log, name)
+    node = Node(name, loaded)
+    try:
+        build(node)
+    except LinkError as error:
+        node.log.error(str(error))
+        return EXIT_LINK
+    node.present()
+    return serve(node)
+
+
+def serve(node: Node[C]) -> int:
+    """Run the loop until a signal, let the service come to rest, and leave."""
+    _on_signal(node)
+    try:
+        node.bus.open()
+        node.log.info("started", robot=node.config.robot.id)
+        node.loop.run()
+        node.log.info("stopping")
+        _come_to_rest(node)
+    finally:
+        node.last_words()
+        # After a bug of ours too: an open session keeps a process that has failed from ending.
+        node.bus.close()
+        node.loop.close()
+    node.log.info("stopped")
+    return 0
+
+
+def _come_to_rest(node: Node[C]) -> None:
+    deadline_ns = time.monotonic_ns() + round(REST_S * S)
+
+    def check(now_ns: int) -> None:
+        if node.at_rest() or now_ns > deadline_ns:
+            node.loop.stop()
+
+    node.loop.every(0.02, check)
+    node.loop.run()
+
+
+def arguments(name: str) -> argparse.ArgumentParser:
+    """Return the options that every service takes."""
+    parser = argparse.ArgumentParser(prog=name)
+    add_sources(parser)
+    return parser
+
+
+def add_sources(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where settings come from."""
+    parser.add_argument(
+        "--config", action="append", type=Path, metavar="FILE", default=None,
+        help="a TOML file over config/t2.toml; may be repeated, the later wins",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", action="append", dest="sets", metavar="PATH=VALUE", default=[],
+        help="one setting, such as board.port=4002; wins over files and environment",
+    )  # fmt: skip
+
+
+def sources(options: argparse.Namespace) -> Sources:
+    """Return where the settings come from, by the options."""
+    return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)
+
+
+@cache
+def package_version() -> str:
+    """Return the installed version of T2."""
+    try:
+        return version("t2")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def resident_bytes() -> int:
+    """Return the resident memory of this process, 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def _on_signal(node: Node[C]) -> None:
+    def stop(number: int, _: FrameType | None) -> None:
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, leave)
+        node.loop.stop()
+
+    def leave(number: int, _: FrameType | None) -> None:
+        try:
+            node.last_words()
+        finally:
+            os._exit(128 + number)
+
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, stop)

@@ -1,0 +1,138 @@
+"""Settings that two services share; each section is a frozen struct with its own limits.
+
+A service's whole configuration is a struct of sections, see ``services/*/config.py``.
+"""
+
+import re
+from collections.abc import Mapping
+from ipaddress import ip_address
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from common.errors import WireError
+from common.wire.framing import Covers, crc_function
+
+Limits = Mapping[str, tuple[float, float]]
+Port = Annotated[int, Meta(ge=1, le=65535)]
+
+# What the wheel of eclipse-zenoh can carry; a client would look for anything else forever.
+ENDPOINT = re.compile(r"((tcp|udp|tls|quic|ws)/.+:\d+|unixsock-stream/.+)([?#].*)?")
+
+
+class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One table of the configuration file."""
+
+
+def check_protections(
+    given: Mapping[str, float], limits: Limits, i_accept: tuple[str, ...]
+) -> None:
+    """Raise ``ValueError`` for a setting that takes a protection away and is not owned up to.
+
+    Outside of its limits a protection is as good as gone. Zero never means "off".
+    """
+    unknown = sorted(set(i_accept) - set(limits))
+    if unknown:
+        raise ValueError(f"i_accept names {unknown[0]!r}, which takes no protection away")
+    for name, (low, high) in limits.items():
+        if not low <= given[name] <= high and name not in i_accept:
+            raise ValueError(
+                f"{name} = {given[name]} takes a protection away; "
+                f"allowed is {low}..{high}, or name it in i_accept"
+            )
+
+
+class Robot(Section, frozen=True, kw_only=True):
+    """Which robot this is."""
+
+    id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+\Z")] = "001"
+
+
+class Bus(Section, frozen=True, kw_only=True):
+    """Where the Zenoh router is."""
+
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
+    connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
+    lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is noticed
+
+    def __post_init__(self) -> None:
+        for endpoint in (*self.listen, *self.connect):
+            if not ENDPOINT.fullmatch(endpoint):
+                raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
+        if not (self.listen or self.connect):
+            raise ValueError("one of listen and connect needs an endpoint")
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where a client dials: ``connect``, or else the embedded router."""
+        return self.connect or tuple(
+            endpoint.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+            for endpoint in self.listen
+        )
+
+
+class Board(Section, frozen=True, kw_only=True):
+    """The vehicle's main board and our side of its cable (manual 1)."""
+
+    address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
+    port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
+    listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
+    listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
+    any_source_port: bool = False  # take frames from every port of the board's address
+
+    def __post_init__(self) -> None:
+        for name in ("address", "listen_address"):
+            value = getattr(self, name)
+            try:
+                ip_address(value)
+            except ValueError:
+                raise ValueError(f"{name} is {value!r}, allowed is an IP address") from None
+        if len(set(self.listen_ports)) < len(self.listen_ports):
+            raise ValueError(f"listen_ports {self.listen_ports} names a port twice")
+        if self.address == self.listen_address and self.port in self.listen_ports:
+            raise ValueError(
+                f"port {self.port} of {self.address} is both the board's and in listen_ports"
+            )
+
+
+class Wire(Section, frozen=True, kw_only=True):
+    """What the manual leaves open about the frames; the defaults are today's answers."""
+
+    crc: str = "crc-16"  # a 16-bit name of crcmod.predefined
+    crc_covers: Covers = "payload"
+    angular_unit: Literal["decidegree", "milliradian"] = "decidegree"  # per second
+
+    def __post_init__(self) -> None:
+        try:
+            crc_function(self.crc)
+        except WireError as error:
+            raise ValueError(str(error)) from None
+
+
+class Log(Section, frozen=True, kw_only=True):
+    """What is written to standard error."""
+
+    level: Literal["debug", "info", "warning", "error"] = "info"
+    format: Literal["auto", "text", "json"] = "auto"  # auto: text on a terminal, JSON otherwise
+
+
+class Vehicle(Section, frozen=True, kw_only=True):
+    """The vehicle's body; the manual gives no dimensions, so measure yours.
+
+    The origin of ``base_link`` is the middle of the wheels, on the ground.
+    """
+
+    length: Annotated[float, Meta(ge=0.2, le=5.0)] = 1.10  # m, bumper to bumper
+    width: Annotated[float, Meta(ge=0.2, le=3.0)] = 0.70  # m
+    wheelbase: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.70  # m, front axle to rear axle
+    track: Annotated[float, Meta(ge=0.1, le=3.0)] = 0.56  # m, left wheels to right wheels
+    sonar_min: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05  # m, nearer cannot be measured
+    sonar_max: Annotated[float, Meta(ge=0.5, le=20.0)] = 5.0  # m, farther gives no echo
+
+
+class Shared(Struct, frozen=True, kw_only=True):
+    """The sections that every service has; a service's own configuration adds to them."""
+
+    robot: Robot = Robot()
+    bus: Bus = Bus()
+    log: Log = Log()

@@ -1,0 +1,233 @@
+"""Calls over a real router: replies, refusals, and the words when nobody answers."""
+
+import msgpack
+import pytest
+import zenoh
+
+from common import keys
+from common.bus.bus import Bus
+from common.bus.calls import Caller
+from common.messages import Done, LedRequest, ReleaseRequest
+from tests.common.rig import Rig, until_heard
+from tests.support import wait_until
+
+
+class Server:
+    """Serves the release, and keeps whom it has not answered."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Caller[Done]] = []
+        self.asked: list[ReleaseRequest] = []
+        self.refuses = ""
+
+    def serve(self, bus: Bus) -> None:
+        bus.serve(keys.RELEASE, self.take)
+
+    def take(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
+        self.asked.append(request)
+        if self.refuses:
+            caller.refuse(self.refuses)
+        elif request.held:
+            caller.reply(Done(text="held"))
+        else:
+            self.waiting.append(caller)
+
+
+class Asker:
+    """Asks on a bus, and keeps what comes of it."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self.replies: list[Done] = []
+        self.refusals: list[str] = []
+
+    @property
+    def answers(self) -> int:
+        return len(self.replies) + len(self.refusals)
+
+    def ask(self, *, held: bool = True, timeout_s: float = 20.0) -> None:
+        self.bus.ask(
+            keys.RELEASE,
+            ReleaseRequest(held=held),
+            self.replies.append,
+            self.refusals.append,
+            timeout_s,
+        )
+
+    def ask_until_replied(self) -> None:
+        """Ask again until the server is known to the router."""
+
+        def replied() -> bool:
+            count = self.answers
+            self.ask()
+            wait_until(lambda: self.answers > count, "an answer")
+            return bool(self.replies)
+
+        wait_until(replied, "a reply")
+        self.replies.clear()
+        self.refusals.clear()
+
+
+@pytest.fixture
+def server() -> Server:
+    return Server()
+
+
+@pytest.fixture
+def asker(rig: Rig, server: Server) -> Asker:
+    rig.bus(server.serve)
+    asker = Asker(rig.bus())
+    asker.ask_until_replied()
+    return asker
+
+
+def test_a_call_is_replied_to(asker: Asker) -> None:
+    asker.ask()
+    wait_until(lambda: asker.answers, "an answer")
+    assert asker.replies == [Done(text="held")]
+    assert asker.refusals == []
+
+
+def test_a_reply_may_come_later(asker: Asker, server: Server) -> None:
+    asker.ask(held=False)
+    wait_until(lambda: server.waiting, "the question")
+    assert asker.answers == 0
+    server.waiting.pop().reply(Done(text="at last"))
+    wait_until(lambda: asker.answers, "an answer")
+    assert asker.replies == [Done(text="at last")]
+
+
+def test_a_refusal_brings_its_reason(asker: Asker, server: Server) -> None:
+    server.refuses = "the bumper is pressed: 撞"
+    asker.ask()
+    wait_until(lambda: asker.answers, "an answer")
+    assert asker.refusals == ["the bumper is pressed: 撞"]
+    assert asker.replies == []
+
+
+def test_who_does_not_answer_in_time_is_named(asker: Asker, server: Server) -> None:
+    asker.ask(held=False, timeout_s=0.3)
+    wait_until(lambda: asker.answers, "the timeout")
+    assert asker.refusals == ["safety does not answer"]
+    wait_until(lambda: server.waiting, "the question, however late")
+    server.waiting.pop().reply(Done(text="too late"))  # harmless, and nobody hears it
+    asker.ask(timeout_s=20.0)
+    wait_until(lambda: asker.answers == 2, "the next answer")
+    assert asker.replies == [Done(text="held")]
+
+
+def test_the_router_s_own_timeout_is_no_refusal(asker: Asker) -> None:
+    # Both the asking session and the router watch the time; which of them says it is chance.
+    for count in range(1, 31):
+        asker.ask(held=False, timeout_s=0.02)
+        wait_until(lambda: asker.answers == count, "the timeout")  # noqa: B023
+    assert set(asker.refusals) == {"safety does not answer"}
+
+
+def test_a_refusal_needs_no_encoding(rig: Rig) -> None:
+    def answer(query: zenoh.Query) -> None:
+        query.reply_err("not with us")
+
+    queryable = rig.session().declare_queryable(keys.RELEASE.on(rig.robot), answer)
+    asker = Asker(rig.bus())
+
+    def refused() -> bool:
+        asker.ask()
+        return "not with us" in asker.refusals
+
+    wait_until(refused, "the refusal")
+    queryable.undeclare()
+
+
+def test_nobody_there_is_said_at_once(rig: Rig) -> None:
+    asker = Asker(rig.bus())
+    asker.ask(timeout_s=600.0)
+    wait_until(lambda: asker.answers, "an answer")
+    assert asker.refusals == ["safety does not answer"]
+
+
+def test_no_router_is_said_at_once(rig: Rig) -> None:
+    asker = Asker(Bus([rig.endpoint], rig.robot, rig.loop.post))  # never opened
+    asker.ask()
+    wait_until(lambda: asker.answers, "an answer")
+    assert asker.refusals == ["there is no router"]
+
+
+def test_a_reply_of_the_wrong_kind_is_a_refusal(rig: Rig) -> None:
+    key = keys.RELEASE.on(rig.robot)
+
+    def answer(query: zenoh.Query) -> None:
+        query.reply(key, msgpack.packb({"text": 5}))
+
+    queryable = rig.session().declare_queryable(key, answer)
+    asker = Asker(rig.bus())
+
+    def refused() -> bool:
+        asker.ask()
+        return any(reason.startswith("not a Done: ") for reason in asker.refusals)
+
+    wait_until(refused, "the refusal")
+    queryable.undeclare()
+    assert asker.replies == []
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"\xc1", "not a ReleaseRequest: "),
+        (msgpack.packb({"held": 1}), "Expected `bool`, got `int` - at `$.held`"),
+        (msgpack.packb({"hold": True}), "unknown field `hold`"),
+        (b"\x91" * 100_000, "not a ReleaseRequest: "),
+        (b"\x00" * 1_000_000, "not a ReleaseRequest: "),
+    ],
+    ids=["no msgpack", "wrong type", "unknown field", "deep", "big"],
+)
+def test_a_request_that_is_none_is_refused_with_its_fault(
+    rig: Rig, server: Server, asker: Asker, payload: bytes, reason: str
+) -> None:
+    asked = len(server.asked)
+    replies = list(rig.session().get(keys.RELEASE.on(rig.robot), payload=payload))
+    assert len(replies) == 1
+    assert replies[0].err is not None
+    assert reason in replies[0].err.payload.to_bytes().decode()
+    assert len(server.asked) == asked
+
+
+def test_a_request_without_payload_is_one_of_defaults(
+    rig: Rig, server: Server, asker: Asker
+) -> None:
+    (reply,) = rig.session().get(keys.RELEASE.on(rig.robot))
+    assert reply.ok is not None
+    assert msgpack.unpackb(reply.ok.payload.to_bytes()) == {"text": "held"}
+    assert str(reply.ok.encoding) == "application/msgpack;t2.v1.Done"
+    assert server.asked[-1] == ReleaseRequest()
+
+
+def test_a_required_field_is_missed(rig: Rig) -> None:
+    asked: list[LedRequest] = []
+    bus = rig.bus(lambda bus: bus.serve(keys.SET_LED, lambda request, _: asked.append(request)))
+    session = rig.session()
+
+    def reasons() -> list[str]:
+        replies = session.get(keys.SET_LED.on(rig.robot))
+        return [reply.err.payload.to_bytes().decode() for reply in replies if reply.err]
+
+    wait_until(lambda: any("missing required field `channel`" in said for said in reasons()), "it")
+    assert asked == []
+    assert bus.counters["undecodable"] >= 1
+
+
+def test_any_query_on_an_answer_is_answered(rig: Rig) -> None:
+    key = keys.info_key(rig.robot, "bridge", "schema")
+    rig.bus(lambda bus: bus.answer(key, lambda: b'{"a": 1}', "application/json"))
+    session = rig.session()
+
+    def answers() -> list[zenoh.Sample]:
+        replies = session.get(keys.info_key(rig.robot, "*", "*"))
+        return [reply.ok for reply in replies if reply.ok]
+
+    found: list[zenoh.Sample] = []
+    until_heard(lambda: found.extend(answers()), lambda: found, "an answer")
+    assert found[0].payload.to_bytes() == b'{"a": 1}'
+    assert str(found[0].key_expr) == key
+    assert str(found[0].encoding) == "application/json"

@@ -1,0 +1,76 @@
+"""Publishing: the header that is put on, what is kept, and how Zenoh is told to carry it."""
+
+from collections import Counter
+from typing import Any, cast
+
+import msgpack
+import pytest
+import zenoh
+
+from common import keys
+from common.bus.publisher import Publisher, qos
+from common.keys import ClassOfService
+from common.messages import Bumper, Motion
+
+
+def test_it_numbers_and_stamps_even_without_a_bus() -> None:
+    counts: Counter[str] = Counter()
+    publisher = Publisher(keys.BUMPER, "t2/v1/001/tel/bridge/bumper", 77, counts)
+    assert publisher.next_seq == 1
+    first, second = publisher.put(Bumper(pressed=False)), publisher.put(Bumper(pressed=True))
+    assert (first.seq, second.seq, publisher.next_seq) == (1, 2, 3)
+    assert first.boot == second.boot == 77
+    assert first.mono_ns <= second.mono_ns
+    assert first.t_ns > 1_500_000_000 * 10**9  # a wall clock, in nanoseconds
+    assert publisher.last is second
+    assert second.pressed
+    assert not counts  # nothing was sent
+
+
+def test_a_header_that_was_there_is_replaced() -> None:
+    publisher = Publisher(keys.BUMPER, "k", 77, Counter())
+    assert publisher.put(Bumper(pressed=True, seq=900, boot=1)).seq == 1
+    assert publisher.last is not None
+    assert publisher.last.boot == 77
+
+
+@pytest.mark.parametrize(
+    "service",
+    [keys.ESTOP_CLASS, keys.COMMAND, keys.FAST, keys.SLOW, keys.EVENT],
+    ids=lambda service: service.name,
+)
+def test_congestion_never_blocks(service: ClassOfService) -> None:
+    options = qos(service)
+    assert options["congestion_control"] == zenoh.CongestionControl.DROP
+    assert options["priority"] == getattr(zenoh.Priority, service.priority)
+    assert options["express"] is service.express
+
+
+class Session:
+    """Takes what is sent, in Zenoh's place."""
+
+    def __init__(self) -> None:
+        self.sent: list[dict[str, Any]] = []
+
+    def declare_publisher(self, _: str, **__: object) -> "Session":
+        return self
+
+    def put(self, payload: bytes, attachment: bytes | None) -> None:
+        self.sent.append(msgpack.unpackb(payload) | {"raw": attachment})
+
+
+def test_a_motion_never_waits_for_a_bus() -> None:
+    counts: Counter[str] = Counter()
+    publisher = Publisher(keys.MOTION, "k", 77, counts)
+    session = Session()
+    publisher.put(Motion(command="run", linear=1.0))
+    publisher.declare(cast(zenoh.Session, session))
+    assert session.sent == []
+    publisher.put(Motion(command="stop"), b"raw")
+    assert [(sent["seq"], sent["command"], sent["raw"]) for sent in session.sent] == [
+        (2, "stop", b"raw")
+    ]
+    publisher.withdraw()
+    publisher.put(Motion(command="run"))
+    publisher.declare(cast(zenoh.Session, session))
+    assert counts["k"] == len(session.sent) == 1

@@ -1,0 +1,160 @@
+"""How a client finds its router, early or late, and the router itself."""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+import structlog
+import structlog.testing
+import zenoh
+
+from common import keys
+from common.bus import session as session_module
+from common.bus.bus import Arrival, Bus
+from common.bus.session import client_config, router
+from common.errors import LinkError
+from common.messages import Bumper, Done, Event, ResetRequest
+from tests.common.rig import Rig, until_heard
+from tests.support import free_port, wait_until
+
+
+def nowhere() -> str:
+    """Return an endpoint where nobody listens."""
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+@pytest.fixture
+def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Let the tries follow each other quickly, and tell when each was."""
+    made: list[float] = []
+
+    def config(endpoints: Sequence[str], lease_s: float) -> zenoh.Config:
+        made.append(time.monotonic())
+        quick = client_config(endpoints, lease_s)
+        quick.insert_json5("connect/timeout_ms", "50")
+        return quick
+
+    monkeypatch.setattr(session_module, "client_config", config)
+    monkeypatch.setattr(session_module, "RETRY_S", 0.01)
+    return made
+
+
+def test_a_client_never_scouts_and_notices_a_silent_partition() -> None:
+    config = client_config(["tcp/127.0.0.1:1"], lease_s=0.5)
+    assert json.loads(config.get_json("mode")) == "client"
+    assert json.loads(config.get_json("scouting/multicast/enabled")) is False
+    assert json.loads(config.get_json("scouting/gossip/enabled")) is False
+    assert json.loads(config.get_json("transport/link/tx/lease")) == 500
+    assert json.loads(config.get_json("transport/shared_memory/enabled")) is False
+
+
+def test_without_a_router_it_says_so_again_and_again(
+    monkeypatch: pytest.MonkeyPatch, tries: list[float]
+) -> None:
+    monkeypatch.setattr(session_module, "COMPLAIN_S", 0.2)
+    where = nowhere()
+    with structlog.testing.capture_logs() as lines:
+        bus = Bus([where], "001", lambda call: call())
+        bus.open()
+        wait_until(lambda: len(lines) >= 3, "three lines")
+        assert not bus.connected
+        bus.close()
+    assert {line["event"] for line in lines} == {"waiting for a router"}
+    assert lines[0]["endpoints"] == [where]
+    assert lines[0]["log_level"] == "warning"
+
+
+def test_it_says_so_once_in_five_seconds(tries: list[float]) -> None:
+    with structlog.testing.capture_logs() as lines:
+        bus = Bus([nowhere()], "001", lambda call: call())
+        bus.open()
+        wait_until(lambda: len(tries) >= 3, "three tries")
+        bus.close()
+    assert len(lines) <= 1 + (tries[-1] - tries[0]) / session_module.COMPLAIN_S
+
+
+def test_a_router_that_comes_later_is_found(rig: Rig) -> None:
+    where = nowhere()
+    rig.endpoint = where
+    heard: list[Arrival[Bumper]] = []
+    with structlog.testing.capture_logs() as lines:
+        hearer = Bus([where], rig.robot, rig.loop.post)
+        hearer.subscribe(keys.BUMPER, heard.append)
+        hearer.open()
+        wait_until(lambda: lines, "the line that says so")
+        with router([where]):
+            publisher = rig.bus().publisher(keys.BUMPER)
+            until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+            hearer.close()
+
+
+def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
+    rig.endpoint = nowhere()
+    heard: list[Arrival[Bumper]] = []
+    seen: list[str] = []
+    replies: list[Done] = []
+    late: list[str] = []
+    token = keys.live_key(rig.robot, "bridge", "1")
+
+    def declare(bus: Bus) -> None:
+        bus.subscribe(keys.BUMPER, heard.append)
+        bus.subscribe(keys.EVENTS, lambda a: late.append(a.message.name), depth=99, service="*")
+        bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="done")))
+        bus.watch_live(keys.live_key(rig.robot, "*", "*"), lambda key, _: seen.append(key))
+
+    with router([rig.endpoint]):
+        hearer, sender = rig.bus(declare), rig.bus(lambda bus: bus.live(token))
+        bumper = sender.publisher(keys.BUMPER)
+        events = sender.publisher(keys.EVENTS, service="bridge")
+        until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        wait_until(lambda: seen, "the token")
+    wait_until(lambda: not (hearer.connected or sender.connected), "the router's end")
+    bumper.put(Bumper(pressed=True))  # harmless
+    heard.clear()
+    seen.clear()
+    with router([rig.endpoint]):
+        wait_until(lambda: hearer.connected and sender.connected, "both back")
+        until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        wait_until(lambda: seen, "the token")
+        until_heard(
+            lambda: events.put(Event(name="back", level="info", text="")), lambda: late, "an event"
+        )
+        until_heard(
+            lambda: sender.ask(keys.RESET, ResetRequest(), replies.append, print),
+            lambda: replies,
+            "a reply",
+        )
+
+
+def test_closing_while_it_looks_for_a_router_does_not_wait_for_one() -> None:
+    bus = Bus([nowhere()], "001", lambda call: call())
+    bus.open()
+    bus.close()
+    assert not bus._opener._thread.is_alive()
+
+
+def test_a_bus_that_was_never_opened_can_be_closed() -> None:
+    Bus([nowhere()], "001", lambda call: call()).close()
+
+
+def test_a_taken_port_is_a_link_error() -> None:
+    where = nowhere()
+    with (
+        router([where]),
+        pytest.raises(LinkError, match=f"^the router cannot listen on {where}: ") as caught,
+        router([where]),
+    ):
+        raise AssertionError("two routers on one port")
+    assert "/root/" not in str(caught.value)
+
+
+def test_a_router_on_a_unix_socket(rig: Rig, tmp_path: Path) -> None:
+    rig.endpoint = f"unixsock-stream/{tmp_path}/bus.sock"
+    heard: list[Arrival[Bumper]] = []
+    with router([rig.endpoint]):
+        hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
+        sender = rig.bus().publisher(keys.BUMPER)
+        until_heard(lambda: sender.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        hearer.close()

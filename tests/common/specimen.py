@@ -1,0 +1,34 @@
+"""A small service to be run as a process: ``python -m tests.common.specimen KIND [options]``.
+
+KINDs are plain, restless (never at rest), failing (once it is connected) and refused (a port).
+"""
+
+import sys
+
+from common import keys
+from common.errors import LinkError
+from common.messages import Bumper
+from common.service import Node, run
+from common.settings import Shared
+
+
+def build(node: Node[Shared]) -> None:
+    """Publish the bumper, and go wrong as asked."""
+    kind = sys.argv[1]
+    if kind == "refused":
+        raise LinkError("port 4002 is taken")
+    bumper = node.bus.publisher(keys.BUMPER)
+
+    def tick(_: int) -> None:
+        bumper.put(Bumper(pressed=True))
+        if kind == "failing" and node.bus.connected:
+            raise RuntimeError("a bug of ours")
+
+    node.loop.every(0.05, tick)
+    node.at_rest = lambda: kind != "restless"
+    node.counters["resets"] += 1
+    node.event("built", "info", "all is built", count=3)
+
+
+if __name__ == "__main__":
+    sys.exit(run("specimen", Shared, build, sys.argv[2:]))

@@ -1,0 +1,151 @@
+"""Messages to bytes and back, and what is refused on the way in."""
+
+import math
+
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.codec import EMPTY, decode, encode, encoding, finite
+from common.errors import MessageError
+from common.messages import (
+    Bumper,
+    Cause,
+    Drive,
+    Event,
+    Limits,
+    Motion,
+    ReleaseRequest,
+    SafetyState,
+    Ultrasonic,
+)
+
+STATE = SafetyState(
+    seq=3,
+    boot=2**63 - 1,
+    verdict="slow",
+    latched=("contact",),
+    causes=(Cause(name="zone", action="slow", age=0.5, text="etwas ist nah: 近"),),
+    source=None,
+    limits=Limits(forward=0.1, backward=1.0, angular=0.5),
+    heartbeat=7,
+    text="slow",
+)
+
+
+def test_plain_msgpack_reads_our_bytes() -> None:
+    plain = msgpack.unpackb(encode(STATE))
+    assert plain["verdict"] == "slow"
+    assert plain["boot"] == 2**63 - 1
+    assert plain["source"] is None
+    assert plain["causes"] == [
+        {"name": "zone", "action": "slow", "age": 0.5, "text": "etwas ist nah: 近"}
+    ]
+    assert plain["limits"] == {"forward": 0.1, "backward": 1.0, "angular": 0.5}
+
+
+def test_we_read_the_bytes_of_plain_msgpack() -> None:
+    payload = msgpack.packb({"angular": 0, "linear": 1, "echo": 3, "later": ["unknown", {}]})
+    assert decode(payload, Drive) == Drive(linear=1.0, angular=0.0, echo=3)
+
+
+def test_what_goes_out_comes_back() -> None:
+    assert decode(encode(STATE), SafetyState) == STATE
+
+
+@given(st.builds(Motion, command=st.sampled_from(["run", "stop", "brake"]),
+                 linear=st.floats(allow_nan=False), angular=st.floats(allow_nan=False),
+                 source=st.none() | st.text(), seq=st.integers(0, 2**63)))  # fmt: skip
+def test_every_motion_comes_back(motion: Motion) -> None:
+    assert decode(encode(motion), Motion) == motion
+
+
+def test_an_empty_map_is_a_request_of_defaults() -> None:
+    assert decode(EMPTY, ReleaseRequest) == ReleaseRequest(held=True)
+
+
+@pytest.mark.parametrize(
+    ("about", "field"),
+    [
+        ({"pressed": 1}, r"Expected `bool`, got `int` - at `\$.pressed`"),
+        ({"pressed": None}, r"at `\$.pressed`"),
+        ({}, "missing required field `pressed`"),
+        ({"pressed": True, "seq": "1"}, r"Expected `int`, got `str` - at `\$.seq`"),
+        ([True], "Expected `object`, got `array`"),
+        (None, "Expected `object`, got `None`"),
+    ],
+)
+def test_a_wrong_type_is_refused_by_its_field(about: object, field: str) -> None:
+    with pytest.raises(MessageError, match=f"^not a Bumper: .*{field}"):
+        decode(msgpack.packb(about), Bumper)
+
+
+@pytest.mark.parametrize("count", [7, 9])
+def test_ranges_are_eight(count: int) -> None:
+    with pytest.raises(MessageError, match=r"of length .= 8 - at `\$.ranges`"):
+        decode(msgpack.packb({"ranges": [1.0] * count, "status": ["ok"] * 8}), Ultrasonic)
+
+
+def test_a_word_that_the_contract_does_not_know_is_refused() -> None:
+    with pytest.raises(MessageError, match=r"Invalid enum value 'fly' - at `\$.command`"):
+        decode(msgpack.packb({"command": "fly"}), Motion)
+
+
+def test_a_request_refuses_what_it_does_not_know() -> None:
+    with pytest.raises(MessageError, match="unknown field `hold`"):
+        decode(msgpack.packb({"hold": True}), ReleaseRequest)
+
+
+HOSTILE = {
+    "nothing": b"",
+    "no msgpack": b"\xc1",
+    "cut off": encode(STATE)[:-1],
+    "more behind it": encode(STATE) + b"\x00",
+    "a list said to be endless": b"\x81\xa7latched\xdd\xff\xff\xff\xff",
+    "a map said to be endless": b"\xdf\xff\xff\xff\xff",
+    "a text said to be endless": b"\x81\xa4text\xdb\xff\xff\xff\xff",
+    "deeper than any stack": b"\x81\xa1x" + b"\x91" * 100_000,
+    "no UTF-8": b"\x81\xa4text\xa1\xff",
+    "an extension": msgpack.packb(msgpack.ExtType(5, b"x")),
+    "a megabyte": msgpack.packb(b"\x00" * 1_000_000),
+}
+
+
+@pytest.mark.parametrize("payload", HOSTILE.values(), ids=HOSTILE)
+@pytest.mark.parametrize("kind", [SafetyState, Event])
+def test_hostile_bytes_are_refused(payload: bytes, kind: type[SafetyState | Event]) -> None:
+    with pytest.raises(MessageError):
+        decode(payload, kind)
+
+
+@given(st.binary(max_size=64))
+def test_any_bytes_are_a_message_or_refused(payload: bytes) -> None:
+    try:
+        message = decode(payload, Bumper)
+    except MessageError:
+        return
+    assert isinstance(message.pressed, bool)
+
+
+def test_nan_passes_a_typed_decode_which_is_why_finite_exists() -> None:
+    hostile = decode(msgpack.packb({"linear": math.nan, "angular": 0.0, "echo": 0}), Drive)
+    assert not finite(hostile.linear, hostile.angular)
+
+
+@pytest.mark.parametrize(
+    ("values", "answer"),
+    [
+        ((), True),
+        ((0.0, -1.5, 3), True),
+        ((0.0, math.nan), False),
+        ((math.inf,), False),
+        ((-math.inf, 0.0), False),
+    ],
+)
+def test_finite(values: tuple[float, ...], answer: bool) -> None:
+    assert finite(*values) is answer
+
+
+def test_the_encoding_names_the_message() -> None:
+    assert encoding(Bumper) == "application/msgpack;t2.v1.Bumper"

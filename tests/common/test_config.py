@@ -1,0 +1,255 @@
+"""Where settings come from, which of them wins, and what is said when one is wrong."""
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from cli.settings import Everything
+from common.config import DEFAULT_FILE, Loaded, Sources, flatten, load
+from common.errors import ConfigError
+from common.settings import Shared
+
+
+class Desk:
+    """A directory to write settings in, which is the working directory too."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def file(self, text: str, name: str = "over.toml") -> Path:
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def load(
+        self, *texts: str, environ: dict[str, str] | None = None, sets: Sequence[str] = ()
+    ) -> Loaded[Everything]:
+        files = [self.file(text, f"over{number}.toml") for number, text in enumerate(texts)]
+        return load(Everything, Sources((DEFAULT_FILE, *files), environ or {}, sets))
+
+    def refused(
+        self, *texts: str, environ: dict[str, str] | None = None, sets: Sequence[str] = ()
+    ) -> str:
+        with pytest.raises(ConfigError) as caught:
+            self.load(*texts, environ=environ, sets=sets)
+        return str(caught.value)
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
+    monkeypatch.chdir(tmp_path)
+    return Desk(tmp_path)
+
+
+# --- the file that we ship ----------------------------------------------------------------------
+
+
+def test_the_shipped_file_names_every_setting() -> None:
+    table = tomllib.loads(DEFAULT_FILE.read_text(encoding="utf-8"))
+    assert {path for path, _ in flatten(table)} == {path for path, _ in flatten(Everything())}
+
+
+def test_the_shipped_file_gives_every_setting_its_default() -> None:
+    loaded = load(Everything, Sources(environ={}))
+    assert dict(flatten(loaded.config)) == dict(flatten(Everything()))
+
+
+# --- what wins ----------------------------------------------------------------------------------
+
+
+def test_the_later_source_wins(desk: Desk) -> None:
+    file = "[board]\nport = 1\n[bridge]\nlease = 0.1\n[odom]\nhold = 0.2"
+    env = {"T2__BOARD__PORT": "2", "T2__BRIDGE__LEASE": "0.15", "PATH": "/bin"}
+    loaded = desk.load(file, environ=env, sets=["board.port=3"])
+    assert loaded.config.board.port == 3
+    assert loaded.config.bridge.lease == 0.15
+    assert loaded.config.odom.hold == 0.2
+
+
+def test_of_two_files_and_of_two_sets_the_later_wins(desk: Desk) -> None:
+    assert desk.load("[board]\nport = 1", "[board]\nport = 2").config.board.port == 2
+    assert desk.load(sets=["board.port=1", "board.port=2"]).config.board.port == 2
+
+
+def test_every_setting_knows_where_it_came_from(desk: Desk) -> None:
+    settings = desk.load(
+        "[board]\nport = 9",
+        environ={"T2__ODOM__HOLD": "0.2"},
+        sets=["log.level=debug"],
+    ).settings
+    assert settings["board.port"].origin == "over0.toml"
+    assert settings["odom.hold"].origin == "environment T2__ODOM__HOLD"
+    assert settings["log.level"].origin == "--set log.level=debug"
+    assert settings["robot.id"].origin == str(DEFAULT_FILE)  # not below the working directory
+    assert set(settings) == {path for path, _ in flatten(Everything())}
+
+
+def test_what_nobody_names_is_a_default(desk: Desk) -> None:
+    setting = load(Shared, Sources((), {})).settings["bus.lease"]
+    assert (setting.value, setting.origin) == (1.0, "default")
+
+
+def test_a_file_below_the_working_directory_is_called_by_its_short_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(DEFAULT_FILE.parent.parent)
+    loaded = load(Shared, Sources(environ={}))
+    assert loaded.settings["robot.id"].origin == "config/t2.toml"
+
+
+@pytest.mark.parametrize("name", ["T2__BOARD__PORT", "t2__board__port", "T2__Board__Port"])
+def test_the_environment_is_read_in_any_case(desk: Desk, name: str) -> None:
+    assert desk.load(environ={name: "77"}).config.board.port == 77
+
+
+def test_a_service_leaves_the_sections_of_others_alone(desk: Desk) -> None:
+    file = desk.file("[safety]\nnonsense = 1\n[robot]\nid = 'x'")
+    loaded = load(Shared, Sources((file,), {"T2__BRIDGE__NONSENSE": "1"}))
+    assert loaded.config.robot.id == "x"
+    assert not any(path.startswith(("safety", "bridge")) for path in loaded.settings)
+
+
+# --- how values are read ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "value"),
+    [
+        ("robot.id=007", "robot.id", "007"),  # text stays text
+        ("robot.id = a ", "robot.id", "a"),
+        ("board.listen_ports=4002, 4001", "board.listen_ports", (4002, 4001)),
+        ("board.listen_ports=[4002]", "board.listen_ports", (4002,)),
+        ("bus.listen=tcp/a:1,tcp/[::1]:2", "bus.listen", ("tcp/a:1", "tcp/[::1]:2")),
+        ("bus.connect=", "bus.connect", ()),
+        ("board.any_source_port=true", "board.any_source_port", True),
+        ("odom.hold=5e-2", "odom.hold", 0.05),
+        ("log.format=json", "log.format", "json"),
+        ("safety.sources.web.priority=3", "safety.sources.web.priority", 3),
+        ("sim.drive.coast=2", "sim.drive.coast", 2.0),
+    ],
+)  # fmt: skip
+def test_a_set_is_read_as_its_field_wants_it(
+    desk: Desk, text: str, path: str, value: object
+) -> None:
+    found, _, given = text.partition("=")
+    name = "T2__" + found.strip().upper().replace(".", "__")
+    for loaded in (desk.load(sets=[text]), desk.load(environ={name: given.strip()})):
+        assert dict(flatten(loaded.config))[path] == value
+
+
+def test_a_table_adds_to_what_was_given_before(desk: Desk) -> None:
+    file = "[safety.sources.nav]\npriority = 40\nlease = 0.1"
+    loaded = desk.load(file, sets=["safety.sources={new={priority=5,lease=0.2}}"])
+    sources = loaded.config.safety.sources
+    assert sources["nav"].priority == 40
+    assert sources["new"].priority == 5
+    assert sources["teleop"].priority == 30
+    assert loaded.settings["safety.sources.new.lease"].origin.startswith("--set safety.sources=")
+
+
+@pytest.mark.parametrize("empty", ["[board]", "board = {}", "[safety.sources]", ""])
+def test_an_empty_table_takes_nothing_away(desk: Desk, empty: str) -> None:
+    loaded = desk.load("[board]\nport = 5000", empty)
+    assert loaded.config.board.port == 5000
+    assert "web" in loaded.config.safety.sources
+
+
+# --- what is refused, and in which words --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[bord]\nport = 1", "over0.toml: bord.port: no section 'bord'; did you mean 'board'?"),
+        ("[bord]", "over0.toml: bord: no section 'bord'; did you mean 'board'?"),
+        ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
+        ("[sim.drive]\nzzz = 1", "over0.toml: sim.drive.zzz: unknown; there are acceleration"),
+        ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
+        ("[board]\nport = {}", "over0.toml: board.port = {}: Expected `int`, got `object`"),
+        ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),
+        ("[board]\nport = true", "board.port = True: Expected `int`, got `bool`"),
+        ("[board]\nport = '1'", "board.port = '1': Expected `int`, got `str`; allowed is 1..65535"),
+        ("robot = 5", "over0.toml: robot = 5: Expected `object`, got `int`"),
+        ("safety.sources = 3", "over0.toml: safety.sources = 3: Expected `object`, got `int`"),
+        ("[odom]\nhold = nan", "odom.hold = nan: Expected `float` >= 0.02; allowed is 0.02..0.5"),
+        ("[odom]\nturn_noise = inf", "odom.turn_noise = inf: Expected `float` <= 10.0"),
+        ("[odom]\nturn_noise = 0", "Expected `float` > 0.0; allowed is over 0.0..10.0"),
+        ("[sim]\nseed = -1", "over0.toml: sim.seed = -1: Expected `int` >= 0"),
+        ("[log]\nlevel = 'loud'", "allowed is 'debug', 'error', 'info', 'warning'"),
+        ("[robot]\nid = 'a/b'", "robot.id = 'a/b': Expected `str` matching regex"),
+        ("[robot]\nid = \"001\\n\"", "robot.id = '001\\n': Expected `str` matching regex"),
+        ("[board]\nlisten_ports = [1, 70000]", "board.listen_ports = [1, 70000]: Expected `int`"),
+        ("[board]\nlisten_ports = []", "board.listen_ports = []: Expected `array` of length >= 1"),
+        ("[safety.sources.web]\nprio = 1", "over0.toml: safety.sources.web.prio: unknown; did you"),
+        ("[safety.sources.new]\nlease = 0.1", "over0.toml: safety.sources.new: Object missing"),
+        ("[safety.sources]\nweb = 'x'", "safety.sources.web = 'x': Expected `object`, got `str`"),
+        ("[safety.sources.web]\npriority = 'a'", "sources.web.priority = 'a': Expected `int`"),
+        ("[safety]\nmargin = 0.0", "over0.toml: safety: margin = 0.0 takes a protection away"),
+        ("[safety]\ni_accept = ['x']", "i_accept names 'x', which takes no protection away"),
+    ],
+)  # fmt: skip
+def test_a_wrong_file_is_refused_by_name_value_and_range(
+    desk: Desk, text: str, sentence: str
+) -> None:
+    said = desk.refused(text)
+    assert sentence in said
+    assert "over0.toml" in said
+
+
+@pytest.mark.parametrize(
+    ("sets", "sentence"),
+    [
+        ("board.port", "--set board.port: should look like board.port=4002"),
+        ("=4002", "--set =4002: should look like board.port=4002"),
+        (" =4002", "should look like board.port=4002"),
+        ("board.port=", "--set board.port=: board.port = '': Expected `int`, got `str`"),
+        ("board..port=3", "--set board..port=3: board.: unknown"),
+        ("port=3", "--set port=3: port: no section 'port'"),
+        ("safety.sources.web.lease=99", "safety.sources.web.lease = 99: Expected `float` <= 10.0"),
+    ],
+)
+def test_a_wrong_set_is_refused(desk: Desk, sets: str, sentence: str) -> None:
+    assert sentence in desk.refused(sets=[sets])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("T2__BOARD__PORT", "x", "environment T2__BOARD__PORT: board.port = 'x': Expected `int`"),
+        ("T2__BOARD", "1", "environment T2__BOARD: board = 1: Expected `object`, got `int`"),
+        ("T2__BORD__PORT", "1", "environment T2__BORD__PORT: bord.port: no section 'bord'"),
+        ("T2__", "1", "environment T2__: : no section ''"),
+    ],
+)
+def test_a_wrong_environment_is_refused(desk: Desk, name: str, value: str, sentence: str) -> None:
+    assert sentence in desk.refused(environ={name: value})
+
+
+def test_what_two_settings_break_together_names_both(desk: Desk) -> None:
+    said = desk.refused("[board]\nport = 4001")
+    assert f"{DEFAULT_FILE}, over0.toml: board: port 4001 of 127.0.0.1 is both the board's" in said
+
+
+def test_a_protection_may_be_taken_away_when_owned_up_to(desk: Desk) -> None:
+    loaded = desk.load("[safety]\nmargin = 0.0\ni_accept = ['margin']")
+    assert loaded.config.safety.margin == 0.0
+
+
+@pytest.mark.parametrize("text", ["a = ", "\x00", "a = " + "[" * 3000, "[board]\n[board]"])
+def test_what_is_no_toml_is_refused(desk: Desk, text: str) -> None:
+    assert "over0.toml: is no TOML: " in desk.refused(text)
+
+
+def test_what_is_no_text_is_refused(desk: Desk) -> None:
+    (desk.folder / "raw.toml").write_bytes(b"a = '\xff'")
+    with pytest.raises(ConfigError, match=r"raw\.toml: is no TOML: "):
+        load(Shared, Sources((Path("raw.toml"),), {}))
+
+
+def test_what_cannot_be_read_is_refused(desk: Desk) -> None:
+    with pytest.raises(ConfigError, match=r"^none\.toml: cannot be read: No such file"):
+        load(Shared, Sources((Path("none.toml"),), {}))
+    with pytest.raises(ConfigError, match="cannot be read: Is a directory"):
+        load(Shared, Sources((desk.folder,), {}))

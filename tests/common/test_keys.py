@@ -1,0 +1,95 @@
+"""The table of keys: complete, unambiguous, and out of reach of a stray ``put t2/**``."""
+
+import pytest
+import zenoh
+
+from common import keys, messages
+from common.keys import CALLS, TOPICS, Call, Topic
+from common.messages import Message
+
+NAMES = {"side": "left", "service": "bridge", "source": "web"}
+
+
+def whole(topic: Topic[Message]) -> str:
+    """Return a topic's key with its names filled in."""
+    return topic.on("001", **NAMES)
+
+
+def every_key() -> list[str]:
+    return [
+        *map(whole, TOPICS),
+        *(call.on("001") for call in CALLS),
+        keys.estop_key("001"),
+        *(keys.info_key("001", "bridge", part) for part in ("schema", "config", "last")),
+        keys.live_key("001", "bridge", "1"),
+    ]
+
+
+def test_the_tables_hold_every_topic_and_every_call() -> None:
+    declared = vars(keys).values()
+    assert {id(t) for t in declared if isinstance(t, Topic)} == {id(t) for t in TOPICS}
+    assert {id(c) for c in declared if isinstance(c, Call)} == {id(c) for c in CALLS}
+
+
+def test_every_message_has_its_topic() -> None:
+    kinds = {
+        kind
+        for kind in vars(messages).values()
+        if isinstance(kind, type) and issubclass(kind, Message) and kind is not Message
+    }
+    assert kinds == {topic.message for topic in TOPICS}
+
+
+def test_no_two_keys_meet() -> None:
+    found = [zenoh.KeyExpr(key) for key in every_key()]
+    meeting = [(str(a), str(b)) for a in found for b in found if a is not b and a.intersects(b)]
+    assert meeting == []
+
+
+@pytest.mark.parametrize("key", every_key())
+def test_a_key_is_canonical_and_below_the_root(key: str) -> None:
+    assert str(zenoh.KeyExpr.autocanonize(key)) == key
+    assert key.startswith("t2/v1/001/")
+
+
+def test_on_fills_in_robot_and_names() -> None:
+    assert keys.DRIVE.on("007", source="web") == "t2/v1/007/@cmd/drive/web"
+    assert keys.DRIVER.on("*", side="*") == "t2/v1/*/tel/bridge/driver/*"
+    assert keys.RESET.on("007") == "t2/v1/007/srv/safety/reset"
+    with pytest.raises(KeyError, match="source"):
+        keys.DRIVE.on("007")
+
+
+@pytest.mark.parametrize("topic", [keys.DRIVE, keys.MOTION], ids=lambda topic: topic.path)
+@pytest.mark.parametrize("stray", ["t2/**", "**", "t2/v1/*/**", "t2/v1/001/*/*"])
+def test_a_stray_put_does_not_reach_the_wheels(topic: Topic[Message], stray: str) -> None:
+    assert not zenoh.KeyExpr(stray).intersects(zenoh.KeyExpr(whole(topic)))
+
+
+@pytest.mark.parametrize("expression", ["t2/v1/*/estop", "t2/v1/001/estop", "t2/**"])
+def test_one_put_stops_a_fleet(expression: str) -> None:
+    assert zenoh.KeyExpr(expression).intersects(zenoh.KeyExpr(keys.estop_key("001")))
+
+
+def test_of_two_robots_one_is_stopped() -> None:
+    assert not zenoh.KeyExpr(keys.estop_key("002")).intersects(zenoh.KeyExpr(keys.estop_key("001")))
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.path)
+def test_what_moves_the_wheels_goes_first(topic: Topic[Message]) -> None:
+    commands = topic.path.startswith("@cmd/")
+    assert (topic.service is keys.COMMAND) == commands
+    assert topic.service.express == commands
+    assert (topic.rate_hz == 0) == (topic.service is keys.EVENT)
+    assert topic.what
+
+
+def test_nothing_is_ahead_of_the_emergency_stop() -> None:
+    assert keys.ESTOP_CLASS.priority == "REAL_TIME"
+    assert keys.ESTOP_CLASS.express
+    assert "REAL_TIME" not in {topic.service.priority for topic in TOPICS}
+
+
+def test_events_alone_have_a_history() -> None:
+    """A motion that is replayed would move the robot on its own."""
+    assert {topic.path for topic in TOPICS if topic.service.history} == {"evt/{service}"}

@@ -1,0 +1,91 @@
+"""What is written to standard error, and in which form."""
+
+import io
+import json
+import sys
+from collections.abc import Iterator
+
+import pytest
+import structlog
+
+from common import log
+from common.settings import Log
+
+
+class Screen(io.StringIO):
+    """A standard error that is a terminal or not."""
+
+    def __init__(self, tty: bool) -> None:
+        super().__init__()
+        self._tty = tty
+
+    def isatty(self) -> bool:
+        return self._tty
+
+
+@pytest.fixture(autouse=True)
+def _as_before() -> Iterator[None]:
+    before = structlog.get_config()
+    yield
+    structlog.configure(**before)
+
+
+def written(
+    monkeypatch: pytest.MonkeyPatch, settings: Log, *, tty: bool, level: str = "warning"
+) -> str:
+    screen = Screen(tty)
+    monkeypatch.setattr(sys, "stderr", screen)
+    log.configure(settings, "bridge")
+    getattr(structlog.get_logger(), level)("link lost", epoch=2)
+    return screen.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("settings", "tty"), [(Log(), False), (Log(format="json"), True)], ids=["auto", "asked for"]
+)
+def test_json_is_one_object_a_line(
+    monkeypatch: pytest.MonkeyPatch, settings: Log, tty: bool
+) -> None:
+    line = written(monkeypatch, settings, tty=tty)
+    assert line.endswith("}\n")
+    entry = json.loads(line)
+    assert entry.pop("timestamp").endswith("Z")
+    assert entry == {"service": "bridge", "event": "link lost", "level": "warning", "epoch": 2}
+
+
+@pytest.mark.parametrize(
+    ("settings", "tty"), [(Log(), True), (Log(format="text"), False)], ids=["auto", "asked for"]
+)
+def test_text_is_readable(monkeypatch: pytest.MonkeyPatch, settings: Log, tty: bool) -> None:
+    line = written(monkeypatch, settings, tty=tty)
+    assert "link lost" in line
+    assert "bridge" in line
+    assert not line.startswith("{")
+
+
+@pytest.mark.parametrize(
+    ("level", "given", "shown"),
+    [
+        ("info", "debug", False),
+        ("info", "info", True),
+        ("error", "warning", False),
+        ("error", "error", True),
+        ("debug", "debug", True),
+    ],
+)
+def test_the_level_decides(
+    monkeypatch: pytest.MonkeyPatch, level: str, given: str, shown: bool
+) -> None:
+    settings = Log(level=level)  # type: ignore[arg-type]
+    assert bool(written(monkeypatch, settings, tty=False, level=given)) is shown
+
+
+def test_an_error_brings_its_traceback_into_the_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Screen(tty=False)
+    monkeypatch.setattr(sys, "stderr", screen)
+    log.configure(Log(), "bridge")
+    try:
+        raise KeyError("key")
+    except KeyError:
+        structlog.get_logger().exception("failed")
+    assert "KeyError: 'key'" in json.loads(screen.getvalue())["exception"]

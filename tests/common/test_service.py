@@ -1,0 +1,255 @@
+"""A service's life, from its settings to its exit code, as a real process."""
+
+import json
+import signal
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError
+
+import msgspec
+import pytest
+import zenoh
+
+from common import keys
+from common.bus.bus import Bus
+from common.bus.session import router
+from common.messages import Event, Health
+from common.service import EXIT_CONFIG, EXIT_LINK, Node, package_version, resident_bytes, run
+from common.settings import Shared
+from tests.common.program import Program, program
+from tests.common.rig import Rig
+from tests.support import free_port, wait_until
+
+SPECIMEN = "tests.common.specimen"
+
+
+def on(endpoint: str, robot: str) -> list[str]:
+    """Return the options that put a service on a router."""
+    return ["--set", f"bus.connect={endpoint}", "--set", f"robot.id={robot}"]
+
+
+# --- settings -----------------------------------------------------------------------------------
+
+
+def test_a_wrong_setting_ends_it_before_anything_is_built(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    built: list[Node[Shared]] = []
+    code = run("odom", Shared, built.append, ["--set", "bus.lease=99"])
+    assert code == EXIT_CONFIG == 78
+    assert built == []
+    said = capsys.readouterr().err
+    assert said == (
+        "odom: --set bus.lease=99: bus.lease = 99: Expected `float` <= 10.0; allowed is 0.2..10.0\n"
+    )
+
+
+def test_a_file_that_is_not_there_ends_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("odom", Shared, lambda _: None, ["--config", "none.toml"]) == EXIT_CONFIG
+    assert capsys.readouterr().err == "odom: none.toml: cannot be read: No such file or directory\n"
+
+
+def test_options_that_nobody_knows_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run("odom", Shared, lambda _: None, ["--speed", "9"])
+    assert caught.value.code == 2
+    assert "unrecognized arguments: --speed 9" in capsys.readouterr().err
+
+
+def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
+    with program(SPECIMEN, "refused", *on(shared_router, "refused")) as it:
+        assert it.code() == EXIT_LINK == 69
+        assert it.events() == ["port 4002 is taken"]
+
+
+# --- on a router --------------------------------------------------------------------------------
+
+
+class Witness:
+    """Hears what a service says of itself."""
+
+    def __init__(self, robot: str) -> None:
+        self.health: list[Health] = []
+        self.events: list[Event] = []
+        self.tokens: list[tuple[str, bool]] = []
+        self.robot = robot
+
+    def declare(self, bus: Bus) -> None:
+        bus.subscribe(keys.HEALTH, lambda a: self.health.append(a.message), service="*")
+        bus.subscribe(keys.EVENTS, lambda a: self.events.append(a.message), depth=99, service="*")
+        bus.watch_live(
+            keys.live_key(self.robot, "*", "*"), lambda key, on: self.tokens.append((key, on))
+        )
+
+
+@pytest.fixture(scope="module")
+def lived(shared_router: str) -> Iterator[tuple[Rig, Program, Witness]]:
+    """Run one service for all the tests that only look at it."""
+    with Rig(shared_router) as rig:
+        witness = Witness(rig.robot)
+        rig.bus(witness.declare)
+        with program(SPECIMEN, "plain", *on(shared_router, rig.robot)) as it:
+            wait_until(lambda: len(witness.health) >= 2, "health")
+            yield rig, it, witness
+
+
+Lived = tuple[Rig, Program, Witness]
+
+
+def info(rig: Rig, part: str) -> dict[str, object]:
+    """Ask the service what it tells newcomers."""
+    session: zenoh.Session = rig.session()
+    (reply,) = session.get(keys.info_key(rig.robot, "specimen", part))
+    assert reply.ok is not None
+    assert str(reply.ok.encoding) == "application/json"
+    found: dict[str, object] = json.loads(reply.ok.payload.to_bytes())
+    return found
+
+
+def test_its_health_comes_every_second(lived: Lived) -> None:
+    rig, _, witness = lived
+    first, last = witness.health[0], witness.health[-1]
+    assert last.service == "specimen"
+    assert last.version == package_version()
+    assert last.uptime > first.uptime >= 0
+    assert last.boot == first.boot != 0
+    assert last.counters["resets"] == 1
+    assert 1_000_000 < last.rss < 10**10
+    assert last.lateness >= 0
+    bumper = keys.BUMPER.on(rig.robot)
+    wait_until(lambda: witness.health[-1].rates.get(bumper, 0) > 1, "the bumper's rate")
+    # By the time that has passed, not by that which should have: never more than it is due.
+    assert max(health.rates.get(bumper, 0) for health in witness.health) < 60
+
+
+def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
+    rig, it, _ = lived
+    witness = Witness(rig.robot)
+    rig.bus(witness.declare)
+    wait_until(lambda: witness.events, "the event")
+    assert witness.events[0].name == "built"
+    assert witness.events[0].about == {"count": 3}
+    logged = [json.loads(line) for line in it.lines if "event_name" in line]
+    assert [(e["event"], e["event_name"], e["level"]) for e in logged] == [
+        ("all is built", "built", "info")
+    ]
+
+
+def test_its_token_carries_its_boot(lived: Lived) -> None:
+    rig, _, witness = lived
+    wait_until(lambda: witness.tokens, "the token")
+    key, alive = witness.tokens[0]
+    assert key == keys.live_key(rig.robot, "specimen", f"{witness.health[0].boot:x}")
+    assert alive
+
+
+def test_it_tells_its_schemas(lived: Lived) -> None:
+    made = info(lived[0], "schema")
+    assert set(made) == {"tel/bridge/bumper", "tel/{service}/health", "evt/{service}"}
+    assert "pressed" in json.dumps(made["tel/bridge/bumper"])
+
+
+def test_it_tells_its_settings_and_where_they_came_from(lived: Lived) -> None:
+    rig, _, _ = lived
+    told = info(rig, "config")
+    assert told["robot.id"] == {"value": rig.robot, "origin": f"--set robot.id={rig.robot}"}
+    assert told["bus.lease"] == {"value": 1.0, "origin": "config/t2.toml"}
+
+
+def test_it_tells_its_last_values(lived: Lived) -> None:
+    rig, _, _ = lived
+    last = msgspec.convert(info(rig, "last"), dict[str, dict[str, object]])
+    assert last[keys.BUMPER.on(rig.robot)]["pressed"] is True
+    assert last[keys.HEALTH.on(rig.robot, service="specimen")]["service"] == "specimen"
+
+
+def test_its_logs_are_json_lines(lived: Lived) -> None:
+    it = lived[1]
+    it.wait_for("started")
+    for line in it.lines:
+        entry = json.loads(line)
+        assert entry["service"] == "specimen"
+        assert entry["level"] == "info"
+
+
+def test_sigterm_lets_it_come_to_rest_and_its_token_goes(lived: Lived) -> None:
+    """The last of those that share it."""
+    _, it, witness = lived
+    it.process.send_signal(signal.SIGTERM)
+    assert it.code() == 0
+    assert it.events()[-2:] == ["stopping", "stopped"]
+    key = witness.tokens[0][0]
+    wait_until(lambda: (key, False) in witness.tokens, "the token's end")
+
+
+def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) -> None:
+    with program(SPECIMEN, "failing", *on(shared_router, "failing")) as it:
+        assert it.code() == 1
+        assert "RuntimeError: a bug of ours" in it.text
+
+
+# --- without one, and with one that comes and goes ----------------------------------------------
+
+
+def test_it_waits_for_a_router_and_outlives_its_restart(rig: Rig) -> None:
+    rig.endpoint = f"tcp/127.0.0.1:{free_port()}"
+    witness = Witness(rig.robot)
+    with program(SPECIMEN, "plain", *on(rig.endpoint, rig.robot)) as it:
+        it.wait_for("waiting for a router")
+        with router([rig.endpoint]):
+            rig.bus(witness.declare)
+            wait_until(lambda: witness.health, "health")
+            assert {event.name for event in witness.events} <= {"built"}
+        witness.health.clear()
+        with router([rig.endpoint]):
+            wait_until(lambda: witness.health, "health after the restart")
+            assert info(rig, "last")
+        it.process.send_signal(signal.SIGINT)
+        assert it.code() == 0
+        assert it.events()[-1] == "stopped"
+
+
+def test_a_second_signal_ends_it_at_once() -> None:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with program(SPECIMEN, "restless", *on(where, "001")) as it:
+        it.wait_for("waiting for a router")
+        it.process.send_signal(signal.SIGINT)
+        it.wait_for("stopping")
+        it.process.send_signal(signal.SIGTERM)
+        assert it.code() == 128 + signal.SIGTERM
+        assert "stopped" not in it.events()
+
+
+def test_on_a_terminal_it_writes_text_and_it_ends_though_it_finds_no_rest() -> None:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with program(SPECIMEN, "restless", *on(where, "001"), tty=True) as it:
+        it.wait_for("started")
+        it.process.send_signal(signal.SIGTERM)
+        assert it.code() == 0
+        it.wait_for("stopped")
+        assert not any(line.startswith("{") for line in it.lines)
+
+
+# --- small parts --------------------------------------------------------------------------------
+
+
+def test_memory_is_unknown_where_the_system_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert resident_bytes() > 1_000_000
+
+    def absent(*_: object, **__: object) -> str:
+        raise FileNotFoundError
+
+    monkeypatch.setattr("common.service.Path.read_text", absent)
+    assert resident_bytes() == 0
+
+
+def test_the_version_is_that_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    package_version.cache_clear()
+    assert package_version()[0].isdigit()
+
+    def absent(_: str) -> str:
+        raise PackageNotFoundError
+
+    package_version.cache_clear()
+    monkeypatch.setattr("common.service.version", absent)
+    assert package_version() == "unknown"
+    package_version.cache_clear()

@@ -1,0 +1,96 @@
+"""The installed ``zenoh`` command with our codec, against a real router."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.bus.calls import Caller
+from common.messages import Bumper, Done, Drive, ReleaseRequest
+from tests.common.rig import Rig, until_heard
+from tests.support import PATIENCE_S, wait_until
+
+ZENOH = Path(sys.executable).parent / "zenoh"
+
+
+def command(rig: Rig, *words: str) -> list[str]:
+    """Return the command line that docs and README give."""
+    options = ("--mode", "client", "--connect", rig.endpoint)
+    return [str(ZENOH), *options, "--cfg", "scouting/multicast/enabled:false", *words]
+
+
+def zenoh(rig: Rig, *words: str) -> "subprocess.CompletedProcess[str]":
+    """Run the command to its end."""
+    return subprocess.run(
+        command(rig, *words), capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+
+
+@pytest.fixture
+def watching(rig: Rig) -> Iterator["subprocess.Popen[str]"]:
+    words = ("subscribe", "-k", f"t2/v1/{rig.robot}/**", "--decoder", "t2")
+    with subprocess.Popen(
+        command(rig, *words, "--line", "{key}: {value}"), stdout=subprocess.PIPE, text=True,
+        env={"PYTHONUNBUFFERED": "1"},
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_it_shows_our_messages(rig: Rig, watching: "subprocess.Popen[str]") -> None:
+    bus = rig.bus()
+    publisher = bus.publisher(keys.BUMPER)
+    # What is put before it has subscribed is lost; a match tells that it has.
+    until_heard(
+        lambda: publisher.put(Bumper(pressed=True)),
+        lambda: publisher._declared.matching_status.matching,
+        "the subscription",
+    )
+    publisher.put(Bumper(pressed=True))
+    assert watching.stdout is not None
+    line = watching.stdout.readline()
+    found = re.fullmatch(r"(\S+): (\{.*\})\n", line)
+    assert found, line
+    assert found[1] == keys.BUMPER.on(rig.robot)
+    shown = json.loads(found[2])
+    assert shown["pressed"] is True
+    assert shown["boot"] == bus.boot
+
+
+def test_it_puts_a_message_that_we_understand(rig: Rig) -> None:
+    heard: list[Arrival[Drive]] = []
+    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*"))
+    key = keys.DRIVE.on(rig.robot, source="web")
+    text = '{"linear": 0.25, "angular": 0, "echo": 1}'
+    done = zenoh(rig, "put", "-k", key, "--encoder", "t2", "-v", text)
+    assert done.returncode == 0, done.stderr
+    wait_until(lambda: heard, "the message")
+    message = heard[0].message
+    assert (message.linear, message.echo, message.seq) == (0.25, 1, 1)
+    assert message.boot != 0
+
+
+def test_it_makes_a_call(rig: Rig) -> None:
+    asked: list[ReleaseRequest] = []
+
+    def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
+        asked.append(request)
+        caller.reply(Done(text="creeping"))
+
+    def declare(bus: Bus) -> None:
+        bus.serve(keys.RELEASE, release)
+
+    rig.bus(declare)
+    key = keys.RELEASE.on(rig.robot)
+    words = ("--encoder", "t2", "--decoder", "t2", "-v", '{"held": false}')
+    done = zenoh(rig, "get", "-s", key, *words)
+    assert '{"text": "creeping"}' in done.stdout, done.stderr
+    assert asked == [ReleaseRequest(held=False)]
