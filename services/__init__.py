@@ -1,0 +1,1 @@
+"""The T2 micro-services; each imports ``common`` and never another service."""

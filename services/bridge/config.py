@@ -1,0 +1,46 @@
+"""The bridge's settings."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from common import settings
+
+Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
+
+
+# See ``settings.check_protections``.
+PROTECTIVE: settings.Limits = {"lease": (0.0, 0.5), "silence": (0.0, 0.5), "coast": (0.0, 3.0)}
+
+
+class Bridge(settings.Section, frozen=True, kw_only=True):
+    """How the bridge treats the board."""
+
+    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message holds
+    silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s after which the board is lost
+    failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port is taken
+    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP before it becomes BREAK
+    max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
+    max_angular: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # rad/s
+    answer_timeout: Annotated[float, Meta(ge=0.02, le=1.0)] = 0.1  # s for a query's answer
+    echo_timeout: Annotated[float, Meta(ge=0.05, le=2.0)] = 0.5  # s for a switch or lamp's echo
+    bumper_rate: Rate = 50.0
+    ultrasonic_rate: Rate = 20.0
+    mileage_rate: Rate = 50.0
+    driver_rate: Rate = 2.0  # for each side
+
+    def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in PROTECTIVE}
+        settings.check_protections(given, PROTECTIVE, self.i_accept)
+        if self.failover >= self.silence:
+            raise ValueError(f"failover {self.failover} s must be under silence {self.silence} s")
+
+
+class BridgeConfig(settings.Shared, frozen=True, kw_only=True):
+    """All sections that the bridge reads."""
+
+    board: settings.Board = settings.Board()
+    wire: settings.Wire = settings.Wire()
+    vehicle: settings.Vehicle = settings.Vehicle()
+    bridge: Bridge = Bridge()

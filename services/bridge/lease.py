@@ -1,0 +1,152 @@
+"""What the wheels are told: one motion authority, its lease, and the reflex.
+
+The board has no documented watchdog, so it is never left with a RUN that nobody stands behind. A
+motion message is turned into one frame at once and holds for the lease. A RUN is obeyed only while
+all of this is so; otherwise STOP goes out in its place:
+
+========== ================================ ==================================================
+condition  lost by                          regained by
+========== ================================ ==================================================
+ready      link lost, switches unverified,  both emergency switches on and echoed
+           board restarted, stopping
+neutral    start, not ready, lease over,    a STOP or a RUN of zero from the authority, while
+           a new authority                  ready: nothing moves because something came back
+judged     a bumper hit (the reflex: BREAK  a motion message whose ``judged`` covers that hit:
+           at once)                         a RUN that was under way must not undo the BREAK
+========== ================================ ==================================================
+
+When the lease is over: STOP at once and at 20 Hz for ever, and BREAK from ``coast_ns`` on while the
+vehicle still moves. The authority is the ``boot`` of the sender; as long as its lease lives another
+is refused.
+
+A latch must outlive the safety service that holds it: who latched last is remembered here, until
+the same one says that it was reset, or its successor has latched in its place.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from common.freshness import S
+from common.messages import Motion
+
+STOP_PERIOD_NS = S // 20
+AT_ONCE = -STOP_PERIOD_NS  # as a send time: so long ago that the next STOP is due
+STANDING_MPS = 0.02
+STANDING_RADPS = 0.05  # 3 deg/s: the board's own resolution is 0.1 deg/s, its sensor is noisier
+
+
+class Order(StrEnum):
+    """What the next frame asks of the board."""
+
+    RUN = "run"
+    STOP = "stop"
+    BRAKE = "brake"
+
+
+class Refusal(StrEnum):
+    """Why a motion message, or the RUN in it, was not obeyed."""
+
+    SECOND_AUTHORITY = "second_authority"
+    OLD = "seq_not_rising"
+    NOT_READY = "not_ready"
+    NOT_NEUTRAL = "waiting_for_neutral"
+    NOT_JUDGED = "hit_not_judged"
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """Who may move the vehicle, until when, and what is missing."""
+
+    boot: int | None = None  # the authority's
+    seq: int = 0  # its newest message
+    renewed_ns: int = 0
+    over_since_ns: int | None = 0  # None while the lease lives
+    ready: bool = False
+    neutral: bool = False
+    hit: int | None = None  # ``seq`` of the bumper sample that awaits judgement
+    sent_ns: int = 0
+    latched_by: int | None = None  # the authority whose latch nobody has reset
+
+    @property
+    def waiting(self) -> str:
+        """Say in words why a RUN would not be obeyed; empty when it would."""
+        if not self.ready:
+            return "the board is not ready"
+        if self.hit is not None:
+            return "safety has not judged the bumper hit"
+        if not self.neutral:
+            return "a neutral motion from safety is due"
+        return ""
+
+
+def on_motion(
+    lease: Lease, motion: Motion, now_ns: int, lease_ns: int, own_boot: int
+) -> tuple[Lease, Order | None, Refusal | None]:
+    """Judge one motion message; return the order to send, if any, and what was refused."""
+    if motion.boot != lease.boot:
+        if lease.boot is not None and now_ns - lease.renewed_ns <= lease_ns:
+            return lease, None, Refusal.SECOND_AUTHORITY
+        lease = replace(lease, boot=motion.boot, seq=motion.seq - 1, neutral=False)
+    if motion.seq <= lease.seq:
+        return lease, None, Refusal.OLD
+    lease = expire(lease, now_ns, lease_ns)
+    lease = replace(lease, seq=motion.seq, renewed_ns=now_ns, over_since_ns=None)
+    if motion.judged_boot == own_boot and lease.hit is not None and motion.judged >= lease.hit:
+        lease = replace(lease, hit=None)
+    if motion.latched or lease.latched_by == motion.boot:
+        lease = replace(lease, latched_by=motion.boot if motion.latched else None)
+    order, refusal = _order(lease, motion)
+    if order is not Order.RUN or (motion.linear == 0 and motion.angular == 0):
+        lease = replace(lease, neutral=lease.neutral or (lease.ready and refusal is None))
+    return replace(lease, sent_ns=now_ns), order, refusal
+
+
+def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
+    if lease.hit is not None:
+        return Order.BRAKE, Refusal.NOT_JUDGED if motion.command == "run" else None
+    if motion.command != "run":
+        return Order(motion.command), None
+    if not lease.ready:
+        return Order.STOP, Refusal.NOT_READY
+    if not lease.neutral and (motion.linear != 0 or motion.angular != 0):
+        return Order.STOP, Refusal.NOT_NEUTRAL
+    return Order.RUN, None
+
+
+def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
+    """Answer the first sample of a bumper hit: the reflex."""
+    return replace(lease, hit=seq, sent_ns=now_ns), Order.BRAKE
+
+
+def on_ready(lease: Lease, ready: bool) -> Lease:
+    """Take in whether the board may be driven; losing that takes the neutral along."""
+    if ready == lease.ready:
+        return lease
+    return replace(lease, ready=ready, neutral=False, sent_ns=lease.sent_ns if ready else AT_ONCE)
+
+
+def expire(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
+    """Note when the lease has run out; it takes the neutral along."""
+    if lease.over_since_ns is not None or now_ns - lease.renewed_ns <= lease_ns:
+        return lease
+    return replace(lease, over_since_ns=now_ns, neutral=False, sent_ns=AT_ONCE)
+
+
+def on_tick(
+    lease: Lease, now_ns: int, lease_ns: int, coast_ns: int, standing: bool
+) -> tuple[Lease, Order | None]:
+    """Return what must be sent by now although no motion message asked for it."""
+    lease = expire(lease, now_ns, lease_ns)
+    if lease.over_since_ns is None and lease.ready:
+        return lease, None
+    if now_ns - lease.sent_ns < STOP_PERIOD_NS:
+        return lease, None
+    since_ns = lease.over_since_ns
+    coasted = since_ns is not None and now_ns - since_ns > coast_ns
+    brake = lease.hit is not None or (coasted and not standing)
+    return replace(lease, sent_ns=now_ns), Order.BRAKE if brake else Order.STOP
+
+
+def standing(linear: float, angular: float) -> bool:
+    """Tell whether a measured velocity (m/s, rad/s) counts as standstill."""
+    return abs(linear) < STANDING_MPS and abs(angular) < STANDING_RADPS

@@ -1,0 +1,118 @@
+"""Frames to messages and back: the one place where mm/s and 0.1 deg/s become SI.
+
+The bus has metres, radians and seconds; the wire has millimetres and tenths of a degree
+(manual 2.2 to 2.7). What the vehicle cannot mean is refused with ``WireError`` here, because the
+frame's CRC does not cover everything.
+"""
+
+import math
+
+from common.codec import finite
+from common.errors import MessageError, WireError
+from common.messages import Bumper, Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
+from common.settings import Vehicle, Wire
+from common.wire.commands import MotionCommand, MotionKind
+from common.wire.frame import MAGNITUDE_MAX
+from common.wire.reports import (
+    SONAR_FAULT_MM,
+    DistanceReport,
+    DriverReport,
+    UltrasonicReport,
+    VelocityReport,
+)
+from services.bridge.lease import Order
+
+MM = 1000.0
+# No such vehicle drives or turns faster; the frame was damaged in its unprotected header.
+PLAUSIBLE_MPS = 5.0
+PLAUSIBLE_RADPS = 10.0
+
+FAULT_NAMES = ("over_current", "over_voltage", "encoder", "under_voltage", "overload")
+KINDS = {Order.STOP: MotionKind.STOP, Order.RUN: MotionKind.RUN, Order.BRAKE: MotionKind.BREAK}
+
+
+class Translator:
+    """Translates by the settings of one vehicle."""
+
+    def __init__(self, wire: Wire, vehicle: Vehicle, max_linear: float, max_angular: float) -> None:
+        self._per_radian = 1000.0 if wire.angular_unit == "milliradian" else 1800.0 / math.pi
+        self._near_mm = vehicle.sonar_min * MM
+        self._far_mm = vehicle.sonar_max * MM
+        self._max_linear = max_linear
+        self._max_angular = max_angular
+
+    def command(self, order: Order, motion: Motion | None = None) -> MotionCommand:
+        """Return the frame for an order; a RUN carries the motion, clamped to the limits."""
+        if order is not Order.RUN or motion is None:
+            return MotionCommand(KINDS[order])
+        linear = clamp(motion.linear, self._max_linear) * MM
+        angular = clamp(motion.angular, self._max_angular) * self._per_radian
+        return MotionCommand(MotionKind.RUN, round(linear), round(clamp(angular, MAGNITUDE_MAX)))
+
+    def velocity(self, frame: VelocityReport) -> Velocity:
+        """Return the measured velocity in m/s and rad/s (manual 2.2)."""
+        linear = frame.linear_mmps / MM
+        angular = frame.angular_raw / self._per_radian
+        if abs(linear) > PLAUSIBLE_MPS or abs(angular) > PLAUSIBLE_RADPS:
+            raise WireError(f"implausible velocity {linear:.1f} m/s, {angular:.1f} rad/s")
+        return Velocity(linear=linear, angular=angular)
+
+    def mileage(self, frame: DistanceReport, epoch: int) -> Mileage:
+        """Return distance in m and heading in rad (manual 2.3)."""
+        heading = math.radians(frame.heading_ddeg / 10)
+        return Mileage(distance=frame.distance_mm / MM, heading=heading, epoch=epoch)
+
+    def ultrasonic(self, frame: UltrasonicReport) -> Ultrasonic:
+        """Return the ranges in m; None where there is none, and why."""
+        status = tuple(self._status(raw_mm) for raw_mm in frame.ranges_mm)
+        ranges = tuple(
+            raw_mm / MM if state == "ok" else None
+            for raw_mm, state in zip(frame.ranges_mm, status, strict=True)
+        )
+        return Ultrasonic(ranges=ranges, status=status)
+
+    def _status(self, raw_mm: int) -> RangeStatus:
+        if raw_mm == SONAR_FAULT_MM:
+            return "fault"
+        if raw_mm < self._near_mm:
+            return "too_near"
+        return "no_echo" if raw_mm >= self._far_mm else "ok"
+
+
+def check_finite(motion: Motion) -> None:
+    """Raise ``MessageError`` for NaN and infinity in a RUN, which pass a typed decode."""
+    if motion.command == "run" and not finite(motion.linear, motion.angular):
+        raise MessageError(f"motion of {motion.linear} m/s, {motion.angular} rad/s is not finite")
+
+
+def driver(frame: DriverReport) -> Driver:
+    """Return the faults of a driver by name, all 32 bits of them (manual 2.7)."""
+    names = tuple(
+        FAULT_NAMES[bit] if bit < len(FAULT_NAMES) else f"bit_{bit}"
+        for bit in range(32)
+        if frame.fault_bits >> bit & 1
+    )
+    return Driver(faults=names, bits=frame.fault_bits)
+
+
+def clamp(value: float, limit: float) -> float:
+    """Return the value, not beyond the limit either way."""
+    return max(-limit, min(limit, value))
+
+
+class BumperFilter:
+    """A hit needs one sample, a clear bumper three in a row: the header of a frame has no CRC."""
+
+    CLEAR_SAMPLES = 3
+
+    def __init__(self) -> None:
+        self.pressed: bool | None = None  # None until the first sample
+        self._clear = 0
+
+    def take(self, pressed: bool) -> tuple[Bumper | None, bool]:
+        """Return the message for a sample, if one can be made, and whether a hit begins with it."""
+        self._clear = 0 if pressed else self._clear + 1
+        hit = pressed and not self.pressed
+        if pressed or self._clear >= self.CLEAR_SAMPLES:
+            self.pressed = pressed
+        return None if self.pressed is None else Bumper(pressed=self.pressed), hit

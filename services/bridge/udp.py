@@ -1,0 +1,65 @@
+"""The sockets to the board: both of our ports, and nobody but the board."""
+
+import errno
+import socket
+from collections.abc import Iterator
+from contextlib import suppress
+
+from common.errors import LinkError
+from common.settings import Board
+
+DATAGRAM_MAX = 2048
+# A flood must not keep the loop from its timers: the rest waits for the next round.
+BURST = 64
+
+
+class Sockets:
+    """One socket for each of our ports; commands leave from the one that is active."""
+
+    def __init__(self, board: Board) -> None:
+        """Bind the ports; raise ``LinkError`` naming the one that cannot be had."""
+        self.refused = 0  # datagrams from anybody else
+        self.last_stranger: tuple[str, int] | None = None
+        self._board = (board.address, board.port)
+        self._any_port = board.any_source_port
+        self.sockets = [_bind(board.listen_address, port) for port in board.listen_ports]
+
+    def read(self, port: int) -> Iterator[bytes]:
+        """Yield the datagrams of the board that wait on the port of this index."""
+        for _ in range(BURST):
+            try:
+                datagram, source = self.sockets[port].recvfrom(DATAGRAM_MAX)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue  # an earlier command found no board, or no network
+            if source == self._board or (self._any_port and source[0] == self._board[0]):
+                yield datagram
+            else:
+                self.refused += 1
+                self.last_stranger = source
+
+    def send(self, datagram: bytes, port: int) -> None:
+        """Send to the board from the port of this index; an absent network loses it."""
+        with suppress(OSError):
+            self.sockets[port].sendto(datagram, self._board)
+
+    def close(self) -> None:
+        """Give the ports back."""
+        for sock in self.sockets:
+            sock.close()
+
+
+def _bind(address: str, port: int) -> socket.socket:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setblocking(False)
+    try:
+        sock.bind((address, port))
+    except OSError as error:
+        sock.close()
+        hint = {
+            errno.EADDRINUSE: "another program has it; is a bridge running already?",
+            errno.EADDRNOTAVAIL: "this host has no such address; see board.listen_address",
+        }.get(error.errno or 0, error.strerror)
+        raise LinkError(f"cannot listen on UDP {address}:{port}: {hint}") from None
+    return sock

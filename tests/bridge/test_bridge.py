@@ -1,0 +1,369 @@
+"""The bridge as a process: real UDP on one side, a real router on the other."""
+
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgpack
+import pytest
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival, Bus
+from common.bus.publisher import Publisher
+from common.loop import Loop
+from common.wire import reports
+from common.wire.commands import MotionKind
+from common.wire.frame import Side
+from common.wire.framing import Framing
+from tests.bridge.board import Board, board
+from tests.support import bus_on, free_port, router_process, running, wait_until
+
+
+@dataclass
+class Rig:
+    """A bridge between a test board and a test bus on which the test plays safety."""
+
+    board: Board
+    endpoint: str
+    loop: Loop
+    process: "subprocess.Popen[bytes]"
+    bus: Bus = field(init=False)
+    motion: Publisher[m.Motion] = field(init=False)
+    seen: dict[str, list[Any]] = field(default_factory=dict)
+    raw: dict[str, bytes] = field(default_factory=dict)
+    driving: m.Motion | None = None
+    rearms: bool = True  # say STOP until the bridge is armed, as safety does
+
+    def declare(self, bus: Bus) -> None:
+        self.bus = bus
+        self.motion = bus.publisher(keys.MOTION)
+        for topic in (keys.LINK, keys.BUMPER, keys.MILEAGE, keys.ULTRASONIC, keys.VELOCITY):
+            bus.subscribe(topic, self._take, depth=64)
+        bus.subscribe(keys.SWITCHES, self._take, depth=64)
+        bus.subscribe(keys.DRIVER, self._take, depth=64, side="*")
+        bus.subscribe(keys.EVENTS, self._take, depth=64, service="bridge")
+        self.loop.post(lambda: self.loop.every(0.05, self._beat))
+
+    def _take(self, arrival: Arrival[Any]) -> None:
+        name = arrival.key.removeprefix("t2/v1/001/")
+        self.seen.setdefault(name, []).append(arrival.message)
+        if arrival.raw:
+            self.raw[name] = arrival.raw
+
+    def _beat(self, _: int) -> None:
+        if self.driving is not None:
+            bumpers = self.seen.get("tel/bridge/bumper", [m.Bumper(pressed=False)])
+            judged = {"judged": bumpers[-1].seq, "judged_boot": bumpers[-1].boot}
+            link = self.link()
+            waits = self.rearms and link is not None and not link.armed
+            fields = {"command": "stop"} if waits else _fields(self.driving)
+            self.motion.put(m.Motion(**{**fields, **judged}))
+
+    def command(self, command: m.Command, linear: float = 0.0) -> None:
+        """Say this at 20 Hz from now on, as safety would."""
+        self.driving = m.Motion(command=command, linear=linear, source="test")
+
+    def silence(self) -> None:
+        """Say nothing any more."""
+        self.driving = None
+
+    def newest(self, name: str) -> Any:
+        return self.seen.get(name, [None])[-1]
+
+    def link(self) -> m.Link | None:
+        newest: m.Link | None = self.newest("tel/bridge/link")
+        return newest
+
+    def events(self) -> list[str]:
+        return [event.name for event in self.seen.get("evt/bridge", [])]
+
+    def drive(self) -> None:
+        """Bring it to half a metre a second."""
+        self.command("stop")
+        wait_until(lambda: (link := self.link()) and link.armed, "an armed bridge")
+        self.command("run", 0.5)
+        self.board.wait_for(MotionKind.RUN, 500)
+
+
+def _fields(message: m.Motion) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in ("command", "linear", "angular", "source")}
+
+
+@contextmanager
+def bridge_process(made: Board, endpoint: str, *sets: str) -> Iterator["subprocess.Popen[bytes]"]:
+    settings = [
+        f"board.port={made.address[1]}",
+        f"board.listen_ports={made.ports}",
+        f"bus.connect={endpoint}",
+        # Patient: these machines hold processes up for tenths of a second.
+        "bridge.i_accept=lease,silence",
+        "bridge.lease=0.8",
+        "bridge.silence=0.8",
+        *sets,
+    ]
+    words = [word for setting in settings for word in ("--set", setting)]
+    command = [sys.executable, "-m", "services.bridge", *words]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Share one router among these tests: each has a bridge of its own."""
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(where):
+        yield where
+
+
+@pytest.fixture
+def rig(endpoint: str) -> Iterator[Rig]:
+    with (
+        board() as made,
+        bridge_process(made, endpoint) as process,
+        running(Loop()) as loop,
+    ):
+        rig = Rig(made, endpoint, loop, process)
+        with bus_on(endpoint, loop, rig.declare):
+            yield rig
+
+
+def test_everything_the_board_says_reaches_the_bus_with_its_raw_frame(rig: Rig) -> None:
+    names = ["velocity", "mileage", "ultrasonic", "bumper", "driver/left", "driver/right"]
+    wait_until(lambda: {f"tel/bridge/{name}" for name in names} <= set(rig.seen), "all streams")
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    wait_until(
+        lambda: (s := rig.newest("tel/bridge/switches")) and s.ultrasonic_brake and s.bumper_brake,
+        "both switches on and echoed",
+    )
+    assert rig.newest("tel/bridge/mileage").distance == 1.0
+    assert rig.raw["tel/bridge/bumper"] == Framing().pack(reports.BumperReport(False))
+    assert rig.newest("tel/bridge/ultrasonic").ranges == (1.0,) * 8
+
+
+def test_nothing_is_published_twice_although_it_comes_to_both_ports(rig: Rig) -> None:
+    wait_until(lambda: rig.newest("tel/bridge/link"), "a link")
+    rig.board.say(reports.DriverReport(Side.LEFT, 0b1000))
+    wait_until(lambda: "driver_fault" in rig.events(), "the fault, unasked")
+    faulty = [d for d in rig.seen["tel/bridge/driver/left"] if d.bits == 0b1000]
+    assert len(faulty) == 1
+    assert faulty[0].faults == ("under_voltage",)
+
+
+def test_begins_with_stop_even_without_a_router() -> None:
+    with board() as made, bridge_process(made, "tcp/127.0.0.1:1"):
+        made.wait_for(MotionKind.STOP)
+        wait_until(lambda: len(made.motions) > 10, "STOP at 20 Hz")
+        assert {motion.kind for motion in made.motions} == {MotionKind.STOP}
+
+
+def test_a_run_needs_a_neutral_first_and_silence_ends_it(rig: Rig) -> None:
+    rig.rearms = False
+    rig.command("run", 0.5)
+    wait_until(lambda: (link := rig.link()) and "neutral" in link.waiting, "asks for a neutral")
+    rig.rearms = True
+    rig.drive()
+    rig.silence()
+    rig.board.wait_for(MotionKind.STOP)
+    rig.rearms = False
+    rig.command("run", 0.5)
+    wait_until(lambda: (link := rig.link()) and not link.armed, "disarmed")
+    assert rig.board.last().kind is MotionKind.STOP  # type: ignore[union-attr]
+
+
+def test_stop_becomes_break_while_the_vehicle_does_not_slow_down(rig: Rig) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 500
+    rig.silence()
+    rig.board.wait_for(MotionKind.BREAK)
+    rig.board.speed_mmps = 0
+    rig.board.wait_for(MotionKind.STOP)
+
+
+def test_the_reflex_breaks_and_only_a_judging_motion_ends_it(rig: Rig) -> None:
+    rig.drive()
+    rig.silence()
+    rig.board.pressed = True
+    rig.board.wait_for(MotionKind.BREAK)
+    wait_until(lambda: "contact" in rig.events(), "the event")
+    rig.motion.put(m.Motion(command="run", linear=0.3))
+    wait_until(lambda: rig.newest("tel/bridge/bumper").pressed, "the bumper message")
+    rig.command("stop")
+    wait_until(lambda: (link := rig.link()) and link.armed, "judged and neutral")
+    runs = [motion for motion in rig.board.motions if motion.linear_mmps == 300]
+    assert runs == []
+
+
+def test_a_second_authority_is_refused_and_reported(rig: Rig) -> None:
+    rig.drive()
+    with running(Loop()) as loop:
+        other: list[Publisher[m.Motion]] = []
+        with bus_on(rig.endpoint, loop, lambda bus: other.append(bus.publisher(keys.MOTION))):
+            motion = m.Motion(command="run", linear=0.9)
+
+            def beat(_: int) -> None:
+                other[0].put(motion)
+
+            loop.post(lambda: loop.every(0.02, beat))
+            wait_until(lambda: "second_authority" in rig.events(), "the event")
+    assert not any(motion.linear_mmps == 900 for motion in rig.board.motions)
+
+
+@pytest.mark.parametrize("hostile", [float("nan"), float("inf")])
+def test_what_is_not_finite_never_reaches_the_board(rig: Rig, hostile: float) -> None:
+    rig.drive()
+    rig.command("run", hostile)
+    rig.board.wait_for(MotionKind.STOP)
+
+
+def test_wrong_types_and_garbage_on_motion_are_dropped(rig: Rig) -> None:
+    rig.drive()
+    session = rig.bus._session
+    assert session is not None
+    for payload in (b"", b"\xc1", msgpack.packb({"command": "fly"}), msgpack.packb([1] * 1000)):
+        session.put("t2/v1/001/@cmd/motion", payload)
+    rig.command("stop")
+    rig.board.wait_for(MotionKind.STOP)
+    assert rig.process.poll() is None
+
+
+def test_a_silent_board_is_lost_and_its_return_needs_switches_and_a_neutral(rig: Rig) -> None:
+    rig.drive()
+    asked = rig.board.switch_asks
+    rig.board.silent = True
+    wait_until(lambda: "link_lost" in rig.events(), "link lost")
+    rig.board.wait_for(MotionKind.STOP)
+    rig.rearms = False
+    rig.board.silent = False
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    wait_until(lambda: rig.board.switch_asks > asked, "the switches are asked for again")
+    wait_until(lambda: (link := rig.link()) and "neutral" in link.waiting, "waits for a neutral")
+    assert rig.board.last().kind is MotionKind.STOP  # type: ignore[union-attr]
+    rig.rearms = True
+    rig.drive()
+
+
+def test_a_board_that_does_not_echo_is_not_driven(rig: Rig) -> None:
+    rig.drive()
+    rig.board.echo = False
+    rig.board.silent = True
+    wait_until(lambda: (link := rig.link()) and link.state == "lost", "link lost")
+    rig.board.silent = False
+    wait_until(lambda: "switches_unverified" in rig.events(), "the event")
+    rig.command("stop")
+    wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "says what it waits for")
+    rig.board.echo = True
+    rig.drive()
+
+
+def test_counters_that_jump_to_zero_start_a_new_epoch(rig: Rig) -> None:
+    rig.drive()
+    rig.board.distance_mm = 0
+    wait_until(lambda: "board_restarted" in rig.events(), "the event")
+    wait_until(lambda: rig.newest("tel/bridge/mileage").epoch == 1, "the epoch")
+    rig.drive()
+
+
+def test_one_dead_port_costs_no_link(rig: Rig) -> None:
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    for port in (1, 0, 1):
+        rig.board.to_ports = [port]
+        rig.drive()
+        wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    wait_until(lambda: "port_changed" in rig.events(), "the event")
+
+
+def test_frames_of_strangers_and_broken_frames_are_counted_not_taken(rig: Rig) -> None:
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.bind(("127.0.0.1", 0))
+        rig.board.say(reports.BumperReport(True), stranger)
+    good = Framing().pack(reports.BumperReport(True))
+    rig.board.say_bytes(good[:-1] + b"\0")
+    rig.board.say_bytes(b"garbage" + good[:5])
+    rig.board.say(reports.VelocityReport(30000, 0))
+
+    def counted() -> bool:
+        link = rig.link()
+        wanted = {"wrong_address", "bad_crc", "no_magic", "truncated", "implausible"}
+        return link is not None and wanted <= set(link.rejected)
+
+    wait_until(counted, "every reason counted")
+    assert not any(bumper.pressed for bumper in rig.seen["tel/bridge/bumper"])
+    assert "contact" not in rig.events()
+
+
+def ask(rig: Rig, call: Any, request: Any) -> Any:
+    answers: list[Any] = []
+    done = threading.Event()
+
+    def take(answer: Any) -> None:
+        answers.append(answer)
+        done.set()
+
+    rig.bus.ask(call, request, take, take)
+    assert done.wait(10)
+    return answers[0]
+
+
+def test_switches_and_lamps_answer_with_the_boards_own_echo(rig: Rig) -> None:
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    answer = ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))
+    assert answer.bumper_brake is False
+    rig.command("stop")
+    wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "not ready")
+    assert ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=True)).bumper_brake is True
+    lamp = m.LedRequest(channel=3, mode=1)
+    assert isinstance(ask(rig, keys.SET_LED, lamp), m.Done)
+    assert rig.board.leds[0].channel == 3
+
+
+def test_refusals_name_the_reason(rig: Rig) -> None:
+    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    lamp = m.LedRequest(channel=3, mode=1)
+    rig.board.led_done = False
+    assert "0xAA" in ask(rig, keys.SET_LED, lamp)
+    rig.board.led_done = None
+    assert "did not echo" in ask(rig, keys.SET_LED, lamp)
+    rig.board.echo = False
+    request = m.SwitchesRequest(ultrasonic_brake=False)
+    assert "did not echo" in ask(rig, keys.SET_SWITCHES, request)
+    rig.board.silent = True
+    wait_until(lambda: (link := rig.link()) and link.state == "lost", "link lost")
+    assert "absent" in ask(rig, keys.SET_LED, lamp)
+
+
+def test_sigterm_stops_until_the_vehicle_stands_and_leaves_with_zero(rig: Rig) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 0
+    rig.process.terminate()
+    assert rig.process.wait(10) == 0
+    assert rig.board.last().kind is MotionKind.STOP  # type: ignore[union-attr]
+
+
+def test_a_taken_port_is_said_clearly(endpoint: str) -> None:
+    with board() as made, bridge_process(made, endpoint) as first:
+        made.wait_for(MotionKind.STOP)
+        with bridge_process(made, endpoint) as second:
+            assert second.wait(20) == 69
+            assert second.stderr is not None
+            assert b"is a bridge running already?" in second.stderr.read()
+        assert first.poll() is None
+
+
+def test_bad_settings_end_it_before_anything_opens() -> None:
+    with board() as made, bridge_process(made, "tcp/127.0.0.1:1", "bridge.lease=0") as process:
+        assert process.wait(20) == 78
+        assert process.stderr is not None
+        text = process.stderr.read().decode()
+    assert "bridge.lease" in text
+    assert "0.05..10.0" in text
+    assert made.motions == []

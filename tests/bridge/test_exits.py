@@ -1,0 +1,77 @@
+"""However the bridge ends, the board is not left with a RUN: it stops nothing by itself."""
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from common.config import Sources, load
+from common.service import Node, serve
+from common.wire.commands import MotionKind
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from tests.bridge.board import board
+from tests.bridge.test_bridge import Rig, endpoint, rig
+
+__all__ = ["endpoint", "rig"]  # fixtures
+
+
+def end(rig: Rig, *signals: signal.Signals) -> int:
+    """Send the signals and wait for the end of the bridge."""
+    for number in signals:
+        rig.process.send_signal(number)
+    return rig.process.wait(20)
+
+
+def test_a_bridge_whose_parent_and_log_are_gone_stops_the_vehicle(rig: Rig) -> None:
+    rig.drive()
+    assert rig.process.stderr is not None
+    rig.process.stderr.close()
+    assert end(rig, signal.SIGTERM) == 0
+    rig.board.wait_for(MotionKind.STOP)
+
+
+def test_a_second_signal_brakes_before_the_bridge_ends(rig: Rig) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 500  # it would wait for the vehicle to stand
+    rig.process.send_signal(signal.SIGINT)
+    rig.board.wait_for(MotionKind.STOP)
+    assert end(rig, signal.SIGTERM) == 128 + signal.SIGTERM
+    rig.board.wait_for(MotionKind.BREAK)
+
+
+def test_a_vehicle_that_does_not_stop_is_left_with_a_break(rig: Rig) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 500
+    assert end(rig, signal.SIGTERM) == 0
+    rig.board.wait_for(MotionKind.BREAK)
+
+
+@pytest.fixture
+def _signals() -> Iterator[None]:
+    """Give the handlers back that ``serve`` replaces."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_signals")
+def test_a_bug_of_ours_leaves_a_break() -> None:
+    def bug(_: int) -> None:
+        made.wait_for(MotionKind.STOP)
+        raise ZeroDivisionError
+
+    with board() as made:
+        sets = [
+            f"board.port={made.address[1]}",
+            f"board.listen_ports={made.ports}",
+            "bus.connect=tcp/127.0.0.1:1",
+        ]
+        node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
+        bridge = Bridge(node)
+        node.loop.every(1.0, bug)
+        with pytest.raises(ZeroDivisionError):
+            serve(node)
+        made.wait_for(MotionKind.BREAK)
+        bridge._sockets.close()  # the end of the process does it otherwise

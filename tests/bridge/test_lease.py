@@ -1,0 +1,263 @@
+"""The lease: state by event, dense where something tips over."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace as replace_message
+
+from common.freshness import S
+from common.messages import Motion
+from services.bridge import lease as leases
+from services.bridge.lease import Lease, Order, Refusal, on_hit, on_motion, on_ready, on_tick
+
+MS = S // 1000
+LEASE = 200 * MS
+COAST = 1000 * MS
+OWN_BOOT = 7
+NOW = 100 * S
+
+ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
+HIT = replace(ARMED, hit=5)
+
+
+def run(
+    linear: float = 0.5,
+    angular: float = 0.0,
+    *,
+    seq: int = 11,
+    boot: int = 1,
+    judged: int = 0,
+    judged_boot: int = 0,
+) -> Motion:
+    return Motion(
+        command="run",
+        linear=linear,
+        angular=angular,
+        seq=seq,
+        boot=boot,
+        judged=judged,
+        judged_boot=judged_boot,
+    )
+
+
+def stop(seq: int = 11, boot: int = 1) -> Motion:
+    return Motion(command="stop", seq=seq, boot=boot)
+
+
+def brake(seq: int = 11, boot: int = 1) -> Motion:
+    return Motion(command="brake", seq=seq, boot=boot)
+
+
+def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order | None, object]:
+    return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT)
+
+
+@pytest.mark.parametrize(
+    ("state", "motion", "order", "refusal"),
+    [
+        # armed: everything goes
+        (ARMED, run(), Order.RUN, None),
+        (ARMED, run(0.0, 0.0), Order.RUN, None),
+        (ARMED, run(0.0, 0.1), Order.RUN, None),
+        (ARMED, stop(), Order.STOP, None),
+        (ARMED, brake(), Order.BRAKE, None),
+        # the board is not ready: no RUN, not even of zero
+        (replace(ARMED, ready=False), run(), Order.STOP, Refusal.NOT_READY),
+        (replace(ARMED, ready=False), run(0.0), Order.STOP, Refusal.NOT_READY),
+        (replace(ARMED, ready=False), stop(), Order.STOP, None),
+        (replace(ARMED, ready=False), brake(), Order.BRAKE, None),
+        # no neutral yet: only what does not move
+        (replace(ARMED, neutral=False), run(), Order.STOP, Refusal.NOT_NEUTRAL),
+        (replace(ARMED, neutral=False), run(0.0, 0.1), Order.STOP, Refusal.NOT_NEUTRAL),
+        (replace(ARMED, neutral=False), run(0.0, 0.0), Order.RUN, None),
+        (replace(ARMED, neutral=False), brake(), Order.BRAKE, None),
+        # an unjudged hit: BREAK, whatever is asked
+        (HIT, run(), Order.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, stop(), Order.BRAKE, None),
+        (HIT, brake(), Order.BRAKE, None),
+        (HIT, run(judged=4, judged_boot=OWN_BOOT), Order.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(judged=5, judged_boot=OWN_BOOT), Order.RUN, None),
+        (HIT, run(judged=6, judged_boot=OWN_BOOT), Order.RUN, None),
+        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), Order.BRAKE, Refusal.NOT_JUDGED),
+        # seq must rise
+        (ARMED, run(seq=10), None, Refusal.OLD),
+        (ARMED, run(seq=9), None, Refusal.OLD),
+        (ARMED, run(seq=12), Order.RUN, None),
+        # a second authority
+        (ARMED, run(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
+        (ARMED, brake(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
+    ],
+)
+def test_order(state: Lease, motion: Motion, order: Order | None, refusal: Refusal | None) -> None:
+    assert obey(state, motion)[1:] == (order, refusal)
+
+
+@pytest.mark.parametrize(("age", "obeyed"), [(LEASE - 1, True), (LEASE, True), (LEASE + 1, False)])
+def test_lease_holds_for_its_time_and_takes_the_neutral_along(age: int, obeyed: bool) -> None:
+    after, order, refusal = obey(ARMED, run(), NOW + age)
+    assert (order is Order.RUN) is obeyed
+    assert (refusal is Refusal.NOT_NEUTRAL) is not obeyed
+    assert after.neutral is obeyed
+
+
+@pytest.mark.parametrize("age", [LEASE - 1, LEASE, LEASE + 1])
+def test_second_authority_waits_for_the_end_of_the_first(age: int) -> None:
+    after, order, refusal = obey(ARMED, run(boot=2, seq=3), NOW + age)
+    if age <= LEASE:
+        assert (after, order, refusal) == (ARMED, None, Refusal.SECOND_AUTHORITY)
+    else:
+        assert (after.boot, after.seq, after.neutral) == (2, 3, False)
+        assert (order, refusal) == (Order.STOP, Refusal.NOT_NEUTRAL)
+
+
+def test_the_first_authority_must_be_neutral_too() -> None:
+    fresh = Lease(ready=True)
+    after, order, _ = obey(fresh, run(seq=1))
+    assert order is Order.STOP
+    after, order, _ = obey(after, stop(seq=2))
+    assert (order, after.neutral) == (Order.STOP, True)
+    assert obey(after, run(seq=3))[1] is Order.RUN
+
+
+@pytest.mark.parametrize("neutral", [stop(), brake(), run(0.0, 0.0)])
+def test_neutral_counts_only_while_ready(neutral: Motion) -> None:
+    assert obey(replace(ARMED, neutral=False), neutral)[0].neutral
+    assert not obey(replace(ARMED, neutral=False, ready=False), neutral)[0].neutral
+
+
+def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
+    lost = on_ready(replace(ARMED, sent_ns=NOW), False)
+    assert not lost.neutral
+    assert on_tick(lost, NOW, LEASE, COAST, True)[1] is Order.STOP
+    again = on_ready(lost, True)
+    assert obey(again, run())[1:] == (Order.STOP, Refusal.NOT_NEUTRAL)
+    assert on_ready(ARMED, True) is ARMED
+
+
+def test_the_reflex_breaks_at_once_and_holds_while_time_passes() -> None:
+    hit, order = on_hit(ARMED, 42, NOW)
+    assert (order, hit.hit, hit.sent_ns) == (Order.BRAKE, 42, NOW)
+    over = replace(hit, over_since_ns=NOW)
+    assert on_tick(over, NOW + 60 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+
+
+@pytest.mark.parametrize(
+    ("age", "standing", "order"),
+    [
+        (LEASE, False, None),
+        (LEASE + 1, False, Order.STOP),
+        (LEASE + 1, True, Order.STOP),
+    ],
+)
+def test_tick_when_the_lease_ends(age: int, standing: bool, order: Order | None) -> None:
+    state = replace(ARMED, sent_ns=NOW + age)
+    after, sent = on_tick(state, NOW + age, LEASE, COAST, standing)
+    assert sent is order
+    assert after.neutral is (order is None)
+
+
+@pytest.mark.parametrize(
+    ("age", "standing", "order"),
+    [
+        (COAST, False, Order.STOP),
+        (COAST + 1, False, Order.BRAKE),
+        (COAST + 1, True, Order.STOP),
+        (60 * S, False, Order.BRAKE),
+        (3600 * S, True, Order.STOP),
+    ],
+)
+def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, order: Order) -> None:
+    over = Lease(over_since_ns=NOW, sent_ns=NOW)
+    assert on_tick(over, NOW + age, LEASE, COAST, standing)[1] is order
+
+
+@pytest.mark.parametrize(("wait", "due"), [(50 * MS - 1, False), (50 * MS, True)])
+def test_stop_goes_out_at_20_hz(wait: int, due: bool) -> None:
+    over = Lease(over_since_ns=NOW, sent_ns=NOW)
+    after, order = on_tick(over, NOW + wait, LEASE, COAST, True)
+    assert (order is Order.STOP) is due
+    assert after.sent_ns == (NOW + wait if due else NOW)
+
+
+def test_a_lease_that_lives_but_is_not_ready_still_stops() -> None:
+    state = replace(ARMED, ready=False, sent_ns=NOW - 50 * MS)
+    assert on_tick(state, NOW, LEASE, COAST, False)[1] is Order.STOP
+
+
+def test_it_says_what_it_waits_for() -> None:
+    assert ARMED.waiting == ""
+    texts = [
+        replace(ARMED, ready=False).waiting,
+        HIT.waiting,
+        replace(ARMED, neutral=False).waiting,
+    ]
+    assert all(texts)
+    assert len(set(texts)) == 3
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "stands"),
+    [
+        (0.0, 0.0, True), (0.0199, 0.0, True), (0.02, 0.0, False), (-0.02, 0.0, False),
+        (0.0, 0.049, True), (0.0, 0.05, False), (0.0, -0.05, False),
+    ],
+)  # fmt: skip
+def test_standing(linear: float, angular: float, stands: bool) -> None:
+    assert leases.standing(linear, angular) is stands
+
+
+motions = st.builds(
+    Motion,
+    command=st.sampled_from(["run", "stop", "brake"]),
+    linear=st.sampled_from([0.0, 0.3, -1.0]),
+    seq=st.integers(0, 20),
+    boot=st.integers(1, 2),
+    judged=st.integers(0, 20),
+    judged_boot=st.sampled_from([OWN_BOOT, 8]),
+)
+events = st.lists(
+    st.one_of(motions, st.booleans(), st.integers(1, 20), st.just("tick")), max_size=40
+)
+
+
+@given(events, st.lists(st.integers(0, 300), min_size=40, max_size=40))
+def test_no_run_without_everything(happening: list[object], waits_ms: list[int]) -> None:
+    """Whatever happens in whatever order: a moving RUN has all its conditions behind it."""
+    lease, now = Lease(over_since_ns=NOW), NOW
+    for event, wait in zip(happening, waits_ms, strict=False):
+        now += wait * MS
+        order: Order | None
+        if isinstance(event, Motion):
+            lease, order, _ = on_motion(lease, event, now, LEASE, OWN_BOOT)
+            if order is Order.RUN and event.linear:
+                assert lease.ready
+                assert lease.neutral
+                assert lease.hit is None
+                assert event.boot == lease.boot
+        elif isinstance(event, bool):
+            lease = on_ready(lease, event)
+        elif isinstance(event, int):
+            lease, order = on_hit(lease, event, now)
+            assert order is Order.BRAKE
+        else:
+            lease, order = on_tick(lease, now, LEASE, COAST, False)
+            assert order is not Order.RUN
+
+
+def test_a_latch_is_remembered_until_it_is_reset_by_who_holds_it() -> None:
+    latched, _, _ = obey(ARMED, replace_message(brake(), latched=True))
+    assert latched.latched_by == 1
+    later = NOW + LEASE + 1
+    started, _, _ = obey(latched, stop(1, boot=2), later)  # has not heard of it yet
+    assert (started.boot, started.latched_by) == (2, 1)
+    taken, _, _ = obey(started, replace_message(brake(2, boot=2), latched=True), later)
+    assert taken.latched_by == 2
+    reset, _, _ = obey(taken, stop(3, boot=2), later)
+    assert reset.latched_by is None
+
+
+def test_the_latch_of_a_second_authority_is_not_taken_in() -> None:
+    lease, _, refusal = obey(ARMED, replace_message(brake(boot=2), latched=True))
+    assert (lease.latched_by, refusal) == (None, Refusal.SECOND_AUTHORITY)

@@ -1,0 +1,48 @@
+"""When the board's counters have started anew."""
+
+import math
+
+import pytest
+
+from common.messages import Mileage
+from services.bridge.mileage import restarted
+
+
+def at(distance: float, degrees: float = 0.0) -> Mileage:
+    return Mileage(distance=distance, heading=math.radians(degrees), epoch=0)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "gap_s", "anew"),
+    [
+        # to zero: sooner than any driving
+        (at(5.0), at(0.0), 0.02, True),
+        (at(-5.0), at(0.0), 0.02, True),
+        (at(0.0, 90.0), at(0.0), 0.02, True),
+        (at(0.0, -179.0), at(0.0), 0.02, True),
+        (at(0.051), at(0.0), 0.02, True),
+        (at(0.049), at(0.0), 0.02, False),
+        (at(0.051), at(0.0051), 0.02, False),
+        (at(0.051), at(0.0, 0.6), 0.02, False),
+        (at(0.0, 3.5), at(0.0), 0.02, True),
+        (at(0.0, 3.4), at(0.0), 0.02, False),
+        # through zero, with samples missing
+        (at(0.3), at(0.0), 0.2, False),
+        (at(0.33), at(0.0), 0.2, True),
+        (at(0.33), at(0.0), 60.0, True),
+        # anywhere: further than the vehicle can have moved
+        (at(5.0), at(5.02), 0.02, False),
+        (at(5.0), at(6.099), 0.02, False),
+        (at(5.0), at(6.101), 0.02, True),
+        (at(5.0), at(6.9), 0.2, False),
+        (at(5.0), at(7.1), 0.2, True),
+        (at(5.0, 0.0), at(5.0, 62.0), 0.02, False),
+        (at(5.0, 0.0), at(5.0, 64.0), 0.02, True),
+        # the wrap is no jump
+        (at(5.0, 179.9), at(5.0, -179.9), 0.02, False),
+        (at(5.0, 180.0), at(5.0, -180.0), 0.02, False),
+        (at(0.0), at(0.0), 0.02, False),
+    ],
+)
+def test_restarted(before: Mileage, after: Mileage, gap_s: float, anew: bool) -> None:
+    assert restarted(before, after, gap_s) is anew

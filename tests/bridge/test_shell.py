@@ -1,0 +1,73 @@
+"""The bridge's shell in this process: a board that starts anew, a network that fails."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from common.config import Sources, load
+from common.service import Node
+from common.settings import Board as Settings
+from common.wire.reports import BumperReport, DistanceReport
+from services.bridge import bridge as shell
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from services.bridge.lease import Lease
+from services.bridge.udp import Sockets
+from tests.bridge.board import Board, board
+
+NOW = 1_000_000_000
+
+
+@pytest.fixture
+def made() -> Iterator[Board]:
+    with board() as made:
+        yield made
+
+
+@pytest.fixture
+def bridge(made: Board) -> Iterator[Bridge]:
+    sets = [f"board.port={made.address[1]}", f"board.listen_ports={made.ports}"]
+    node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
+    bridge = Bridge(node)
+    yield bridge
+    bridge._sockets.close()
+    node.loop.close()
+
+
+def test_a_board_that_starts_anew_disarms_at_once(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bridge._wheels.lease = Lease(boot=1, ready=True, neutral=True, over_since_ns=None)
+    bridge._on_distance(DistanceReport(1000, 0), b"", NOW)
+    assert bridge._wheels.lease.waiting == ""
+    monkeypatch.setattr(shell, "restarted", lambda *_: True)
+    bridge._on_distance(DistanceReport(0, 0), b"", NOW + 1)
+    assert (bridge._wheels.lease.ready, bridge._wheels.lease.neutral) == (False, False)
+
+
+def test_a_short_hit_is_told_until_safety_has_judged_it(bridge: Bridge) -> None:
+    for on in (True, False, False, False, False, False):
+        bridge._on_bumper(BumperReport(on), b"", NOW)
+        assert bridge._to_bumper.last is not None
+        assert bridge._to_bumper.last.pressed
+    bridge._wheels.lease = Lease(boot=1)
+    bridge._on_bumper(BumperReport(False), b"", NOW)
+    assert bridge._to_bumper.last is not None
+    assert not bridge._to_bumper.last.pressed
+
+
+class Broken:
+    """A socket whose network is down."""
+
+    def recvfrom(self, _: int) -> tuple[bytes, tuple[str, int]]:
+        raise OSError(100, "Network is down")
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+def test_a_network_that_fails_is_silence(made: Board) -> None:
+    sockets = Sockets(Settings(port=made.address[1], listen_ports=tuple(made.ports)))
+    sockets.close()
+    sockets.sockets = [Broken()]  # type: ignore[list-item]
+    assert list(sockets.read(0)) == []

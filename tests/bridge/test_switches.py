@@ -1,0 +1,69 @@
+"""The board's emergency brakes: on and echoed."""
+
+import pytest
+
+from common.freshness import S
+from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
+from services.bridge.switches import (
+    AGAIN_NS,
+    ASK_NS,
+    Switches,
+    on_echo,
+    on_request,
+    on_return,
+    on_tick,
+)
+
+BOTH_ON = Switches(ultrasonic=True, bumper=True)
+
+
+def test_a_return_asks_for_both_until_they_echo() -> None:
+    switches, frames = on_tick(on_return(S), S)
+    assert frames == [UltrasonicBrakeSet(True), BumperBrakeSet(True)]
+    assert on_tick(switches, S + ASK_NS - 1)[1] == []
+    switches = on_echo(switches, True, None)
+    switches, frames = on_tick(switches, S + ASK_NS)
+    assert frames == [BumperBrakeSet(True)]
+    assert not switches.verified
+    switches = on_echo(switches, None, True)
+    assert switches.verified
+    assert switches.settled
+    asked = switches.asked_ns or 0
+    assert on_tick(switches, asked + AGAIN_NS - 1)[1] == []
+    assert len(on_tick(switches, asked + AGAIN_NS)[1]) == 2
+
+
+@pytest.mark.parametrize(
+    ("ultrasonic", "bumper", "verified"),
+    [(True, True, True), (True, False, False), (False, True, False), (None, True, False),
+     (True, None, False)],
+)  # fmt: skip
+def test_verified_means_both_on_by_the_boards_own_word(
+    ultrasonic: bool | None, bumper: bool | None, verified: bool
+) -> None:
+    assert Switches(ultrasonic=ultrasonic, bumper=bumper).verified is verified
+
+
+def test_an_operator_may_switch_one_off_but_then_it_is_not_verified() -> None:
+    switches = on_request(BOTH_ON, False, None, S)
+    assert not switches.settled
+    switches, frames = on_tick(switches, S)
+    assert frames == [UltrasonicBrakeSet(False)]
+    switches = on_echo(switches, False, None)
+    assert switches.settled
+    assert not switches.verified
+    assert switches.bumper is True
+
+
+def test_a_request_for_the_bumper_leaves_the_ultrasonic_alone() -> None:
+    switches = on_request(BOTH_ON, None, False, S)
+    assert (switches.want_ultrasonic, switches.want_bumper) == (True, False)
+    assert (switches.ultrasonic, switches.bumper) == (True, None)
+    assert on_tick(switches, S)[1] == [BumperBrakeSet(False)]
+
+
+def test_a_board_that_echoes_the_other_position_is_asked_again() -> None:
+    switches, _ = on_tick(on_return(S), S)
+    switches = on_echo(switches, False, False)
+    assert not switches.settled
+    assert len(on_tick(switches, S + ASK_NS)[1]) == 2
