@@ -1,0 +1,1 @@
+"""Safety: decides what may move the vehicle, and says why not."""

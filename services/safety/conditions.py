@@ -1,0 +1,120 @@
+"""What the inputs show by themselves, before anybody asks to move."""
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+from common.freshness import Latest, fresh
+from common.messages import Driver
+from services.safety.config import Safety
+from services.safety.inputs import Estop, Inputs
+from services.safety.latches import Observation, Token
+
+T = TypeVar("T")
+
+# The bridge needs three clear samples to end a hit, so a hit is at least three samples long: fewer
+# lost ones cannot hide it.
+LOST_SAMPLES = 3
+
+
+def observe_inputs(
+    inputs: Inputs, settings: Safety, judged: Token | None, reader_was_up: bool, now_ns: int
+) -> Iterator[Observation]:
+    """Yield each cause that inputs raise, present or not; ``judged`` is the last bumper sample."""
+    tick = (0, now_ns)
+    yield _contact(inputs, tick)
+    yield Observation("estop", isinstance(inputs.event, Estop), tick)
+    yield Observation("estop_reader", reader_was_up and not inputs.reader, tick)
+    yield _driver("left", inputs.left, tick)
+    yield _driver("right", inputs.right, tick)
+    yield Observation("leaving", inputs.leaving, tick)
+    yield _starting(inputs, tick)
+    yield from _link(inputs, tick)
+    yield _switches(inputs, settings, tick)
+    yield _bumper(inputs, settings, judged, now_ns)
+    yield _silent(inputs, settings, now_ns)
+
+
+def _contact(inputs: Inputs, tick: Token) -> Observation:
+    bumper = inputs.bumper
+    if bumper is None:
+        return Observation("contact", False, tick)
+    sample = bumper.value
+    return Observation("contact", sample.pressed, (sample.boot, sample.seq))
+
+
+def _driver(side: str, latest: Latest[Driver] | None, tick: Token) -> Observation:
+    if latest is None:
+        return Observation(f"driver_{side}", False, tick)
+    sample = latest.value
+    faulty = bool(sample.bits or sample.faults)
+    names = ", ".join(sample.faults) or f"bits {sample.bits:#x}"
+    text = f"The {side} motor driver reports: {names.replace('_', ' ')}."
+    return Observation(f"driver_{side}", faulty, (sample.boot, sample.seq), text)
+
+
+def _starting(inputs: Inputs, tick: Token) -> Observation:
+    needed = {
+        "velocity": inputs.velocity,
+        "ultrasonic": inputs.ultrasonic,
+        "bumper": inputs.bumper,
+        "left driver": inputs.left,
+        "right driver": inputs.right,
+        "switches": inputs.switches,
+        "link": inputs.link,
+    }
+    missing = [name for name, latest in needed.items() if latest is None]
+    if not inputs.reader:
+        missing.append("emergency stop")
+    text = f"Waiting for the first sample of: {', '.join(missing)}."
+    return Observation("starting", bool(missing), tick, text)
+
+
+def _link(inputs: Inputs, tick: Token) -> Iterator[Observation]:
+    if inputs.link is None:
+        return
+    link = inputs.link.value
+    words = {"lost": "The link to the board is lost.", "never": "The board was never heard."}
+    yield Observation("link", link.state != "up", tick, words.get(link.state, ""))
+    text = f"The bridge does not obey yet: {link.waiting or 'it is not armed'}."
+    yield Observation("unarmed", link.state == "up" and not link.armed, tick, text)
+    # The bridge remembers a latch until it hears of it from us, so that none dies with its service.
+    yield Observation("predecessor", link.latched_by not in (None, inputs.boot), tick)
+
+
+def _switches(inputs: Inputs, settings: Safety, tick: Token) -> Observation:
+    if inputs.switches is None or not settings.require_switches:
+        return Observation("switches", False, tick)
+    switches = inputs.switches.value
+    verified = switches.ultrasonic_brake is True and switches.bumper_brake is True
+    return Observation("switches", not verified, tick)
+
+
+def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int) -> Observation:
+    tick = (0, now_ns)
+    if inputs.bumper is None:
+        return Observation("bumper", False, tick)
+    if not fresh(inputs.bumper, now_ns, settings.bumper_age):
+        return Observation("bumper", True, tick, "The bumper is not being read.")
+    boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
+    if judged is not None and boot != judged[0]:
+        return Observation("bumper", True, tick, "The bridge has started anew.")
+    lost = judged is not None and seq - judged[1] > LOST_SAMPLES
+    return Observation("bumper", lost, tick, "Samples of the bumper were lost.")
+
+
+def _silent(inputs: Inputs, settings: Safety, now_ns: int) -> Observation:
+    too_old = {
+        "velocity": _is_old(inputs.velocity, settings.velocity_age, now_ns),
+        "link": _is_old(inputs.link, settings.link_age, now_ns),
+        "switches": _is_old(inputs.switches, settings.switches_age, now_ns),
+        "left driver": _is_old(inputs.left, settings.driver_age, now_ns),
+        "right driver": _is_old(inputs.right, settings.driver_age, now_ns),
+        "a velocity that is a number": inputs.velocity is not None and inputs.measured is None,
+    }
+    old = [name for name, is_old in too_old.items() if is_old]
+    return Observation("silent", bool(old), (0, now_ns), f"Not heard lately: {', '.join(old)}.")
+
+
+def _is_old(latest: Latest[T] | None, age_s: float, now_ns: int) -> bool:
+    """Tell whether a stream that was heard has dried up."""
+    return latest is not None and not fresh(latest, now_ns, age_s)

@@ -1,0 +1,63 @@
+"""What a decision is made from: the newest sample of each stream, and at most one event."""
+
+from dataclasses import dataclass
+
+from common import codec
+from common.freshness import Latest
+from common.messages import Bumper, Drive, Driver, Link, Switches, Ultrasonic, Velocity
+from services.safety.twist import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """A request on a source; None where the payload was none."""
+
+    source: str
+    drive: Drive | None
+
+
+@dataclass(frozen=True, slots=True)
+class Estop:
+    """Someone put or deleted on the estop key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """An operator asks to clear the latches."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """An operator holds the release, or lets go of it."""
+
+    held: bool
+
+
+Event = Ask | Estop | Reset | Hold
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """A snapshot; None for a stream of which nothing has come yet."""
+
+    velocity: Latest[Velocity] | None = None
+    ultrasonic: Latest[Ultrasonic] | None = None
+    bumper: Latest[Bumper] | None = None
+    left: Latest[Driver] | None = None
+    right: Latest[Driver] | None = None
+    switches: Latest[Switches] | None = None
+    link: Latest[Link] | None = None
+    reader: bool = False  # whether the emergency stop's own session has a router
+    leaving: bool = False  # whether this service is on its way out
+    event: Event | None = None
+    boot: int = 0  # this service's own
+
+    @property
+    def measured(self) -> Twist | None:
+        """The newest measured velocity, however old; None when it is no number."""
+        if self.velocity is None:
+            return None
+        velocity = self.velocity.value
+        if not codec.finite(velocity.linear, velocity.angular):
+            return None
+        return Twist(velocity.linear, velocity.angular)

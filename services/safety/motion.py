@@ -1,0 +1,110 @@
+"""From a wish to a twist: limits, zones, ramp, and what of that the operator should know."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from common.messages import SONAR_NAMES
+from common.settings import Vehicle
+from services.safety.causes import wants_neutral
+from services.safety.config import Safety
+from services.safety.latches import Observation
+from services.safety.ramp import ramp, start
+from services.safety.state import RELEASE, State
+from services.safety.twist import STILL, Twist
+from services.safety.zones import zones
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """Who asks for which motion, within the limits."""
+
+    source: str
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What the wish comes down to."""
+
+    twist: Twist = STILL
+    slowed_by: int | None = None  # the sonar that limits the wish
+    blocked_by: int | None = None  # the sonar that leaves no room
+
+
+class Planner:
+    """Turns wishes into twists; holds no state."""
+
+    def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
+        self.zones = zones(vehicle, settings)
+        self.reach = math.hypot(vehicle.length, vehicle.width) / 2  # m, to the body's corners
+        self._settings = settings
+        self._up = Twist(settings.linear_acceleration, settings.angular_acceleration)
+        self._down = Twist(settings.deceleration, settings.angular_deceleration)
+
+    def wish(self, state: State, creeping: bool, now_ns: int) -> Wish | None:
+        """Return the motion that is asked for: the held release before any source."""
+        settings = self._settings
+        if creeping:
+            return Wish(RELEASE, state.release.away(settings.release_speed, self.reach))
+        source = state.arbiter.driver(now_ns)
+        if source is None:
+            return None
+        asked = state.arbiter.channels[source].wish
+        return Wish(source, asked.within(settings.max_linear, settings.max_angular))
+
+    def plan(self, state: State, measured: Twist, wish: Wish, step_s: float) -> Plan:
+        """Return the twist for the next moment; still when the way is blocked."""
+        distances = state.heard.distances
+        limit = self.zones.limit(wish.twist, distances)
+        target = wish.twist.scaled(limit.factor)
+        sent = state.verdict
+        current = sent.twist if sent.command == "run" else start(measured, target)
+        ramped = ramp(current, target, self._up, self._down, step_s)
+        here = self.zones.limit(ramped, distances)
+        for tightest in (limit, here):
+            if tightest.factor == 0:
+                return Plan(blocked_by=tightest.sonar)
+        blocked_by = self.zones.too_fast(measured, distances)
+        if blocked_by is not None:
+            return Plan(blocked_by=blocked_by)
+        return Plan(ramped.scaled(here.factor), limit.sonar)
+
+
+def observations(
+    state: State, wish: Wish | None, plan: Plan, barred: bool, now_ns: int
+) -> Iterator[Observation]:
+    """Yield the causes that depend on a wish, present or not."""
+    tick = (0, now_ns)
+    faults = state.heard.faults
+    creeping = wish is not None and wish.source == RELEASE
+    yield Observation("no_request", wish is None, tick)
+    yield Observation("neutral", _wants_neutral(state, wish), tick)
+    yield Observation("release", creeping and not barred, tick)
+    blocked, slowed = plan.blocked_by, plan.slowed_by
+    yield Observation("blocked", blocked is not None, tick, _blocked(state, blocked))
+    yield Observation("obstacle", slowed is not None, tick, _slowed(state, slowed))
+    yield Observation("sonar", bool(faults), tick, f"Sonar not trusted: {faults}.")
+
+
+def _wants_neutral(state: State, wish: Wish | None) -> bool:
+    """Tell whether the driver has yet to let go; other causes are to be cured first."""
+    if wish is None or wish.source == RELEASE or any(wants_neutral(n) for n in state.latches):
+        return False
+    return not state.arbiter.channels[wish.source].neutral
+
+
+def _blocked(state: State, sonar: int | None) -> str:
+    if sonar is None:
+        return ""
+    name, one = SONAR_NAMES[sonar].replace("_", " "), state.heard.sonars[sonar]
+    if one.fault:
+        return f"No motion toward the {name}: that sonar is {one.fault}."
+    return f"No room toward the {name}: {one.distance:.2f} m."
+
+
+def _slowed(state: State, sonar: int | None) -> str:
+    if sonar is None:
+        return ""
+    distance = state.heard.sonars[sonar].distance
+    return f"Slowed by an obstacle at {distance:.2f} m ({SONAR_NAMES[sonar].replace('_', ' ')})."

@@ -1,0 +1,127 @@
+"""The safety service on the bus: streams in, verdicts out; decides nothing itself."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.bus.calls import Caller
+from common.errors import MessageError
+from common.freshness import Latest
+from common.messages import Done, Drive, Message, ReleaseRequest, ResetRequest
+from common.service import Node
+from services.safety.config import SafetyConfig
+from services.safety.heartbeat import Heartbeat
+from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.policy import Policy
+from services.safety.report import motion_message, notes, signature, state_message
+
+M = TypeVar("M", bound=Message)
+
+DECIDE_S = 1 / 50
+TELL_S = 1 / 20
+BUMPER_DEPTH = 64  # a hit of one sample must not be pushed out, even after a second's stall
+DRIVE_DEPTH = 64
+
+
+class Ports:
+    """Keeps the newest samples, decides on each event, and publishes what comes out."""
+
+    def __init__(self, node: Node[SafetyConfig], reader: Bus) -> None:
+        self._node = node
+        self._reader = reader
+        self._policy = Policy(node.config.safety, node.config.vehicle)
+        # Echoes of an earlier life must be unknown to this one.
+        heartbeat = Heartbeat(node.bus.boot % 2**31)
+        self._state = replace(self._policy.start(), heartbeat=heartbeat)
+        self._inputs = Inputs(boot=node.bus.boot)
+        self._motion = node.bus.publisher(keys.MOTION)
+        self._safety = node.bus.publisher(keys.SAFETY)
+        self._listen()
+        node.at_rest = self._come_to_rest
+        node.loop.every(DECIDE_S, lambda _: self._decide())
+        node.loop.every(TELL_S, self._tell)
+
+    def _listen(self) -> None:
+        bus, robot = self._node.bus, self._node.config.robot.id
+        bus.subscribe(keys.VELOCITY, self._keep("velocity"))
+        bus.subscribe(keys.ULTRASONIC, self._keep("ultrasonic", at_once=True))
+        bus.subscribe(keys.BUMPER, self._keep("bumper", at_once=True), depth=BUMPER_DEPTH)
+        bus.subscribe(keys.DRIVER, self._keep("left"), side="left")
+        bus.subscribe(keys.DRIVER, self._keep("right"), side="right")
+        bus.subscribe(keys.SWITCHES, self._keep("switches"))
+        bus.subscribe(keys.LINK, self._keep("link"))
+        bus.subscribe(
+            keys.DRIVE, self._ask, depth=DRIVE_DEPTH, refused=self._no_request, source="*"
+        )
+        bus.serve(keys.RESET, self._reset)
+        bus.serve(keys.RELEASE, self._hold)
+        self._reader.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
+
+    def _keep(self, field: str, *, at_once: bool = False) -> Callable[[Arrival[M]], None]:
+        """Return a handler that keeps the newest sample in the inputs' field of that name."""
+
+        def take(arrival: Arrival[M]) -> None:
+            latest = Latest(arrival.message, arrival.received_ns)
+            self._inputs = replace(self._inputs, **{field: latest})  # type: ignore[arg-type]
+            if at_once:
+                self._decide()
+
+        return take
+
+    def _ask(self, arrival: Arrival[Drive]) -> None:
+        self._decide(Ask(source_of(arrival.key), arrival.message))
+
+    def _no_request(self, key: str, _: MessageError) -> None:
+        self._decide(Ask(source_of(key), None))
+
+    def _reset(self, _: ResetRequest, caller: Caller[Done]) -> None:
+        self._decide(Reset(), self._answerer(caller))
+
+    def _hold(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
+        self._decide(Hold(request.held), self._answerer(caller))
+
+    def _answerer(self, caller: Caller[Done]) -> Callable[[bool, str], None]:
+        def answer(done: bool, text: str) -> None:
+            if done:
+                caller.reply(Done(text=text))
+            else:
+                caller.refuse(text)
+
+        return answer
+
+    def _decide(
+        self, event: Event | None = None, answer: Callable[[bool, str], None] | None = None
+    ) -> None:
+        now_ns = time.monotonic_ns()
+        inputs = replace(self._inputs, reader=self._reader.connected, event=event)
+        before = self._state
+        self._state, verdict = self._policy.decide(before, inputs, now_ns)
+        self._motion.put(motion_message(self._state))
+        if verdict.refused:
+            self._node.counters[f"refused_{verdict.refused}"] += 1
+        if answer and verdict.reply:
+            answer(verdict.reply.done, verdict.reply.text)
+        if signature(before) != signature(self._state):
+            self._tell(now_ns)
+        for note in notes(before, self._state, event):
+            self._node.event(note.name, note.level, note.text, **note.about)
+
+    def _tell(self, now_ns: int) -> None:
+        self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))
+        self._safety.put(state_message(self._policy, self._state, now_ns))
+
+    def _come_to_rest(self) -> bool:
+        """Stop the vehicle before the service ends; an unknown speed is not waited for."""
+        if not self._inputs.leaving:
+            self._inputs = replace(self._inputs, leaving=True)
+            self._decide()
+        measured = self._inputs.measured
+        return measured is None or measured.is_standing
+
+
+def source_of(key: str) -> str:
+    """Return the source in a key ``.../@cmd/drive/{source}``."""
+    return key.rsplit("/", 1)[-1]

@@ -1,0 +1,137 @@
+"""What is told: the state for everybody, in words too, and the transitions as events."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from common.freshness import S
+from common.messages import Cause, Level, Limits, Motion, SafetyState
+from services.safety.causes import BY_NAME
+from services.safety.inputs import Event as Trigger
+from services.safety.inputs import Hold, Reset
+from services.safety.latches import GOOD_SAMPLES, latched, ordered
+from services.safety.policy import Policy
+from services.safety.state import State
+from services.safety.twist import Twist
+
+MOVING = ("run", "slow")
+# What operators know a cause by, where its own name is too fine.
+EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """One transition, worth an event."""
+
+    name: str
+    level: Level
+    text: str
+    about: dict[str, str | None]
+
+
+def motion_message(state: State) -> Motion:
+    """Return what the bridge is told."""
+    verdict = state.verdict
+    return Motion(
+        command=verdict.command,
+        linear=verdict.twist.linear,
+        angular=verdict.twist.angular,
+        source=verdict.source,
+        judged=verdict.judged[1],
+        judged_boot=verdict.judged[0],
+        latched=bool(latched(state.latches)),
+    )
+
+
+def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
+    """Return what everybody is told; the heartbeat is the one that the state has."""
+    causes = tuple(
+        Cause(
+            name=name,
+            action=BY_NAME[name].action,
+            age=(now_ns - state.latches[name].since_ns) / S,
+            text=state.latches[name].text,
+        )
+        for name in ordered(state.latches)
+    )
+    return SafetyState(
+        verdict=state.verdict.name,
+        latched=latched(state.latches),
+        causes=causes,
+        source=state.verdict.source,
+        limits=_limits(policy, state),
+        heartbeat=state.heartbeat.number,
+        text=sentence(state),
+    )
+
+
+def sentence(state: State) -> str:
+    """Say why the vehicle does or does not move."""
+    names = ordered(state.latches)
+    if state.verdict.command == "run":
+        who = f"Driving as {state.verdict.source} asks."
+        slowing = [state.latches[n].text for n in names if BY_NAME[n].action == "slow"]
+        return " ".join([*slowing[:1], who])
+    worst = names[0]
+    text = state.latches[worst].text
+    if worst not in latched(state.latches):
+        return text
+    gone = state.latches[worst].good >= GOOD_SAMPLES
+    return f"{text} {'Reset to go on.' if gone else 'It is not gone yet.'}"
+
+
+def signature(state: State) -> tuple[object, ...]:
+    """Return what must be told at once when it changes."""
+    return state.verdict.name, ordered(state.latches), state.verdict.source
+
+
+def notes(before: State, after: State, trigger: Trigger | None) -> Iterator[Note]:
+    """Yield the transitions of one decision."""
+    old, new = before.verdict, after.verdict
+    for name in latched(after.latches):
+        if name not in before.latches:
+            text = after.latches[name].text
+            yield Note(EVENT_NAMES.get(name, name), "error", text, {"cause": name})
+    if old.name in MOVING and new.name not in MOVING:
+        worst = ordered(after.latches)[0]
+        level: Level = "info" if worst in ("no_request", "neutral") else "warning"
+        yield Note("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
+    if old.source != new.source:
+        yield Note("source", "info", _handover(new.source), {"from": old.source, "to": new.source})
+    if ("release" in before.latches) != ("release" in after.latches):
+        began = "release" in after.latches
+        text = "Creeping off the bumper." if began else "No longer creeping off the bumper."
+        yield Note("release" if began else "release_end", "warning", text, {})
+    yield from _answered(after, trigger)
+
+
+def _answered(after: State, trigger: Trigger | None) -> Iterator[Note]:
+    reply = after.verdict.reply
+    if reply is None:
+        return
+    if isinstance(trigger, Reset):
+        yield Note(
+            "reset" if reply.done else "reset_refused",
+            "info" if reply.done else "warning",
+            reply.text,
+            {},
+        )
+    elif isinstance(trigger, Hold) and not reply.done:
+        yield Note("release_refused", "warning", reply.text, {})
+
+
+def _handover(source: str | None) -> str:
+    return f"{source} drives." if source else "Nobody drives."
+
+
+def _limits(policy: Policy, state: State) -> Limits:
+    linear, angular = policy.settings.max_linear, policy.settings.max_angular
+    distances = state.heard.distances
+
+    def most(twist: Twist) -> float:
+        return policy.planner.zones.limit(twist, distances).factor
+
+    return Limits(
+        forward=linear * most(Twist(linear)),
+        backward=linear * most(Twist(-linear)),
+        angular=angular * min(most(Twist(0.0, angular)), most(Twist(0.0, -angular))),
+    )

@@ -1,0 +1,55 @@
+"""What safety remembers from one decision to the next, and what a decision is."""
+
+from dataclasses import dataclass, field
+
+from common.messages import Command
+from common.messages import Verdict as VerdictName
+from services.safety.arbiter import Arbiter
+from services.safety.ears import Heard
+from services.safety.flapping import Credit
+from services.safety.heartbeat import Heartbeat
+from services.safety.latches import Latches, Token
+from services.safety.release import Release
+from services.safety.runaway import Axis
+from services.safety.twist import STILL, Twist
+
+RELEASE = "release"  # stands where a source stands while the vehicle creeps off its bumper
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What a reset or a release is answered."""
+
+    done: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the bridge is told, and what became of the event that came with the inputs."""
+
+    name: VerdictName = "inhibited"
+    command: Command = "stop"
+    twist: Twist = STILL  # still unless the command is to run
+    source: str | None = None  # who drives, or would if safety let it
+    judged: Token = (0, 0)  # boot and seq of the newest bumper sample that was judged
+    reply: Reply | None = None  # to a reset or a hold
+    refused: str = ""  # why the request was refused, by the names in ``arbiter.py``
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything that decisions depend on besides the inputs."""
+
+    arbiter: Arbiter
+    heartbeat: Heartbeat = field(default_factory=Heartbeat)
+    latches: Latches = field(default_factory=dict)
+    heard: Heard = field(default_factory=Heard)
+    linear: Axis = field(default_factory=Axis)
+    angular: Axis = field(default_factory=Axis)
+    credit: Credit = field(default_factory=Credit)
+    release: Release = field(default_factory=Release)
+    moved: Twist | None = None  # the last measured velocity that was a motion
+    reader_was_up: bool = False
+    decided_ns: int | None = None
+    verdict: Verdict = field(default_factory=Verdict)

@@ -1,0 +1,92 @@
+"""How fast the vehicle may move, by what its sonars see.
+
+Toward a reading d the vehicle may do the v for which reacting and stopping takes the room there is:
+
+    v * t_react + v^2 / (2 a) = d - margin
+
+A sonar sits at (x, y) and looks along its yaw. Under a twist (v, w) that point moves with
+(v - w*y, w*x); the part along the axis is the speed of approach. The sonars on the flanks move
+across their axis, but the corners swing out to both sides when the vehicle turns, so these
+sonars limit |w| * length / 2 as well. A twist that is too fast anywhere is scaled down as a whole:
+the curve stays. No approach, no limit: the way out stays open.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from common.settings import Vehicle
+from common.vehicle import Mount, sonar_mounts
+from services.safety.config import Safety
+from services.safety.twist import Twist
+
+GRAZING_MPS = 1e-6  # less is rounding: cos(90 deg) is no zero in floating point
+MEASURED_EXCESS_MPS = 0.2  # what lag and noise may put on top of the allowed speed
+MEASURED_CREEP_MPS = 0.05  # inside the margin
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """The tightest limit on a twist, and the sonar that sets it (None for no limit)."""
+
+    factor: float  # 0..1, to scale the twist with
+    sonar: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Zones:
+    """The field around one vehicle; distances are in the manual's order of sonars."""
+
+    mounts: tuple[Mount, ...]
+    corner: float  # m from the middle to the bumpers
+    margin: float  # m
+    react: float  # s
+    deceleration: float  # m/s^2
+
+    def allowed(self, distance: float) -> float:
+        """Return the speed (m/s) at which it can still stop short of the margin."""
+        if distance <= self.margin:
+            return 0.0
+        lag = self.deceleration * self.react
+        return math.sqrt(lag * lag + 2 * self.deceleration * (distance - self.margin)) - lag
+
+    def approach(self, sonar: int, twist: Twist) -> float:
+        """Return how fast (m/s) the vehicle closes in on what this sonar sees."""
+        mount = self.mounts[sonar]
+        across = twist.linear - twist.angular * mount.y, twist.angular * mount.x
+        along = across[0] * math.cos(mount.yaw) + across[1] * math.sin(mount.yaw)
+        if mount.name in ("left", "right"):
+            return max(along, abs(twist.angular) * self.corner)
+        return along
+
+    def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
+        """Return how far the twist must be slowed; a factor of 0 is a blocked way."""
+        tightest = Limit(1.0)
+        for sonar, distance in enumerate(distances):
+            speed = self.approach(sonar, twist)
+            if speed <= GRAZING_MPS:
+                continue
+            factor = self.allowed(distance) / speed
+            if factor < tightest.factor:
+                tightest = Limit(factor, sonar)
+        return tightest
+
+    def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
+        """Return the sonar toward which the vehicle really moves too fast, if any."""
+        for sonar, distance in enumerate(distances):
+            allowed = self.allowed(distance)
+            bound = allowed + MEASURED_EXCESS_MPS if allowed else MEASURED_CREEP_MPS
+            if self.approach(sonar, measured) > bound:
+                return sonar
+        return None
+
+
+def zones(vehicle: Vehicle, settings: Safety) -> Zones:
+    """Return the zones of this vehicle with these settings."""
+    return Zones(
+        mounts=sonar_mounts(vehicle),
+        corner=vehicle.length / 2,
+        margin=settings.margin,
+        react=settings.react,
+        deceleration=settings.deceleration,
+    )

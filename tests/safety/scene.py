@@ -1,0 +1,175 @@
+"""A bridge, a driver and a clock for the policy, without a bus: time passes only here."""
+
+from dataclasses import replace
+
+import msgspec
+
+from common.freshness import Latest, S
+from common.messages import (
+    SONAR_NAMES,
+    Bumper,
+    Drive,
+    Driver,
+    Link,
+    Message,
+    RangeStatus,
+    Switches,
+    Ultrasonic,
+    Velocity,
+)
+from common.settings import Vehicle
+from services.safety.config import Safety
+from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.policy import Policy
+from services.safety.state import Verdict
+
+TICK_S = 0.02
+FREE: tuple[float | None, ...] = (None,) * 8
+NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
+
+
+def link(state: str = "up", armed: bool = True) -> Link:
+    return Link(
+        state=state,  # type: ignore[arg-type]
+        board="127.0.0.1:4003",
+        epoch=0,
+        armed=armed,
+        waiting="" if armed else "a neutral motion from safety is due",
+        rates={},
+        rejected={},
+        round_trip=None,
+    )
+
+
+class Scene:
+    """All streams come at every tick unless they are muted; the vehicle moves as commanded."""
+
+    def __init__(self, settings: Safety | None = None) -> None:
+        self.policy = Policy(settings or Safety(), Vehicle())
+        self.state = self.policy.start()
+        self.now_ns = 10 * S
+        self.inputs = Inputs()
+        self.verdict = Verdict()
+        self.muted: set[str] = set()
+        self.boot, self.seq = 7, 0
+        self.driver_boot, self.driver_seq = 99, 0
+        self.pressed = False
+        self.ranges, self.status = FREE, NO_ECHO
+        self.linear: float | None = None  # measured; None follows the command
+        self.angular: float | None = None
+        self.left_bits, self.right_bits = 0, 0
+        self.switches = Switches(ultrasonic_brake=True, bumper_brake=True)
+        self.link = link()
+        self.reader = True
+        self.decide()  # a service decides before anything has come
+
+    def decide(self, event: Event | None = None) -> Verdict:
+        inputs = replace(self.inputs, reader=self.reader, event=event)
+        self.state, self.verdict = self.policy.decide(self.state, inputs, self.now_ns)
+        return self.verdict
+
+    def feed(self) -> None:
+        """Let one sample of every stream that is not muted come in."""
+        self.seq += 1
+        sent = self.verdict.twist
+        linear = sent.linear if self.linear is None else self.linear
+        angular = sent.angular if self.angular is None else self.angular
+        samples: dict[str, Message] = {
+            "velocity": Velocity(linear=linear, angular=angular),
+            "ultrasonic": Ultrasonic(ranges=self.ranges, status=self.status),
+            "bumper": Bumper(pressed=self.pressed),
+            "left": Driver(faults=(), bits=self.left_bits),
+            "right": Driver(faults=(), bits=self.right_bits),
+            "switches": self.switches,
+            "link": self.link,
+        }
+        for name, sample in samples.items():
+            if name not in self.muted:
+                self.put(name, sample)
+
+    def put(self, name: str, sample: Message) -> None:
+        stamped = msgspec.structs.replace(sample, seq=self.seq, boot=self.boot)
+        latest = Latest(stamped, self.now_ns)
+        self.inputs = replace(self.inputs, **{name: latest})  # type: ignore[arg-type]
+
+    def tick(self, ticks: int = 1) -> Verdict:
+        """Let time pass, with samples."""
+        for _ in range(ticks):
+            self.now_ns += round(TICK_S * S)
+            self.feed()
+            self.state = replace(self.state, heartbeat=self.state.heartbeat.beat(self.now_ns))
+            self.decide()
+        return self.verdict
+
+    def ask(self, linear: float = 0.0, angular: float = 0.0, source: str = "teleop") -> Verdict:
+        """Put one request."""
+        self.driver_seq += 1
+        drive = Drive(
+            linear=linear,
+            angular=angular,
+            echo=self.state.heartbeat.number,
+            seq=self.driver_seq,
+            boot=self.driver_boot,
+        )
+        return self.decide(Ask(source, drive))
+
+    def drive(
+        self,
+        linear: float = 0.0,
+        angular: float = 0.0,
+        seconds: float = 0.2,
+        source: str = "teleop",
+    ) -> Verdict:
+        """Ask the same at every tick for a while."""
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+            self.ask(linear, angular, source)
+        return self.verdict
+
+    def ready(self) -> "Scene":
+        """Come up and let the driver be neutral."""
+        self.tick(40)
+        self.drive()
+        assert self.verdict.command == "run", self.state.latches
+        return self
+
+    def running(self, linear: float = 0.5, angular: float = 0.0) -> "Scene":
+        """Come up and drive."""
+        self.ready().drive(linear, angular, 2.0)
+        assert self.verdict.command == "run", self.state.latches
+        return self
+
+    def reset(self) -> str:
+        """Ask for a reset; return the reason of its refusal."""
+        reply = self.decide(Reset()).reply
+        assert reply
+        return "" if reply.done else reply.text
+
+    def hold(self, held: bool = True) -> str:
+        """Hold the release; return the reason of its refusal."""
+        reply = self.decide(Hold(held)).reply
+        assert reply
+        return "" if reply.done else reply.text
+
+    def estop(self) -> Verdict:
+        return self.decide(Estop())
+
+    def sonar(self, **distances: float | None) -> None:
+        """Set readings by the sonar's name; None is a fault."""
+        ranges, status = list(self.ranges), list(self.status)
+        for name, distance in distances.items():
+            n = SONAR_NAMES.index(name)
+            ranges[n] = distance
+            status[n] = "ok" if distance is not None else "fault"
+        self.ranges, self.status = tuple(ranges), tuple(status)
+
+
+def hit() -> Scene:
+    """Drive forward into something and stand there, pressed."""
+    scene = Scene().running()
+    scene.pressed = True
+    scene.tick()
+    scene.linear = 0.0
+    scene.tick(40)
+    scene.linear = None
+    return scene

@@ -1,0 +1,126 @@
+"""Each reason to refuse a request, who drives, and who is armed."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.freshness import S
+from common.messages import Drive
+from services.safety.arbiter import RIVAL_NS, Arbiter
+from services.safety.config import Safety
+from services.safety.heartbeat import Heartbeat
+from services.safety.inputs import Ask
+from services.safety.twist import Twist
+
+SOURCES = Safety().sources
+AGE_NS = 400_000_000
+BEAT = Heartbeat(40).beat(0)  # sent 41 at time 0
+
+
+def ask(
+    arbiter: Arbiter,
+    now_ns: int,
+    *,
+    source: str = "teleop",
+    seq: int = 1,
+    boot: int = 1,
+    linear: float = 0.0,
+    echo: int = 41,
+) -> tuple[Arbiter, str]:
+    drive = Drive(linear=linear, angular=0.0, echo=echo, seq=seq, boot=boot)
+    return arbiter.take(Ask(source, drive), BEAT, AGE_NS, now_ns)
+
+
+def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: float = 0.0) -> Arbiter:
+    arbiter, refused = ask(arbiter, now_ns, source=source, linear=linear)
+    assert refused == ""
+    return arbiter
+
+
+@pytest.mark.parametrize("linear", [math.nan, math.inf, -math.inf])
+def test_no_number_no_motion(linear: float) -> None:
+    assert ask(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
+    wrong = Drive(linear=0.0, angular=linear, echo=41)
+    assert Arbiter(SOURCES).take(Ask("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
+
+
+@pytest.mark.parametrize(
+    ("echo", "now_ns", "reason"),
+    [
+        (41, 0, ""),
+        (41, AGE_NS, ""),
+        (41, AGE_NS + 1, "late"),
+        (40, 0, "late"),
+        (42, 0, "late"),
+    ],
+)
+def test_a_late_or_unknown_echo_is_refused(echo: int, now_ns: int, reason: str) -> None:
+    assert ask(Arbiter(SOURCES), now_ns, echo=echo)[1] == reason
+
+
+@pytest.mark.parametrize(("seq", "reason"), [(4, "seq_not_rising"), (5, "seq_not_rising"), (6, "")])
+def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
+    arbiter, _ = ask(Arbiter(SOURCES), 0, seq=5)
+    assert ask(arbiter, 1, seq=seq)[1] == reason
+
+
+def test_unknown_sources_and_nonsense_are_refused() -> None:
+    assert ask(Arbiter(SOURCES), 0, source="nobody") == (Arbiter(SOURCES), "unknown_source")
+    assert Arbiter(SOURCES).take(Ask("web", None), BEAT, AGE_NS, 0)[1] == "not_a_request"
+
+
+def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
+    lease_ns = round(SOURCES["teleop"].lease * S)
+    arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
+    refused, reason = ask(arbiter, lease_ns, boot=2)
+    assert reason == "second_publisher"
+    assert refused.rivals(lease_ns + RIVAL_NS - 1) == "teleop"
+    assert refused.rivals(lease_ns + RIVAL_NS) == ""
+    taken, reason = ask(arbiter, lease_ns + 1, boot=2)
+    assert reason == ""
+    assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
+
+
+def test_an_absent_driver_is_none() -> None:
+    assert Arbiter(SOURCES).driver(0) is None
+    assert Arbiter(SOURCES).rivals(0) == ""
+
+
+def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
+    arbiter = accepted(accepted(Arbiter(SOURCES), 0), 0, "web", 0.5)
+    arbiter = arbiter.armed(0)
+    assert arbiter.channels["teleop"].neutral
+    assert not arbiter.channels["web"].neutral
+    arbiter = arbiter.disarmed()
+    assert not arbiter.channels["teleop"].neutral
+    assert not arbiter.armed(S).channels["teleop"].neutral
+    assert arbiter.asks_to_move(0)
+    assert not arbiter.asks_to_move(S)
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([*SOURCES, "nobody"]), st.integers(0, 400), st.floats(-1, 1)),
+        max_size=30,
+    )
+)
+def test_the_best_fresh_source_drives_whatever_comes(
+    asked: list[tuple[str, int, float]],
+) -> None:
+    arbiter, last, now_ns = Arbiter(SOURCES), {}, 0
+    beat = Heartbeat()
+    for seq, (source, pause_ms, linear) in enumerate(asked, start=1):
+        now_ns += pause_ms * 1_000_000
+        beat = beat.beat(now_ns)
+        drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
+        arbiter, refused = arbiter.take(Ask(source, drive), beat, AGE_NS, now_ns)
+        assert refused == ("" if source in SOURCES else "unknown_source")
+        if not refused:
+            last[source] = (now_ns, linear)
+        fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * S]
+        best = max(fresh, key=lambda n: SOURCES[n].priority, default=None)
+        assert arbiter.driver(now_ns) == best
+        if best:
+            assert arbiter.channels[best].wish == Twist(last[best][1], 0.0)

@@ -1,0 +1,66 @@
+"""Settings: the file is the defaults, and a protection is not taken away by accident."""
+
+import msgspec
+import pytest
+
+from common.config import Sources, load
+from common.errors import ConfigError
+from services.safety.config import PROTECTIVE, Safety, SafetyConfig, Source
+
+
+def read(*sets: str) -> Safety:
+    return load(SafetyConfig, Sources(environ={}, sets=sets)).config.safety
+
+
+def test_the_file_holds_the_defaults() -> None:
+    assert read() == Safety()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("margin", 0.04),
+        ("margin", 0.0),
+        ("react", 0.09),
+        ("max_linear", 1.51),
+        ("bumper_age", 0.26),
+        ("settle", 0.09),
+        ("release_speed", 0.2),
+        ("runaway_time", 2.0),
+        ("require_switches", False),
+        ("sources.nav.lease", 0.51),
+    ],
+)
+def test_what_takes_a_protection_away_must_be_owned_up_to(name: str, value: object) -> None:
+    given = f"safety.{name}={str(value).lower()}"
+    with pytest.raises(ConfigError, match=f"{name} = .* or name it in i_accept"):
+        read(given)
+    assert read(given, f"safety.i_accept={name}").i_accept == (name,)
+
+
+@pytest.mark.parametrize("name", ["bumper_age", "settle", "max_linear", "sources.teleop.lease"])
+def test_zero_never_means_off(name: str) -> None:
+    with pytest.raises(ConfigError, match=name.split(".")[0]):
+        read(f"safety.{name}=0", f"safety.i_accept={name}")
+
+
+def test_only_protections_can_be_given_up() -> None:
+    with pytest.raises(ConfigError, match="i_accept names 'hysteresis'"):
+        read("safety.i_accept=hysteresis")
+
+
+def test_priorities_are_unique() -> None:
+    with pytest.raises(ConfigError, match="different priorities"):
+        read("safety.sources.web.priority=30")
+    assert read("safety.sources.web.priority=5").sources["web"] == Source(priority=5, lease=0.3)
+
+
+def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
+    with pytest.raises(ConfigError, match=r"sonar_max 1.2 m is too near: .* in 1.28 m"):
+        read("vehicle.sonar_max=1.2")
+    assert read("vehicle.sonar_max=1.2", "safety.max_linear=0.9").max_linear == 0.9
+
+
+def test_every_protection_is_a_setting_and_its_default_is_allowed() -> None:
+    defaults = msgspec.structs.asdict(Safety())
+    assert all(low <= defaults[name] <= high for name, (low, high) in PROTECTIVE.items())

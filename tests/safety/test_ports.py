@@ -1,0 +1,187 @@
+"""The shell in this process: what goes in and what comes out of one loop."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+import zenoh
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.bus.session import client_config
+from common.config import Sources, load
+from common.loop import Loop
+from common.messages import (
+    Bumper,
+    Drive,
+    Motion,
+    ReleaseRequest,
+    ResetRequest,
+    SafetyState,
+    Velocity,
+)
+from common.service import Node
+from services.safety import __main__ as program
+from services.safety.config import SafetyConfig
+from services.safety.ports import Ports, source_of
+from tests.support import bus_on, running, wait_until
+
+
+def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
+    sources = Sources(environ={}, sets=[f"bus.connect={endpoint}", *sets])
+    return Node("safety", load(SafetyConfig, sources))
+
+
+@contextlib.contextmanager
+def safety_on(endpoint: str) -> Iterator[Node[SafetyConfig]]:
+    node = make_node(endpoint)
+    reader = node.open_bus()
+    Ports(node, reader)
+    with running(node.loop):
+        for bus in (node.bus, reader):
+            bus.open()
+        wait_until(lambda: node.bus.connected and reader.connected, "both sessions")
+        yield node
+        for bus in (reader, node.bus):
+            bus.close()
+
+
+@dataclass
+class Seen:
+    motions: list[Motion] = field(default_factory=list)
+    states: list[SafetyState] = field(default_factory=list)
+    answers: list[str] = field(default_factory=list)
+
+    def watch(self, bus: Bus) -> None:
+        bus.subscribe(keys.MOTION, self._motion, depth=64)
+        bus.subscribe(keys.SAFETY, self._state, depth=64)
+
+    def _motion(self, arrival: Arrival[Motion]) -> None:
+        self.motions.append(arrival.message)
+
+    def _state(self, arrival: Arrival[SafetyState]) -> None:
+        self.states.append(arrival.message)
+
+
+def repeat_until(do: Callable[[], object], true: Callable[[], object], what: str) -> None:
+    """Do it again and again: samples right after a declaration may be lost."""
+
+    def tried() -> object:
+        do()
+        return true()
+
+    wait_until(tried, what)
+
+
+def test_stop_is_published_from_the_beginning_and_the_heartbeat_rises(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with running(loop), safety_on(endpoint), bus_on(endpoint, loop, seen.watch):
+        wait_until(lambda: len(seen.motions) > 20 and len(seen.states) > 5, "a stream of both")
+    assert "run" not in {motion.command for motion in seen.motions}
+    beats = [state.heartbeat for state in seen.states]
+    assert beats == sorted(set(beats))
+    assert seen.states[0].text  # in words, whatever the reason is
+
+
+def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch) as bus,
+    ):
+        bumper, velocity = bus.publisher(keys.BUMPER), bus.publisher(keys.VELOCITY)
+        repeat_until(
+            lambda: (
+                velocity.put(Velocity(linear=0.0, angular=0.0)),
+                bumper.put(Bumper(pressed=True)),
+            ),
+            lambda: seen.motions and seen.motions[-1].command == "brake",
+            "the brake",
+        )
+        assert seen.motions[-1].judged_boot == bus.boot
+        for held in (True, False):
+            bus.ask(
+                keys.RELEASE,
+                ReleaseRequest(held=held),
+                lambda done: seen.answers.append(done.text),
+                seen.answers.append,
+            )
+        bus.ask(
+            keys.RESET,
+            ResetRequest(),
+            lambda done: seen.answers.append(done.text),
+            seen.answers.append,
+        )
+        wait_until(lambda: len(seen.answers) == 3, "three answers")
+        assert "Let go." in seen.answers
+        assert any("Not gone yet" in text for text in seen.answers)
+        wait_until(node.at_rest, "rest")
+        wait_until(
+            lambda: any(c.name == "leaving" for state in seen.states[-1:] for c in state.causes),
+            "leaving",
+        )
+
+
+def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch) as bus,
+        zenoh.open(client_config([endpoint])) as session,
+    ):
+        drive, other = (bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
+        key = keys.DRIVE.on("001", source="demo")
+        wanted = {"refused_late", "refused_unknown_source", "refused_not_a_request"}
+        repeat_until(
+            lambda: (
+                drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+                other.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+                session.put(key, b"\xc1"),
+                session.delete(key),
+            ),
+            lambda: wanted <= set(node.counters),
+            "every reason",
+        )
+
+
+def test_an_estop_by_delete_latches(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint),
+        bus_on(endpoint, loop, seen.watch),
+        zenoh.open(client_config([endpoint])) as session,
+    ):
+        repeat_until(
+            lambda: session.delete("t2/v1/001/estop"),
+            lambda: seen.states and "estop" in seen.states[-1].latched,
+            "a latched emergency stop",
+        )
+
+
+def test_the_source_is_the_last_part_of_the_key() -> None:
+    assert source_of(keys.DRIVE.on("001", source="nav")) == "nav"
+
+
+def test_the_program_opens_a_reader_and_closes_it(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Bus] = []
+
+    def run(
+        name: str, root: object, build: Callable[[Node[SafetyConfig]], None], argv: object
+    ) -> int:
+        node = make_node(endpoint, "safety.margin=0.0", 'safety.i_accept=["margin"]')
+        opened.append(node.open_bus())
+        monkeypatch.setattr(node, "open_bus", lambda: opened[0])
+        build(node)
+        with running(node.loop):
+            wait_until(lambda: opened[0].connected, "the reader")
+        return 5
+
+    monkeypatch.setattr(program, "run", run)
+    assert program.main([]) == 5
+    assert not opened[0].connected

@@ -1,0 +1,48 @@
+"""A latch outlives the service that holds it: the bridge remembers it, the next one takes it on."""
+
+from dataclasses import replace
+
+from msgspec.structs import replace as with_fields
+
+from services.safety.latches import latched
+from services.safety.report import motion_message
+from tests.safety.scene import Scene
+
+OLD, OWN = 5, 6
+
+
+def successor(latched_by: int | None) -> Scene:
+    """Start a service beside a bridge that remembers this."""
+    scene = Scene()
+    scene.inputs = replace(scene.inputs, boot=OWN)
+    scene.link = with_fields(scene.link, latched_by=latched_by)
+    return scene
+
+
+def test_a_latch_is_told_until_it_is_reset() -> None:
+    scene = Scene().running()
+    assert not motion_message(scene.state).latched
+    scene.estop()
+    assert motion_message(scene.state).latched
+    scene.drive(0.0, seconds=1.0)
+    assert scene.reset() == ""
+    assert not motion_message(scene.state).latched
+
+
+def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
+    scene = successor(latched_by=OLD)
+    scene.tick(100)
+    scene.drive(0.0)
+    assert scene.drive(0.5, seconds=1.0).command == "brake"
+    assert latched(scene.state.latches) == ("predecessor",)
+    assert scene.reset() == "Not gone yet: Safety started anew with a reset still due."
+    scene.link = with_fields(scene.link, latched_by=OWN)  # the bridge has heard of it from us
+    scene.tick(100)
+    assert scene.reset() == ""
+    scene.link = with_fields(scene.link, latched_by=None)
+    scene.drive(0.0)
+    assert scene.drive(0.5).command == "run"
+
+
+def test_without_a_latch_a_successor_needs_no_reset() -> None:
+    successor(latched_by=None).ready()

@@ -1,0 +1,112 @@
+"""What is told: sentences, causes, limits, and events on transitions only."""
+
+import pytest
+
+from services.safety.inputs import Estop, Event, Hold, Reset
+from services.safety.report import (
+    motion_message,
+    notes,
+    sentence,
+    signature,
+    state_message,
+)
+from tests.safety.scene import Scene, hit
+
+
+def noted(scene: Scene, event: Event | None = None) -> list[str]:
+    before = scene.state
+    scene.decide(event)
+    return [note.name for note in notes(before, scene.state, event)]
+
+
+def ticked(scene: Scene) -> list[str]:
+    before = scene.state
+    scene.tick()
+    return [note.name for note in notes(before, scene.state, None)]
+
+
+def test_the_state_tells_verdict_causes_and_limits() -> None:
+    scene = Scene().running()
+    scene.sonar(front=1.0)
+    scene.drive(1.0)
+    state = state_message(scene.policy, scene.state, scene.now_ns + 500_000_000)
+    assert (state.verdict, state.source, state.latched) == ("slow", "teleop", ())
+    assert [cause.name for cause in state.causes] == ["obstacle"]
+    assert state.causes[0].age >= 0.5
+    assert state.limits.forward == pytest.approx(scene.policy.planner.zones.allowed(1.0))
+    assert (state.limits.backward, state.limits.angular) == (1.0, 1.0)
+    assert state.heartbeat == scene.state.heartbeat.number
+
+
+def test_the_motion_tells_what_was_judged() -> None:
+    scene = Scene().running()
+    motion = motion_message(scene.state)
+    assert (motion.command, motion.source) == ("run", "teleop")
+    assert motion.linear == pytest.approx(scene.verdict.twist.linear)
+    assert (motion.judged_boot, motion.judged) == (scene.boot, scene.seq)
+
+
+def test_one_sentence_says_why() -> None:
+    scene = Scene()
+    assert sentence(scene.state).startswith("Waiting for the first sample of: velocity,")
+    scene.tick(40)
+    assert sentence(scene.state) == "Nobody asks to move."
+    scene.drive(0.5)
+    assert sentence(scene.state).startswith("Waiting for a neutral request")
+    scene.drive()
+    assert sentence(scene.state) == "Driving as teleop asks."
+    scene.sonar(front=0.5)
+    scene.drive(0.5)
+    assert (
+        sentence(scene.state) == "Slowed by an obstacle at 0.50 m (front). Driving as teleop asks."
+    )
+    scene.pressed = True
+    scene.tick()
+    assert sentence(scene.state) == "The bumper was hit. It is not gone yet."
+    scene.pressed = False
+    scene.tick(5)
+    assert sentence(scene.state) == "The bumper was hit. Reset to go on."
+
+
+def test_transitions_are_told_once() -> None:
+    scene = Scene().running()
+    assert ticked(scene) == []
+    scene.pressed = True
+    assert ticked(scene) == ["contact", "stop"]
+    scene.linear = 0.0
+    assert ticked(scene) == []
+    scene.left_bits = 3
+    assert ticked(scene) == ["driver_fault"]
+    assert noted(scene, Estop()) == ["estop"]
+    assert noted(scene, Reset()) == ["reset_refused"]
+    assert noted(scene, Hold(True)) == ["release_refused"]
+    scene.pressed, scene.left_bits = False, 0
+    scene.tick(30)
+    assert noted(scene, Reset()) == ["reset"]
+    assert noted(scene, Reset()) == ["reset"]
+
+
+def test_a_change_of_source_is_told() -> None:
+    scene = Scene().ready()
+    for _ in range(15):
+        assert ticked(scene) == []
+    assert ticked(scene) == ["stop", "source"]
+
+
+def test_a_release_is_told_when_it_begins_and_ends() -> None:
+    scene = hit()
+    assert noted(scene, Hold(True)) == ["source", "release"]
+    assert noted(scene, Hold(True)) == []
+    assert noted(scene, Hold(False)) == ["stop", "source", "release_end"]
+
+
+def test_what_changes_is_told_at_once_and_distances_are_not_a_change() -> None:
+    scene = Scene().running()
+    scene.sonar(front=1.0)
+    scene.drive(1.0)
+    before = signature(scene.state)
+    scene.sonar(front=0.9)
+    scene.drive(1.0)
+    assert signature(scene.state) == before
+    scene.estop()
+    assert signature(scene.state) != before
