@@ -1,0 +1,1 @@
+"""Odometry: pose and twist from the board's counters and velocities."""

@@ -1,0 +1,16 @@
+"""``python -m services.odom``: the board's counters and velocities to pose and twist."""
+
+import sys
+
+from common.service import run
+from services.odom.config import OdomConfig
+from services.odom.odometer import Odometer
+
+
+def main() -> int:
+    """Run odometry until it is told to stop."""
+    return run("odom", OdomConfig, Odometer)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""Odometry on the bus: counters and velocities in, pose and twist out at 50 Hz."""
+
+import time
+
+import msgspec
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival
+from common.bus.calls import Caller
+from common.codec import finite
+from common.freshness import S
+from common.service import Node
+from services.odom.config import OdomConfig
+from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
+from services.odom.path import Path
+from services.odom.pose import Pose
+
+SILENT_NS = S // 2  # a pause this long is told; shorter ones are seen by the missing samples
+
+
+class Odometer:
+    """The shell around the estimator and the trajectory."""
+
+    def __init__(self, node: Node[OdomConfig]) -> None:
+        settings = node.config.odom
+        self._node = node
+        self._estimator = Estimator(settings)
+        self._path = Path(settings.path_spacing, settings.path_points)
+        self._published_ns: int | None = None
+        self._silent = True  # nothing was heard yet
+        self._slip = False
+        bus = node.bus
+        self._to_odometry = bus.publisher(keys.ODOMETRY)
+        bus.subscribe(keys.VELOCITY, self._on_velocity)
+        bus.subscribe(keys.MILEAGE, self._on_mileage)
+        bus.serve(keys.SET_POSE, self._on_set_pose)
+        path_key = keys.info_key(bus.robot, node.name, "path")
+        bus.answer(path_key, self._trajectory, "application/json")
+        node.loop.every(1 / keys.ODOMETRY.rate_hz, self._on_tick)
+
+    def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
+        self._note(self._estimator.on_velocity(arrival.message, arrival.received_ns))
+
+    def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
+        self._note(self._estimator.on_mileage(arrival.message, arrival.received_ns))
+
+    def _note(self, outcome: Outcome) -> None:
+        if outcome in REFUSALS:
+            self._node.counters[f"refused_{outcome}"] += 1
+        elif outcome in RESTARTS:
+            text = f"{outcome}: the pose stays, counting goes on from here"
+            self._node.event("reanchored", "warning", text)
+
+    def _on_set_pose(self, request: m.PoseRequest, caller: Caller[m.Done]) -> None:
+        if not finite(request.x, request.y, request.heading):
+            caller.refuse("x, y and heading must be numbers, not NaN or infinity")
+            return
+        pose = Pose(request.x, request.y, request.heading)
+        self._estimator.place(pose, time.monotonic_ns())
+        self._path.clear()
+        text = f"the pose is x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
+        self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
+        caller.reply(m.Done(text=text))
+
+    def _on_tick(self, now_ns: int) -> None:
+        odometry = self._estimator.estimate(now_ns)
+        if odometry is None:
+            self._tell_silence(now_ns)
+            return
+        self._published_ns = now_ns
+        self._to_odometry.put(odometry)
+        self._path.add(Pose(odometry.x, odometry.y, odometry.heading))
+        self._tell_voice()
+        self._tell_slip(odometry)
+
+    def _tell_silence(self, now_ns: int) -> None:
+        if self._silent or self._published_ns is None or now_ns - self._published_ns < SILENT_NS:
+            return
+        self._silent = True
+        self._node.event("silent", "warning", "no counters, no velocities: odometry says nothing")
+
+    def _tell_voice(self) -> None:
+        if self._silent:
+            self._silent = False
+            self._node.event("heard", "info", "counters and velocities come in")
+
+    def _tell_slip(self, odometry: m.Odometry) -> None:
+        if odometry.slip == self._slip:
+            return
+        self._slip = odometry.slip
+        if odometry.slip:
+            text = "counters and velocities disagree: wheels slip, or a unit is wrong"
+            self._node.event("slip", "warning", text, residual=odometry.residual)
+        else:
+            self._node.event("slip_over", "info", "counters and velocities agree again")
+
+    def _trajectory(self) -> bytes:
+        return msgspec.json.encode(
+            {
+                "frame_id": "odom",
+                "epoch": self._estimator.epoch,
+                "spacing": self._path.spacing,
+                "points": self._path.points(),
+            }
+        )

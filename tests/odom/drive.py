@@ -1,0 +1,104 @@
+"""A board that drives a known way, and an estimator that hears some of it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from common.freshness import S
+from common.messages import Mileage, Odometry, Velocity
+from services.odom.config import Odom
+from services.odom.estimator import DISTANCE_WRAP_M, Estimator, Outcome
+from services.odom.pose import Pose
+
+TICK_NS = S // 50
+
+
+@dataclass
+class Board:
+    """Drives exact arcs tick by tick, counts as the real one does, tells what it does."""
+
+    distance: float = 0.0
+    heading: float = 0.0
+    linear: float = 0.0
+    angular: float = 0.0
+    epoch: int = 0
+    boot: int = 1
+    seq: int = 0
+    coarse: bool = False  # count in steps of 1 mm and 0.1 deg
+    now_ns: int = S
+
+    def __post_init__(self) -> None:
+        self.truth = Pose(0.0, 0.0, 0.0)
+
+    def tick(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.now_ns += TICK_NS
+            distance, turn = self.linear * TICK_NS / S, self.angular * TICK_NS / S
+            self.distance += distance
+            self.heading += turn
+            self.truth = self.truth.moved(distance, turn)
+
+    def mileage(self) -> Mileage:
+        self.seq += 1
+        distance = math.remainder(self.distance, DISTANCE_WRAP_M)
+        heading = math.remainder(self.heading, math.tau)
+        if self.coarse:
+            distance = round(distance, 3)
+            heading = math.radians(round(math.degrees(heading), 1))
+        return Mileage(
+            distance=distance, heading=heading, epoch=self.epoch, boot=self.boot, seq=self.seq
+        )
+
+    def velocity(self) -> Velocity:
+        return Velocity(linear=self.linear, angular=self.angular, boot=self.boot)
+
+
+class Listener:
+    """An estimator beside a board."""
+
+    def __init__(self, board: Board, settings: Odom | None = None) -> None:
+        self.board = board
+        self.estimator = Estimator(settings or Odom())
+
+    def hear(self, *, counters: bool = True, velocity: bool = True) -> Outcome | None:
+        """Take what the board says now, in the order in which the bridge publishes it."""
+        outcome = None
+        if counters:
+            outcome = self.estimator.on_mileage(self.board.mileage(), self.board.now_ns)
+        if velocity:
+            self.estimator.on_velocity(self.board.velocity(), self.board.now_ns)
+        return outcome
+
+    def drive(self, ticks: int, *, counters: bool = True, velocity: bool = True) -> None:
+        for _ in range(ticks):
+            self.board.tick()
+            self.hear(counters=counters, velocity=velocity)
+
+    def odometry(self, after_ns: int = 0) -> Odometry:
+        odometry = self.estimator.estimate(self.board.now_ns + after_ns)
+        assert odometry is not None
+        return odometry
+
+    def pose(self) -> Pose:
+        return pose_of(self.odometry())
+
+    def off(self) -> tuple[float, float]:
+        """Return how far (m, rad) the estimate is from the truth."""
+        return apart(self.pose(), self.board.truth)
+
+
+def pose_of(odometry: Odometry) -> Pose:
+    return Pose(odometry.x, odometry.y, odometry.heading)
+
+
+def apart(a: Pose, b: Pose) -> tuple[float, float]:
+    """Return the distance and the angle between two poses."""
+    turned = abs(math.remainder(a.heading - b.heading, math.tau))
+    return math.hypot(a.x - b.x, a.y - b.y), turned
+
+
+def minors(rows: Sequence[float]) -> list[float]:
+    """Return all principal minors of a 3x3 matrix: none is negative if it is semidefinite."""
+    a, b, c, _, d, e, _, _, f = rows
+    whole = a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)
+    return [a, d, f, a * d - b * b, a * f - c * c, d * f - e * e, whole]

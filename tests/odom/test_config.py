@@ -1,0 +1,34 @@
+"""Odometry's settings: what is shipped is the default, and nonsense is refused."""
+
+import msgspec
+import pytest
+
+from common.config import DEFAULT_FILE, Sources, load
+from common.errors import ConfigError
+from services.odom.config import OdomConfig
+
+
+def loaded(*sets: str) -> OdomConfig:
+    return load(OdomConfig, Sources(files=(DEFAULT_FILE,), environ={}, sets=sets)).config
+
+
+def test_the_shipped_file_holds_the_defaults_and_all_of_them() -> None:
+    sources = Sources(files=(DEFAULT_FILE,), environ={})
+    whole = load(OdomConfig, sources)
+    assert whole.config.odom == OdomConfig().odom
+    fields = {field.name for field in msgspec.structs.fields(whole.config.odom)}
+    origins = {name: whole.settings[f"odom.{name}"].origin for name in fields}
+    assert set(origins.values()) == {"config/t2.toml"}
+
+
+@pytest.mark.parametrize(
+    "bad",
+    ["hold=0.0", "hold=1.0", "drift_noise=0", "gap_noise=nan", "slip_turn=9", "path_points=1"],
+)
+def test_nonsense_is_refused_by_name(bad: str) -> None:
+    with pytest.raises(ConfigError, match=f"odom.{bad.split('=')[0]}"):
+        loaded(f"odom.{bad}")
+
+
+def test_a_setting_that_is_given_wins() -> None:
+    assert loaded("odom.hold=0.2").odom.hold == 0.2
