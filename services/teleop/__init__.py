@@ -1,0 +1,1 @@
+"""Teleop: an operator's keys and sticks to requests to move."""

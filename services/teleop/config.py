@@ -1,0 +1,49 @@
+"""Teleop's settings."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from common import settings
+
+Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
+Hold = Annotated[float, Meta(ge=0.1, le=1.0)]  # s
+Index = Annotated[int, Meta(ge=0, le=31)]  # of an axis or a button, as SDL counts them
+GEARS = 5
+
+
+class Teleop(settings.Section, frozen=True, kw_only=True):
+    """How an operator's keys and sticks become requests; slow by default."""
+
+    source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "teleop"
+    gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
+    gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
+    turbo_linear: Speed = 1.0  # m/s
+    turbo_angular: Speed = 1.0  # rad/s
+    hold_first: Hold = 0.6  # s that a tap drives: a terminal's first repeat comes after ~0.5 s
+    hold: Hold = 0.3  # s that a repeat drives
+    gamepad: bool = True
+    deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's way
+    expo: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5  # 0 is straight, 1 is cubic
+    linear_axis: Index = 1  # left stick, up and down
+    angular_axis: Index = 3  # right stick, left and right
+    deadman_button: Index = 4  # left shoulder
+    turbo_button: Index = 5  # right shoulder
+
+    def __post_init__(self) -> None:
+        for name in ("gears_linear", "gears_angular"):
+            gears = getattr(self, name)
+            if len(gears) != GEARS or list(gears) != sorted(gears):
+                raise ValueError(f"{name} {list(gears)} should be {GEARS} rising speeds")
+        if self.hold > self.hold_first:
+            raise ValueError(f"hold {self.hold} s must not exceed hold_first {self.hold_first} s")
+        if self.linear_axis == self.angular_axis:
+            raise ValueError(f"linear_axis and angular_axis are both {self.linear_axis}")
+        if self.deadman_button == self.turbo_button:
+            raise ValueError(f"deadman_button and turbo_button are both {self.deadman_button}")
+
+
+class TeleopConfig(settings.Shared, frozen=True, kw_only=True):
+    """All sections that teleop reads."""
+
+    teleop: Teleop = Teleop()

@@ -1,0 +1,173 @@
+"""The vehicle from above in characters, with what its eight sonars see around it.
+
+::
+
+              1.42 m            each sonar has arcs, one for each band of distance; the one that
+      -     ━━━━━━━━━    0.80 m the reading falls into is lit in the band's colour, "fault" and
+         ╱   ━━━━━━━   ╲        "near" light all of them
+           █╭───────╮█
+       ┃ ┃  │   ▲   │  ┃ ┃
+    -  ┃ ┃  │       │  ┃ ┃  2.10 m
+"""
+
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+
+from rich.text import Text
+
+from common.messages import SONAR_NAMES, Bumper, RangeStatus, Ultrasonic
+
+# Where a band ends, in metres, and its colour. Safety's own distances depend on the speed; these
+# are only for the eye.
+BANDS = ((0.5, "bold red"), (1.0, "bold yellow"), (2.0, "green"))
+FAR = "green"
+DIM = "grey35"
+TROUBLE = "bold magenta"
+UNKNOWN = "-"
+
+HIT = "bold white on red"
+CORNERS = (
+    ("front_left", -1, -1), ("front_right", -1, 1), ("rear_left", 1, -1), ("rear_right", 1, 1),
+)  # fmt: skip
+
+BODY = (
+    "█╭───────╮█",
+    " │   ▲   │ ",
+    " │       │ ",
+    " │       │ ",
+    "█╰───────╯█",
+)
+BODY_WIDTH, BODY_HEIGHT = len(BODY[0]), len(BODY)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One sonar's reading, ready to draw: its words, its colour, and the arcs that are lit."""
+
+    words: str
+    style: str
+    lit: frozenset[int]  # 0 is the nearest band
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Where things go; ``ahead`` is -1 for the front, ``side`` is -1 for the left."""
+
+    middle: int  # column of the vehicle's middle
+    top: int  # row of its front
+    bands: int  # how many arcs fit
+
+    def row(self, ahead: int, band: int) -> int:
+        """Return the row that is ``band`` rows away from the front or the rear."""
+        return self.top - 1 - band if ahead < 0 else self.top + BODY_HEIGHT + band
+
+    def outside(self, side: int, words: str) -> int:
+        """Return where words begin that stand outside of the outermost arc."""
+        gap = 7 + 2 * self.bands
+        return self.middle + gap if side > 0 else self.middle - gap - len(words) + 1
+
+
+class Canvas:
+    """A grid of characters, each with a style; what falls outside is left out."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._cells = [[(" ", "")] * width for _ in range(height)]
+
+    def put(self, row: int, column: int, text: str, style: str) -> None:
+        """Write from left to right."""
+        for at, character in enumerate(text, column):
+            if 0 <= row < len(self._cells) and 0 <= at < len(self._cells[0]):
+                self._cells[row][at] = (character, style)
+
+    def text(self) -> Text:
+        """Return the whole as lines."""
+        return Text("\n", no_wrap=True).join(self._line(row) for row in self._cells)
+
+    @staticmethod
+    def _line(row: list[tuple[str, str]]) -> Text:
+        runs = groupby(row, key=itemgetter(1))
+        return Text.assemble(*(("".join(cell[0] for cell in run), style) for style, run in runs))
+
+
+def reading(distance: float | None, status: RangeStatus) -> Reading:
+    """Return how one sonar's reading (metres) is drawn."""
+    everything = frozenset(range(len(BANDS)))
+    if status == "fault":
+        return Reading("fault", TROUBLE, everything)
+    if status == "too_near":
+        return Reading("near", BANDS[0][1], everything)
+    if status == "no_echo" or distance is None:
+        return Reading(UNKNOWN, DIM, frozenset())
+    for band, (end, style) in enumerate(BANDS):
+        if distance < end:
+            return Reading(f"{distance:.2f} m", style, frozenset({band}))
+    return Reading(f"{distance:.2f} m", FAR, frozenset())
+
+
+def readings(ultrasonic: Ultrasonic | None) -> dict[str, Reading]:
+    """Return all eight by name; without any news they are unknown."""
+    if ultrasonic is None:
+        return {name: Reading("?", DIM, frozenset()) for name in SONAR_NAMES}
+    seen = zip(SONAR_NAMES, ultrasonic.ranges, ultrasonic.status, strict=True)
+    return {name: reading(distance, status) for name, distance, status in seen}
+
+
+def around(
+    ultrasonic: Ultrasonic | None, bumper: Bumper | None, width: int = 38, height: int = 11
+) -> Text:
+    """Return the vehicle and its surroundings, ``width`` by ``height`` characters."""
+    top = (height - BODY_HEIGHT) // 2
+    room = min(top - 1, (width // 2 - 13) // 2)  # a row, or six columns, are for the words
+    plan = Plan(width // 2, top, max(1, min(len(BANDS), room)))
+    canvas = Canvas(width, height)
+    seen = readings(ultrasonic)
+    _body(canvas, plan, bumper)
+    for name, side in (("front", -1), ("rear", 1)):
+        _end(canvas, plan, side, seen[name])
+    for name, side in (("left", -1), ("right", 1)):
+        _side(canvas, plan, side, seen[name])
+    for name, ahead, side in CORNERS:
+        _corner(canvas, plan, (ahead, side), seen[name])
+    return canvas.text()
+
+
+def _body(canvas: Canvas, plan: Plan, bumper: Bumper | None) -> None:
+    hit = bumper is not None and bumper.pressed
+    style = HIT if hit else "bold cyan"
+    left = plan.middle - BODY_WIDTH // 2
+    for row, line in enumerate(BODY):
+        canvas.put(plan.top + row, left, line, style)
+    words = "BUMPER" if hit else "T2"
+    canvas.put(plan.top + 2, left + (BODY_WIDTH - len(words)) // 2, words, style)
+
+
+def _end(canvas: Canvas, plan: Plan, ahead: int, sonar: Reading) -> None:
+    for band in range(plan.bands):
+        half = 3 + band
+        canvas.put(
+            plan.row(ahead, band), plan.middle - half, "━" * (2 * half + 1), _arc(sonar, band)
+        )
+    column = plan.middle - len(sonar.words) // 2
+    canvas.put(plan.row(ahead, plan.bands), column, sonar.words, sonar.style)
+
+
+def _side(canvas: Canvas, plan: Plan, side: int, sonar: Reading) -> None:
+    for band in range(plan.bands):
+        for row in range(1, BODY_HEIGHT - 1):
+            column = plan.middle + side * (7 + 2 * band)
+            canvas.put(plan.top + row, column, "┃", _arc(sonar, band))
+    canvas.put(plan.top + 2, plan.outside(side, sonar.words), sonar.words, sonar.style)
+
+
+def _corner(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> None:
+    ahead, side = at
+    for band in range(plan.bands):
+        column = plan.middle + side * (7 + 2 * band)
+        canvas.put(plan.row(ahead, band), column, "╱" if ahead == side else "╲", _arc(sonar, band))
+    row = plan.row(ahead, plan.bands - 1)
+    canvas.put(row, plan.outside(side, sonar.words), sonar.words, sonar.style)
+
+
+def _arc(sonar: Reading, band: int) -> str:
+    return sonar.style if band in sonar.lit else DIM

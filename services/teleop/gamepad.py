@@ -1,0 +1,105 @@
+"""A gamepad by SDL, where there is one; found and lost while running.
+
+pygame is imported only when a gamepad is wanted: it is large, and it takes a second. SDL wants one
+thread for everything, so all calls come from the loop's.
+"""
+
+import contextlib
+import os
+from types import ModuleType
+from typing import Any, Protocol
+
+from services.teleop.config import Teleop
+from services.teleop.mapping import Deflection, Stick
+
+ENVIRON = {
+    "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would be drawn over the screen
+    "SDL_VIDEODRIVER": "dummy",  # events want a display, and ssh has none
+    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # without a window there is no foreground
+    "SDL_NO_SIGNAL_HANDLERS": "1",  # ctrl-c is ours
+}
+
+
+class Gamepad(Protocol):
+    """What teleop needs of a gamepad."""
+
+    @property
+    def words(self) -> str:
+        """Say which one there is, or why there is none."""
+
+    def read(self) -> Stick | None:
+        """Return how it stands now, None while there is none."""
+
+
+class NoGamepad:
+    """Stands in where none is wanted or none can be."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def read(self) -> Stick | None:
+        """Return None: there is none."""
+        return None
+
+
+class SdlGamepad:
+    """The first gamepad that SDL sees; the next one that it sees after that is lost."""
+
+    def __init__(self, pygame: ModuleType, settings: Teleop) -> None:
+        self._pygame: Any = pygame
+        self._settings = settings
+        self._joystick: Any = None
+        pygame.display.init()
+        pygame.joystick.init()
+
+    @property
+    def words(self) -> str:
+        """Say which one there is."""
+        return str(self._joystick.get_name()) if self._joystick else "none"
+
+    def read(self) -> Stick | None:
+        """Return how it stands now, None while there is none."""
+        for event in self._pygame.event.get():
+            self._take(event)
+        if self._joystick is None and self._pygame.joystick.get_count():
+            with contextlib.suppress(self._pygame.error):  # gone again in the meantime
+                self._joystick = self._pygame.joystick.Joystick(0)
+        return self._stick() if self._joystick else None
+
+    def _take(self, event: Any) -> None:
+        gone = event.type == self._pygame.JOYDEVICEREMOVED
+        if gone and self._joystick and event.instance_id == self._joystick.get_instance_id():
+            self._joystick = None
+
+    def _stick(self) -> Stick:
+        joystick, settings = self._joystick, self._settings
+        push = Deflection(
+            -self._part(joystick.get_axis, settings.linear_axis, joystick.get_numaxes()),
+            -self._part(joystick.get_axis, settings.angular_axis, joystick.get_numaxes()),
+        )
+        deadman, turbo = (
+            bool(self._part(joystick.get_button, index, joystick.get_numbuttons()))
+            for index in (settings.deadman_button, settings.turbo_button)
+        )
+        return Stick(push, deadman, turbo)
+
+    @staticmethod
+    def _part(read: Any, index: int, count: int) -> float:
+        """Read an axis or button; one that this gamepad lacks is at rest."""
+        return float(read(index)) if index < count else 0.0
+
+
+def find(settings: Teleop) -> Gamepad:
+    """Return the gamepad that the settings want; never fails for want of one."""
+    if not settings.gamepad:
+        return NoGamepad("off")
+    for name, value in ENVIRON.items():
+        os.environ.setdefault(name, value)
+    try:
+        import pygame
+    except ImportError:
+        return NoGamepad("none: pygame-ce is not installed")
+    try:
+        return SdlGamepad(pygame, settings)
+    except pygame.error as error:
+        return NoGamepad(f"none: {error}")

@@ -1,0 +1,115 @@
+"""Hold to drive: which keys are held, and what is sent while they are and after.
+
+**Keys.** A terminal sends a key when it goes down and again while it stays down, but nothing when
+it comes up. A key is therefore held until a deadline: ``first`` seconds after it came out of the
+blue (the first repeat takes a terminal about half a second) and ``repeat`` seconds after each
+repeat. After the bus was lost, keys count only once none has come for ``first`` seconds: what is
+still held then is an old wish.
+
+**Deadman.** A gamepad's button tells both ways, but it counts only after it was seen up: one that
+is down when the gamepad is found, or after a stop, must be let go first.
+
+**Requests.** On every tick, 20 times a second, at most one request goes out:
+
+========== ========================= =========================================
+phase      tick, something is held   tick, nothing is held
+========== ========================= =========================================
+SILENT     send zero; DRIVING        send nothing
+DRIVING    send the twist            send zero; RELEASING, two zeros are left
+RELEASING  send zero; DRIVING        send zero; SILENT once none is left
+========== ========================= =========================================
+
+The zero ahead of a drive is neutral: it lets safety and the bridge arm. ``stop`` is RELEASING with
+three zeros, in any phase.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from common.freshness import S
+from services.teleop.mapping import STILL, Twist
+
+ZEROS = 3  # on release: one may be lost, two are a doubt
+
+
+class Keys:
+    """Which keys are held, by deadlines."""
+
+    def __init__(self, first_s: float, repeat_s: float) -> None:
+        self._first_ns = round(first_s * S)
+        self._repeat_ns = round(repeat_s * S)
+        self._until_ns: dict[str, int] = {}
+        self._muted_until_ns: int | None = None
+
+    def press(self, key: str, now_ns: int) -> None:
+        """Take a key press or its repeat; a terminal does not tell which."""
+        if self._muted_until_ns is not None and now_ns < self._muted_until_ns:
+            self.mute(now_ns)
+            return
+        hold_ns = self._repeat_ns if key in self.held(now_ns) else self._first_ns
+        self._until_ns[key] = now_ns + hold_ns
+
+    def held(self, now_ns: int) -> Iterable[str]:
+        """Return the keys that are held."""
+        return [key for key, until_ns in self._until_ns.items() if now_ns < until_ns]
+
+    def clear(self) -> None:
+        """Let all of them go."""
+        self._until_ns.clear()
+
+    def mute(self, now_ns: int) -> None:
+        """Let all of them go, and let none count before there was silence."""
+        self.clear()
+        self._muted_until_ns = now_ns + self._first_ns
+
+
+class Deadman:
+    """A button that drives while it is down, once it has been seen up."""
+
+    def __init__(self) -> None:
+        self._seen_up = False
+
+    def held(self, down: bool) -> bool:
+        """Take the button's state and tell whether it counts."""
+        self._seen_up = self._seen_up or not down
+        return down and self._seen_up
+
+    def drop(self) -> None:
+        """Want it let go before it counts again."""
+        self._seen_up = False
+
+
+class Phase(Enum):
+    """What the last tick left behind."""
+
+    SILENT = "silent"
+    DRIVING = "driving"
+    RELEASING = "releasing"
+
+
+@dataclass
+class Requests:
+    """What to send, tick by tick."""
+
+    phase: Phase = Phase.SILENT
+    zeros: int = 0  # left to send while RELEASING
+
+    def tick(self, held: Twist | None) -> Twist | None:
+        """Return the request to send now, or None for silence; ``held`` is None when let go."""
+        if held is not None:
+            first = self.phase is not Phase.DRIVING
+            self.phase = Phase.DRIVING
+            return STILL if first else held
+        if self.phase is Phase.DRIVING:
+            self.stop()
+        if self.phase is Phase.SILENT:
+            return None
+        self.zeros -= 1
+        if self.zeros == 0:
+            self.phase = Phase.SILENT
+        return STILL
+
+    def stop(self) -> None:
+        """Send zeros and then fall silent, whatever went before."""
+        self.phase, self.zeros = Phase.RELEASING, ZEROS

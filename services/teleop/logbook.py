@@ -1,0 +1,53 @@
+"""The last few things worth a line: the program's own log and the events of all services.
+
+While the screen is up, standard error is the operator's picture, so the log must not go there.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+from typing import cast
+
+import structlog
+
+from common.messages import Level
+from common.settings import Log
+from services.teleop.view import Line
+
+KEPT = 100
+LEVELS: dict[str, Level] = {"warning": "warning", "error": "error", "critical": "error"}
+
+
+class Logbook:
+    """Keeps the newest lines; may be written from any thread."""
+
+    def __init__(self) -> None:
+        self._lines: deque[Line] = deque(maxlen=KEPT)
+        self._lock = threading.Lock()
+
+    def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
+        """Append a line, of now unless its wall clock time is given."""
+        line = Line(time.time_ns() if t_ns is None else t_ns, service, level, text)
+        with self._lock:
+            self._lines.append(line)
+
+    def last(self, count: int) -> tuple[Line, ...]:
+        """Return the newest lines, the newest last."""
+        with self._lock:
+            return tuple(self._lines)[-count:]
+
+    def take_log(self, settings: Log) -> None:
+        """Let every log line of this process end here and nowhere else."""
+        structlog.configure(
+            processors=[self._keep],
+            wrapper_class=structlog.make_filtering_bound_logger(
+                logging.getLevelNamesMapping()[settings.level.upper()]
+            ),
+        )
+
+    def _keep(
+        self, _: object, method: str, event: structlog.typing.EventDict
+    ) -> structlog.typing.EventDict:
+        self.add("teleop", LEVELS.get(method, "info"), cast(str, event["event"]))
+        raise structlog.DropEvent

@@ -1,0 +1,73 @@
+"""What the operator sees, as one frozen picture: made in the loop's thread, drawn in another."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from common.bus.bus import Arrival, Bus
+from common.freshness import Latest, fresh
+from common.keys import Topic
+from common.messages import (
+    Bumper,
+    Driver,
+    Level,
+    Link,
+    Message,
+    Odometry,
+    SafetyState,
+    Ultrasonic,
+    Velocity,
+)
+from services.teleop.mapping import Twist
+
+M = TypeVar("M", bound=Message)
+
+
+class Ear(Generic[M]):
+    """The newest message of a topic while it is worth showing."""
+
+    def __init__(self, bus: Bus, topic: Topic[M], worth_s: float, side: str = "") -> None:
+        self._latest: Latest[M] | None = None
+        self._worth_s = worth_s
+        bus.subscribe(topic, self._hear, side=side)
+
+    def at(self, now_ns: int) -> M | None:
+        """Return the message, or None once it is older than it is worth."""
+        latest = self._latest
+        return latest.value if latest and fresh(latest, now_ns, self._worth_s) else None
+
+    def _hear(self, arrival: Arrival[M]) -> None:
+        self._latest = Latest(arrival.message, arrival.received_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of the events panel."""
+
+    t_ns: int  # wall clock
+    service: str
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """Everything on the screen at one moment; None where nothing (fresh) is known."""
+
+    robot: str
+    source: str
+    connected: bool  # to a router
+    gear: int
+    turbo: bool
+    top: Twist  # what full deflection asks in this gear
+    asked: Twist | None = None  # None: silent
+    creeping: bool = False
+    gamepad: str = ""  # in words
+    safety: SafetyState | None = None
+    velocity: Velocity | None = None
+    odometry: Odometry | None = None
+    ultrasonic: Ultrasonic | None = None
+    bumper: Bumper | None = None
+    link: Link | None = None
+    left: Driver | None = None
+    right: Driver | None = None
+    lines: tuple[Line, ...] = ()  # the newest last

@@ -1,0 +1,140 @@
+"""A node without a network: what it publishes and asks is recorded, what it hears is told."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from msgspec import Struct
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.config import Loaded
+from common.keys import Call, Topic
+from common.messages import Drive, Limits, Link, Message, Odometry, SafetyState
+from common.service import Node
+from services.teleop.config import TeleopConfig
+from services.teleop.logbook import Logbook
+from services.teleop.mapping import Twist
+from services.teleop.view import View
+
+
+class FakeBus(Bus):
+    """A bus that never opens."""
+
+    def __init__(self, *args: Any) -> None:
+        self.handlers: dict[str, list[Callable[[Arrival[Any]], None]]] = {}
+        self.asked: list[tuple[str, Any]] = []
+        self.answers: list[tuple[Callable[[Any], None], Callable[[str], None]]] = []
+        self.estops = 0
+        super().__init__(*args)
+
+    def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
+        """Keep the handler for ``tell``; a depth makes no difference here."""
+        names.pop("depth", None)
+        self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
+
+    def ask(
+        self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
+        timeout_s: float = 2.0,
+    ) -> None:  # fmt: skip
+        """Keep the request and where its answer goes."""
+        self.asked.append((call.path, request))
+        self.answers.append((on_reply, on_refusal))
+
+    def estop(self) -> None:
+        """Count it."""
+        self.estops += 1
+
+    def tell(
+        self,
+        topic: Topic[Any],
+        message: Message,
+        received_ns: int | None = None,
+        declared: str = "",
+        **names: str,
+    ) -> None:
+        """Let a message come in, by default now; ``declared`` where the handler's key has a *."""
+        key = topic.on(self.robot, **names)
+        now_ns = time.monotonic_ns() if received_ns is None else received_ns
+        for handler in self.handlers[declared or key]:
+            handler(Arrival(message, key, now_ns, None))
+
+
+class FakeNode(Node[TeleopConfig]):
+    """A node on a ``FakeBus``; its log goes to a logbook, its loop does not run."""
+
+    def __init__(self, **settings: Any) -> None:
+        self.logbook = Logbook()
+        config = TeleopConfig()
+        super().__init__("teleop", Loaded(config, {}))
+        self.logbook.take_log(config.log)
+
+    def open_bus(self) -> FakeBus:
+        """Return the fake."""
+        self.fake = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+        return self.fake
+
+    @property
+    def requests(self) -> tuple[int, Drive | None]:
+        """How many requests to move went out, and the last one."""
+        publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
+        return publisher.next_seq - 1, publisher.last
+
+
+def safety_state(**fields: Any) -> SafetyState:
+    """Return a state of safety that lets everything through, but for the given fields."""
+    usual: dict[str, Any] = {
+        "verdict": "run",
+        "latched": (),
+        "causes": (),
+        "source": "teleop",
+        "limits": Limits(forward=1.0, backward=0.5, angular=1.0),
+        "heartbeat": 7,
+        "text": "Driving.",
+    }
+    return SafetyState(**usual | fields)
+
+
+def link(**fields: Any) -> Link:
+    """Return a link that is up, but for the given fields."""
+    usual: dict[str, Any] = {
+        "state": "up",
+        "board": "10.7.5.224:4002",
+        "epoch": 0,
+        "armed": True,
+        "waiting": "",
+        "rates": {"Velocity": 50.0, "Driver": 2.0},
+        "rejected": {},
+        "round_trip": 0.0008,
+    }
+    return Link(**usual | fields)
+
+
+def odometry(**fields: Any) -> Odometry:
+    """Return a pose, but for the given fields."""
+    usual: dict[str, Any] = {
+        "x": 1.234,
+        "y": -0.4,
+        "heading": 1.5708,
+        "linear": 0.2,
+        "angular": 0.0,
+        "pose_covariance": (0.0,) * 9,
+        "twist_covariance": (0.0,) * 4,
+        "epoch": 0,
+        "residual": 0.004,
+        "slip": False,
+    }
+    return Odometry(**usual | fields)
+
+
+def view(**fields: Any) -> View:
+    """Return a view that knows nothing yet, but for the given fields."""
+    usual: dict[str, Any] = {
+        "robot": "001",
+        "source": "teleop",
+        "connected": True,
+        "gear": 1,
+        "turbo": False,
+        "top": Twist(0.2, 0.3),
+    }
+    return View(**usual | fields)

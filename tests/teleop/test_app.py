@@ -1,0 +1,175 @@
+"""The screen, with a real desk on a bus that never opens; the test moves the desk's clock."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+
+import pytest
+import structlog
+from textual.events import AppBlur
+from textual.pilot import Pilot
+
+from common import keys
+from common.bus.bus import Post
+from common.freshness import S
+from common.messages import ReleaseRequest, ResetRequest, Ultrasonic
+from services.teleop.app import Panel, TeleopApp
+from services.teleop.config import Teleop
+from services.teleop.desk import Desk
+from tests.support import PATIENCE_S
+from tests.teleop.support import FakeNode, link, safety_state
+
+
+class Bench:
+    """A node, its desk and the screen in front of it."""
+
+    def __init__(self) -> None:
+        self.node = FakeNode()
+        self.desk = Desk(self.node, self.node.logbook)
+        self.ended = False
+        self.now_ns = 100 * S
+        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
+        self.app = TeleopApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
+
+    def speeds(self, count: int) -> list[float]:
+        """Let the desk's clock tick, and return the speeds asked for, in order."""
+        sent = []
+        for _ in range(count):
+            before, _ = self.node.requests
+            self.desk.tick(self.now_ns)
+            self.now_ns += S // 20
+            after, last = self.node.requests
+            if after > before and last is not None:
+                sent.append(last.linear)
+        return sent
+
+    def words(self, name: str) -> str:
+        """Return what a panel shows; nothing before it is there."""
+        panels = self.app.query(Panel).filter(f"#{name}")
+        return "".join(panel.shown.plain for panel in panels if panel.shown)
+
+    @asynccontextmanager
+    async def shown(self, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[None]]:
+        async with self.app.run_test(size=size) as pilot:
+            yield pilot
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.node.loop.close()
+    structlog.reset_defaults()
+
+
+def play(bench: Bench, act: Callable[[Pilot[None]], Awaitable[None]], *size: int) -> None:
+    """Run the screen while ``act`` lasts."""
+
+    async def main() -> None:
+        async with bench.shown((size[0], size[1]) if size else (80, 24)) as pilot:
+            await act(pilot)
+
+    asyncio.run(main())
+
+
+async def until(true: Callable[[], object], what: str) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not true():
+        assert time.monotonic() < deadline, f"waited for: {what}"
+        await asyncio.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("key", "speed"), [("w", 0.2), ("W", 0.2), ("up", 0.2), ("shift+up", 0.2), ("s", -0.2)]
+)
+def test_a_key_drives_and_silence_follows(bench: Bench, key: str, speed: float) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press(key)
+        sent = bench.speeds(30)
+        assert sent[:2] == [0.0, speed]
+        assert sent[-4:] == [speed, 0.0, 0.0, 0.0]
+        assert len(sent) < 20
+        assert bench.speeds(3) == []
+
+    play(bench, act)
+
+
+def test_calls_are_made_by_their_keys(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("e")
+        assert bench.node.fake.estops == 1
+        await pilot.press("r")
+        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest())]
+        await pilot.press("f")
+        bench.speeds(1)
+        assert bench.node.fake.asked[-1] == (keys.RELEASE.path, ReleaseRequest())
+
+    play(bench, act)
+
+
+def test_the_focus_is_the_hold(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("w")
+        bench.app.post_message(AppBlur())
+        await pilot.pause()
+        assert bench.speeds(5) == []
+
+    play(bench, act)
+
+
+@pytest.mark.parametrize("key", ["q", "Q", "ctrl+c", "ctrl+q"])
+def test_leaving_waits_for_the_last_zeros(bench: Bench, key: str) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press(key)
+        assert bench.app.is_running
+        assert bench.speeds(5) == [0.0] * 3
+        bench.ended = True
+        await until(lambda: not bench.app.is_running, "the screen to leave")
+
+    play(bench, act)
+
+
+def test_leaving_twice_does_not_wait_for_a_desk_that_hangs(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("q")
+        await pilot.press("q")
+        await until(lambda: not bench.app.is_running, "the screen to leave")
+
+    play(bench, act)
+
+
+def test_what_is_known_is_shown(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        fake = bench.node.fake
+        fake.tell(keys.SAFETY, safety_state(text="Driving, slowly."))
+        fake.tell(keys.LINK, link())
+        fake.tell(
+            keys.ULTRASONIC, Ultrasonic(ranges=(1.5, *(None,) * 7), status=("ok", *("fault",) * 7))
+        )
+        bench.desk.tick(0)
+        await until(lambda: "Driving, slowly." in bench.words("safety"), "safety's words")
+        assert "10.7.5.224:4002" in bench.words("motion")
+        assert "1.50 m" in bench.words("around")
+        assert bench.words("around").count("fault") == 7
+        assert "no router yet" in bench.words("header")
+        bench.node.logbook.add("safety", "error", "contact")
+        bench.desk.tick(0)
+        await until(lambda: "contact" in bench.words("events"), "the event")
+
+    play(bench, act)
+
+
+@pytest.mark.parametrize(("size", "rows"), [((80, 24), 11), ((120, 40), 13)])
+def test_it_fits_and_grows(bench: Bench, size: tuple[int, int], rows: int) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await until(
+            lambda: len(bench.words("around").split("\n")) == rows, f"a drawing of {rows} rows"
+        )
+        for panel in bench.app.query(Panel):
+            assert bench.app.screen.region.contains_region(panel.region), panel.id
+        assert (
+            bench.words("motion").count("\n") < bench.app.query_one("#motion").content_size.height
+        )
+
+    play(bench, act, *size)

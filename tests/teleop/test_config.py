@@ -1,0 +1,42 @@
+"""Teleop's settings: the shipped file and what is refused."""
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.config import Sources, load
+from common.errors import ConfigError
+from services.teleop.config import Teleop, TeleopConfig
+
+
+def test_the_shipped_file_says_the_defaults() -> None:
+    assert load(TeleopConfig, Sources(environ={})).config.teleop == Teleop()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"source": "Tele op"},
+        {"gears_linear": [0.2, 0.3]},
+        {"gears_angular": [0.5, 0.4, 0.6, 0.7, 0.8]},
+        {"gears_linear": [0.0, 0.3, 0.4, 0.5, 0.6]},
+        {"turbo_linear": float("nan")},
+        {"hold": 0.5, "hold_first": 0.4},
+        {"hold": 2.0},
+        {"linear_axis": 3},
+        {"turbo_button": 4},
+    ],
+)
+def test_a_bad_setting_is_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(settings, Teleop)
+
+
+def test_a_slower_terminal_is_allowed() -> None:
+    assert msgspec.convert({"hold_first": 0.8}, Teleop).hold_first == 0.8
+
+
+def test_a_refusal_names_the_field() -> None:
+    with pytest.raises(ConfigError, match=r"hold 0\.9 s must not exceed hold_first"):
+        load(TeleopConfig, Sources(environ={}, sets=["teleop.hold=0.9"]))

@@ -1,0 +1,144 @@
+"""Presses and sticks to requests, tick by tick."""
+
+import pytest
+
+from common.freshness import S
+from services.teleop.config import Teleop
+from services.teleop.controls import Controls
+from services.teleop.mapping import STILL, Deflection, Stick, Twist
+
+PERIOD_NS = S // 20
+FIRST_GEAR = Twist(0.2, 0.0)
+UP = Stick(Deflection(1, 0), deadman=False, turbo=False)
+DOWN = Stick(Deflection(1, 0), deadman=True, turbo=False)
+
+
+class Hands:
+    """Controls on a clock that only ticks move."""
+
+    def __init__(self) -> None:
+        self.controls = Controls(Teleop())
+        self.now_ns = 0
+
+    def press(self, key: str) -> None:
+        self.controls.press(key, self.now_ns)
+
+    def ticks(self, count: int, stick: Stick | None = None) -> list[Twist | None]:
+        sent = []
+        for _ in range(count):
+            sent.append(self.controls.tick(stick, self.now_ns))
+            self.now_ns += PERIOD_NS
+        return sent
+
+
+@pytest.fixture
+def hands() -> Hands:
+    return Hands()
+
+
+def test_a_tap_is_a_zero_the_twist_for_its_time_three_zeros_and_silence(hands: Hands) -> None:
+    assert hands.ticks(2) == [None, None]
+    hands.press("w")
+    assert hands.ticks(18) == [STILL] + [FIRST_GEAR] * 11 + [STILL] * 3 + [None] * 3
+    assert hands.controls.silent
+
+
+def test_repeats_keep_driving(hands: Hands) -> None:
+    for _ in range(20):
+        hands.press("w")
+        hands.ticks(5)
+    assert hands.ticks(1) == [FIRST_GEAR]
+    assert hands.ticks(20)[-1] is None
+
+
+def test_space_ends_a_hold_at_once(hands: Hands) -> None:
+    hands.press("w")
+    hands.ticks(3)
+    hands.press("space")
+    assert hands.ticks(5) == [STILL] * 3 + [None] * 2
+
+
+@pytest.mark.parametrize("key", ["x", "enter", "6", "0", "e", ""])
+def test_a_key_without_meaning_moves_nothing(hands: Hands, key: str) -> None:
+    hands.press(key)
+    assert hands.ticks(3) == [None] * 3
+
+
+def test_gears_are_chosen_by_number(hands: Hands) -> None:
+    hands.press("5")
+    hands.press("s")
+    assert hands.ticks(2)[-1] == Twist(-0.8, 0.0)
+
+
+def test_turbo_is_good_for_one_hold(hands: Hands) -> None:
+    hands.press("t")
+    hands.press("w")
+    assert hands.ticks(2)[-1] == Twist(1.0, 0.0)
+    hands.ticks(20)
+    assert not hands.controls.turbo
+    hands.press("w")
+    assert hands.ticks(2)[-1] == FIRST_GEAR
+
+
+@pytest.mark.parametrize("key", ["t", "1", "space"])
+def test_turbo_is_called_off(hands: Hands, key: str) -> None:
+    hands.press("t")
+    hands.press(key)
+    assert not hands.controls.turbo
+
+
+def test_creeping_and_driving_exclude_each_other(hands: Hands) -> None:
+    hands.press("w")
+    hands.ticks(2)
+    hands.press("f")
+    assert hands.controls.creeping(hands.now_ns)
+    assert hands.ticks(4) == [STILL] * 3 + [None]
+    hands.press("w")
+    assert not hands.controls.creeping(hands.now_ns)
+
+
+def test_creeping_ends_by_itself(hands: Hands) -> None:
+    hands.press("f")
+    hands.ticks(12)
+    assert not hands.controls.creeping(hands.now_ns)
+
+
+def test_a_gamepad_drives_while_its_deadman_is_down(hands: Hands) -> None:
+    assert hands.ticks(2, UP) == [None, None]
+    assert hands.ticks(3, DOWN) == [STILL, FIRST_GEAR, FIRST_GEAR]
+    assert hands.ticks(4, UP) == [STILL] * 3 + [None]
+
+
+def test_a_gamepad_has_turbo_of_its_own(hands: Hands) -> None:
+    hands.ticks(1, UP)
+    sent = hands.ticks(2, Stick(Deflection(1, 0), deadman=True, turbo=True))
+    assert sent[-1] == Twist(1.0, 0.0)
+
+
+def test_a_lost_gamepad_is_a_release_and_its_return_moves_nothing(hands: Hands) -> None:
+    hands.ticks(1, UP)
+    hands.ticks(3, DOWN)
+    assert hands.ticks(4, None) == [STILL] * 3 + [None]
+    assert hands.ticks(3, DOWN) == [None] * 3
+    hands.ticks(1, UP)
+    assert hands.ticks(2, DOWN) == [STILL, FIRST_GEAR]
+
+
+@pytest.mark.parametrize("key", ["space", "f"])
+def test_after_a_stop_the_deadman_must_come_up(hands: Hands, key: str) -> None:
+    hands.ticks(1, UP)
+    hands.ticks(2, DOWN)
+    hands.press(key)
+    assert hands.ticks(20, DOWN)[3:] == [None] * 17
+
+
+def test_creeping_keeps_a_gamepad_out(hands: Hands) -> None:
+    hands.press("f")
+    hands.ticks(1, UP)
+    assert hands.ticks(2, DOWN) == [None, None]
+
+
+def test_keys_win_over_the_gamepad(hands: Hands) -> None:
+    hands.ticks(1, UP)
+    hands.press("s")
+    assert hands.ticks(2, DOWN)[-1] == Twist(-0.2, 0.0)

@@ -1,0 +1,148 @@
+"""The whole program in a terminal of its own, on a real bus."""
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.loop import Loop
+from common.messages import Drive, Health
+from services.teleop import life
+from tests.support import bus_on, free_port, running, wait_until
+from tests.teleop.terminal import Terminal, terminal
+
+
+@pytest.fixture
+def loop() -> Iterator[Loop]:
+    with running(Loop()) as loop:
+        yield loop
+
+
+@pytest.fixture
+def requests() -> list[Drive]:
+    return []
+
+
+@pytest.fixture
+def bus(endpoint: str, loop: Loop, requests: list[Drive]) -> Iterator[Bus]:
+    def hear(arrival: Arrival[Drive]) -> None:
+        requests.append(arrival.message)
+
+    with bus_on(
+        endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, hear, source="teleop", depth=64)
+    ) as bus:
+        yield bus
+
+
+def drive_off(it: Terminal, requests: list[Drive]) -> None:
+    """Hold W until the vehicle is asked to move."""
+
+    def hold(key: str) -> bool:
+        it.type(key)
+        it.read()
+        return any((request.linear > 0) == (key == "w") for request in requests)
+
+    wait_until(lambda: it.shows(b"ESTOP"), "the screen")
+    wait_until(lambda: hold(" "), "a zero: the way through the bus is open")
+    wait_until(lambda: hold("w"), "a request to move")
+    assert {request.linear for request in requests} == {0.0, 0.2}
+
+
+def zeros(requests: list[Drive]) -> int:
+    """Return how many zeros came last."""
+    moving = [i for i, request in enumerate(requests) if request.linear]
+    return len(requests) - 1 - moving[-1]
+
+
+def hang_up(it: Terminal) -> None:
+    it.hang_up()
+
+
+def terminate(it: Terminal) -> None:
+    it.process.send_signal(signal.SIGTERM)
+
+
+def leave(it: Terminal) -> None:
+    it.type("q")
+
+
+@pytest.mark.usefixtures("bus")
+@pytest.mark.parametrize(("end", "code"), [(hang_up, life.EXIT_HANGUP), (terminate, 0), (leave, 0)])
+def test_every_end_is_zeros_and_then_silence(
+    endpoint: str, requests: list[Drive], end: Callable[[Terminal], None], code: int
+) -> None:
+    with terminal(endpoint) as it:
+        drive_off(it, requests)
+        end(it)
+        wait_until(it.ends, "its end")
+        assert it.process.returncode == code
+        wait_until(lambda: zeros(requests) >= 3, "zeros")
+    assert 3 <= zeros(requests) <= 5  # a hold that ran out just before adds to them
+
+
+@pytest.mark.usefixtures("bus")
+def test_letting_go_is_zeros_and_then_silence(endpoint: str, requests: list[Drive]) -> None:
+    with terminal(endpoint) as it:
+        drive_off(it, requests)
+        wait_until(lambda: it.reading() and zeros(requests) >= 3, "zeros")
+        assert it.process.poll() is None
+        it.type("q")
+        wait_until(it.ends, "its end")
+    assert zeros(requests) == 6  # three for the release, three for the end: silence in between
+
+
+def test_it_is_alive_and_well_on_the_bus(endpoint: str, loop: Loop) -> None:
+    alive: list[str] = []
+    health: list[Health] = []
+
+    def declare(bus: Bus) -> None:
+        bus.subscribe(keys.HEALTH, lambda it: health.append(it.message), service="teleop")
+        bus.watch_live(keys.live_key("001", "teleop", "*"), lambda key, up: alive.append(key))
+
+    with bus_on(endpoint, loop, declare), terminal(endpoint) as it:
+        wait_until(lambda: it.reading() and alive and health, "presence and health")
+    assert health[0].service == "teleop"
+
+
+def test_without_a_router_the_screen_says_so() -> None:
+    with terminal(f"tcp/127.0.0.1:{free_port()}") as it:
+        wait_until(lambda: it.shows(b"no router yet"), "the words")
+        it.type("q")
+        wait_until(it.ends, "its end")
+        assert it.process.returncode == 0
+
+
+def test_without_a_terminal_there_is_nothing_to_drive_with(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(life, "terminal_is_there", lambda: False)
+    assert life.main([]) == 1
+    assert "needs a terminal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--set", "teleop.hold=9"], "teleop.hold"),
+        (["--source", "No Name"], "teleop.source"),
+        (["--robot", "a/b"], "robot.id"),
+    ],
+)
+def test_a_bad_setting_ends_it_before_anything_opens(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert life.main(words) == 78
+    assert named in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(life, "terminal_is_there", lambda: True)
+    monkeypatch.delitem(sys.modules, "services.teleop.app", raising=False)
+    monkeypatch.setitem(sys.modules, "textual", None)
+    assert life.main(["--no-gamepad"]) == 1
+    assert "install the extra `teleop`" in capsys.readouterr().err

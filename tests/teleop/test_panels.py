@@ -1,0 +1,76 @@
+"""The panels' words."""
+
+import pytest
+
+from common.messages import Bumper, Cause
+from services.teleop import panels
+from services.teleop.mapping import Twist
+from services.teleop.view import Line
+from tests.teleop.support import link, safety_state, view
+
+CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
+SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
+IDLE = Cause(name="no_request", action="stop", age=1.0, text="Nobody asks to move.")
+
+
+def test_the_header_tells_the_way_to_the_vehicle() -> None:
+    words = panels.header(view(link=link(), bumper=Bumper(pressed=False))).plain
+    assert words == "T2 001  ● bus  ● board  ● bumper  gear 1/5  0.20 m/s 0.30 rad/s"
+
+
+def test_the_header_fits_when_nothing_is_there() -> None:
+    words = panels.header(view(connected=False)).plain
+    assert "no router yet" in words
+    assert "no bridge" in words
+    assert len(words) <= 78
+
+
+@pytest.mark.parametrize(("state", "words"), [("lost", "board lost"), ("never", "never seen")])
+def test_the_header_tells_a_board_that_is_away(state: str, words: str) -> None:
+    assert words in panels.header(view(link=link(state=state))).plain
+
+
+def test_the_header_tells_turbo_and_a_pressed_bumper() -> None:
+    words = panels.header(view(turbo=True, top=Twist(1, 1), bumper=Bumper(pressed=True))).plain
+    assert "TURBO  1.00 m/s" in words
+    assert "PRESSED" in words
+
+
+def test_without_safety_it_says_so() -> None:
+    assert "NO SAFETY" in panels.safety(view(), 2).plain
+
+
+def test_safety_is_told_in_its_own_words() -> None:
+    words = panels.safety(view(safety=safety_state(verdict="slow", text="Slowed.")), 2).plain
+    assert words == " SLOW   Slowed."
+
+
+def test_latched_causes_come_first_and_say_what_helps() -> None:
+    state = safety_state(
+        verdict="brake", latched=("contact",), causes=(SILENT, CONTACT, IDLE), text="No."
+    )
+    assert panels.safety(view(safety=state), 5).plain.split("\n")[1:] == [
+        "LATCHED The bumper was hit. 12 s, R resets",
+        "stop An input is too old. 5 min",
+    ]
+
+
+def test_where_room_is_scarce_causes_are_named_in_one_line() -> None:
+    state = safety_state(latched=("contact",), causes=(SILENT, CONTACT))
+    lines = panels.safety(view(safety=state), 2).plain.split("\n")
+    assert lines[1:] == ["LATCHED contact 12 s, R resets  stop silent 5 min"]
+
+
+def test_the_newest_events_are_shown() -> None:
+    lines = tuple(Line(0, "bridge", "warning", f"event {number}") for number in range(5))
+    shown = panels.events(view(lines=lines), 2).plain.split("\n")
+    assert [line[9:] for line in shown] == ["bridge  event 3", "bridge  event 4"]
+    assert panels.events(view(lines=lines), 0).plain == ""
+    assert panels.events(view(lines=lines), 9).plain.count("event") == 5
+
+
+def test_the_hints_say_what_the_key_repeat_means_and_fit() -> None:
+    keys, limit = panels.hints(0.6, 0.3).plain.split("\n")
+    assert "E ESTOP" in keys
+    assert "a tap drives 0.6 s, a hold 0.3 s past the last repeat" in limit
+    assert max(len(keys), len(limit)) <= 78

@@ -1,0 +1,94 @@
+"""The motion panel."""
+
+import pytest
+
+from common.messages import Driver, Limits, Velocity
+from services.teleop.mapping import Twist
+from services.teleop.table import motion
+from services.teleop.view import View
+from tests.teleop.support import link, odometry, safety_state, view
+
+
+def rows(of: View) -> dict[str, str]:
+    return {line[:8].strip(): line[8:].strip() for line in motion(of).plain.split("\n")}
+
+
+def test_it_fits_between_its_borders() -> None:
+    full = view(link=link(), odometry=odometry(), safety=safety_state(), gamepad="none")
+    for of in (view(), full):
+        lines = motion(of).plain.split("\n")
+        assert len(lines) == 11
+        assert max(len(line) for line in lines) <= 40
+
+
+def test_without_data_nothing_is_made_up() -> None:
+    table = rows(view())
+    assert table["m/s"].split() == ["-", "-", "-"]
+    assert {table[name] for name in ("pose", "odom", "board", "rates", "motor L")} == {"no data"}
+    assert table["driver"] == "nobody"
+
+
+@pytest.mark.parametrize(("linear", "allowed"), [(0.35, "0.22"), (0.0, "0.22"), (-0.35, "0.50")])
+def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
+    limits = Limits(forward=0.22, backward=0.5, angular=0.9)
+    table = rows(
+        view(
+            asked=Twist(linear, 0.1),
+            safety=safety_state(limits=limits),
+            velocity=Velocity(linear=0.21, angular=-0.02),
+        )
+    )
+    assert table["m/s"].split() == [f"{linear:+.2f}", allowed, "+0.21"]
+    assert table["rad/s"].split() == ["+0.10", "0.90", "-0.02"]
+
+
+def test_zero_has_no_minus() -> None:
+    assert rows(view(asked=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
+
+
+def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
+    table = rows(view(odometry=odometry()))
+    assert table["pose"] == "x +1.23  y -0.40 m  +90°"
+    assert table["odom"] == "residual +0.004 m  no slip"
+    assert rows(view(odometry=odometry(residual=None, slip=True)))["odom"] == "residual -  SLIP"
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({}, "10.7.5.224:4002  0.8 ms"),
+        ({"round_trip": None}, "10.7.5.224:4002"),
+        ({"state": "lost"}, "lost: 10.7.5.224:4002"),
+        ({"armed": False, "waiting": "a neutral motion"}, "a neutral motion"),
+        ({"armed": False}, "not armed"),
+    ],
+)
+def test_the_way_to_the_board(fields: dict[str, object], words: str) -> None:
+    assert rows(view(link=link(**fields)))["board"] == words
+
+
+def test_the_fastest_streams_are_shown() -> None:
+    assert rows(view(link=link()))["rates"] == "velo 50 driv 2"
+    assert rows(view(link=link(rates={})))["rates"] == "none"
+
+
+def test_driver_faults_are_named_by_side() -> None:
+    table = rows(
+        view(left=Driver(faults=(), bits=0), right=Driver(faults=("encoder", "bit_9"), bits=516))
+    )
+    assert table["motor L"] == "ok"
+    assert table["motor R"] == "encoder bit_9"
+
+
+@pytest.mark.parametrize(
+    ("creeping", "source", "words"),
+    [
+        (False, None, "nobody"),
+        (False, "teleop", "teleop (you)"),
+        (False, "nav", "nav"),
+        (True, None, "you, creeping off the bumper"),
+    ],
+)
+def test_who_drives(creeping: bool, source: str | None, words: str) -> None:
+    of = view(creeping=creeping, safety=safety_state(source=source))
+    assert rows(of)["driver"] == words

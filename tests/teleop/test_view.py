@@ -1,0 +1,26 @@
+"""A stream's newest value, while it is worth showing."""
+
+from common import keys
+from common.freshness import S
+from common.messages import Bumper
+from services.teleop.view import Ear
+from tests.teleop.support import FakeBus
+
+
+def test_a_value_is_shown_while_it_is_worth_it() -> None:
+    bus = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    ear = Ear(bus, keys.BUMPER, 0.5)
+    assert ear.at(0) is None
+    bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * S)
+    assert ear.at(10 * S + S // 2) == Bumper(pressed=True)
+    assert ear.at(10 * S + S // 2 + 1) is None
+
+
+def test_each_side_has_its_own_ear() -> None:
+    bus = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    Ear(bus, keys.DRIVER, 2.0, side="left")
+    Ear(bus, keys.DRIVER, 2.0, side="right")
+    assert sorted(bus.handlers) == [
+        "t2/v1/001/tel/bridge/driver/left",
+        "t2/v1/001/tel/bridge/driver/right",
+    ]
