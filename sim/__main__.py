@@ -1,0 +1,66 @@
+"""The simulated vehicle alone: the board's side of the cable, in a world, until ctrl-c."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+import structlog
+
+from common import log
+from common.config import load
+from common.errors import ConfigError, LinkError
+from common.service import EXIT_CONFIG, EXIT_LINK, add_sources, sources
+from sim.config import Config
+from sim.files import load_plan, load_script
+from sim.process import Process, Trace
+from sim.requests import Script
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the simulator's options."""
+    parser.add_argument("--world", help="a name in sim/worlds, or a TOML file")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="write down what happens")
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="a script of faults")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate until SIGINT or SIGTERM; raise ``ConfigError`` before anything opens."""
+    world = [f"sim.world={options.world}"] if options.world is not None else []
+    options.sets = [*options.sets, *world]
+    config = load(Config, sources(options)).config
+    plan = load_plan(config.sim.world, config.vehicle)
+    script = load_script(options.faults) if options.faults else Script()
+    log.configure(config.log, "sim")
+    with closing(Trace(options.trace)) as trace:
+        try:
+            process = Process(config, plan, script, trace)
+        except LinkError as error:
+            structlog.get_logger().error(str(error))
+            return EXIT_LINK
+        with process:
+            for name in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(name, lambda *_: process.loop.stop())
+            structlog.get_logger().info(
+                "started", world=plan.title, board=f"{config.board.address}:{config.board.port}"
+            )
+            process.run()
+    return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments and return the exit code."""
+    parser = argparse.ArgumentParser(prog="sim", description=__doc__)
+    add_arguments(parser)
+    try:
+        return run(parser.parse_args(argv))
+    except ConfigError as error:
+        print(f"sim: {error}", file=sys.stderr)
+        return EXIT_CONFIG
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""The cable between board and PC, one way of it, with all that can happen to a datagram.
+
+Each datagram meets the faults in this order: dropped, corrupted, sent from a foreign address, held
+to be joined with the next one, delayed, duplicated. What is not delayed comes out at once and in
+order.
+"""
+
+import heapq
+import random
+from dataclasses import dataclass, replace
+
+from common.freshness import S
+from sim.requests import Wire
+
+REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
+
+
+@dataclass(frozen=True, slots=True)
+class Datagram:
+    """Bytes from or to one of the PC's ports."""
+
+    payload: bytes
+    port: int  # of the PC, in ``board.listen_ports``
+    foreign: bool = False  # comes from an address that is not the sender's own
+
+
+class Cable:
+    """One direction; what is put in is taken out when it is due."""
+
+    def __init__(self, seed: int) -> None:
+        self.faults = Wire()
+        self._random = random.Random(seed)
+        self._under_way: list[tuple[int, int, Datagram]] = []  # due, order, datagram
+        self._held: dict[int, bytes] = {}
+        self._order = 0
+
+    def put(self, datagram: Datagram, now_ns: int) -> None:
+        """Send one."""
+        if self._happens(self.faults.drop):
+            return
+        if self._happens(self.faults.corrupt):
+            datagram = replace(datagram, payload=self._flip(datagram.payload))
+        if self._happens(self.faults.foreign):
+            datagram = replace(datagram, foreign=True)
+        payload = self._held.pop(datagram.port, b"") + datagram.payload
+        if self._happens(self.faults.join):
+            self._held[datagram.port] = payload
+            return
+        for _ in range(2 if self._happens(self.faults.duplicate) else 1):
+            due_ns = now_ns + round(self._delay_s() * S)
+            heapq.heappush(
+                self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
+            )
+            self._order += 1
+
+    def take(self, now_ns: int) -> list[Datagram]:
+        """Return what has arrived by now, in the order of arrival."""
+        arrived = []
+        while self._under_way and self._under_way[0][0] <= now_ns:
+            arrived.append(heapq.heappop(self._under_way)[2])
+        return arrived
+
+    def _happens(self, chance: float) -> bool:
+        # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.
+        return chance > 0 and self._random.random() < chance
+
+    def _delay_s(self) -> float:
+        faults = self.faults
+        late = self._random.uniform(0.0, faults.jitter) if faults.jitter else 0.0
+        return faults.delay + late + (REORDER_S if self._happens(faults.reorder) else 0.0)
+
+    def _flip(self, payload: bytes) -> bytes:
+        if not payload:
+            return payload
+        flipped = bytearray(payload)
+        for _ in range(self._random.randint(1, 3)):
+            flipped[self._random.randrange(len(flipped))] ^= 1 << self._random.randrange(8)
+        return bytes(flipped)

@@ -1,0 +1,107 @@
+"""Requests from outside, by hand or by script, done to a simulation."""
+
+from msgspec import Struct
+
+from common.freshness import S
+from sim import requests as q
+from sim.board import DRIVER_SIDES
+from sim.geometry import Pose
+from sim.simulation import Simulation
+from sim.trace import Disturbed, Truth
+from sim.vehicle import Twist
+from sim.world import World
+
+
+class Reply(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The answer to a request; ``error`` says why it was refused."""
+
+    ok: bool
+    error: str = ""
+    truth: Truth | None = None
+
+
+class Injection:
+    """Does requests, those of a script when their time has come."""
+
+    def __init__(self, simulation: Simulation, script: q.Script, now_ns: int) -> None:
+        self._simulation = simulation
+        self._start_ns = now_ns
+        self._steps = sorted(script.steps, key=lambda step: step.at, reverse=True)
+
+    def advance(self, now_ns: int) -> None:
+        """Do the steps of the script that are due, each at its own time; step the simulation."""
+        while self._steps and self._due_ns(self._steps[-1]) <= now_ns:
+            step = self._steps.pop()
+            due_ns = self._due_ns(step)
+            self._simulation.advance(due_ns)
+            self.handle(step.request, due_ns)
+        self._simulation.advance(now_ns)
+
+    def handle(self, request: q.Asked, now_ns: int) -> Reply:
+        """Do one request; what is refused changes nothing."""
+        if isinstance(request, q.AskTruth):
+            return Reply(ok=True, truth=self._simulation.truth(now_ns))
+        error = self._disturb(request, now_ns)
+        self._simulation.record(Disturbed(mono_ns=now_ns, request=request, error=error))
+        return Reply(ok=not error, error=error)
+
+    def _due_ns(self, step: q.Step) -> int:
+        return self._start_ns + round(step.at * S)
+
+    def _disturb(self, request: q.Asked, now_ns: int) -> str:
+        """Return why it was refused, nothing when it was done."""
+        match request:
+            case q.Place():
+                return self._place(request.pose)
+            case q.AddBox():
+                return self._rebuild(self._simulation.world.with_box(request.box))
+            case q.RemoveBox():
+                return self._remove(request.name)
+            case q.Wire():
+                self._wire(request)
+            case _:
+                self._disturb_board(request, now_ns)
+        return ""
+
+    def _disturb_board(self, request: q.Asked, now_ns: int) -> None:
+        simulation = self._simulation
+        match request:
+            case q.Bumper():
+                simulation.hand_on_bumper = request.pressed
+                simulation.feel()
+            case q.Sonar():
+                simulation.sonars.disturb(request)
+            case q.Driver():
+                simulation.set_driver(DRIVER_SIDES[request.side], request.bits, now_ns)
+            case q.Freeze():
+                simulation.freeze(request.seconds, now_ns)
+            case q.PowerCycle():  # pragma: no branch - there is no other
+                simulation.power_cycle(request.seconds, now_ns)
+
+    def _wire(self, faults: q.Wire) -> None:
+        if faults.direction in ("to_pc", "both"):
+            self._simulation.to_pc.faults = faults
+        if faults.direction in ("to_board", "both"):
+            self._simulation.to_board.faults = faults
+
+    def _place(self, pose: Pose) -> str:
+        simulation = self._simulation
+        if simulation.world.blocks(simulation.body, pose):
+            return f"something is in the way at x {pose.x:g}, y {pose.y:g}"
+        simulation.pose, simulation.twist = pose, Twist()
+        simulation.feel()
+        return ""
+
+    def _rebuild(self, world: World) -> str:
+        simulation = self._simulation
+        if world.blocks(simulation.body, simulation.pose):
+            return "the vehicle is in the way"
+        simulation.world = world
+        simulation.feel()
+        return ""
+
+    def _remove(self, name: str) -> str:
+        names = [box.name for box in self._simulation.world.boxes]
+        if name not in names:
+            return f"no box is called {name!r}; there are: {', '.join(names) or 'none'}"
+        return self._rebuild(self._simulation.world.without(name))

@@ -1,0 +1,113 @@
+"""The simulated vehicle as a process: sockets, clock and trace around the simulation."""
+
+import time
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Self
+
+import msgspec
+import structlog
+
+from common.errors import ConfigError
+from common.freshness import S
+from common.loop import Loop
+from sim import trace as t
+from sim.config import Config
+from sim.control import ControlSocket
+from sim.injection import Injection
+from sim.requests import Script
+from sim.simulation import STEP_NS, Simulation
+from sim.udp import BoardSocket
+from sim.world import Plan
+
+
+class Trace:
+    """A file of JSON lines, each written at once; or none."""
+
+    def __init__(self, file: Path | None) -> None:
+        try:
+            self._out = file.open("wb", buffering=0) if file else None
+        except OSError as error:
+            raise ConfigError(f"--trace {file}: cannot be written: {error.strerror}") from None
+
+    def write(self, line: t.Line) -> None:
+        """Append a line."""
+        if self._out is not None:
+            self._out.write(msgspec.json.encode(line) + b"\n")
+
+    def close(self) -> None:
+        """End the file."""
+        if self._out is not None:
+            self._out.close()
+
+
+class Process:
+    """Everything that ``python -m sim`` runs; making one opens its sockets."""
+
+    def __init__(self, config: Config, plan: Plan, script: Script, trace: Trace) -> None:
+        now_ns = time.monotonic_ns()
+        self.simulation = Simulation(config, plan, now_ns)
+        self._injection = Injection(self.simulation, script, now_ns)
+        self._trace = trace
+        self._log = structlog.get_logger()
+        with ExitStack() as stack:  # what is open already is closed when the next port is taken
+            self.loop = stack.enter_context(closing(Loop()))
+            self._board = stack.enter_context(closing(BoardSocket(config.board)))
+            self.loop.watch(self._board.sock, self._hear)
+            if config.sim.control_port:
+                control = ControlSocket(config.sim.control_port, self._injection)
+                stack.enter_context(closing(control))
+                self.loop.watch(control.sock, lambda now_ns: self._obey(control, now_ns))
+            self._opened = stack.pop_all()
+        self.loop.every(STEP_NS / S, self._step)
+
+    def run(self) -> None:
+        """Serve until the loop is stopped."""
+        self.loop.run()
+        counters = dict(self.simulation.counters)
+        self._log.info("stopped", unsent=self._board.unsent, **counters)
+
+    def close(self) -> None:
+        """Give ports and descriptors back."""
+        self._opened.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _step(self, now_ns: int) -> None:
+        self._injection.advance(now_ns)
+        self._deliver()
+
+    def _hear(self, now_ns: int) -> None:
+        # An answer must tell of now, also when this process was held up before it.
+        self._injection.advance(now_ns)
+        for payload, port in self._board.receive():
+            self.simulation.receive(payload, port, now_ns)
+        self._deliver()
+
+    def _obey(self, control: ControlSocket, now_ns: int) -> None:
+        control.serve(now_ns)
+        self._deliver()
+
+    def _deliver(self) -> None:
+        now_ns = time.monotonic_ns()
+        for datagram in self.simulation.take_sent(now_ns):
+            self._board.send(datagram)
+        for line in self.simulation.take_records():
+            self._trace.write(line)
+            self._tell(line)
+
+    def _tell(self, line: t.Line) -> None:
+        match line:
+            case t.BumperSent():
+                self._log.info("bumper reported", pressed=line.pressed)
+            case t.Power():
+                self._log.warning("power", on=line.on)
+            case t.Disturbed():
+                request = msgspec.to_builtins(line.request)
+                self._log.warning("disturbed", request=request, error=line.error)
+            case _:  # commands and truth are samples, no transitions
+                pass

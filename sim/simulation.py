@@ -1,0 +1,229 @@
+"""The whole simulated vehicle: body, world, sensors, board and cable, in steps of simulated time.
+
+Time comes in: ``advance`` steps up to it, ``receive`` and ``handle`` happen at it. What goes out is
+collected, to be taken: datagrams for the PC, and lines for the trace. The same seed and the same
+calls give the same of both. One step::
+
+    script -> command -> velocity -> way through the world -> sensors -> stream -> trace
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from common.freshness import S
+from common.wire.commands import TO_BOARD, MotionCommand
+from common.wire.frame import Frame, Side
+from common.wire.framing import Framing, Received
+from common.wire.reports import FROM_BOARD, BumperReport
+from sim import trace as t
+from sim.board import Board
+from sim.config import Config
+from sim.faults import Cable, Datagram
+from sim.geometry import Rectangle
+from sim.sonar import Sonars
+from sim.vehicle import Twist, go, next_twist, wheels
+from sim.world import Plan, World
+
+STEP_NS = S // 100
+STREAM_STEPS = 2  # velocity at 50 Hz
+SONAR_STEPS = 5  # a round of echoes takes about that long: 20 Hz
+TRUTH_STEPS = 5  # 20 Hz
+CATCH_UP_NS = S // 2  # a longer hole is skipped: the world stood still meanwhile
+
+KINDS: tuple[t.Kind, ...] = ("stop", "run", "break")
+
+
+class Simulation:
+    """A vehicle that was powered on at ``now_ns``; its start must be free of obstacles."""
+
+    def __init__(self, config: Config, plan: Plan, now_ns: int) -> None:
+        self.now_ns = now_ns  # simulated up to here
+        self.world = World.of(plan)
+        self.body = Rectangle(config.vehicle.length / 2, config.vehicle.width / 2)
+        self.pose = plan.start.pose
+        self.twist = Twist()
+        self.hand_on_bumper = False
+        sim = config.sim
+        self.sonars = Sonars(config.vehicle, sim.sonar_cone, sim.sonar_noise, sim.seed)
+        self._ranges = self.sonars.measure(self.world, self.pose)
+        self.board = Board(config.wire, sim, self._ranges)
+        self.to_pc, self.to_board = Cable(sim.seed + 1), Cable(sim.seed + 2)
+        self.counters: Counter[str] = Counter()
+        self._config = config
+        self._framing = Framing(config.wire.crc, config.wire.crc_covers)
+        self._records: list[t.Line] = []
+        self._steps = 0
+        self._driven = 0.0
+        self._contact = self.world.contact(self.body, self.pose)
+        self._silent_until_ns = now_ns
+        self._powered = True
+        self._said_pressed = False
+        self._command = t.Command(mono_ns=now_ns, kind="stop", linear=0.0, angular=0.0)
+
+    def advance(self, now_ns: int) -> None:
+        """Step up to now, or leave out what is too long ago."""
+        hole = now_ns - self.now_ns - CATCH_UP_NS
+        if hole > 0:
+            self.now_ns += hole
+            self.counters["holes"] += 1
+        while self.now_ns + STEP_NS <= now_ns:
+            self.now_ns += STEP_NS
+            self._step()
+            self._hear(self.now_ns)
+
+    def receive(self, payload: bytes, port: int | None, now_ns: int) -> None:
+        """Take a datagram from that port of the PC; None for any other sender, who is ignored."""
+        if port is None:
+            self.counters["foreign"] += 1
+            return
+        self.to_board.put(Datagram(payload, port), now_ns)
+        self._hear(now_ns)
+
+    def take_sent(self, now_ns: int) -> list[Datagram]:
+        """Return the datagrams that leave for the PC by now."""
+        sent = self.to_pc.take(now_ns)
+        for datagram in sent:
+            self._note_bumper(datagram, now_ns)
+        return sent
+
+    def take_records(self) -> Sequence[t.Line]:
+        """Return what there is to trace since the last call."""
+        records, self._records = self._records, []
+        return records
+
+    def record(self, line: t.Line) -> None:
+        """Put something into the trace."""
+        self._records.append(line)
+
+    def freeze(self, seconds: float, now_ns: int) -> None:
+        """Let the board hear and say nothing for that long."""
+        self._silent_until_ns = now_ns + round(seconds * S)
+
+    def power_cycle(self, seconds: float, now_ns: int) -> None:
+        """Cut the board's power; it speaks again that much later, with all counters at zero."""
+        self._powered = False
+        self.twist = Twist()  # unpowered wheels hold: their motors are geared and shorted
+        self.board.power_on()
+        self._hold(self.board.command, now_ns)
+        self.freeze(seconds, now_ns)
+        self.record(t.Power(mono_ns=now_ns, on=False))
+
+    def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
+        """Set a driver's fault bits; the board reports a fault unasked."""
+        changed = bits != self.board.driver_bits[side]
+        self.board.driver_bits[side] = bits
+        if changed and bits:
+            self._send_to_all(self.board.driver(side), now_ns)
+
+    def truth(self, now_ns: int) -> t.Truth:
+        """Return how things are."""
+        clearance = self.world.clearance(self.body, self.pose)
+        return t.Truth(
+            mono_ns=now_ns,
+            x=self.pose.x,
+            y=self.pose.y,
+            heading=self.pose.heading,
+            linear=self.twist.linear,
+            angular=self.twist.angular,
+            distance=self._driven,
+            clearance=clearance if math.isfinite(clearance) else None,
+            contact=self._contact,
+            pressed=self._pressed(),
+            wheels=tuple(wheel.angle for wheel in wheels(self.twist, self._config.vehicle)),
+            command=self._command,
+            braking=self.board.braking(),
+            ultrasonic_brake=self.board.ultrasonic_brake,
+            bumper_brake=self.board.bumper_brake,
+            silent=self._silent(now_ns),
+        )
+
+    def feel(self) -> None:
+        """Let the bumper know of a world, a pose or a hand that has changed."""
+        self._contact = self.world.contact(self.body, self.pose)
+        self.board.sense(self.twist, self._ranges, self._pressed())
+
+    def _step(self) -> None:
+        self._steps += 1
+        self._wake()
+        self._move(STEP_NS / S)
+        if self._steps % SONAR_STEPS == 0:
+            self._ranges = self.sonars.measure(self.world, self.pose)
+        self.board.sense(self.twist, self._ranges, self._pressed())
+        if self._steps % STREAM_STEPS == 0:
+            self._send_to_all(self.board.velocity(), self.now_ns)
+        if self._steps % TRUTH_STEPS == 0:
+            self.record(self.truth(self.now_ns))
+
+    def _wake(self) -> None:
+        if not self._powered and not self._silent(self.now_ns):
+            self._powered = True
+            self.record(t.Power(mono_ns=self.now_ns, on=True))
+
+    def _move(self, dt: float) -> None:
+        command = self.board.drive()
+        drive = self._config.sim.drive
+        twist = next_twist(self.twist, command.kind, self.board.target(command), drive, dt)
+        if twist == Twist():
+            self.twist = twist
+            return
+        way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
+        self.pose, self.twist = way.pose, Twist() if way.held else twist
+        self._driven += abs(way.distance)
+        self.board.count(way.distance, way.turn)
+        self._contact = self.world.contact(self.body, self.pose)
+
+    def _hear(self, now_ns: int) -> None:
+        for datagram in self.to_board.take(now_ns):
+            if datagram.foreign:
+                self.counters["foreign"] += 1
+            elif self._silent(now_ns):
+                self.counters["unheard"] += 1
+            else:
+                self._read(datagram, now_ns)
+
+    def _read(self, datagram: Datagram, now_ns: int) -> None:
+        for part in self._framing.read(datagram.payload, TO_BOARD):
+            if not isinstance(part, Received):
+                self.counters[f"rejected_{part.reason}"] += 1
+                continue
+            self.counters[type(part.frame).__name__] += 1
+            answer = self.board.answer(part.frame)
+            if isinstance(part.frame, MotionCommand):
+                self._hold(part.frame, now_ns)
+                self.record(self._command)
+            if answer is not None:
+                self._send(answer, datagram.port, now_ns)
+
+    def _hold(self, command: MotionCommand, now_ns: int) -> None:
+        target = self.board.target(command)
+        self._command = t.Command(
+            mono_ns=now_ns,
+            kind=KINDS[command.kind],
+            linear=target.linear,
+            angular=target.angular,
+        )
+
+    def _send_to_all(self, frame: Frame, now_ns: int) -> None:
+        for port in self._config.board.listen_ports:
+            self._send(frame, port, now_ns)
+
+    def _send(self, frame: Frame, port: int, now_ns: int) -> None:
+        if not self._silent(now_ns):
+            self.to_pc.put(Datagram(self._framing.pack(frame), port), now_ns)
+
+    def _note_bumper(self, datagram: Datagram, now_ns: int) -> None:
+        if datagram.foreign:
+            return
+        for part in self._framing.read(datagram.payload, FROM_BOARD):
+            if not isinstance(part, Received) or not isinstance(part.frame, BumperReport):
+                continue
+            if part.frame.on != self._said_pressed:
+                self._said_pressed = part.frame.on
+                self.record(t.BumperSent(mono_ns=now_ns, pressed=self._said_pressed))
+
+    def _pressed(self) -> bool:
+        return self._contact or self.hand_on_bumper
+
+    def _silent(self, now_ns: int) -> bool:
+        return now_ns < self._silent_until_ns

@@ -1,0 +1,73 @@
+"""Eight sonars that look around the vehicle.
+
+Each sends a cone, here a fan of rays; the nearest surface in it is the echo, with noise. What the
+real sensors say at the ends of their range is unknown; these say 0 when something is too near to
+measure, and their greatest range when nothing answers.
+"""
+
+import random
+
+from common.messages import SONAR_NAMES
+from common.settings import Vehicle
+from common.vehicle import Mount, sonar_mounts
+from common.wire.reports import SONAR_FAULT_MM
+from sim.geometry import Pose, ray
+from sim.requests import Sonar
+from sim.world import World
+
+RAYS = 7
+TOO_NEAR_MM = 0
+
+Ranges = tuple[int, int, int, int, int, int, int, int]
+
+
+class Sonars:
+    """The eight of them, in the manual's order, with what is wrong with each.
+
+    cone: the whole opening, rad. noise: standard deviation, m.
+    """
+
+    def __init__(self, vehicle: Vehicle, cone: float, noise: float, seed: int) -> None:
+        self._mounts = sonar_mounts(vehicle)
+        self._nearest, self._farthest = vehicle.sonar_min, vehicle.sonar_max
+        self._fan = tuple(cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
+        self._noise = noise
+        self._random = random.Random(seed)
+        self._wrong: dict[str, Sonar] = {}
+        self._last = dict.fromkeys(SONAR_NAMES, self._in_mm(self._farthest))
+
+    def disturb(self, sonar: Sonar) -> None:
+        """Let one be faulty, stuck, or see a given range; or be well again."""
+        self._wrong[sonar.name] = sonar
+
+    def measure(self, world: World, pose: Pose) -> Ranges:
+        """Return what they report from this pose, in mm."""
+        a, b, c, d, e, f, g, h = (self._report(mount, world, pose) for mount in self._mounts)
+        return a, b, c, d, e, f, g, h
+
+    def _report(self, mount: Mount, world: World, pose: Pose) -> int:
+        noise = self._random.gauss(0.0, self._noise)  # drawn always: a fault moves no other sonar
+        wrong = self._wrong.get(mount.name)
+        if wrong is not None and wrong.fault:
+            return SONAR_FAULT_MM
+        if wrong is not None and wrong.stuck:
+            return self._last[mount.name]
+        if wrong is not None and wrong.range is not None:
+            value = self._in_mm(wrong.range)
+        else:
+            value = self._in_mm(self._echo(mount, world, pose) + noise)
+        self._last[mount.name] = value
+        return value
+
+    def _echo(self, mount: Mount, world: World, pose: Pose) -> float:
+        x, y = pose.outward(mount.x, mount.y)
+        middle = pose.heading + mount.yaw
+        return min(
+            (ray(x, y, middle + aside, s) for aside in self._fan for s in world.visible),
+            default=self._farthest,
+        )
+
+    def _in_mm(self, distance: float) -> int:
+        if distance < self._nearest:
+            return TOO_NEAR_MM
+        return round(min(distance, self._farthest) * 1000)

@@ -1,0 +1,140 @@
+"""Rooms and obstacles: what sonar sees, what only the bumper meets, and where a body fits.
+
+A plan is what a world file says; the world is the plan as surfaces. A world does not change: adding
+a box makes another one.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Self
+
+from msgspec import Meta, Struct
+
+from sim.geometry import Pose, Rectangle, Segment, point_gap
+
+BUMPER_TRAVEL = 0.005  # m; the strip gives that much before the body meets what pressed it
+
+Side = Annotated[float, Meta(ge=0.01, le=100.0)]
+Coordinate = Annotated[float, Meta(ge=-1000.0, le=1000.0)]  # m; a limit also refuses NaN
+Angle = Annotated[float, Meta(ge=-100.0, le=100.0)]  # rad
+Point = tuple[Coordinate, Coordinate]
+
+
+class Part(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One table of a world file."""
+
+
+class Spot(Part, frozen=True, kw_only=True):
+    """A pose with a name for people: where the vehicle starts, or a hint for a driver."""
+
+    x: Coordinate  # m
+    y: Coordinate  # m
+    heading: Angle = 0.0  # rad
+    name: str = ""
+
+    @property
+    def pose(self) -> Pose:
+        """Return it without its name."""
+        return Pose(self.x, self.y, self.heading)
+
+
+class Box(Spot, frozen=True, kw_only=True):
+    """A rectangle on the floor around its pose; a low one is under every sonar's beam."""
+
+    name: str
+    length: Side  # m, along the heading
+    width: Side  # m
+    low: bool = False
+
+    @property
+    def shape(self) -> Rectangle:
+        """Return its rectangle."""
+        return Rectangle(self.length / 2, self.width / 2)
+
+
+class Wall(Part, frozen=True, kw_only=True):
+    """A line through points, thin and high."""
+
+    points: Annotated[tuple[Point, ...], Meta(min_length=2)]
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Return its pieces."""
+        return tuple(
+            Segment(*a, *b) for a, b in zip(self.points[:-1], self.points[1:], strict=True)
+        )
+
+
+class Plan(Part, frozen=True, kw_only=True):
+    """A world file."""
+
+    title: str
+    start: Spot = Spot(x=0.0, y=0.0)
+    walls: tuple[Wall, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    route: tuple[Spot, ...] = ()  # a hint for drivers; the simulation does not read it
+
+    def __post_init__(self) -> None:
+        names = [box.name for box in self.boxes]
+        if len(set(names)) < len(names):
+            raise ValueError("two boxes have the same name")
+
+
+@dataclass(frozen=True)
+class World:
+    """Walls and boxes as surfaces."""
+
+    walls: tuple[Segment, ...]
+    boxes: tuple[Box, ...]
+
+    @classmethod
+    def of(cls, plan: Plan) -> Self:
+        """Build what a plan says."""
+        return cls(tuple(s for wall in plan.walls for s in wall.segments), plan.boxes)
+
+    @cached_property
+    def visible(self) -> tuple[Segment, ...]:
+        """Return the surfaces that sonar sees."""
+        return self.walls + _outlines(box for box in self.boxes if not box.low)
+
+    @cached_property
+    def solid(self) -> tuple[Segment, ...]:
+        """Return all surfaces."""
+        return self.visible + _outlines(box for box in self.boxes if box.low)
+
+    def blocks(self, body: Rectangle, pose: Pose) -> bool:
+        """Tell whether a body cannot be there."""
+        if any(box.shape.holds(box.pose, pose.x, pose.y) for box in self.boxes):
+            return True
+        return any(body.touches(pose, segment) for segment in _near(self.solid, body, pose, 0.0))
+
+    def contact(self, body: Rectangle, pose: Pose) -> bool:
+        """Tell whether something presses the bumper strip, which goes all around the body."""
+        near = _near(self.solid, body, pose, BUMPER_TRAVEL)
+        return any(body.gap(pose, segment) <= BUMPER_TRAVEL for segment in near)
+
+    def clearance(self, body: Rectangle, pose: Pose) -> float:
+        """Return the gap to the nearest surface that sonar sees, in metres; or infinity."""
+        return min((body.gap(pose, segment) for segment in self.visible), default=math.inf)
+
+    def with_box(self, box: Box) -> Self:
+        """Return a world with one more box, in place of one of the same name."""
+        return type(self)(self.walls, (*self.without(box.name).boxes, box))
+
+    def without(self, name: str) -> Self:
+        """Return a world without the box of that name."""
+        return type(self)(self.walls, tuple(box for box in self.boxes if box.name != name))
+
+
+def _outlines(boxes: Iterable[Box]) -> tuple[Segment, ...]:
+    return tuple(side for box in boxes for side in box.shape.outline(box.pose))
+
+
+def _near(
+    segments: tuple[Segment, ...], body: Rectangle, pose: Pose, margin: float
+) -> Iterable[Segment]:
+    """Yield what can be within the margin of the body: most is not, and that is cheap to see."""
+    reach = math.hypot(body.half_length, body.half_width) + margin
+    return (s for s in segments if point_gap(pose.x, pose.y, s) <= reach)

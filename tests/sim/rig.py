@@ -1,0 +1,99 @@
+"""A simulated vehicle on a bench: no sockets, no clock, and a PC that says what it is told to."""
+
+import math
+from typing import Any
+
+import msgspec
+
+from common.freshness import S
+from common.wire.commands import MotionCommand, MotionKind
+from common.wire.frame import Frame
+from common.wire.framing import Framing, Received
+from common.wire.reports import FROM_BOARD
+from sim.config import Config
+from sim.faults import Datagram
+from sim.injection import Injection, Reply
+from sim.requests import Asked, Script
+from sim.simulation import Simulation
+from sim.trace import Line, Truth
+from sim.world import Plan
+
+PORTS = (4002, 4001)
+START_NS = 5 * S  # any time but zero
+EMPTY = Plan(title="nothing")
+
+
+def config(**sections: dict[str, Any]) -> Config:
+    """Return settings without noise, over the defaults."""
+    sections["sim"] = {"sonar_noise": 0.0, "bumper_brake": "toward"} | sections.get("sim", {})
+    return msgspec.convert(sections, Config)
+
+
+def room(*boxes: dict[str, Any], **plan: Any) -> Plan:
+    """Return a plan with these boxes."""
+    return msgspec.convert({"title": "a room", "boxes": boxes, **plan}, Plan)
+
+
+class Rig:
+    """A simulation with its script, the PC's side of the wire, and all that came of it."""
+
+    def __init__(
+        self, plan: Plan = EMPTY, settings: Config | None = None, script: Script | None = None
+    ) -> None:
+        settings = settings or config()
+        self.simulation = Simulation(settings, plan, START_NS)
+        self.injection = Injection(self.simulation, script or Script(), START_NS)
+        self.framing = Framing(settings.wire.crc, settings.wire.crc_covers)
+        self.now_ns = START_NS
+        self.datagrams: list[Datagram] = []
+        self.records: list[Line] = []
+
+    def say(self, *frames: Frame, port: int | None = 4002) -> list[Frame]:
+        """Send frames in one datagram and return what is answered at once."""
+        self.simulation.receive(b"".join(map(self.framing.pack, frames)), port, self.now_ns)
+        return self._collect()
+
+    def run(self, linear: float = 0.0, angular: float = 0.0) -> None:
+        """Command RUN, in m/s and rad/s."""
+        raw = round(math.degrees(angular) * 10)
+        self.say(MotionCommand(MotionKind.RUN, round(linear * 1000), raw))
+
+    def stop(self) -> None:
+        """Command STOP."""
+        self.say(MotionCommand(MotionKind.STOP))
+
+    def after(self, seconds: float) -> list[Frame]:
+        """Let time go by in ticks of 10 ms and return what the board said meanwhile."""
+        end_ns = self.now_ns + round(seconds * S)
+        said = []
+        while self.now_ns < end_ns:
+            self.now_ns = min(end_ns, self.now_ns + S // 100)
+            self.injection.advance(self.now_ns)
+            said += self._collect()
+        return said
+
+    def do(self, request: Asked) -> Reply:
+        """Do something to it."""
+        reply = self.injection.handle(request, self.now_ns)
+        self.records += self.simulation.take_records()
+        return reply
+
+    @property
+    def truth(self) -> Truth:
+        """Return how things are."""
+        return self.simulation.truth(self.now_ns)
+
+    def frames(self, datagram: Datagram) -> list[Frame]:
+        """Return the frames of a datagram that can be read."""
+        parts = self.framing.read(datagram.payload, FROM_BOARD)
+        return [part.frame for part in parts if isinstance(part, Received)]
+
+    def of(self, kind: type[Line]) -> list[Any]:
+        """Return the trace's lines of one kind."""
+        return [record for record in self.records if isinstance(record, kind)]
+
+    def _collect(self) -> list[Frame]:
+        sent = self.simulation.take_sent(self.now_ns)
+        self.datagrams += sent
+        self.records += self.simulation.take_records()
+        return [frame for datagram in sent for frame in self.frames(datagram)]

@@ -1,0 +1,215 @@
+import math
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.settings import Wire
+from common.wire import commands as c
+from common.wire import reports as r
+from common.wire.frame import Frame, Side
+from sim.board import BREAK, STOP, Board
+from sim.config import Sim
+from sim.sonar import Ranges
+from sim.vehicle import Twist
+
+CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
+LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
+FORWARD = c.MotionCommand(c.MotionKind.RUN, 500)
+BACKWARD = c.MotionCommand(c.MotionKind.RUN, -100)
+TURN = c.MotionCommand(c.MotionKind.RUN, 0, 300)
+
+
+def board(unit: str = "decidegree", **settings: Any) -> Board:
+    wire = msgspec.convert({"angular_unit": unit}, Wire)
+    return Board(wire, Sim(**settings), CLEAR)
+
+
+def near(*sonars: int, millimetres: int = 100) -> Ranges:
+    return tuple(millimetres if k in sonars else 5000 for k in range(8))  # type: ignore[return-value]
+
+
+def hit(way: float = 0.5, **settings: Any) -> Board:
+    """Return a board with its bumper brake on that was hit while moving that way."""
+    some = board(**settings)
+    some.answer(c.BumperBrakeSet(True))
+    some.sense(Twist(way), CLEAR, pressed=False)
+    some.sense(Twist(), CLEAR, pressed=True)
+    return some
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        (c.DistanceQuery(), r.DistanceReport(0, 0)),
+        (c.UltrasonicQuery(), r.UltrasonicReport(CLEAR)),
+        (c.BumperQuery(), r.BumperReport(False)),
+        (c.UltrasonicBrakeSet(True), r.UltrasonicBrakeReport(True)),
+        (c.UltrasonicBrakeSet(False), r.UltrasonicBrakeReport(False)),
+        (c.BumperBrakeSet(True), r.BumperBrakeReport(True)),
+        (c.BumperBrakeSet(False), r.BumperBrakeReport(False)),
+        (c.DriverQuery(Side.LEFT), r.DriverReport(Side.LEFT, 0)),
+        (c.DriverQuery(Side.RIGHT), r.DriverReport(Side.RIGHT, 0)),
+        (LED, r.LedReport(True)),
+    ],
+)
+def test_every_query_and_setting_is_answered(command: Frame, answer: Frame) -> None:
+    assert board().answer(command) == answer
+
+
+def test_a_motion_command_is_held_without_an_answer() -> None:
+    some = board()
+    assert some.drive() == STOP
+    assert some.answer(FORWARD) is None
+    assert some.drive() == FORWARD
+
+
+def test_a_lamp_that_is_not_there_is_refused() -> None:
+    some = board(led_channels=3)
+    assert some.answer(LED) == r.LedReport(False)
+    assert some.lamps == {}
+
+
+def test_reports_tell_what_was_sensed() -> None:
+    some = board()
+    some.sense(Twist(0.25, math.radians(-12)), near(2), pressed=True)
+    assert some.velocity() == r.VelocityReport(250, -120)
+    assert some.answer(c.UltrasonicQuery()) == r.UltrasonicReport(near(2))
+    assert some.answer(c.BumperQuery()) == r.BumperReport(True)
+
+
+def test_the_angular_unit_is_a_setting_both_ways() -> None:
+    some = board("milliradian")
+    assert some.target(c.MotionCommand(c.MotionKind.RUN, 0, 500)) == Twist(0.0, 0.5)
+    some.sense(Twist(0.0, -0.25), CLEAR, pressed=False)
+    assert some.velocity() == r.VelocityReport(0, -250)
+    assert board().target(TURN).angular == pytest.approx(math.radians(30))
+
+
+def test_counters_add_up_with_their_signs() -> None:
+    some = board()
+    some.count(1.5, math.radians(30))
+    some.count(-0.25, math.radians(-45))
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(1250, -150)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "reported"), [(179.9, 1799), (180.2, -1798), (-181.0, 1790), (725.0, 50)]
+)
+def test_the_heading_wraps_at_half_a_turn(degrees: float, reported: int) -> None:
+    some = board()
+    some.count(0.0, math.radians(degrees))
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(0, reported)
+
+
+@pytest.mark.parametrize(
+    ("metres", "reported"),
+    [(2147483.647, 2**31 - 1), (2147483.648, -(2**31)), (-2147483.649, 2**31 - 1)],
+)
+def test_the_distance_wraps_at_32_bits(metres: float, reported: int) -> None:
+    some = board()
+    some.count(metres, 0.0)
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(reported, 0)
+
+
+def test_power_on_forgets_all() -> None:
+    some = board()
+    for frame in (FORWARD, LED, c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)):
+        some.answer(frame)
+    some.count(1.0, 1.0)
+    some.driver_bits[Side.RIGHT] = 3
+    some.power_on()
+    assert some.drive() == STOP
+    assert some.lamps == {}
+    assert (some.bumper_brake, some.ultrasonic_brake) == (False, False)
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(0, 0)
+    assert some.driver(Side.RIGHT) == r.DriverReport(Side.RIGHT, 0)
+
+
+def test_both_brakes_are_off_at_first() -> None:
+    some = board()
+    some.answer(FORWARD)
+    some.sense(Twist(0.5), near(1, 2, 3), pressed=True)
+    assert some.drive() == FORWARD
+
+
+@pytest.mark.parametrize(
+    ("command", "rolling", "sonar", "brakes"),
+    [
+        (FORWARD, 0.0, 1, True),
+        (FORWARD, 0.0, 2, True),
+        (FORWARD, 0.0, 3, True),
+        (FORWARD, 0.0, 0, False),
+        (FORWARD, 0.0, 6, False),
+        (BACKWARD, 0.0, 2, False),
+        (BACKWARD, 0.0, 5, True),
+        (BACKWARD, 0.0, 7, True),
+        (BACKWARD, 0.5, 2, True),  # still rolling the other way
+        (STOP, 0.5, 2, True),  # coasting
+        (STOP, 0.0, 2, False),
+        (TURN, 0.0, 2, False),
+    ],
+)
+def test_the_sonar_brake_watches_the_direction_of_motion(
+    command: c.MotionCommand, rolling: float, sonar: int, brakes: bool
+) -> None:
+    some = board()
+    some.answer(c.UltrasonicBrakeSet(True))
+    some.answer(command)
+    some.sense(Twist(rolling), near(sonar), pressed=False)
+    assert some.braking() is brakes
+    assert some.drive() == (BREAK if brakes else command)
+
+
+@pytest.mark.parametrize(
+    ("millimetres", "brakes"), [(0, True), (149, True), (150, False), (0xFFFF, False)]
+)
+def test_the_sonar_brake_has_a_range(millimetres: int, brakes: bool) -> None:
+    some = board(brake_range=0.15)
+    some.answer(c.UltrasonicBrakeSet(True))
+    some.answer(FORWARD)
+    some.sense(Twist(), near(2, millimetres=millimetres), pressed=False)
+    assert some.braking() is brakes
+
+
+@pytest.mark.parametrize(
+    ("way", "command", "brakes"),
+    [
+        (0.5, FORWARD, True),
+        (0.5, TURN, True),
+        (0.5, STOP, True),
+        (0.5, BACKWARD, False),
+        (-0.5, BACKWARD, True),
+        (-0.5, FORWARD, False),
+        (0.0, FORWARD, True),  # pressed by hand while it had never moved
+        (0.0, BACKWARD, True),
+    ],
+)
+def test_the_bumper_brake_lets_it_only_back_off(
+    way: float, command: c.MotionCommand, brakes: bool
+) -> None:
+    some = hit(way)
+    some.answer(command)
+    assert some.braking() is brakes
+
+
+def test_the_bumper_brake_remembers_the_way_of_the_hit_not_of_the_release() -> None:
+    some = hit(0.5)
+    some.answer(BACKWARD)
+    some.sense(Twist(-0.1), CLEAR, pressed=True)
+    assert not some.braking()
+    some.answer(FORWARD)
+    assert some.braking()
+
+
+def test_the_bumper_brake_is_over_when_the_bumper_is_clear() -> None:
+    some = hit(0.5)
+    some.answer(FORWARD)
+    some.sense(Twist(), CLEAR, pressed=False)
+    assert some.drive() == FORWARD
+
+
+def test_a_bumper_brake_may_refuse_all() -> None:
+    some = hit(0.5, bumper_brake="all")
+    some.answer(BACKWARD)
+    assert some.drive() == BREAK

@@ -1,0 +1,104 @@
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.freshness import S
+from sim.faults import Cable, Datagram
+from sim.requests import Wire
+
+MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
+
+
+def through(datagrams: Sequence[Datagram] = MANY, seed: int = 1, **faults: Any) -> list[Datagram]:
+    """Send at 50 Hz and return all in the order of arrival."""
+    cable = Cable(seed)
+    cable.faults = Wire(**faults)
+    arrived, now_ns = [], 0
+    for datagram in datagrams:
+        cable.put(datagram, now_ns)
+        arrived += cable.take(now_ns)
+        now_ns += S // 50
+    return arrived + cable.take(now_ns + 60 * S)
+
+
+def test_a_good_cable_delivers_all_at_once_and_in_order() -> None:
+    assert through() == MANY
+
+
+def test_dropping() -> None:
+    arrived = through(drop=0.25)
+    assert 700 < len(arrived) < 800
+    assert arrived == [datagram for datagram in MANY if datagram in arrived]
+    assert through(drop=1.0) == []
+
+
+def test_duplicating() -> None:
+    assert through(MANY[:2], duplicate=1.0) == [MANY[0], MANY[0], MANY[1], MANY[1]]
+
+
+def test_reordering_loses_nothing_and_changes_the_order() -> None:
+    arrived = through(reorder=0.2)
+    assert arrived != MANY
+    assert sorted(arrived, key=MANY.index) == MANY
+
+
+def test_corrupting_flips_one_to_three_bits() -> None:
+    for before, after in zip(MANY, through(corrupt=1.0), strict=True):
+        flipped = int.from_bytes(before.payload, "big") ^ int.from_bytes(after.payload, "big")
+        assert flipped.bit_count() in (0, 1, 2, 3)  # the same bit twice is as before
+    assert through(corrupt=1.0) != MANY
+
+
+def test_an_empty_datagram_has_no_bits_to_flip() -> None:
+    assert through([Datagram(b"", 4002)], corrupt=1.0) == [Datagram(b"", 4002)]
+
+
+def test_joining_puts_one_before_the_next_of_the_same_port() -> None:
+    cable = Cable(1)
+    cable.faults = Wire(join=1.0)
+    cable.put(Datagram(b"a", 4002), 0)
+    cable.put(Datagram(b"b", 4001), 0)
+    cable.faults = Wire()
+    cable.put(Datagram(b"c", 4002), 0)
+    cable.put(Datagram(b"d", 4002), 0)
+    assert [d.payload for d in cable.take(0)] == [b"ac", b"d"]
+
+
+def test_foreign_ones_are_marked() -> None:
+    assert all(datagram.foreign for datagram in through(foreign=1.0))
+
+
+@pytest.mark.parametrize("at_ns", [0, S // 2 - 1])
+def test_a_delayed_one_is_not_there_before_its_time(at_ns: int) -> None:
+    cable = Cable(1)
+    cable.faults = Wire(delay=0.5)
+    cable.put(MANY[0], 0)
+    assert cable.take(at_ns) == []
+    assert cable.take(S // 2) == [MANY[0]]
+
+
+def test_jitter_is_at_most_that_much_more() -> None:
+    cable = Cable(1)
+    cable.faults = Wire(delay=0.1, jitter=0.1)
+    for datagram in MANY:
+        cable.put(datagram, 0)
+    assert cable.take(S // 10 - 1) == []
+    early = cable.take(3 * S // 20)
+    assert 400 < len(early) < 600
+    assert len(early) + len(cable.take(S // 5)) == len(MANY)
+
+
+def test_the_same_seed_does_the_same() -> None:
+    faults: dict[str, Any] = {
+        "drop": 0.1, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "join": 0.1, "jitter": 0.05,
+    }  # fmt: skip
+    assert through(seed=7, **faults) == through(seed=7, **faults)
+    assert through(seed=7, **faults) != through(seed=8, **faults)
+
+
+@pytest.mark.parametrize("wrong", [{"drop": 1.1}, {"delay": -1}, {"jitter": float("nan")}])
+def test_wrong_chances_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert({"do": "wire", **wrong}, Wire)

@@ -1,0 +1,105 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.geometry import Pose, Rectangle, Segment, point_gap, ray, wrapped
+
+BODY = Rectangle(1.0, 0.5)
+ORIGIN = Pose(0.0, 0.0, 0.0)
+NORTH = Pose(0.0, 0.0, math.pi / 2)
+
+coordinates = st.floats(-10.0, 10.0)
+segments = st.builds(Segment, coordinates, coordinates, coordinates, coordinates)
+poses = st.builds(Pose, coordinates, coordinates, st.floats(-7.0, 7.0))
+
+
+def test_points_of_a_pose_are_turned_with_it() -> None:
+    assert Pose(1.0, 2.0, math.pi / 2).outward(3.0, 0.5) == pytest.approx((0.5, 5.0))
+
+
+@given(poses, coordinates, coordinates)
+def test_looking_outward_and_back_is_the_same_point(pose: Pose, x: float, y: float) -> None:
+    there = pose.outward(x, y)
+    back = Segment(*there, *there).seen_from(pose)
+    assert (back.ax, back.ay) == pytest.approx((x, y), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("segment", "gap"),
+    [
+        (Segment(3.0, -9.0, 3.0, 9.0), 2.0),  # a wall ahead
+        (Segment(-9.0, 0.75, 9.0, 0.75), 0.25),  # one on the left
+        (Segment(4.0, 4.5, 4.0, 9.0), 5.0),  # its end off the corner: 3, 4, 5
+        (Segment(1.5, 0.0, 2.5, 0.0), 0.5),  # its end ahead
+        (Segment(-3.0, -0.5, -2.0, 0.5), 1.0),  # slanting, behind
+        (Segment(1.0, -9.0, 1.0, 9.0), 0.0),  # touching
+        (Segment(-9.0, 0.0, 9.0, 0.0), 0.0),  # right through
+        (Segment(0.1, 0.1, 0.2, 0.2), 0.0),  # inside
+        (Segment(3.0, 0.0, 3.0, 0.0), 2.0),  # a point
+    ],
+)
+def test_gap_beside_a_rectangle(segment: Segment, gap: float) -> None:
+    assert BODY.gap(ORIGIN, segment) == pytest.approx(gap)
+    assert BODY.touches(ORIGIN, segment) is (gap == 0)
+
+
+def test_the_gap_turns_with_the_body() -> None:
+    assert BODY.gap(NORTH, Segment(3.0, -9.0, 3.0, 9.0)) == pytest.approx(2.5)
+
+
+@given(segments, poses)
+def test_gap_is_zero_exactly_when_they_touch(segment: Segment, pose: Pose) -> None:
+    assert (BODY.gap(pose, segment) == 0) is BODY.touches(pose, segment)
+
+
+@given(segments, poses)
+def test_gap_is_never_more_than_to_any_point_of_the_segment(segment: Segment, pose: Pose) -> None:
+    middle = (segment.ax + segment.bx) / 2, (segment.ay + segment.by) / 2
+    nearest_corner = min(math.dist(middle, pose.outward(x, y)) for x, y in BODY.corners())
+    assert BODY.gap(pose, segment) <= nearest_corner + 1e-9
+
+
+def test_outline_goes_around_counter_clockwise_and_closes() -> None:
+    sides = BODY.outline(ORIGIN)
+    assert [(s.ax, s.ay) for s in sides] == [(1.0, 0.5), (-1.0, 0.5), (-1.0, -0.5), (1.0, -0.5)]
+    assert (sides[-1].bx, sides[-1].by) == (1.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "inside"), [(0.0, 0.9, True), (0.6, 0.0, False), (0.5, 1.0, True)]
+)
+def test_points_inside_a_turned_rectangle(x: float, y: float, inside: bool) -> None:
+    turned = Pose(0.0, 0.0, math.pi / 2 + 1e-9)
+    assert Rectangle(1.001, 0.501).holds(turned, x, y) is inside
+
+
+@pytest.mark.parametrize(("x", "y", "gap"), [(1.0, 2.0, 2.0), (-3.0, 4.0, 5.0), (14.0, 3.0, 5.0)])
+def test_distance_from_a_point_to_a_segment(x: float, y: float, gap: float) -> None:
+    assert point_gap(x, y, Segment(0.0, 0.0, 10.0, 0.0)) == pytest.approx(gap)
+
+
+def test_a_segment_may_be_a_point() -> None:
+    assert point_gap(3.0, 4.0, Segment(0.0, 0.0, 0.0, 0.0)) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("angle", "distance"),
+    [
+        (0.0, 2.0),
+        (math.pi / 4, 2.0 * math.sqrt(2)),
+        (math.radians(60), math.inf),  # over its end: 2 * tan(60) = 3.46
+        (math.pi / 2, math.inf),  # along it
+        (math.pi, math.inf),  # away from it
+    ],
+)
+def test_rays(angle: float, distance: float) -> None:
+    assert ray(0.0, 0.0, angle, Segment(2.0, -3.0, 2.0, 3.0)) == pytest.approx(distance)
+
+
+@given(st.floats(-1000.0, 1000.0))
+def test_wrapped_angles_point_the_same_way(angle: float) -> None:
+    value = wrapped(angle)
+    assert -math.pi <= value <= math.pi
+    assert math.cos(value - angle) == pytest.approx(1.0)

@@ -1,0 +1,141 @@
+import math
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.freshness import S
+from common.wire import commands as c
+from common.wire import reports as r
+from sim import requests as q
+from sim.trace import Disturbed
+from tests.sim.rig import START_NS, Rig, room
+
+BOX: dict[str, Any] = {"name": "crate", "x": 3.0, "y": 0.0, "length": 1.0, "width": 1.0}
+CRATE = room(BOX).boxes[0]
+
+
+def test_the_bumper_is_pressed_and_let_go_by_hand() -> None:
+    rig = Rig()
+    assert rig.do(q.Bumper(pressed=True)).ok
+    assert (rig.truth.pressed, rig.truth.contact) == (True, False)
+    assert rig.say(c.BumperQuery()) == [r.BumperReport(True)]
+    rig.do(q.Bumper(pressed=False))
+    assert rig.say(c.BumperQuery()) == [r.BumperReport(False)]
+
+
+def test_a_hand_does_not_lift_the_bumper_off_an_obstacle() -> None:
+    rig = Rig(room(BOX))
+    rig.do(q.Place(x=2.5 - 0.55 - 0.001, y=0.0))
+    rig.do(q.Bumper(pressed=False))
+    assert rig.truth.pressed
+
+
+def test_a_sonar_is_disturbed() -> None:
+    rig = Rig()
+    rig.do(q.Sonar(name="rear", range=0.5))
+    rig.after(0.05)
+    (ranges,) = rig.say(c.UltrasonicQuery())
+    assert isinstance(ranges, r.UltrasonicReport)
+    assert ranges.ranges_mm[6] == 500
+
+
+@pytest.mark.parametrize(
+    ("direction", "to_pc", "to_board"),
+    [("to_pc", 1.0, 0.0), ("to_board", 0.0, 1.0), ("both", 1.0, 1.0)],
+)
+def test_the_cable_is_disturbed_one_way_or_both(
+    direction: str, to_pc: float, to_board: float
+) -> None:
+    rig = Rig()
+    rig.do(msgspec.convert({"do": "wire", "direction": direction, "drop": 1.0}, q.Wire))
+    assert rig.simulation.to_pc.faults.drop == to_pc
+    assert rig.simulation.to_board.faults.drop == to_board
+
+
+def test_it_is_placed_and_stands_there() -> None:
+    rig = Rig()
+    rig.run(1.0)
+    rig.after(1.0)
+    rig.stop()
+    assert rig.do(q.Place(x=-3.0, y=2.0, heading=math.pi)).ok
+    assert (rig.truth.x, rig.truth.y, rig.truth.linear) == (-3.0, 2.0, 0.0)
+
+
+def test_it_is_not_placed_into_something() -> None:
+    rig = Rig(room(BOX))
+    reply = rig.do(q.Place(x=3.0, y=0.0))
+    assert (reply.ok, reply.error) == (False, "something is in the way at x 3, y 0")
+    assert rig.truth.x == 0.0
+
+
+def test_boxes_come_and_go() -> None:
+    rig = Rig()
+    assert rig.do(q.AddBox(box=CRATE)).ok
+    assert rig.truth.clearance == pytest.approx(2.5 - 0.55)
+    assert rig.do(q.RemoveBox(name="crate")).ok
+    assert rig.truth.clearance is None
+
+
+def test_a_box_put_beside_the_vehicle_presses_the_bumper_at_once() -> None:
+    rig = Rig()
+    rig.do(q.AddBox(box=msgspec.structs.replace(CRATE, x=0.55 + 0.5 + 0.001)))
+    assert rig.say(c.BumperQuery()) == [r.BumperReport(True)]
+
+
+def test_a_box_is_not_put_onto_the_vehicle() -> None:
+    rig = Rig()
+    reply = rig.do(q.AddBox(box=msgspec.structs.replace(CRATE, x=0.5)))
+    assert (reply.ok, reply.error) == (False, "the vehicle is in the way")
+    assert rig.simulation.world.boxes == ()
+
+
+@pytest.mark.parametrize(
+    ("plan", "known"), [(room(), "there are: none"), (room(BOX), "there are: crate")]
+)
+def test_a_box_that_is_not_there_cannot_be_removed(plan: Any, known: str) -> None:
+    reply = Rig(plan).do(q.RemoveBox(name="crane"))
+    assert reply.error == f"no box is called 'crane'; {known}"
+
+
+def test_the_truth_is_told_and_leaves_no_line() -> None:
+    rig = Rig()
+    assert rig.do(q.AskTruth()).truth == rig.truth
+    assert rig.records == []
+
+
+def test_what_is_asked_for_is_traced_with_its_error() -> None:
+    rig = Rig(room(BOX))
+    rig.do(q.Place(x=3.0, y=0.0))
+    (line,) = rig.of(Disturbed)
+    assert msgspec.to_builtins(line) == {
+        "event": "fault",
+        "mono_ns": START_NS,
+        "request": {"do": "place", "x": 3.0, "y": 0.0, "heading": 0.0},
+        "error": "something is in the way at x 3, y 0",
+    }
+
+
+def test_a_script_happens_in_order_and_in_time() -> None:
+    steps = (
+        q.Step(at=1.0, request=q.Bumper(pressed=False)),
+        q.Step(at=0.5, request=q.Bumper(pressed=True)),
+        q.Step(at=0.505, request=q.Freeze(seconds=0.1)),
+    )
+    rig = Rig(script=q.Script(steps=steps))
+    rig.after(0.4)
+    assert rig.of(Disturbed) == []
+    rig.after(1.0)
+    assert [(line.request, line.mono_ns - START_NS) for line in rig.of(Disturbed)] == [
+        (q.Bumper(pressed=True), S // 2),
+        (q.Freeze(seconds=0.1), round(0.505 * S)),
+        (q.Bumper(pressed=False), S),
+    ]
+
+
+def test_a_script_is_in_time_though_the_tick_is_late() -> None:
+    rig = Rig(script=q.Script(steps=(q.Step(at=0.1, request=q.Freeze(seconds=0.1)),)))
+    rig.injection.advance(START_NS + S // 2)
+    assert rig.simulation.now_ns == START_NS + S // 2
+    frozen = 4  # at 0.12, 0.14, 0.16 and 0.18 s
+    assert len(rig.simulation.take_sent(rig.now_ns + S)) == 2 * (25 - frozen)

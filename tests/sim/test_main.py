@@ -1,0 +1,217 @@
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from cli.__main__ import main as t2
+from common.errors import LinkError
+from common.service import EXIT_CONFIG, EXIT_LINK
+from common.wire.commands import BumperQuery, MotionCommand, MotionKind
+from common.wire.framing import Framing, Received
+from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
+from sim.__main__ import main
+from sim.control import Control
+from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
+from sim.trace import read
+from sim.world import Box
+from tests.support import PATIENCE_S, free_port, wait_until
+
+FRAMING = Framing()
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Ports of a simulator, the PC's sockets, and the trace."""
+
+    port: int
+    control_port: int
+    pc: tuple[socket.socket, socket.socket]
+    trace: Path
+
+    @property
+    def arguments(self) -> list[str]:
+        """Return the command line that fits."""
+        listen = ",".join(str(sock.getsockname()[1]) for sock in self.pc)
+        sets = [
+            f"board.port={self.port}",
+            f"board.listen_ports={listen}",
+            f"sim.control_port={self.control_port}",
+        ]
+        return ["--trace", str(self.trace), *(word for text in sets for word in ("--set", text))]
+
+    def send(self, frame: Any) -> None:
+        """Send a frame to the board from the PC's first port."""
+        self.pc[0].sendto(FRAMING.pack(frame), ("127.0.0.1", self.port))
+
+    def heard(self, index: int = 0) -> list[Any]:
+        """Return the frames that wait at one of the PC's ports."""
+        frames: list[Any] = []
+        with suppress(BlockingIOError):
+            while True:
+                for part in FRAMING.read(self.pc[index].recv(4096), FROM_BOARD):
+                    frames += [part.frame] if isinstance(part, Received) else []
+        return frames
+
+    def lines(self, event: str) -> list[dict[str, Any]]:
+        """Return the trace's lines of one kind."""
+        lines = msgspec.to_builtins(read(self.trace.read_bytes()))
+        return [line for line in lines if line["event"] == event]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with ExitStack() as stack:
+        pc = []
+        for _ in range(2):
+            sock = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            sock.bind(("127.0.0.1", 0))
+            sock.setblocking(False)
+            pc.append(sock)
+        ports = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
+        yield Bench(*ports, (pc[0], pc[1]), tmp_path / "trace.jsonl")
+
+
+@contextmanager
+def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run the simulator as a process of its own until the context ends."""
+    command = [sys.executable, "-m", "sim", *bench.arguments, *words]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
+        try:
+            wait_until(lambda: bench.heard(), "the board's first frame")
+            yield running
+        finally:
+            running.kill()
+
+
+def test_a_process_streams_drives_and_ends_on_sigterm(bench: Bench) -> None:
+    with process(bench, "--world", "empty") as running:
+        wait_until(lambda: VelocityReport(0, 0) in bench.heard(1), "the second port's stream")
+        bench.send(MotionCommand(MotionKind.RUN, 500))
+        wait_until(lambda: VelocityReport(500, 0) in bench.heard(), "500 mm/s")
+        bench.send(BumperQuery())
+        wait_until(lambda: BumperReport(False) in bench.heard(), "the bumper's answer")
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(PATIENCE_S) == 0
+    (command,) = bench.lines("command")
+    assert (command["kind"], command["linear"]) == ("run", 0.5)
+    assert bench.lines("truth")[-1]["x"] > 0.0
+
+
+def test_a_process_ends_on_sigint(bench: Bench) -> None:
+    with process(bench) as running:
+        running.send_signal(signal.SIGINT)
+        assert running.wait(PATIENCE_S) == 0
+        assert running.stderr is not None
+        assert b"Traceback" not in running.stderr.read()
+
+
+@contextmanager
+def meanwhile(bench: Bench) -> Iterator[list[BaseException]]:
+    """Disturb a simulator that runs in this thread from another one; end it by SIGTERM."""
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        wait_until(lambda: answers(bench.control_port), "the control socket")
+        try:
+            disturb(bench, Control(bench.control_port, PATIENCE_S))
+        except BaseException as error:
+            errors.append(error)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    before = {name: signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)}
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield errors
+    finally:
+        thread.join(PATIENCE_S)
+        for name, handler in before.items():
+            signal.signal(name, handler)
+
+
+def answers(port: int) -> bool:
+    """Tell whether a simulator serves there."""
+    with suppress(LinkError):
+        Control(port, timeout_s=0.5).truth()
+        return True
+    return False
+
+
+def disturb(bench: Bench, control: Control) -> None:
+    """Do a little of everything, and see it on the wire."""
+    control.do(Bumper(pressed=True))
+    bench.send(BumperQuery())
+    wait_until(lambda: BumperReport(True) in bench.heard(), "a pressed bumper")
+    control.do(Wire(direction="to_pc", foreign=1.0))
+    bench.send(BumperQuery())
+    wait_until(lambda: BumperReport(True) in bench.heard(), "the same from elsewhere")
+    control.do(Wire())
+    control.do(AddBox(box=Box(name="crate", x=0.0, y=-1.0, length=0.4, width=0.4)))
+    control.do(Place(x=0.0, y=0.2))
+    control.do(PowerCycle(seconds=0.1))
+    wait_until(lambda: len(bench.lines("power")) == 2, "power again")
+
+
+@pytest.mark.parametrize("command", ["sim", "t2 sim"])
+def test_it_is_disturbed_while_it_runs(bench: Bench, command: str) -> None:
+    bench.trace.with_name("faults.toml").write_text(
+        '[[steps]]\nat = 0.0\nrequest = { do = "sonar", name = "rear", fault = true }'
+    )
+    words = [*bench.arguments, "--faults", str(bench.trace.with_name("faults.toml"))]
+    with meanwhile(bench) as errors:
+        assert (main(words) if command == "sim" else t2(["sim", *words])) == 0
+    assert errors == []
+    done = [line["request"]["do"] for line in bench.lines("fault")]
+    done.remove("sonar")  # the script's; by hand may be as early
+    assert done == ["bumper", "wire", "wire", "add_box", "place", "power_cycle"]
+    assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
+    assert [line["on"] for line in bench.lines("power")] == [False, True]
+
+
+@pytest.mark.parametrize("setting", ["board.port", "sim.control_port"])
+def test_a_taken_port_ends_it_with_a_clear_sentence(
+    bench: Bench, setting: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        assert main([*bench.arguments, "--set", f"{setting}={port}"]) == EXIT_LINK
+    assert f"{setting}: cannot listen on UDP port {port}" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--world", "moon"], "sim.world = 'moon'"),
+        (["--set", "sim.drive.coast=0"], "sim.drive.coast = 0"),
+        (["--set", "sim.sed=1"], "did you mean 'seed'"),
+        (["--faults", "nowhere.toml"], "nowhere.toml: cannot be read"),
+        (["--trace", "nowhere/trace.jsonl"], "--trace nowhere/trace.jsonl: cannot be written"),
+    ],
+)
+def test_bad_settings_end_it_with_what_is_wrong(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == EXIT_CONFIG
+    assert named in capsys.readouterr().err
+
+
+def test_without_control_port_and_trace_there_is_neither(bench: Bench) -> None:
+    words = bench.arguments[2:-2]  # without --trace and sim.control_port
+    command = [sys.executable, "-m", "sim", *words]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
+        wait_until(lambda: bench.heard(), "the board's first frame")
+        assert not answers(bench.control_port)
+        running.terminate()
+        assert running.wait(PATIENCE_S) == 0
+    assert not bench.trace.exists()

@@ -1,0 +1,124 @@
+import math
+import statistics
+
+import pytest
+
+from common.messages import SONAR_NAMES
+from common.settings import Vehicle
+from sim.geometry import Pose
+from sim.requests import Sonar, SonarName
+from sim.sonar import Sonars
+from sim.world import World
+from tests.sim.rig import room
+
+VEHICLE = Vehicle(length=1.0, width=0.6, sonar_min=0.05, sonar_max=4.0)
+# x from -2 to 3, y from -1 to 2: every side at another distance.
+ROOM = World.of(room(walls=[{"points": [[-2, -1], [3, -1], [3, 2], [-2, 2], [-2, -1]]}]))
+HERE = Pose(0.0, 0.0, 0.0)
+
+
+def sonars(cone: float = 0.0, noise: float = 0.0, seed: int = 1) -> Sonars:
+    return Sonars(VEHICLE, cone, noise, seed)
+
+
+def measured(sonars: Sonars, name: str, pose: Pose = HERE, world: World = ROOM) -> int:
+    return dict(zip(SONAR_NAMES, sonars.measure(world, pose), strict=True))[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("left", 1.7),  # 2 to the wall, 0.3 of body
+        ("front_left", 1.7 * math.sqrt(2)),  # at 45 degrees to the upper wall
+        ("front", 2.5),
+        ("front_right", 0.7 * math.sqrt(2)),
+        ("right", 0.7),
+        ("rear_right", 0.7 * math.sqrt(2)),
+        ("rear", 1.5),
+        ("rear_left", 1.5 * math.sqrt(2)),
+    ],
+)
+def test_each_looks_its_own_way(name: str, expected: float) -> None:
+    assert measured(sonars(), name) == round(expected * 1000)
+
+
+def test_they_turn_with_the_vehicle() -> None:
+    assert measured(sonars(), "front", Pose(0.0, 0.0, math.pi / 2)) == 1500
+    assert measured(sonars(), "left", Pose(0.0, 0.0, math.pi / 2)) == 1700
+
+
+def test_a_cone_sees_what_a_ray_would_miss() -> None:
+    post = {"name": "post", "x": 2.5, "y": 0.4, "length": 0.1, "width": 0.1}
+    world = World.of(room(post))
+    assert measured(sonars(cone=0.0), "front", world=world) == 4000
+    assert 1900 < measured(sonars(cone=0.6), "front", world=world) < 2100
+
+
+def test_a_cone_that_meets_a_flat_wall_measures_its_nearest_point() -> None:
+    assert measured(sonars(cone=0.6), "front") == 2500
+
+
+@pytest.mark.parametrize(
+    ("gap", "expected"), [(0.049, 0), (0.051, 51), (3.999, 3999), (4.001, 4000)]
+)
+def test_the_ends_of_the_range(gap: float, expected: int) -> None:
+    wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
+    assert measured(sonars(), "front", world=World.of(wall)) == expected
+
+
+def test_nothing_at_all_is_the_greatest_range() -> None:
+    assert set(sonars().measure(World.of(room()), HERE)) == {4000}
+
+
+def test_low_boxes_are_not_seen() -> None:
+    low = {"name": "step", "x": 2, "y": 0, "length": 0.4, "width": 0.4, "low": True}
+    assert measured(sonars(), "front", world=World.of(room(low))) == 4000
+
+
+def test_noise_is_small_and_around_the_distance() -> None:
+    noisy = sonars(noise=0.01)
+    values = [measured(noisy, "front") for _ in range(400)]
+    assert statistics.mean(values) == pytest.approx(2500, abs=3)
+    assert 8 < statistics.stdev(values) < 12
+
+
+def test_the_same_seed_gives_the_same_noise() -> None:
+    def values(seed: int) -> list[int]:
+        noisy = sonars(noise=0.01, seed=seed)
+        return [measured(noisy, "front") for _ in range(20)]
+
+    assert values(3) == values(3)
+    assert values(3) != values(4)
+
+
+def test_a_faulty_one_says_so_and_the_others_do_not() -> None:
+    some = sonars()
+    some.disturb(Sonar(name="front", fault=True))
+    assert measured(some, "front") == 0xFFFF
+    assert measured(some, "right") == 700
+
+
+def test_a_stuck_one_keeps_its_last_range_and_comes_back() -> None:
+    some = sonars()
+    assert measured(some, "front") == 2500
+    some.disturb(Sonar(name="front", stuck=True))
+    assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 2500
+    some.disturb(Sonar(name="front"))
+    assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 1500
+
+
+@pytest.mark.parametrize(("value", "expected"), [(1.234, 1234), (0.01, 0), (50.0, 4000)])
+def test_a_range_can_be_made_up(value: float, expected: int) -> None:
+    some = sonars()
+    some.disturb(Sonar(name="left", range=value))
+    assert measured(some, "left") == expected
+
+
+def test_a_fault_does_not_change_the_noise_of_others() -> None:
+    well, ill = sonars(noise=0.01), sonars(noise=0.01)
+    ill.disturb(Sonar(name="front", fault=True))
+    assert measured(well, "right") == measured(ill, "right")
+
+
+def test_requests_name_the_sonars_as_messages_do() -> None:
+    assert SonarName.__args__ == SONAR_NAMES  # type: ignore[attr-defined]
