@@ -1,0 +1,50 @@
+"""The ``t2`` command: each subcommand lives in a module of its name.
+
+Such a module has a docstring whose first line is its help, ``add_arguments(parser)`` and
+``run(options) -> int``. Only the one that is asked for is imported, so that ``t2`` starts fast.
+"""
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from common.errors import ConfigError, LinkError, RobotError
+from common.service import EXIT_CONFIG, EXIT_LINK
+
+COMMANDS = {
+    "up": "router, simulated vehicle, bridge, safety and odometry, until ctrl-c",
+    "demo": "a simulated T2 drives a lap through the real services",
+    "drive": "drive from this terminal, by keys or gamepad",
+    "router": "the embedded Zenoh router alone",
+    "sim": "the simulated vehicle alone",
+    "config": "what is in force and where each value came from",
+    "wire": "read captured frames",
+}
+EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the subcommand that the arguments name, and return its exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    parser = argparse.ArgumentParser(prog="t2", description="The drive stack of the T2 robot.")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    named = next((word for word in words if word in COMMANDS), None)
+    for name, text in COMMANDS.items():
+        subparser = subparsers.add_parser(name, help=text, description=text)
+        if name == named:
+            import_module(f"cli.{name}").add_arguments(subparser)
+    options = parser.parse_args(words)
+    try:
+        code: int = import_module(f"cli.{options.command}").run(options)
+    except RobotError as error:
+        print(f"t2 {options.command}: {error}", file=sys.stderr)
+        return EXIT_CODES.get(type(error), 1)
+    except KeyboardInterrupt:  # ctrl-c while a command does not yet, or no more, see to it itself
+        return 128 + signal.SIGINT
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

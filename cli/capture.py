@@ -1,0 +1,130 @@
+"""Where captured datagrams come from: hex text, or a pcap or pcapng file of UDP packets.
+
+Hex on the command line is one datagram; a text has one a line. Spaces, colons, commas, dashes and
+0x are left out, and so is what follows a #. A pcapng file is read by the link type of its first
+interface.
+"""
+
+import io
+import re
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from common.errors import RobotError
+
+PCAP_MAGICS = tuple(
+    bytes.fromhex(magic)
+    for magic in ("a1b2c3d4", "d4c3b2a1", "a1b23c4d", "4d3cb2a1", "0a0d0d0a")  # the last: pcapng
+)
+RAW_IP = (12, 14, 101, 228, 229)  # link types without a header of their own; tcpdump.org has them
+
+
+@dataclass(frozen=True, slots=True)
+class Datagram:
+    """The bytes of one datagram and where they stood."""
+
+    where: str
+    data: bytes
+
+
+def read(source: str) -> list[Datagram]:
+    """Return the datagrams of ``-`` (standard input), of a file, or of hex itself."""
+    if source == "-":
+        return from_bytes("standard input", sys.stdin.buffer.read())
+    data = _hex(source)
+    if data:
+        return [Datagram("", data)]
+    try:
+        return from_bytes(source, Path(source).read_bytes())
+    except OSError as error:
+        raise RobotError(f"{source!r} is no hex and no file: {error.strerror}") from None
+
+
+def from_bytes(name: str, content: bytes) -> list[Datagram]:
+    """Return the datagrams of a capture, or of a text of hex lines."""
+    if content.startswith(PCAP_MAGICS):
+        datagrams = list(_from_pcap(name, content))
+        kind = "UDP packets"
+    else:
+        try:
+            text = content.decode()
+        except UnicodeDecodeError:
+            raise RobotError(f"{name}: neither pcap, pcapng nor hex text") from None
+        datagrams = _from_text(name, text)
+        kind = "hex lines"
+    if not datagrams:
+        raise RobotError(f"{name}: has no {kind}")
+    return datagrams
+
+
+def _from_text(name: str, text: str) -> list[Datagram]:
+    datagrams = []
+    for number, line in enumerate(text.splitlines(), 1):
+        where = f"{name} line {number}"
+        data = _hex(line.partition("#")[0])
+        if data is None:
+            raise RobotError(f"{where}: {line.strip()[:40]!r} is not hex")
+        if data:
+            datagrams.append(Datagram(where, data))
+    return datagrams
+
+
+def _hex(text: str) -> bytes | None:
+    digits = re.sub(r"0[xX]|[\s:,-]", "", text)
+    try:
+        return bytes.fromhex(digits)
+    except ValueError:
+        return None
+
+
+def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
+    try:
+        from dpkt import dpkt, ip, ip6, pcap, udp  # type: ignore[import-untyped]
+    except ImportError:
+        raise RobotError(
+            "reading a capture wants dpkt; `make` installs it, or pip install -e '.[inspect]'"
+        ) from None
+    number = 0
+    try:
+        reader = pcap.UniversalReader(io.BytesIO(content))
+        open_link = _link(name, reader.datalink())
+        for number, (_, packet) in enumerate(reader, 1):
+            network = open_link(packet)
+            while not isinstance(network, (ip.IP, ip6.IP6, bytes)):
+                network = network.data
+            if not isinstance(network, bytes) and isinstance(network.data, udp.UDP):
+                segment = network.data
+                ends = _ends(network.src, segment.sport, network.dst, segment.dport)
+                yield Datagram(f"packet {number} {ends}", bytes(segment.data))
+    except (dpkt.Error, ValueError, KeyError) as error:
+        raise RobotError(f"{name}: broken after packet {number}: {error}") from None
+
+
+def _link(name: str, kind: int) -> Callable[[bytes], Any]:
+    """Return what takes a packet's link header off."""
+    from dpkt import ethernet, ip, ip6, loopback, pcap, sll, sll2
+
+    def raw(packet: bytes) -> Any:
+        return (ip6.IP6 if packet[:1] >= b"\x60" else ip.IP)(packet)
+
+    links: dict[int, Callable[[bytes], Any]] = {
+        pcap.DLT_EN10MB: ethernet.Ethernet,
+        pcap.DLT_LINUX_SLL: sll.SLL,
+        pcap.DLT_LINUX_SLL2: sll2.SLL2,
+        pcap.DLT_NULL: loopback.Loopback,
+        **dict.fromkeys(RAW_IP, raw),
+    }
+    if kind not in links:
+        raise RobotError(f"{name}: link type {kind} is not known here; capture on Ethernet")
+    return links[kind]
+
+
+def _ends(source: bytes, source_port: int, target: bytes, target_port: int) -> str:
+    family = socket.AF_INET if len(source) == 4 else socket.AF_INET6
+    addresses = (socket.inet_ntop(family, address) for address in (source, target))
+    ends = zip(addresses, (source_port, target_port), strict=True)
+    return " > ".join(f"{address}:{port}" for address, port in ends)

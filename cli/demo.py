@@ -1,0 +1,167 @@
+"""``t2 demo``: a simulated T2 drives a lap through the real services."""
+
+import argparse
+import signal
+import socket
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from cli.lap import holdup
+from cli.lap.driver import PERIOD_S, Driver
+from cli.lap.score import good, read, results
+from cli.lap.script import PATIENT, QUICK, Lap, lap
+from cli.settings import Everything
+from cli.supervisor import Supervisor
+from cli.up import commands
+from common import log
+from common.bus.bus import Bus
+from common.config import load
+from common.errors import ConfigError, LinkError, RobotError
+from common.freshness import S
+from common.loop import Loop
+from common.service import add_sources, sources
+from sim.files import load_plan
+
+WORLD = "office"
+PATIENCE_S = 120.0  # a lap takes a third of that; a busy machine stops it now and then
+LOOK_S, DRAW_S = 0.1, 0.125
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--fast", action="store_true", help="end before the way home, no plot")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
+    )
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Drive the lap; 0 when all went as it should, 128 and the number after a signal."""
+    try:
+        from cli.lap.show import Show
+    except ImportError as error:
+        raise RobotError(
+            f"the demo wants {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
+        ) from None
+    options.no_sim, options.world = False, WORLD
+    make_room(options)
+    holdup_s = holdup.measured()
+    options.sets = [*own_ports(), *holdup.settings(holdup_s), *options.sets]
+    config = load(Everything, sources(options)).config
+    # What the processes say goes to a file; on the terminal it would tear the picture.
+    log.configure(replace(config.log, level="error"), "demo")
+    pace = PATIENT if holdup_s > holdup.LIMIT_S else QUICK
+    driven, plan = Lap(lap(options.fast, pace)), load_plan(WORLD, config.vehicle)
+    where = config.bus.endpoints, config.robot.id
+    with (
+        Show(plan, config.vehicle, options.out) as show,
+        closing(Loop()) as loop,
+        closing(Bus(*where, loop.post, config.bus.lease)) as bus,
+    ):
+        if holdup_s > holdup.LIMIT_S:
+            show.say(holdup.sentence(holdup_s))
+        driver = Driver(bus, driven, show.step)
+        bus.open()
+        interrupted = drive(options, loop, driver, show.draw)
+    if interrupted:
+        return 128 + interrupted
+    trace = read(trace_file(options)) if trace_file(options).exists() else None
+    if trace is None or not trace.truth:
+        raise LinkError(f"the simulated vehicle never ran; see {log_file(options)}")
+    rows = results(trace, driver.odometry, driven, options.fast)
+    if not options.fast:
+        show.plot(trace, driver.odometry)
+    show.results(rows, driver)
+    return 0 if good(rows) else 1
+
+
+def drive(
+    options: argparse.Namespace,
+    loop: Loop,
+    driver: Driver,
+    draw: Callable[[Driver, int], None],
+) -> int:
+    """Keep the processes running until the lap is over, or patience is; return a signal or 0."""
+    began_ns = time.monotonic_ns()
+    signals: list[int] = []
+
+    def leave(number: int, _: object) -> None:
+        signals.append(number)
+        loop.stop()
+
+    with log_file(options).open("wb") as output:
+        supervisor = Supervisor(traced(options), output)
+
+        def look(now_ns: int) -> None:
+            if supervisor.look(time.monotonic()):
+                raise LinkError(f"a process cannot run; see {output.name}")
+            if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * S:
+                loop.stop()
+
+        before = {name: signal.signal(name, leave) for name in (signal.SIGINT, signal.SIGTERM)}
+        loop.every(LOOK_S, look)
+        loop.every(PERIOD_S, driver.on_beat)
+        loop.every(DRAW_S, lambda now_ns: draw(driver, now_ns))
+        try:
+            loop.run()
+        finally:
+            supervisor.end()
+            for name, handler in before.items():
+                signal.signal(name, handler)
+    return signals[0] if signals else 0
+
+
+def make_room(options: argparse.Namespace) -> None:
+    """Make the folder for what the demo writes; an earlier lap's trace is none of this one."""
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        log_file(options).write_bytes(b"")
+        trace_file(options).unlink(missing_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out {options.out}: cannot be written: {error.strerror}") from None
+
+
+def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
+    """Return the processes of ``t2 up``, with a simulator that writes down what happens."""
+    trace = ["--trace", str(trace_file(options))]
+    return [
+        (name, [*command, *(trace if name == "sim" else [])]) for name, command in commands(options)
+    ]
+
+
+def trace_file(options: argparse.Namespace) -> Path:
+    """Return where the simulator writes."""
+    out: Path = options.out
+    return out / "trace.jsonl"
+
+
+def log_file(options: argparse.Namespace) -> Path:
+    """Return where the processes write what they have to say."""
+    out: Path = options.out
+    return out / "processes.log"
+
+
+def own_ports() -> list[str]:
+    """Return settings with ports of the demo's own, so that it runs beside ``t2 up``."""
+    board, first, second = (_free(socket.SOCK_DGRAM) for _ in range(3))
+    router = _free(socket.SOCK_STREAM)
+    return [
+        f"board.port={board}",
+        f"board.listen_ports=[{first}, {second}]",
+        "board.address=127.0.0.1",
+        "board.listen_address=127.0.0.1",
+        f"bus.listen=tcp/127.0.0.1:{router}",
+        "bus.connect=",
+    ]
+
+
+def _free(kind: socket.SocketKind) -> int:
+    with socket.socket(socket.AF_INET, kind) as sock:
+        sock.bind(("127.0.0.1", 0))
+        port: int = sock.getsockname()[1]
+        return port

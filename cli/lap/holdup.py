@@ -1,0 +1,59 @@
+"""How long this machine holds processes up, and what the demo does about it.
+
+A vehicle's computer answers within milliseconds, and T2's time limits are made for one. On a
+virtual machine that is given a CPU only now and then, processes stand still for tenths of a second;
+safety then rightly stops the vehicle all the time. There the demo takes longer limits, and drives
+slower for it, because safety reckons with the longer reaction time.
+"""
+
+import time
+
+LIMIT_S = 0.05  # up to this the shipped limits hold
+SAMPLES_S = 0.005
+
+AGES = ("bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age")
+SLOWER = ("switches_age", "driver_age")
+
+
+def measured(seconds: float = 1.5) -> float:
+    """Return how much longer than asked a short sleep took at most, in seconds."""
+    worst, last = 0.0, time.monotonic()
+    end = last + seconds
+    while last < end:
+        time.sleep(SAMPLES_S)
+        now = time.monotonic()
+        worst, last = max(worst, now - last - SAMPLES_S), now
+    return worst
+
+
+def settings(holdup_s: float) -> list[str]:
+    """Return the settings that a machine wants, for ``--set``; none for a good one."""
+    if holdup_s <= LIMIT_S:
+        return []
+    longer = min(3.0, max(1.0, 3.0 * holdup_s))
+    react = min(1.5, max(0.5, 2.0 * holdup_s))
+    accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
+                "sources.teleop.lease"]  # fmt: skip
+    return [
+        "bus.lease=10",
+        "bridge.i_accept=lease,silence",
+        f"bridge.lease={longer}",
+        f"bridge.silence={longer}",
+        f"bridge.echo_timeout={min(2.0, longer)}",
+        f"safety.i_accept={','.join(accepted)}",
+        *(f"safety.{name}={longer}" for name in AGES),
+        *(f"safety.{name}=10" for name in SLOWER),
+        f"safety.runaway_time={longer}",
+        f"safety.release_lease={longer}",
+        f"safety.sources.demo.lease={longer}",
+        f"safety.sources.teleop.lease={longer}",
+        f"safety.react={react}",
+    ]
+
+
+def sentence(holdup_s: float) -> str:
+    """Say why the lap is not driven with the shipped limits."""
+    return (
+        f"This machine holds processes up for as long as {holdup_s:.2f} s. "
+        f"The demo takes longer time limits and drives slower for it."
+    )

@@ -1,0 +1,21 @@
+"""Every section of every service, as one configuration."""
+
+from common import settings
+from services.bridge.config import Bridge
+from services.odom.config import Odom
+from services.safety.config import Safety
+from services.teleop.config import Teleop
+from sim.config import Sim
+
+
+class Everything(settings.Shared, frozen=True, kw_only=True):
+    """What may stand in ``config/``."""
+
+    board: settings.Board = settings.Board()
+    wire: settings.Wire = settings.Wire()
+    vehicle: settings.Vehicle = settings.Vehicle()
+    bridge: Bridge = Bridge()
+    safety: Safety = Safety()
+    odom: Odom = Odom()
+    teleop: Teleop = Teleop()
+    sim: Sim = Sim()

@@ -1,0 +1,122 @@
+"""Processes that belong together: started, restarted when they crash, ended in order.
+
+A process that says that a restart will not help (exit codes 78 and 69) ends them all.
+"""
+
+import ctypes
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import structlog
+
+from common.service import EXIT_CONFIG, EXIT_LINK
+
+HOPELESS = (EXIT_CONFIG, EXIT_LINK)
+BACKOFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)  # before each restart; the last one stays
+CALM_S = 10.0  # a process that lived this long begins with the first backoff again
+PATIENCE_S = 4.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand
+LOOK_S = 0.1
+PR_SET_PDEATHSIG = 1
+# Found before any fork: between fork and exec a process with other threads must not load anything.
+_prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+
+
+@dataclass(slots=True)
+class Child:
+    """One process and when it may be started again."""
+
+    name: str
+    command: Sequence[str]
+    process: "subprocess.Popen[bytes] | None" = None
+    started_s: float = 0.0
+    restarts: int = 0
+    due_s: float = 0.0
+
+
+class Supervisor:
+    """Keeps processes running until ``stop``; those named first are ended last.
+
+    Their output goes to ``output``, or where the supervisor's own goes.
+    """
+
+    def __init__(
+        self, commands: Sequence[tuple[str, Sequence[str]]], output: BinaryIO | None = None
+    ) -> None:
+        self.children = [Child(name, command) for name, command in commands]
+        self._output = output
+        self._stopped = False
+        self._log = structlog.get_logger()
+
+    def run(self) -> int:
+        """Keep them running; return 0 after ``stop``, or the exit code of a hopeless one."""
+        code = 0
+        try:
+            while not self._stopped and not code:
+                code = self.look(time.monotonic())
+                time.sleep(LOOK_S)
+        finally:
+            self.end()
+        return code
+
+    def end(self) -> None:
+        """End them all, the last one first."""
+        for child in reversed(self.children):
+            _end(child)
+
+    def stop(self) -> None:
+        """Let ``run`` end them all; safe in a signal handler."""
+        self._stopped = True
+
+    def look(self, now_s: float) -> int:
+        """Start what is due and notice what has ended; return the code of a hopeless one, or 0."""
+        for child in self.children:
+            if child.process is None and now_s >= child.due_s:
+                child.process = _start(child.command, self._output)
+                child.started_s = now_s
+            code = child.process.poll() if child.process is not None else None
+            if code in HOPELESS:
+                self._log.error("cannot run", process=child.name, exit_code=code)
+                return int(code or 0)
+            if code is not None:
+                self._bury(child, code, now_s)
+        return 0
+
+    def _bury(self, child: Child, code: int, now_s: float) -> None:
+        if now_s - child.started_s > CALM_S:
+            child.restarts = 0
+        wait_s = BACKOFF_S[min(child.restarts, len(BACKOFF_S) - 1)]
+        child.process, child.due_s = None, now_s + wait_s
+        child.restarts += 1
+        self._log.error("ended, starts again", process=child.name, exit_code=code, wait_s=wait_s)
+
+
+def _start(command: Sequence[str], output: BinaryIO | None) -> "subprocess.Popen[bytes]":
+    # A group of its own keeps ctrl-c from reaching all at once: the bridge must find its board
+    # still there when it stops the vehicle.
+    return subprocess.Popen(
+        command, stdout=output, stderr=output, process_group=0, preexec_fn=_die_with_parent
+    )
+
+
+def _die_with_parent() -> None:
+    """Have the system end the child when the supervisor is killed; other systems do without."""
+    if _prctl is not None:
+        _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def _end(child: Child) -> None:
+    if child.process is None:
+        return
+    with suppress(ProcessLookupError):
+        child.process.terminate()
+    try:
+        child.process.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        child.process.kill()
+        child.process.wait()

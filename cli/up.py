@@ -1,0 +1,54 @@
+"""``t2 up``: router, simulated vehicle, bridge, safety and odometry, until ctrl-c."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Sequence
+
+import structlog
+
+from cli.settings import Everything
+from cli.supervisor import Supervisor
+from common import log
+from common.config import load
+from common.service import add_sources, sources
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
+    parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Keep the stack running until SIGINT or SIGTERM."""
+    config = load(Everything, sources(options)).config
+    log.configure(config.log, "up")
+    supervisor = Supervisor(commands(options))
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, lambda *_: supervisor.stop())
+    structlog.get_logger().info(
+        "starting; `t2 drive` in a second terminal drives it",
+        robot=config.robot.id,
+        board=f"{config.board.address}:{config.board.port}",
+        simulated=not options.no_sim,
+        bus=list(config.bus.endpoints),
+    )
+    return supervisor.run()
+
+
+def commands(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
+    """Return what is run, by name: the later ones stand on the earlier ones."""
+    passed = passed_on(options)
+    modules = {"router": ["cli", "router"]}
+    if not options.no_sim:
+        modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
+    modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}
+    return [(name, [sys.executable, "-m", *words, *passed]) for name, words in modules.items()]
+
+
+def passed_on(options: argparse.Namespace) -> list[str]:
+    """Return the options that say where settings come from, as they were given."""
+    files = [word for file in options.config or () for word in ("--config", str(file))]
+    return files + [word for text in options.sets for word in ("--set", text)]

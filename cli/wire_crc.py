@@ -1,0 +1,103 @@
+"""Which CRC captured frames carry: every 16-bit one that crcmod predefines, over both ranges.
+
+A frame is taken by its magic and its size alone. An empty payload and one of zeros have the CRC 0
+under every CRC that starts at zero, whatever its polynomial: they prove nothing.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import get_args
+
+import crcmod.predefined
+
+from common.wire.framing import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET, Covers, crc_function
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A CRC and a range, and how many frames they explain."""
+
+    crc: str
+    covers: Covers
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What the frames say."""
+
+    frames: int
+    telling: int  # those whose payload is not all zeros
+    fits: list[Fit]  # best first, none without a telling frame
+
+    @property
+    def answers(self) -> list[Fit]:
+        """What explains every frame, if any frame tells anything."""
+        return [fit for fit in self.fits if fit.frames == self.frames]
+
+
+def frames(datagrams: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield what looks like a frame by magic and size."""
+    for datagram in datagrams:
+        start = datagram.find(MAGIC)
+        while start >= 0:
+            size = int.from_bytes(datagram[start + 2 : start + 4], "little")
+            whole = HEADER.size <= size <= len(datagram) - start
+            if whole:
+                yield datagram[start : start + size]
+            start = datagram.find(MAGIC, start + (size if whole else 1))
+
+
+def identify(captured: Iterable[bytes]) -> Findings:
+    """Try every CRC over every range on the frames."""
+    found = list(captured)
+    telling = [frame for frame in found if any(frame[PAYLOAD_OFFSET:])]
+    fits = [
+        Fit(name, covers, _count(name, covers, found))
+        for name, covers in product(names(), get_args(Covers))
+        if _count(name, covers, telling)
+    ]
+    fits.sort(key=lambda fit: (-fit.frames, fit.crc))
+    return Findings(len(found), len(telling), fits)
+
+
+def names() -> list[str]:
+    """Return the 16-bit CRCs that crcmod predefines."""
+    definitions = crcmod.predefined._crc_definitions  # there is no public list
+    return [each["name"] for each in definitions if each["poly"].bit_length() == 17]
+
+
+def report(findings: Findings) -> list[str]:
+    """Return the findings in words."""
+    silent = findings.frames - findings.telling
+    lines = [
+        f"{findings.frames} frames; {silent} have an empty or all-zero payload, which proves "
+        "nothing: its CRC is 0 under every CRC that starts at zero"
+    ]
+    lines += [
+        f"{fit.crc} over {fit.covers}: fits {fit.frames} of {findings.frames}"
+        for fit in findings.fits
+    ]
+    return [*lines, _verdict(findings)]
+
+
+def _verdict(findings: Findings) -> str:
+    if not findings.telling:
+        return "no verdict: capture frames with something in them, such as motion"
+    if not findings.answers:
+        return "no CRC that crcmod predefines explains every frame"
+    if len(findings.answers) > 1:
+        return "several explain every frame: capture more"
+    answer = findings.answers[0]
+    return f'set: wire.crc = "{answer.crc}", wire.crc_covers = "{answer.covers}"'
+
+
+def _count(name: str, covers: Covers, found: Iterable[bytes]) -> int:
+    crc = crc_function(name)
+    header = covers == "header_and_payload"
+    return sum(
+        crc((frame[:CRC_OFFSET] + b"\0\0" if header else b"") + frame[PAYLOAD_OFFSET:])
+        == int.from_bytes(frame[CRC_OFFSET:PAYLOAD_OFFSET], "little")
+        for frame in found
+    )

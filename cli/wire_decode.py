@@ -1,0 +1,136 @@
+"""Datagrams to readable lines: each frame with its sender and units, each bad run with its reason.
+
+The same id means one frame from the PC and another one from the board; the sizes differ, except
+for those of the two emergency brake switches. So each frame is read both ways unless the sender is
+known.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, get_args
+
+from common.messages import SONAR_NAMES, FaultName
+from common.settings import Wire
+from common.wire.commands import TO_BOARD
+from common.wire.frame import Frame
+from common.wire.framing import Framing, Reason, Received, Rejected
+from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
+
+TABLES: dict[str, Mapping[int, type[Frame]]] = {"pc": TO_BOARD, "board": FROM_BOARD}
+SENDERS = (*TABLES, "both")
+
+# When neither reading takes a frame, the reason that got furthest says most.
+FURTHEST = (
+    Reason.BAD_VALUE, Reason.BAD_CRC, Reason.TRUNCATED, Reason.BAD_SIZE,
+    Reason.UNKNOWN_ID, Reason.NO_MAGIC,
+)  # fmt: skip
+
+UNITS = {"_mmps": "mm/s", "_mm": "mm", "_ddeg": "deg", "_raw": ""}
+
+
+@dataclass(frozen=True, slots=True)
+class Good:
+    """A frame, and who may have sent it; more than one where the bytes do not tell."""
+
+    offset: int
+    raw: bytes
+    frames: dict[str, Frame]  # by sender
+
+
+@dataclass(frozen=True, slots=True)
+class Bad:
+    """A run of bytes that is no frame, and why."""
+
+    offset: int
+    raw: bytes
+    reason: Reason
+    detail: str
+
+
+def parts(framing: Framing, datagram: bytes, sender: str) -> Iterator[Good | Bad]:
+    """Yield what a datagram holds, in order; all its bytes are in there."""
+    tables = TABLES if sender == "both" else {sender: TABLES[sender]}
+    offset = 0
+    while offset < len(datagram):
+        rest = datagram[offset:]
+        read = {name: next(framing.read(rest, kinds)) for name, kinds in tables.items()}
+        part = _best(offset, read)
+        yield part
+        offset += len(part.raw)
+
+
+def _best(offset: int, read: Mapping[str, Received | Rejected]) -> Good | Bad:
+    good = {name: part for name, part in read.items() if isinstance(part, Received)}
+    if good:
+        raw = next(iter(good.values())).raw
+        return Good(offset, raw, {name: part.frame for name, part in good.items()})
+    bad = [part for part in read.values() if isinstance(part, Rejected)]
+    worst = min(bad, key=lambda part: FURTHEST.index(part.reason))
+    return Bad(offset, worst.raw, worst.reason, worst.detail)
+
+
+def as_text(part: Good | Bad, wire: Wire) -> str:
+    """Return one line."""
+    if isinstance(part, Bad):
+        return f"+{part.offset:<4} BAD {part.reason}: {part.detail}: {part.raw.hex()}"
+    senders = " or ".join(part.frames)
+    names = " or ".join(type(frame).__name__ for frame in part.frames.values())
+    texts = [_text(name, value, wire) for name, value in _fields(part)]
+    return f"+{part.offset:<4} {senders:<5} {names} {', '.join(texts)}".rstrip()
+
+
+def as_table(part: Good | Bad, where: str) -> dict[str, Any]:
+    """Return one JSON object."""
+    place = {"where": where, "offset": part.offset, "hex": part.raw.hex()}
+    if isinstance(part, Bad):
+        return place | {"reason": part.reason, "detail": part.detail}
+    return place | {
+        "from": list(part.frames),
+        "frame": [type(frame).__name__ for frame in part.frames.values()],
+        "fields": dict(_fields(part)),
+    }
+
+
+def _fields(part: Good) -> list[tuple[str, Any]]:
+    """Return the fields; where two senders are possible, both frames have the same ones."""
+    frame = next(iter(part.frames.values()))
+    return [(field.name, getattr(frame, field.name)) for field in dataclasses.fields(frame)]
+
+
+def _text(name: str, value: Any, wire: Wire) -> str:
+    if name == "angular_raw":
+        return _angular(value, wire)
+    if name == "ranges_mm":
+        shown = ("fault" if range_ == SONAR_FAULT_MM else str(range_) for range_ in value)
+        pairs = zip(SONAR_NAMES, shown, strict=True)
+        return " ".join(f"{place}={text}" for place, text in pairs) + " mm"
+    if name == "fault_bits":
+        return f"faults 0x{value:08x} {' '.join(_faults(value))}".rstrip()
+    if isinstance(value, IntEnum):
+        return f"{name} {value.name}"
+    return _number(name, value)
+
+
+def _number(name: str, value: int) -> str:
+    for suffix, unit in UNITS.items():
+        if name.endswith(suffix):
+            shown = f"{value / 10:.1f}" if suffix == "_ddeg" else str(value)
+            return f"{name.removesuffix(suffix)} {shown} {unit}"
+    if isinstance(value, bool):
+        return f"{name} {'yes' if value else 'no'}"
+    return f"{name} {value}"
+
+
+def _angular(value: int, wire: Wire) -> str:
+    if wire.angular_unit == "milliradian":
+        return f"angular {value / 1000:.3f} rad/s"
+    return f"angular {value / 10:.1f} deg/s"
+
+
+def _faults(bits: int) -> list[str]:
+    names = get_args(FaultName)
+    return [
+        names[bit] if bit < len(names) else f"bit_{bit}" for bit in range(32) if bits >> bit & 1
+    ]

@@ -1,0 +1,139 @@
+"""The whole stack as processes of its own, with a simulator that writes down what it received."""
+
+import contextlib
+import signal
+import socket
+import subprocess
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cli.lap import holdup
+from cli.lap.score import Trace, read
+from cli.up import commands
+from common.config import Sources, load
+from common.freshness import S
+from services.bridge.config import BridgeConfig
+from sim.control import Control
+from tests.support import free_port, wait_until
+
+
+@dataclass
+class Chain:
+    """Running processes by name, and how to look at the board."""
+
+    endpoint: str
+    trace_file: Path
+    control: Control
+    commands: dict[str, list[str]]
+    log: Path
+    lease_s: float  # that the bridge obeys a motion message
+    processes: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
+
+    def start(self, name: str) -> None:
+        """Start one of them, or start it again."""
+        with self.log.open("ab") as output:
+            self.processes[name] = subprocess.Popen(
+                self.commands[name], stdout=output, stderr=output
+            )
+
+    def kill(self, name: str) -> int:
+        """Kill one of them with -9; return when, in monotonic nanoseconds."""
+        process = self.processes[name]
+        at_ns = time.monotonic_ns()
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        return at_ns
+
+    def trace(self) -> Trace:
+        """Return what the simulator has written down so far."""
+        return read(self.trace_file)
+
+    def last(self) -> str:
+        """Return the kind of the command that the board holds."""
+        made = self.trace().commands
+        return made[-1].kind if made else "none"
+
+    def speed(self) -> float:
+        """Return how fast the vehicle really is, in m/s."""
+        return self.control.truth().linear
+
+    def end(self) -> None:
+        """End them all."""
+        for process in self.processes.values():
+            process.kill()
+            process.wait()
+
+
+@contextlib.contextmanager
+def chain(folder: Path, world: str = "empty") -> Iterator[Chain]:
+    """Run the stack while the context lasts, as shipped unless this machine cannot bear it."""
+    holdup_s = holdup.measured()
+    board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    sets = [
+        f"board.port={board}",
+        f"board.listen_ports=[{first}, {second}]",
+        f"bus.listen={endpoint}",
+        f"sim.control_port={control}",
+        *holdup.settings(holdup_s),
+    ]
+    lease_s = load(BridgeConfig, Sources(sets=sets)).config.bridge.lease
+    options = Namespace(no_sim=False, world=world, config=None, sets=sets)
+    made = {name: list(command) for name, command in commands(options)}
+    trace_file = folder / "trace.jsonl"
+    made["sim"] += ["--trace", str(trace_file)]
+    it = Chain(endpoint, trace_file, Control(control), made, folder / "log.jsonl", lease_s)
+    for name in made:
+        it.start(name)
+    try:
+        wait_until(lambda: _is_up(it), "all processes up")
+        yield it
+    finally:
+        it.end()
+
+
+def _is_up(it: Chain) -> bool:
+    ended = [name for name, process in it.processes.items() if process.poll() is not None]
+    assert not ended, f"{ended} ended: {it.log.read_text()}"
+    return it.log.read_text().count('"event": "started"') >= len(it.commands)
+
+
+class Witness:
+    """Notes how long this machine holds a process up that only wants to sleep.
+
+    A deadline that is met late by no more than this was met by the program and missed by the
+    machine.
+    """
+
+    def __init__(self) -> None:
+        # A process of its own: a thread would also wait for this interpreter's lock.
+        self._process = subprocess.Popen(
+            [sys.executable, "-S", "-c", WITNESS], stdout=subprocess.PIPE, text=True
+        )
+
+    def stop(self) -> float:
+        """Return the longest hold-up, in seconds."""
+        self._process.send_signal(signal.SIGTERM)
+        out, _ = self._process.communicate()
+        return float(out)
+
+
+WITNESS = """
+import signal, sys, time
+signal.signal(signal.SIGTERM, lambda *_: (print(worst), sys.exit()))
+worst, last = 0.0, time.monotonic()
+while True:
+    time.sleep(0.005)
+    now = time.monotonic()
+    worst, last = max(worst, now - last - 0.005), now
+"""
+
+
+def until_still_s(trace: Trace, since_ns: int) -> float:
+    """Return how long after a moment the board last received a command to move, in seconds."""
+    moving = [c.mono_ns for c in trace.commands if c.kind == "run" and (c.linear or c.angular)]
+    return max(0.0, (moving[-1] - since_ns) / S) if moving else 0.0

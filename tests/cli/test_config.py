@@ -1,0 +1,92 @@
+"""``t2 config``: values, origins, and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from common.service import EXIT_CONFIG
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.toml"
+    path.write_text("[board]\nport = 5001\n[safety]\nmargin = 0.3\n", encoding="utf-8")
+    return path
+
+
+def as_json(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, dict[str, object]]:
+    assert main(["config", "--json", *words]) == 0
+    table: dict[str, dict[str, object]] = json.loads(capsys.readouterr().out)
+    return table
+
+
+def test_every_section_is_there_with_its_origin(capsys: pytest.CaptureFixture[str]) -> None:
+    table = as_json(capsys)
+    sections = {path.split(".")[0] for path in table}
+    assert sections == {
+        "robot", "bus", "board", "wire", "log", "vehicle",
+        "bridge", "safety", "odom", "teleop", "sim",
+    }  # fmt: skip
+    assert table["bus.listen"]["value"] == ["tcp/127.0.0.1:7447"]
+    assert str(table["bus.listen"]["origin"]).endswith("config/t2.toml")
+    assert table["safety.sources.demo.priority"]["value"] == 15
+
+
+def test_every_default_is_written_down(capsys: pytest.CaptureFixture[str]) -> None:
+    assert [path for path, row in as_json(capsys).items() if row["origin"] == "default"] == []
+
+
+def test_the_later_origin_wins(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--config", str(file)]
+    assert as_json(capsys, *words)["board.port"] == {"value": 5001, "origin": str(file)}
+    monkeypatch.setenv("T2__BOARD__PORT", "5002")
+    table = as_json(capsys, *words)
+    assert table["board.port"] == {"value": 5002, "origin": "environment T2__BOARD__PORT"}
+    assert table["safety.margin"] == {"value": 0.3, "origin": str(file)}
+    words += ["--set", "board.port=5003"]
+    assert as_json(capsys, *words)["board.port"] == {
+        "value": 5003,
+        "origin": "--set board.port=5003",
+    }
+
+
+def test_the_table_has_a_line_a_setting_in_columns(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--config", str(file), "--set", "robot.id=007"]
+    paths = list(as_json(capsys, *words))
+    assert main(["config", *words]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == paths
+    assert len({line.index('"007"') for line in lines if line.startswith("robot.id ")}) == 1
+    (port,) = (line for line in lines if line.startswith("board.port "))
+    assert port.split() == ["board.port", "5001", str(file)]
+    (robot,) = (line for line in lines if line.startswith("robot.id "))
+    assert robot.endswith("--set robot.id=007")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "board.port=0"], "board.port = 0"),
+        (["--set", "board.prot=1"], "did you mean 'port'?"),
+        (["--set", "bord.port=1"], "no section 'bord'; did you mean 'board'?"),
+        (["--set", "board.port"], "should look like board.port=4002"),
+        (["--set", "bus.listen=foo/"], "endpoint 'foo/' should look like tcp/"),
+        (["--set", "bus.connect=/127.0.0.1:7447"], "should look like tcp/"),
+        (["--set", "safety.bumper_age=nan"], "safety"),
+        (["--config", "no/such.toml"], "no/such.toml: cannot be read"),
+    ],
+)
+def test_what_is_refused_is_named(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["config", *words]) == EXIT_CONFIG
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("t2 config: ")
+    assert said in shown.err

@@ -1,0 +1,135 @@
+"""``t2`` itself: its help, its exit codes, and what it says without the extras."""
+
+import subprocess
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import COMMANDS, main
+from common.errors import ConfigError, LinkError, RobotError
+from common.service import EXIT_CONFIG, EXIT_LINK
+from tests.cli.processes import PATIENCE_S
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--help"])
+    assert end.value.code == 0
+    shown = capsys.readouterr().out
+    for name in COMMANDS:
+        assert f"    {name} " in shown
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("up", "--no-sim"),
+        ("demo", "--fast"),
+        ("drive", "--source"),
+        ("router", "--set"),
+        ("sim", "--world"),
+        ("config", "--json"),
+        ("wire", "identify-crc"),
+    ],
+)
+def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    assert end.value.code == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: t2 {command}")
+    assert COMMANDS[command] in " ".join(shown.split())
+    assert option in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "required: COMMAND"),
+        (["fly"], "invalid choice: 'fly'"),
+        (["up", "--nonsense"], "unrecognized arguments: --nonsense"),
+        (["--set", "board.port=1", "up"], "invalid choice"),
+    ],
+)
+def test_what_is_no_command_is_said(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    assert end.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+def raising(error: BaseException) -> Callable[[Namespace], int]:
+    def run(_: Namespace) -> int:
+        raise error
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ConfigError("a setting is wrong"), EXIT_CONFIG),
+        (LinkError("a port is taken"), EXIT_LINK),
+        (RobotError("something is missing"), 1),
+    ],
+)
+def test_errors_are_sentences_with_exit_codes(
+    error: RobotError,
+    code: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("cli.config.run", raising(error))
+    assert main(["config"]) == code
+    assert capsys.readouterr().err == f"t2 config: {error}\n"
+
+
+def test_an_early_ctrl_c_leaves_without_a_word(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("cli.config.run", raising(KeyboardInterrupt()))
+    assert main(["config"]) == 130
+    assert capsys.readouterr().err == ""
+
+
+# The robot's set has none of the extras: only what wants them may miss them, in a sentence.
+ROBOT_SET = """
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("rich", "matplotlib", "textual", "pygame", "dpkt"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Absent())
+from cli.__main__ import COMMANDS, main
+from services.teleop import life
+life.terminal_is_there = lambda: True
+for name in COMMANDS:
+    try:
+        main([name, "--help"])
+    except SystemExit as end:
+        assert end.code == 0, name
+capture = sys.argv[1]
+for words in (["demo"], ["drive"], ["wire", "decode", capture]):
+    print(words[0], "gives", main(words), file=sys.stderr)
+"""
+
+
+def test_without_the_extras(tmp_path: Path) -> None:
+    capture = tmp_path / "trip.pcap"
+    capture.write_bytes(bytes.fromhex("d4c3b2a1") + bytes(20))
+    result = subprocess.run(
+        [sys.executable, "-c", ROBOT_SET, str(capture)],
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    demo, demo_code, drive, drive_code, wire, wire_code = result.stderr.splitlines()
+    assert demo.startswith("t2 demo: the demo wants rich; ")
+    assert demo.endswith("pip install -e '.[demo]'")
+    assert drive.startswith("t2 drive: the screen needs ")
+    assert wire.endswith("pip install -e '.[inspect]'")
+    assert [demo_code, drive_code, wire_code] == ["demo gives 1", "drive gives 1", "wire gives 1"]

@@ -1,0 +1,135 @@
+"""``t2 up`` as a process: it comes up, mends itself, and leaves nothing behind."""
+
+import json
+import os
+import signal
+import socket
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from cli.up import commands
+from common.service import EXIT_CONFIG, EXIT_LINK
+from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
+from tests.support import free_port, wait_until
+
+STACK = {"router", "sim", "bridge", "safety", "odom"}
+
+
+def ports() -> list[str]:
+    """Return settings with ports that were free a moment ago."""
+    board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
+    return [
+        f"board.port={board}",
+        f"board.listen_ports={first},{second}",
+        f"bus.listen=tcp/127.0.0.1:{free_port()}",
+    ]
+
+
+def starts(log: Path, name: str) -> int:
+    """Return how often a service has said that it has started."""
+    # Up to the last whole line; five processes write here, and none into the other's line.
+    lines = [json.loads(line) for line in log.read_text(encoding="utf-8").split("\n")[:-1]]
+    return sum(line["service"] == name and line["event"] == "started" for line in lines)
+
+
+def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with running(t2("up", *sets(*ports(), "log.format=json")), log) as up:
+        wait_until(lambda: all(starts(log, name) for name in STACK), "all five", PATIENCE_S)
+        first = children(up.pid)
+        assert set(first) == STACK
+
+        # The router's port and the bridge's two come back though their holders were killed.
+        for victim in ("router", "bridge"):
+            os.kill(first[victim], signal.SIGKILL)
+        wait_until(lambda: starts(log, "router") == starts(log, "bridge") == 2, "both", PATIENCE_S)
+        second = children(up.pid)
+        assert set(second) == STACK
+        changed = {name for name in STACK if first[name] != second[name]}
+        assert changed == {"router", "bridge"}
+        assert log.read_text().count("ended, starts again") == 2
+
+        up.send_signal(signal.SIGINT)
+        assert up.wait(PATIENCE_S) == 0
+        wait_gone(list(second.values()))
+    said = log.read_text()
+    assert "Traceback" not in said
+    # In reverse order: the bridge stops the vehicle while its board is still there.
+    assert said.index('"service": "odom", "event": "stopped"') < said.index(
+        '"service": "bridge", "event": "stopped"'
+    )
+
+
+def test_a_taken_port_ends_it_all_with_a_sentence(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        words = sets(*ports(), f"board.listen_ports={port}")
+        with running(t2("up", "--no-sim", *words), log) as up:
+            assert up.wait(PATIENCE_S) == EXIT_LINK
+    said = log.read_text()
+    assert f"127.0.0.1:{port}" in said
+    assert "another program has it" in said
+    assert "Traceback" not in said
+    assert starts(log, "sim") == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (sets("board.port=0"), "board.port = 0"),
+        (sets("safety.margin=0"), "margin"),
+        (["--config", "no/such.toml"], "no/such.toml"),
+    ],
+)
+def test_a_bad_setting_opens_nothing(
+    words: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delattr("cli.up.Supervisor")
+    assert main(["up", *words]) == EXIT_CONFIG
+    error = capsys.readouterr().err
+    assert error.startswith("t2 up: ")
+    assert said in error
+
+
+# --- what is run ------------------------------------------------------------------------------
+
+
+def options(**given: object) -> Namespace:
+    return Namespace(**({"no_sim": False, "world": None, "config": None, "sets": []} | given))
+
+
+def test_later_ones_stand_on_earlier_ones() -> None:
+    names = [name for name, _ in commands(options())]
+    assert names == ["router", "sim", "bridge", "safety", "odom"]
+
+
+def test_without_the_simulated_vehicle() -> None:
+    names = [name for name, _ in commands(options(no_sim=True, world="office"))]
+    assert names == ["router", "bridge", "safety", "odom"]
+
+
+def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
+    files = [Path("a.toml"), Path("b.toml")]
+    made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))
+    passed = [
+        "--config",
+        "a.toml",
+        "--config",
+        "b.toml",
+        "--set",
+        "robot.id=2",
+        "--set",
+        "log.level=debug",
+    ]
+    for name, command in made.items():
+        assert command[-len(passed) :] == passed, name
+    assert " ".join(made["sim"][1:5]) == "-m sim --world x"
+    assert " ".join(made["router"][1:4]) == "-m cli router"
