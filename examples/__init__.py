@@ -1,0 +1,1 @@
+"""Consumers to begin from."""

@@ -1,0 +1,65 @@
+"""Both consumers, run as a newcomer runs them, against a real router with a robot made up."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from common import keys
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.messages import Odometry, Ultrasonic
+from tests.support import PATIENCE_S, bus_on, free_port, router_process, running
+
+RANGES = (2.0, 1.5, 0.62, None, 3.0, None, None, 4.0)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[str]:
+    """Run a router with a robot on it that measures and drives; name the endpoint."""
+    where = f"tcp/127.0.0.1:{free_port()}"
+
+    def declare(bus: Bus) -> None:
+        ultrasonic, odometry = bus.publisher(keys.ULTRASONIC), bus.publisher(keys.ODOMETRY)
+
+        def play(_: int) -> None:
+            status = tuple("no_echo" if one is None else "ok" for one in RANGES)
+            ultrasonic.put(Ultrasonic(ranges=RANGES, status=status))  # type: ignore[arg-type]
+            odometry.put(
+                Odometry(
+                    x=1.25, y=-0.5, heading=0.1, linear=0.3, angular=0.0,
+                    pose_covariance=(0.0,) * 9, twist_covariance=(0.0,) * 4,
+                    epoch=0, residual=None, slip=False,
+                )
+            )  # fmt: skip
+
+        loop.every(0.05, play)
+
+    with router_process(where), running(Loop()) as loop, bus_on(where, loop, declare):
+        yield where
+
+
+def first_line(*words: str) -> tuple[str, int]:
+    """Run a program until its first line of output, then stop it as ctrl-c does."""
+    with subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
+    return line, process.returncode
+
+
+def test_the_consumer_with_our_helpers_tells_the_nearest_obstacle(robot: str) -> None:
+    line, code = first_line("-m", "examples.nearest_obstacle", "--set", f"bus.connect={robot}")
+    assert line == "0.62 m front\n"
+    assert code == 0
+
+
+def test_the_plain_consumer_watches_the_vehicle(robot: str) -> None:
+    line, _ = first_line("examples/watch_plain.py", robot)
+    assert line == "x   1.25 m  y  -0.50 m   0.30 m/s\n"

@@ -1,0 +1,56 @@
+"""Hypothesis strategies for every frame of the wire, and plain examples of each."""
+
+from hypothesis import strategies as st
+
+from common.wire import commands as c
+from common.wire import reports as r
+from common.wire.frame import Frame, Side
+
+velocities = st.integers(-32767, 32767)
+octets = st.integers(0, 255)
+sides = st.sampled_from(Side)
+ranges_mm = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
+
+commands = st.one_of(
+    st.builds(c.MotionCommand, st.sampled_from(c.MotionKind), velocities, velocities),
+    st.builds(c.DistanceQuery),
+    st.builds(c.UltrasonicQuery),
+    st.builds(c.BumperQuery),
+    st.builds(c.UltrasonicBrakeSet, st.booleans()),
+    st.builds(c.BumperBrakeSet, st.booleans()),
+    st.builds(c.DriverQuery, sides),
+    st.builds(c.LedSet, octets, octets, st.integers(0, 10), *[octets] * 6),
+)
+
+reports = st.one_of(
+    st.builds(r.VelocityReport, velocities, velocities),
+    st.builds(r.DistanceReport, st.integers(-(2**31), 2**31 - 1), st.integers(-1800, 1800)),
+    st.builds(r.UltrasonicReport, ranges_mm),
+    st.builds(r.BumperReport, st.booleans()),
+    st.builds(r.UltrasonicBrakeReport, st.booleans()),
+    st.builds(r.BumperBrakeReport, st.booleans()),
+    st.builds(r.DriverReport, sides, st.integers(0, 2**32 - 1)),
+    st.builds(r.LedReport, st.booleans()),
+)
+
+# One of each, with something in every byte that may hold something.
+COMMANDS: tuple[Frame, ...] = (
+    c.MotionCommand(c.MotionKind.RUN, 500, -300),
+    c.DistanceQuery(),
+    c.UltrasonicQuery(),
+    c.BumperQuery(),
+    c.UltrasonicBrakeSet(True),
+    c.BumperBrakeSet(True),
+    c.DriverQuery(Side.RIGHT),
+    c.LedSet(9, 1, 8, 2, 3, 4, 5, 6, 7),
+)
+REPORTS: tuple[Frame, ...] = (
+    r.VelocityReport(-1000, 250),
+    r.DistanceReport(-123456, 1799),
+    r.UltrasonicReport((100, 200, 300, 400, 500, 600, 0xFFFF, 5000)),
+    r.BumperReport(True),
+    r.UltrasonicBrakeReport(True),
+    r.BumperBrakeReport(True),
+    r.DriverReport(Side.LEFT, 0x8000001F),
+    r.LedReport(True),
+)
