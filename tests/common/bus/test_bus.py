@@ -112,9 +112,10 @@ def test_what_is_no_message_is_refused_counted_and_harmless(rig: Rig) -> None:
     stranger = rig.session()
     until_heard(lambda: stranger.put(bumper(rig), b""), lambda: refused, "the first")
     count = len(refused)
+    wait = zenoh.CongestionControl.BLOCK  # what is dropped on the way is not refused
     for payload in HOSTILE.values():
-        stranger.put(bumper(rig), payload)
-    stranger.delete(bumper(rig))
+        stranger.put(bumper(rig), payload, congestion_control=wait)
+    stranger.delete(bumper(rig), congestion_control=wait)
     wait_until(lambda: len(refused) >= count + len(HOSTILE) + 1, "all of them")
     stranger.put(bumper(rig), msgpack.packb({"pressed": True, "later": {"a": [1]}}))
     wait_until(lambda: heard, "a good one after them")
