@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from common.errors import ConfigError, LinkError, RobotError
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 
 COMMANDS = {
     "up": "router, simulated vehicle, bridge, safety and odometry, until ctrl-c",

@@ -5,7 +5,7 @@ import json
 
 from cli.settings import Everything
 from common.config import Loaded, load
-from common.service import add_sources, sources
+from common.options import add_sources, sources
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

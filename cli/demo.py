@@ -23,7 +23,7 @@ from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import S
 from common.loop import Loop
-from common.service import add_sources, sources
+from common.options import add_sources, sources
 from sim.files import load_plan
 
 WORLD = "office"

@@ -9,7 +9,7 @@ import structlog
 from common import log
 from common.bus.session import router
 from common.config import load
-from common.service import add_sources, sources
+from common.options import add_sources, sources
 from common.settings import Shared
 
 add_arguments = add_sources

@@ -15,9 +15,8 @@ from typing import BinaryIO
 
 import structlog
 
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import HOPELESS
 
-HOPELESS = (EXIT_CONFIG, EXIT_LINK)
 BACKOFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)  # before each restart; the last one stays
 CALM_S = 10.0  # a process that lived this long begins with the first backoff again
 PATIENCE_S = 4.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand

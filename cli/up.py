@@ -11,7 +11,7 @@ from cli.settings import Everything
 from cli.supervisor import Supervisor
 from common import log
 from common.config import load
-from common.service import add_sources, sources
+from common.options import add_sources, sources
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from cli import capture, wire_crc
 from cli.wire_decode import SENDERS, Bad, as_table, as_text, parts
 from common.config import load
 from common.errors import RobotError
-from common.service import add_sources, sources
+from common.options import add_sources, sources
 from common.settings import Shared, Wire
 from common.wire.framing import Framing
 

@@ -5,7 +5,6 @@ service around a ``Node``, and serves until SIGINT or SIGTERM. The first signal 
 come to rest; a second one ends the process at once.
 """
 
-import argparse
 import os
 import signal
 import sys
@@ -23,16 +22,15 @@ import structlog
 
 from common import keys, log
 from common.bus.bus import Bus
-from common.config import DEFAULT_FILE, Loaded, Sources, load
+from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Event, Health, Level
+from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.schema import schemas
 from common.settings import Shared
 
-EXIT_CONFIG = 78  # EX_CONFIG: a restart will not help
-EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
 REST_S = 2.0  # how long a service may take to come to rest
 
 
@@ -161,30 +159,6 @@ def _come_to_rest(node: Node[C]) -> None:
 
     node.loop.every(0.02, check)
     node.loop.run()
-
-
-def arguments(name: str) -> argparse.ArgumentParser:
-    """Return the options that every service takes."""
-    parser = argparse.ArgumentParser(prog=name)
-    add_sources(parser)
-    return parser
-
-
-def add_sources(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where settings come from."""
-    parser.add_argument(
-        "--config", action="append", type=Path, metavar="FILE", default=None,
-        help="a TOML file over config/t2.toml; may be repeated, the later wins",
-    )  # fmt: skip
-    parser.add_argument(
-        "--set", action="append", dest="sets", metavar="PATH=VALUE", default=[],
-        help="one setting, such as board.port=4002; wins over files and environment",
-    )  # fmt: skip
-
-
-def sources(options: argparse.Namespace) -> Sources:
-    """Return where the settings come from, by the options."""
-    return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)
 
 
 @cache

@@ -12,7 +12,7 @@ import structlog
 from common import log
 from common.config import load
 from common.errors import ConfigError, LinkError
-from common.service import EXIT_CONFIG, EXIT_LINK, add_sources, sources
+from common.options import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from sim.config import Config
 from sim.files import load_plan, load_script
 from sim.process import Process, Trace

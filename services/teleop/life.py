@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 from common import log
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
-from common.service import EXIT_CONFIG, REST_S, Node, add_sources, sources
+from common.options import EXIT_CONFIG, add_sources, sources
+from common.service import REST_S, Node
 from services.teleop.config import TeleopConfig
 from services.teleop.desk import Desk
 from services.teleop.gamepad import find

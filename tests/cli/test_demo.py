@@ -19,7 +19,7 @@ from cli.lap import holdup
 from cli.lap.score import read
 from cli.settings import Everything
 from common.config import Sources, load
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S, children, ran, sets, t2, wait_gone
 from tests.support import wait_until
 

@@ -10,7 +10,7 @@ import pytest
 
 from cli.__main__ import COMMANDS, main
 from common.errors import ConfigError, LinkError, RobotError
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S
 
 

@@ -5,7 +5,7 @@ import signal
 import pytest
 
 from cli.__main__ import main
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S, ran, sets
 from tests.support import free_port, router_process
 

@@ -11,7 +11,7 @@ import pytest
 
 from cli import supervisor as module
 from cli.supervisor import BACKOFF_S, CALM_S, Child, Supervisor
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import alive, running, wait_gone
 from tests.support import wait_until
 

@@ -11,7 +11,7 @@ import pytest
 
 from cli.__main__ import main
 from cli.up import commands
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
 from tests.support import free_port, wait_until
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from common.service import EXIT_CONFIG
+from common.options import EXIT_CONFIG
 from common.wire.framing import Framing
 from tests.cli.captures import DISTANCE, QUERY, RUN, VELOCITY, as_pcap, on_ethernet, packet
 from tests.wire.strategies import COMMANDS

@@ -13,7 +13,8 @@ from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
 from common.messages import Event, Health
-from common.service import EXIT_CONFIG, EXIT_LINK, Node, package_version, resident_bytes, run
+from common.options import EXIT_CONFIG, EXIT_LINK
+from common.service import Node, package_version, resident_bytes, run
 from common.settings import Shared
 from tests.common.program import Program, program
 from tests.common.rig import Rig

@@ -15,7 +15,7 @@ import pytest
 
 from cli.__main__ import main as t2
 from common.errors import LinkError
-from common.service import EXIT_CONFIG, EXIT_LINK
+from common.options import EXIT_CONFIG, EXIT_LINK
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
