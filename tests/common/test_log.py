@@ -1,15 +1,20 @@
 """What is written to standard error, and in which form."""
 
+import contextlib
 import io
 import json
+import os
 import sys
+import threading
 from collections.abc import Iterator
+from typing import TextIO
 
 import pytest
 import structlog
 
 from common import log
 from common.settings import Log
+from tests.support import PATIENCE_S, wait_until
 
 
 class Screen(io.StringIO):
@@ -35,8 +40,9 @@ def written(
 ) -> str:
     screen = Screen(tty)
     monkeypatch.setattr(sys, "stderr", screen)
-    log.configure(settings, "bridge")
+    lossy = log.configure(settings, "bridge")
     getattr(structlog.get_logger(), level)("link lost", epoch=2)
+    lossy.drain(PATIENCE_S)
     return screen.getvalue()
 
 
@@ -83,9 +89,46 @@ def test_the_level_decides(
 def test_an_error_brings_its_traceback_into_the_json(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(tty=False)
     monkeypatch.setattr(sys, "stderr", screen)
-    log.configure(Log(), "bridge")
+    lossy = log.configure(Log(), "bridge")
     try:
         raise KeyError("key")
     except KeyError:
         structlog.get_logger().exception("failed")
+    lossy.drain(PATIENCE_S)
     assert "KeyError: 'key'" in json.loads(screen.getvalue())["exception"]
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, TextIO]]:
+    """A pipe: the end to read from, and a file on the other."""
+    out, into = os.pipe()
+    file = os.fdopen(into, "w")
+    yield out, file
+    with contextlib.suppress(OSError):
+        os.close(out)
+    with contextlib.suppress(BrokenPipeError):
+        file.close()
+
+
+def test_a_file_that_nobody_reads_holds_up_nobody(pipe: tuple[int, TextIO]) -> None:
+    said = threading.Event()
+
+    def say() -> None:
+        lossy = log.Lossy(pipe[1])
+        for _ in range(10 * log.WAITING_MAX):
+            lossy.write("x" * 100 + "\n")
+        lossy.drain(0.0)
+        said.set()
+
+    threading.Thread(target=say, daemon=True).start()
+    wait_until(said.is_set, "all is said, though the pipe is full")
+
+
+def test_a_file_that_is_gone_loses_lines_only(pipe: tuple[int, TextIO]) -> None:
+    os.close(pipe[0])
+    lossy = log.Lossy(pipe[1])
+    lossy.write("nobody reads this\n")
+    lossy.drain(PATIENCE_S)
+    lossy.write("nor this\n")
+    lossy.drain(PATIENCE_S)
+    assert not pipe[1].closed

@@ -186,7 +186,13 @@ def test_a_taken_port_ends_it_with_a_clear_sentence(
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         assert main([*bench.arguments, "--set", f"{setting}={port}"]) == EXIT_LINK
-    assert f"{setting}: cannot listen on UDP port {port}" in capfd.readouterr().err
+    said: list[str] = []
+
+    def refused() -> bool:
+        said.append(capfd.readouterr().err)
+        return f"{setting}: cannot listen on UDP port {port}" in "".join(said)
+
+    wait_until(refused, "the sentence, which a thread of its own writes")
 
 
 @pytest.mark.parametrize(
