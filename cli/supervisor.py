@@ -10,16 +10,15 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import BinaryIO
 
 import structlog
 
+from common.backoff import Backoff
 from common.options import HOPELESS
 
-BACKOFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)  # before each restart; the last one stays
-CALM_S = 10.0  # a process that lived this long begins with the first backoff again
-PATIENCE_S = 4.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand
+PATIENCE_S = 5.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand
 LOOK_S = 0.1
 PR_SET_PDEATHSIG = 1
 # Found before any fork: between fork and exec a process with other threads must not load anything.
@@ -34,7 +33,7 @@ class Child:
     command: Sequence[str]
     process: "subprocess.Popen[bytes] | None" = None
     started_s: float = 0.0
-    restarts: int = 0
+    backoff: Backoff = field(default_factory=Backoff)
     due_s: float = 0.0
 
 
@@ -87,11 +86,8 @@ class Supervisor:
         return 0
 
     def _bury(self, child: Child, code: int, now_s: float) -> None:
-        if now_s - child.started_s > CALM_S:
-            child.restarts = 0
-        wait_s = BACKOFF_S[min(child.restarts, len(BACKOFF_S) - 1)]
+        wait_s = child.backoff.after(now_s - child.started_s)
         child.process, child.due_s = None, now_s + wait_s
-        child.restarts += 1
         self._log.error("ended, starts again", process=child.name, exit_code=code, wait_s=wait_s)
 
 

@@ -36,9 +36,10 @@ def settings(holdup_s: float) -> list[str]:
                 "sources.teleop.lease"]  # fmt: skip
     return [
         "bus.lease=10",
-        "bridge.i_accept=lease,silence",
+        "bridge.i_accept=lease,silence,heartbeat",
         f"bridge.lease={longer}",
         f"bridge.silence={longer}",
+        f"bridge.heartbeat={longer}",
         f"bridge.echo_timeout={min(2.0, longer)}",
         f"safety.i_accept={','.join(accepted)}",
         *(f"safety.{name}={longer}" for name in AGES),

@@ -1,15 +1,51 @@
-"""``python -m services.bridge``: the board's frames to messages, safety's motion to frames."""
+"""``python -m services.bridge``: the guard, and the bridge under it."""
 
 import sys
+import time
+from collections.abc import Sequence
 
-from common.service import run
-from services.bridge.bridge import Bridge
+import structlog
+
+from common import log
+from common.config import load
+from common.errors import ConfigError, LinkError
+from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
+from common.settings import Board
 from services.bridge.config import BridgeConfig
+from services.bridge.guard import Guard, bridge_command
+from services.bridge.udp import Sockets
+
+# A bridge whose guard was killed keeps the ports until its vehicle stands.
+RIVAL_S = 4.0
 
 
-def main() -> int:
-    """Run the bridge until it is told to stop."""
-    return run("bridge", BridgeConfig, Bridge)
+def main(argv: Sequence[str] | None = None) -> int:
+    """Guard the bridge until it is told to stop; return the exit code."""
+    given = sys.argv[1:] if argv is None else argv
+    try:
+        config = load(BridgeConfig, sources(arguments("bridge").parse_args(given))).config
+    except ConfigError as error:
+        print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
+        return EXIT_CONFIG
+    log.configure(config.log, "guard")
+    try:
+        sockets = bound(config.board)
+    except LinkError as error:
+        structlog.get_logger().error(str(error))
+        return EXIT_LINK
+    return Guard(config, sockets, bridge_command(given)).run()
+
+
+def bound(board: Board) -> Sockets:
+    """Bind the ports; raise ``LinkError`` when they cannot be had for long enough."""
+    end_s = time.monotonic() + RIVAL_S
+    while True:
+        try:
+            return Sockets(board)
+        except LinkError:
+            if time.monotonic() > end_s:
+                raise
+            time.sleep(0.1)
 
 
 if __name__ == "__main__":

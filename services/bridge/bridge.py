@@ -14,6 +14,7 @@ from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
 from services.bridge.config import Bridge as Settings
 from services.bridge.config import BridgeConfig
+from services.bridge.handover import Handover, Heartbeat
 from services.bridge.mileage import restarted
 from services.bridge.operator import Operator
 from services.bridge.poll import Poll
@@ -31,13 +32,14 @@ Handler = Callable[[Any, bytes, int], None]  # frame, raw bytes, receive time
 class Bridge:
     """Reads the board's datagrams in the order of their urgency, and keeps asking."""
 
-    def __init__(self, node: Node[BridgeConfig]) -> None:
+    def __init__(self, node: Node[BridgeConfig], handover: Handover | None = None) -> None:
         config = node.config
         self._node = node
         self._framing = Framing(config.wire.crc, config.wire.crc_covers)
         limits = config.bridge.max_linear, config.bridge.max_angular
         self._translator = Translator(config.wire, config.vehicle, *limits)
-        self._sockets = Sockets(config.board)
+        self._sockets = Sockets(config.board, handover.sockets if handover else ())
+        self._heartbeat = Heartbeat(handover.heartbeat, self._on_no_guard) if handover else None
         self._wheels = Wheels(node, self._sockets, self._framing, self._translator)
         self._readiness = Readiness(node)
         self._operator = Operator(node, self._readiness, self._wheels.send)
@@ -81,7 +83,7 @@ class Bridge:
         loop.every(LINK_S, lambda _: self._tell_link())
         loop.every(1.0, self._on_second)
         self._node.at_rest = self._wheels.at_rest
-        self._node.last_words = self._wheels.last_words
+        self._node.last_words = self._last_words
 
     # --- what comes from the board ----------------------------------------------------------
 
@@ -181,6 +183,18 @@ class Bridge:
         self._operator.on_tick(now_ns)
         if self._told != self._link_state():
             self._tell_link()
+        if self._heartbeat is not None:
+            self._heartbeat.beat(self._wheels.port)
+
+    def _on_no_guard(self) -> None:
+        # The two are restarted together: a bridge that nobody guards must not drive.
+        self._node.event("guard_gone", "error", "the guard has died: stops the vehicle and ends")
+        self._node.loop.stop()
+
+    def _last_words(self) -> None:
+        self._wheels.last_words()
+        if self._heartbeat is not None:
+            self._heartbeat.end()
 
     def _on_second(self, _: int) -> None:
         self._rates = {name: float(count) for name, count in sorted(self._frames.items())}

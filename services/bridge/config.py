@@ -10,7 +10,12 @@ Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 
 
 # See ``settings.check_protections``.
-PROTECTIVE: settings.Limits = {"lease": (0.0, 0.5), "silence": (0.0, 0.5), "coast": (0.0, 3.0)}
+PROTECTIVE: settings.Limits = {
+    "lease": (0.0, 0.5),
+    "silence": (0.0, 0.5),
+    "coast": (0.0, 3.0),
+    "heartbeat": (0.0, 0.2),
+}
 
 
 class Bridge(settings.Section, frozen=True, kw_only=True):
@@ -20,6 +25,8 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
     lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message holds
     silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s after which the board is lost
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port is taken
+    # s without a sign of the bridge's loop after which its guard brakes
+    heartbeat: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2
     coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP before it becomes BREAK
     max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
     max_angular: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # rad/s

@@ -2,7 +2,7 @@
 
 import errno
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 from common.errors import LinkError
@@ -16,13 +16,18 @@ BURST = 64
 class Sockets:
     """One socket for each of our ports; commands leave from the one that is active."""
 
-    def __init__(self, board: Board) -> None:
-        """Bind the ports; raise ``LinkError`` naming the one that cannot be had."""
+    def __init__(self, board: Board, inherited: Sequence[int] = ()) -> None:
+        """Bind the ports, or take over the descriptors of a parent that has bound them.
+
+        Raise ``LinkError`` naming the one that cannot be had.
+        """
         self.refused = 0  # datagrams from anybody else
         self.last_stranger: tuple[str, int] | None = None
         self._board = (board.address, board.port)
         self._any_port = board.any_source_port
-        self.sockets = [_bind(board.listen_address, port) for port in board.listen_ports]
+        self.sockets = [socket.socket(fileno=descriptor) for descriptor in inherited] or [
+            _bind(board.listen_address, port) for port in board.listen_ports
+        ]
 
     def read(self, port: int) -> Iterator[bytes]:
         """Yield the datagrams of the board that wait on the port of this index."""

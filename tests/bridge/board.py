@@ -22,6 +22,7 @@ class Board:
         self.address: tuple[str, int] = self.sock.getsockname()
         self.ports = [free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)]
         self.motions: list[MotionCommand] = []
+        self.sources: list[tuple[str, int]] = []  # of the frames that came, of any kind
         self.leds: list[commands.LedSet] = []
         self.silent = False
         self.to_ports = [0, 1]  # indices of the ports that it sends to
@@ -39,12 +40,13 @@ class Board:
         while not self._ended.is_set():
             self.say(reports.VelocityReport(self.speed_mmps, 0))
             try:
-                datagram = self.sock.recv(2048)
+                datagram, source = self.sock.recvfrom(2048)
             except TimeoutError:
                 continue
             for part in self._framing.read(datagram, TO_BOARD):
                 assert isinstance(part, Received), part
                 self._take(part.frame)
+                self.sources.append(source)
 
     def end(self) -> None:
         """Let ``run`` return."""

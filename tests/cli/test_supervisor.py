@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from cli import supervisor as module
-from cli.supervisor import BACKOFF_S, CALM_S, Child, Supervisor
+from cli.supervisor import Child, Supervisor
+from common.backoff import BACKOFF_S
 from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import alive, running, wait_gone
 from tests.support import wait_until
@@ -60,20 +61,6 @@ def test_a_crash_restarts_at_once_and_then_ever_later(supervised: list[Superviso
             assert supervisor.look(now_s + wait_s - 0.01) == 0
             assert child.process is None, f"started again before {wait_s} s were over"
         now_s += wait_s
-    assert child.restarts == len(BACKOFF_S) + 1
-
-
-@pytest.mark.parametrize(("lived_s", "restarts"), [(CALM_S, 4), (CALM_S + 0.1, 1)])
-def test_a_calm_life_begins_with_the_first_backoff_again(
-    supervised: list[Supervisor], lived_s: float, restarts: int
-) -> None:
-    supervisor, child = one(supervised, *SLEEP)
-    child.restarts = 3
-    supervisor.look(0.0)
-    kill(child)
-    supervisor.look(lived_s)
-    assert child.restarts == restarts
-    assert child.due_s - lived_s == BACKOFF_S[restarts - 1]
 
 
 @pytest.mark.parametrize("code", [EXIT_CONFIG, EXIT_LINK])

@@ -1,0 +1,149 @@
+"""The bridge's parent, and the last line on the host: no RUN outlives a bridge that has failed.
+
+It opens the sockets to the board, so that source port and queue survive a restart, starts the
+bridge as its child and reads its heartbeat. While there is none, BREAK goes out at 20 Hz through
+the socket that the bridge used:
+
+============== =============================== ==============================================
+phase          BREAK                           ends with
+============== =============================== ==============================================
+starting       until the first heartbeat, that a heartbeat: alive; none in 10 s: killed
+               follows the bridge's first STOP
+alive          from 200 ms without one         five BREAKs without one: killed; the pipe's end
+ending, killed until the child is gone         it is gone: started again, first at once
+============== =============================== ==============================================
+
+SIGTERM and SIGINT are passed on. A bridge that comes to rest then says the last word itself.
+"""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from types import FrameType
+
+import structlog
+
+from common.backoff import Backoff
+from common.options import HOPELESS
+from common.wire.commands import MotionCommand, MotionKind
+from common.wire.framing import Framing
+from services.bridge.config import BridgeConfig
+from services.bridge.handover import Handover
+from services.bridge.udp import Sockets
+
+BRAKE_MS = 50
+HANGS = 5  # BREAKs to a bridge that gives no heartbeat, until it is killed
+HANGS_AT_START = 200
+GOES = 20  # BREAKs to one that has said its last word
+GOES_AT_REST_S = 4.0  # for one that was told to come to rest
+
+
+class Guard:
+    """Watches one bridge after another."""
+
+    def __init__(self, config: BridgeConfig, sockets: Sockets, command: Sequence[str]) -> None:
+        self._sockets = sockets
+        self._command = command
+        self._missed_ms = round(config.bridge.heartbeat * 1000)
+        framing = Framing(config.wire.crc, config.wire.crc_covers)
+        self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
+        self._port = 0  # index of the one that the bridge uses
+        self._stopping = False
+        self._child: subprocess.Popen[bytes] | None = None  # the one that signals go to
+        self._backoff = Backoff()
+        self._log = structlog.get_logger()
+
+    def run(self) -> int:
+        """Keep a bridge running until a signal or a hopeless end; return the exit code."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._stop)
+        code = 0
+        while not self._stopping and code not in HOPELESS:
+            self.brake()
+            started_s = time.monotonic()
+            child, heartbeat = self._start()
+            self._watch(child, heartbeat)
+            os.close(heartbeat)
+            code = self._end(child)
+            self._await_restart(code, time.monotonic() - started_s)
+        return code
+
+    def brake(self) -> None:
+        """Send BREAK as the bridge would."""
+        self._sockets.send(self._brake, self._port)
+
+    def _start(self) -> tuple["subprocess.Popen[bytes]", int]:
+        heartbeat, to_guard = os.pipe()
+        handover = Handover(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
+        # A group of its own: ctrl-c reaches the guard, which passes it on once.
+        self._child = subprocess.Popen(
+            self._command,
+            env=os.environ | handover.environ(),
+            pass_fds=handover.descriptors,
+            process_group=0,
+        )
+        os.close(to_guard)
+        if self._stopping:  # told while it started
+            self._child.terminate()
+        return self._child, heartbeat
+
+    def _watch(self, child: "subprocess.Popen[bytes]", heartbeat: int) -> None:
+        """Read heartbeats and brake while they are missed; return when there will be no more."""
+        poll = select.poll()
+        poll.register(heartbeat, select.POLLIN)
+        timeout_ms, missed, hangs = BRAKE_MS, 0, HANGS_AT_START
+        while missed < hangs:
+            if poll.poll(timeout_ms):
+                beats = os.read(heartbeat, 4096)
+                if not beats:
+                    return
+                self._port = beats[-1]
+                timeout_ms, missed, hangs = self._missed_ms, 0, HANGS
+            else:
+                self.brake()
+                timeout_ms = BRAKE_MS
+                missed += 1
+        self._log.error("the bridge hangs: killed")
+        child.kill()
+
+    def _end(self, child: "subprocess.Popen[bytes]") -> int:
+        """Brake until the child is gone, and return its exit code as a shell would."""
+        try:
+            code = child.wait(GOES_AT_REST_S if self._stopping else 0.0)
+        except subprocess.TimeoutExpired:
+            code = self._outlast(child)
+        if code != 0:
+            self.brake()
+        return code if code >= 0 else 128 - code
+
+    def _outlast(self, child: "subprocess.Popen[bytes]") -> int:
+        for _ in range(GOES):
+            self.brake()
+            try:
+                return child.wait(BRAKE_MS / 1000)
+            except subprocess.TimeoutExpired:
+                continue
+        child.kill()
+        return child.wait()
+
+    def _await_restart(self, code: int, lived_s: float) -> None:
+        wait_s = self._backoff.after(lived_s)
+        self._log.error("the bridge ended", exit_code=code, wait_s=wait_s)
+        end_s = time.monotonic() + wait_s
+        while not self._stopping and code not in HOPELESS and time.monotonic() < end_s:
+            self.brake()
+            time.sleep(BRAKE_MS / 1000)
+
+    def _stop(self, number: int, _: FrameType | None) -> None:
+        self._stopping = True
+        if self._child is not None:
+            self._child.send_signal(signal.SIGTERM)
+
+
+def bridge_command(argv: Sequence[str]) -> list[str]:
+    """Return what the guard runs."""
+    return [sys.executable, "-m", "services.bridge.guarded", *argv]

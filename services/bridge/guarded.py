@@ -1,0 +1,22 @@
+"""``python -m services.bridge.guarded``: the bridge itself; ``services.bridge.guard`` starts it."""
+
+import os
+import sys
+
+from common.service import run
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from services.bridge.handover import NAME, received
+
+
+def main() -> int:
+    """Run the bridge until it is told to stop, or its guard has died."""
+    if NAME not in os.environ:
+        print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
+        return 2
+    handover = received(os.environ)
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, handover))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,259 @@
+"""The guard with real processes: whatever becomes of the bridge, the board is told BREAK."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from common.config import Sources, load
+from common.options import EXIT_CONFIG, EXIT_LINK
+from common.settings import Board as BoardSettings
+from common.wire.commands import MotionKind
+from services.bridge import __main__ as program
+from services.bridge import guarded
+from services.bridge.config import BridgeConfig
+from services.bridge.guard import Guard
+from services.bridge.udp import Sockets
+from tests.bridge.board import Board, board
+from tests.bridge.test_bridge import Rig, bridge_process, endpoint, rig
+from tests.support import wait_until
+
+__all__ = ["endpoint", "rig"]  # fixtures
+
+PROC = Path("/proc")
+
+
+def bridge_pid(guard: "subprocess.Popen[bytes]") -> int:
+    """Return the process that the guard watches, once there is one."""
+    children = PROC / f"{guard.pid}/task/{guard.pid}/children"
+    wait_until(lambda: children.read_text().split(), "a bridge under the guard")
+    return int(children.read_text().split()[0])
+
+
+def breaks_since(made: Board, count: int) -> int:
+    """Return how many BREAKs the board got after that many commands."""
+    return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
+def test_a_bridge_that_dies_is_braked_for_and_started_again(
+    rig: Rig, number: signal.Signals
+) -> None:
+    rig.drive()
+    source = rig.board.sources[-1]
+    first = bridge_pid(rig.process)
+    count = len(rig.board.motions)
+    os.kill(first, number)
+    wait_until(lambda: breaks_since(rig.board, count), "BREAK")
+    wait_until(lambda: bridge_pid(rig.process) != first, "the next bridge")
+    rig.board.wait_for(MotionKind.STOP)
+    rig.drive()
+    assert rig.board.sources[-1] == source, "from the same port, and the same socket"
+
+
+def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
+    with guarded_rig(0.2) as (made, process):
+        first = bridge_pid(process)
+        count = len(made.motions)
+        os.kill(first, signal.SIGSTOP)
+        wait_until(lambda: breaks_since(made, count) > 3, "BREAK, again and again")
+        wait_until(lambda: bridge_pid(process) != first, "the next bridge")
+        made.wait_for(MotionKind.STOP)
+
+
+def test_a_bridge_that_was_only_held_up_lives_on() -> None:
+    with guarded_rig(0.2) as (made, process):
+        first = bridge_pid(process)
+        count = len(made.motions)
+        os.kill(first, signal.SIGSTOP)
+        wait_until(lambda: breaks_since(made, count), "BREAK")
+        os.kill(first, signal.SIGCONT)
+        made.wait_for(MotionKind.STOP)
+        count = len(made.motions)
+        wait_until(lambda: len(made.motions) > count + 20, "more STOPs")
+        assert {motion.kind for motion in made.motions[-5:]} == {MotionKind.STOP}
+        assert bridge_pid(process) == first
+
+
+def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(rig: Rig) -> None:
+    rig.drive()
+    first = bridge_pid(rig.process)
+    rig.process.kill()
+    rig.board.wait_for(MotionKind.STOP)
+    wait_until(lambda: not (PROC / str(first)).exists(), "the end of the bridge")
+    assert "guard_gone" in rig.events()
+    count = len(rig.board.motions)
+    with pytest.raises(AssertionError):
+        wait_until(lambda: len(rig.board.motions) > count, "a frame of nobody's", patience_s=0.3)
+
+
+def test_the_next_guard_waits_for_the_ports_of_an_orphan(rig: Rig) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 500  # the orphan waits for the vehicle to stand
+    rig.process.kill()
+    with bridge_process(rig.board, rig.endpoint) as second:
+        rig.board.speed_mmps = 0
+        bridge_pid(second)
+        rig.board.wait_for(MotionKind.STOP)
+        assert second.poll() is None
+
+
+def test_a_second_bridge_is_refused_with_the_port(rig: Rig) -> None:
+    rig.board.wait_for(MotionKind.STOP)  # the first one has the ports
+    with bridge_process(rig.board, rig.endpoint) as second:
+        assert second.stderr is not None
+        said = second.stderr.read().decode()
+        assert second.wait(20) == EXIT_LINK
+    port = rig.board.ports[0]
+    assert f"cannot listen on UDP 127.0.0.1:{port}: another program has it" in said
+    assert rig.process.poll() is None
+
+
+def test_ctrl_c_comes_to_rest_with_stop_and_leaves_no_break(rig: Rig) -> None:
+    rig.drive()
+    count = len(rig.board.motions)
+    os.kill(rig.process.pid, signal.SIGINT)
+    assert rig.process.wait(20) == 0
+    assert breaks_since(rig.board, count) == 0
+    rig.board.wait_for(MotionKind.STOP)
+
+
+def test_the_guard_knows_nothing_of_the_bus(rig: Rig) -> None:
+    rig.board.wait_for(MotionKind.STOP)  # the bridge lives
+    assert "zenoh" in (PROC / f"{bridge_pid(rig.process)}/maps").read_text()
+    assert "zenoh" not in (PROC / f"{rig.process.pid}/maps").read_text()
+
+
+@contextmanager
+def guarded_rig(heartbeat_s: float) -> Iterator[tuple[Board, "subprocess.Popen[bytes]"]]:
+    """Run guard and bridge without a router; the bridge says STOP."""
+    with (
+        board() as made,
+        bridge_process(made, "tcp/127.0.0.1:1", f"bridge.heartbeat={heartbeat_s}") as process,
+    ):
+        made.wait_for(MotionKind.STOP)
+        yield made, process
+
+
+# --- with a child of our own in the bridge's place ----------------------------------------------
+
+
+def guard_of(made: Board, code: str) -> Guard:
+    """Return a guard over a program of ours."""
+    sets = [f"board.port={made.address[1]}", f"board.listen_ports={made.ports}"]
+    config = load(BridgeConfig, Sources(environ={}, sets=sets)).config
+    return Guard(config, Sockets(config.board), [sys.executable, "-c", code])
+
+
+@pytest.fixture
+def made() -> Iterator[Board]:
+    with board() as it:
+        yield it
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def run(guard: Guard) -> int:
+    try:
+        return guard.run()
+    finally:
+        guard._sockets.close()
+
+
+def test_a_hopeless_end_is_passed_on_and_braked_for(made: Board) -> None:
+    assert run(guard_of(made, f"raise SystemExit({EXIT_CONFIG})")) == EXIT_CONFIG
+    made.wait_for(MotionKind.BREAK)
+
+
+BEAT = """
+import os, signal, sys, time
+*_, pipe = map(int, os.environ["T2_BRIDGE_HANDOVER"].split(","))
+os.write(pipe, bytes((1,)))
+"""
+
+
+def test_a_child_that_outlives_its_last_word_is_killed(made: Board) -> None:
+    code = (
+        BEAT
+        + """
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+os.kill(os.getppid(), signal.SIGTERM)
+os.close(pipe)
+time.sleep(1000)
+"""
+    )
+    guard = guard_of(made, code)
+    assert run(guard) == 128 + signal.SIGKILL
+    made.wait_for(MotionKind.BREAK)
+
+
+def test_breaks_leave_from_the_port_that_the_bridge_used(made: Board) -> None:
+    assert run(guard_of(made, BEAT + f"sys.exit({EXIT_LINK})")) == EXIT_LINK
+    wait_until(lambda: made.sources[-1][1] == made.ports[1], "BREAK from the second port")
+
+
+def test_a_crash_is_waited_for_longer_each_time(
+    made: Board, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guard = guard_of(made, "raise SystemExit(1)")
+    waits: list[float] = []
+    after = guard._backoff.after
+
+    def wait(lived_s: float) -> float:
+        waits.append(after(lived_s))
+        if len(waits) == 3:
+            guard._stop(signal.SIGTERM, None)
+        return waits[-1]
+
+    monkeypatch.setattr(guard._backoff, "after", wait)
+    assert run(guard) == 1
+    assert waits == [0.0, 0.5, 1.0]
+
+
+def test_it_brakes_while_it_waits(made: Board) -> None:
+    guard = guard_of(made, "")
+    guard._backoff.after(0.0)
+    count = len(made.motions)
+    guard._await_restart(1, 0.0)
+    guard._sockets.close()
+    wait_until(lambda: breaks_since(made, count) >= 5, "BREAK at 20 Hz for half a second")
+
+
+# --- the program --------------------------------------------------------------------------------
+
+
+def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFixture[str]) -> None:
+    assert program.main(["--set", "bridge.heartbeat=0.5"]) == EXIT_CONFIG
+    assert "heartbeat" in capsys.readouterr().err
+    assert program.main(["--set", "bridge.heartbeat=0"]) == EXIT_CONFIG
+
+
+def test_the_bridge_alone_says_how_it_is_started(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("T2_BRIDGE_HANDOVER", raising=False)
+    assert guarded.main() == 2
+    assert "python -m services.bridge" in capsys.readouterr().err
+
+
+def test_a_port_that_becomes_free_is_taken(made: Board) -> None:
+    settings = BoardSettings(port=made.address[1], listen_ports=tuple(made.ports))
+    taken = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    taken.bind((settings.listen_address, made.ports[0]))
+    leaver = threading.Timer(0.3, taken.close)
+    leaver.start()
+    program.bound(settings).close()
+    leaver.join()
