@@ -57,7 +57,9 @@ def kinds() -> list[type[Struct]]:
     """Return every struct of the contract, messages first, requests and replies behind."""
     of_topics = [topic.message for topic in keys.TOPICS]
     of_calls = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
-    return list(dict.fromkeys([m.Message, *of_topics, m.Cause, m.Limits, *of_calls]))
+    return list(
+        dict.fromkeys([m.Message, *of_topics, m.Cause, m.Limits, m.Timing, m.Durations, *of_calls])
+    )
 
 
 def schema(kind: type[Struct]) -> str:

@@ -35,6 +35,7 @@ class Message(Struct, frozen=True, kw_only=True):
     boot: int = 0  # random per start of the sender
     t_ns: int = 0  # the sender's wall clock, for records only
     mono_ns: int = 0  # the sender's monotonic clock
+    host: int = 0  # whose clock that is: random per boot of the sender's host, 0 unknown
 
 
 # --- tel/bridge -----------------------------------------------------------------------------
@@ -166,6 +167,10 @@ class Motion(Message, frozen=True, kw_only=True):
     judged: int = 0  # ``seq`` of the newest bumper sample that the verdict knows
     judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
     latched: bool = False  # whether an operator's reset is due
+    # For measuring only, on the clock of ``mono_ns``.
+    asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
+    heard_ns: int = 0  # when safety received that request; 0 when this answers none
+    judged_ns: int = 0  # when safety received the sample that ``judged`` names
 
 
 # --- evt, health ----------------------------------------------------------------------------
@@ -180,6 +185,21 @@ class Event(Message, frozen=True, kw_only=True):
     about: dict[str, str | int | float | bool | None] = {}
 
 
+class Durations(Struct, frozen=True, kw_only=True):
+    """A histogram of how long something took, since the service's start."""
+
+    counts: tuple[int, ...]  # one for each of ``Timing.bounds``, and one for what took longer
+    worst: float  # s, 0 as long as there is none
+
+
+class Timing(Struct, frozen=True, kw_only=True):
+    """How fast a service reacts; a name with a dot is a hop of what stands before the dot."""
+
+    bounds: tuple[float, ...]  # s, rising; a count is of what took up to its bound
+    durations: dict[str, Durations]  # by name
+    not_counted: dict[str, int]  # what could not be measured, by reason
+
+
 class Health(Message, frozen=True, kw_only=True):
     """How a service fares, once a second."""
 
@@ -190,6 +210,7 @@ class Health(Message, frozen=True, kw_only=True):
     counters: dict[str, int]  # since start
     lateness: float  # s, how late the loop's latest timer was in the last second
     rss: int  # bytes
+    timing: Timing | None = None  # None where nothing is measured
 
 
 # --- srv ------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import S
 from common.loop import Loop
-from common.messages import Event, Health, Level
+from common.messages import Event, Health, Level, Timing
 from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.schema import schemas
 from common.settings import Shared
@@ -49,6 +49,7 @@ class Node(Generic[C]):
         self.counters: Counter[str] = Counter()
         self.at_rest: Callable[[], bool] = lambda: True  # asked while stopping
         self.last_words: Callable[[], None] = lambda: None  # on every way out, a crash too
+        self.timing: Callable[[], Timing | None] = lambda: None  # what goes into the health
         self._loaded = loaded
         self._events = self.bus.publisher(keys.EVENTS, service=name)
         self._health = self.bus.publisher(keys.HEALTH, service=name)
@@ -91,6 +92,7 @@ class Node(Generic[C]):
                 counters=dict(self.bus.counters + self.counters),
                 lateness=self.loop.take_lateness_s(),
                 rss=resident_bytes(),
+                timing=self.timing(),
             )
         )
 

@@ -14,6 +14,7 @@ from msgspec import Struct
 
 from common import codec
 from common.bus.calls import Answers, Caller
+from common.bus.host import host_id
 from common.bus.publisher import Publisher, qos
 from common.bus.ring import Ring
 from common.bus.session import LEASE_S, Opener
@@ -51,6 +52,7 @@ class Bus:
     ) -> None:
         self.robot = robot
         self.boot = secrets.randbits(63)
+        self.host = host_id()
         self.counts: Counter[str] = Counter()  # messages by key, both ways
         # What went wrong, by name; named here, because a new name must not appear on a thread of
         # Zenoh's while the loop reads them.
@@ -69,7 +71,8 @@ class Bus:
 
     def publisher(self, topic: Topic[M], **names: str) -> Publisher[M]:
         """Return a publisher for a topic of this robot."""
-        publisher = Publisher(topic, topic.on(self.robot, **names), self.boot, self.counts)
+        key = topic.on(self.robot, **names)
+        publisher = Publisher(topic, key, self.boot, self.counts, self.host)
         self.publishers.append(publisher)
         self._declare(publisher.declare)
         return publisher
@@ -175,6 +178,10 @@ class Bus:
         """Stop this robot; latches in safety."""
         if self._session is not None:
             self._session.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
+
+    def shares_clock(self, message: Message) -> bool:
+        """Tell whether the sender's ``mono_ns`` is of this host's clock."""
+        return self.host != 0 and message.host == self.host
 
     # --- life -----------------------------------------------------------------------------
 

@@ -21,11 +21,14 @@ class Publisher(Generic[M]):
     While there is no bus it drops them, but for those of a class with a history: these wait.
     """
 
-    def __init__(self, topic: Topic[M], key: str, boot: int, counts: Counter[str]) -> None:
+    def __init__(
+        self, topic: Topic[M], key: str, boot: int, counts: Counter[str], host: int = 0
+    ) -> None:
         self.key = key
         self.last: M | None = None
         self.topic = topic
         self._boot = boot
+        self._host = host
         self._seq = 0
         self._counts = counts
         self._declared: Any = None
@@ -45,6 +48,7 @@ class Publisher(Generic[M]):
             boot=self._boot,
             t_ns=time.time_ns(),
             mono_ns=time.monotonic_ns(),
+            host=self._host,
         )
         self.last = stamped
         if self._declared is None:

@@ -15,11 +15,12 @@ from common.messages import Bumper, Motion
 
 def test_it_numbers_and_stamps_even_without_a_bus() -> None:
     counts: Counter[str] = Counter()
-    publisher = Publisher(keys.BUMPER, "t2/v1/001/tel/bridge/bumper", 77, counts)
+    publisher = Publisher(keys.BUMPER, "t2/v1/001/tel/bridge/bumper", 77, counts, 5)
     assert publisher.next_seq == 1
     first, second = publisher.put(Bumper(pressed=False)), publisher.put(Bumper(pressed=True))
     assert (first.seq, second.seq, publisher.next_seq) == (1, 2, 3)
     assert first.boot == second.boot == 77
+    assert first.host == second.host == 5
     assert first.mono_ns <= second.mono_ns
     assert first.t_ns > 1_500_000_000 * 10**9  # a wall clock, in nanoseconds
     assert publisher.last is second

@@ -1,0 +1,43 @@
+"""A host's number: the same for all its processes, and none where the system does not tell."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from common.bus.bus import Bus
+from common.bus.host import BOOT_ID, host_id
+from common.messages import Bumper
+
+
+@pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")
+def test_another_process_of_this_host_has_the_same() -> None:
+    code = "from common.bus.host import host_id; print(host_id())"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(ran.stdout) == host_id() != 0
+
+
+def test_it_is_made_of_the_boots_own_name(tmp_path: Path) -> None:
+    file = tmp_path / "boot_id"
+    file.write_text("ffffffff-ffff-ffff-0000-000000000000\n", encoding="ascii")
+    assert host_id(file) == 2**63 - 1
+    file.write_text("00000000-0000-0002-ffff-ffffffffffff\n", encoding="ascii")
+    assert host_id(file) == 1
+
+
+@pytest.mark.parametrize("text", [None, "", "no such thing"])
+def test_without_a_name_it_is_unknown(tmp_path: Path, text: str | None) -> None:
+    file = tmp_path / "boot_id"
+    if text is not None:
+        file.write_text(text, encoding="ascii")
+    assert host_id(file) == 0
+
+
+def test_only_a_known_host_shares_its_clock() -> None:
+    bus = Bus([], "001", lambda _: None)
+    bus.host = 5
+    assert bus.shares_clock(Bumper(pressed=True, host=5))
+    assert not bus.shares_clock(Bumper(pressed=True, host=6))
+    bus.host = 0
+    assert not bus.shares_clock(Bumper(pressed=True, host=0))
