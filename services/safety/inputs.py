@@ -14,6 +14,8 @@ class Ask:
 
     source: str
     drive: Drive | None
+    received_ns: int = 0
+    shares_clock: bool = False  # whether its own stamp is of this host's clock
 
 
 @dataclass(frozen=True, slots=True)

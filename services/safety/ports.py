@@ -16,7 +16,7 @@ from services.safety.config import SafetyConfig
 from services.safety.heartbeat import Heartbeat
 from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
 from services.safety.policy import Policy
-from services.safety.report import motion_message, notes, signature, state_message
+from services.safety.report import motion_message, notes, signature, state_message, timed
 
 M = TypeVar("M", bound=Message)
 
@@ -72,7 +72,9 @@ class Ports:
         return take
 
     def _ask(self, arrival: Arrival[Drive]) -> None:
-        self._decide(Ask(source_of(arrival.key), arrival.message))
+        source, drive = source_of(arrival.key), arrival.message
+        shared = self._node.bus.shares_clock(drive)
+        self._decide(Ask(source, drive, arrival.received_ns, shared))
 
     def _no_request(self, key: str, _: MessageError) -> None:
         self._decide(Ask(source_of(key), None))
@@ -99,7 +101,7 @@ class Ports:
         inputs = replace(self._inputs, reader=self._reader.connected, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)
-        self._motion.put(motion_message(self._state))
+        self._motion.put(timed(motion_message(self._state), self._state, inputs))
         if verdict.refused:
             self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:

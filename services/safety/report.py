@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from common.freshness import S
 from common.messages import Cause, Level, Limits, Motion, SafetyState
 from services.safety.causes import BY_NAME
+from services.safety.inputs import Ask, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
-from services.safety.inputs import Hold, Reset
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
 from services.safety.policy import Policy
 from services.safety.state import State
@@ -40,6 +42,20 @@ def motion_message(state: State) -> Motion:
         judged_boot=verdict.judged[0],
         latched=bool(latched(state.latches)),
     )
+
+
+def timed(motion: Motion, state: State, inputs: Inputs) -> Motion:
+    """Return it with the times of what it answers, for whoever measures.
+
+    A request is answered when it was taken and its source drives.
+    """
+    asked_ns = heard_ns = 0
+    ask, verdict = inputs.event, state.verdict
+    if isinstance(ask, Ask) and ask.drive and not verdict.refused and verdict.source == ask.source:
+        heard_ns = ask.received_ns
+        asked_ns = ask.drive.mono_ns if ask.shares_clock else 0
+    judged_ns = inputs.bumper.received_ns if inputs.bumper else 0
+    return replace(motion, asked_ns=asked_ns, heard_ns=heard_ns, judged_ns=judged_ns)
 
 
 def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:

@@ -1,14 +1,18 @@
 """What is told: sentences, causes, limits, and events on transitions only."""
 
+from dataclasses import replace
+
 import pytest
 
-from services.safety.inputs import Estop, Event, Hold, Reset
+from common.messages import Drive
+from services.safety.inputs import Ask, Estop, Event, Hold, Reset
 from services.safety.report import (
     motion_message,
     notes,
     sentence,
     signature,
     state_message,
+    timed,
 )
 from tests.safety.scene import Scene, hit
 
@@ -44,6 +48,37 @@ def test_the_motion_tells_what_was_judged() -> None:
     assert (motion.command, motion.source) == ("run", "teleop")
     assert motion.linear == pytest.approx(scene.verdict.twist.linear)
     assert (motion.judged_boot, motion.judged) == (scene.boot, scene.seq)
+
+
+REQUEST = Drive(linear=0.1, angular=0.0, echo=0, mono_ns=40)
+
+
+def timed_by(scene: Scene, ask: Ask) -> tuple[int, int, int]:
+    inputs = replace(scene.inputs, event=ask)
+    motion = timed(motion_message(scene.state), scene.state, inputs)
+    assert (motion.command, motion.judged) == ("run", scene.seq)  # what was there stays
+    return motion.asked_ns, motion.heard_ns, motion.judged_ns
+
+
+def test_the_motion_carries_the_times_of_what_it_answers() -> None:
+    scene = Scene().running()
+    judged_ns = scene.now_ns
+    assert timed_by(scene, Ask("teleop", REQUEST, 50, True)) == (40, 50, judged_ns)
+    assert timed_by(scene, Ask("teleop", REQUEST, 50, False)) == (0, 50, judged_ns)
+
+
+def test_only_a_request_that_drives_is_answered() -> None:
+    scene = Scene().running()
+    assert timed_by(scene, Ask("web", REQUEST, 50, True))[:2] == (0, 0)
+    assert timed_by(scene, Ask("teleop", None, 50, True))[:2] == (0, 0)
+    scene.state = replace(scene.state, verdict=replace(scene.verdict, refused="late"))
+    assert timed_by(scene, Ask("teleop", REQUEST, 50, True))[:2] == (0, 0)
+
+
+def test_a_motion_that_answers_nothing_carries_no_times() -> None:
+    scene = Scene()
+    motion = timed(motion_message(scene.state), scene.state, replace(scene.inputs, event=Reset()))
+    assert (motion.asked_ns, motion.heard_ns, motion.judged_ns) == (0, 0, 0)
 
 
 def test_one_sentence_says_why() -> None:
