@@ -19,6 +19,7 @@ COMMANDS = {
     "drive": "drive from this terminal, by keys or gamepad",
     "router": "the embedded Zenoh router alone",
     "sim": "the simulated vehicle alone",
+    "latency": "how fast the bridge reacts, hop by hop",
     "config": "what is in force and where each value came from",
     "wire": "read captured frames",
 }

@@ -19,6 +19,8 @@ from services.bridge.mileage import restarted
 from services.bridge.operator import Operator
 from services.bridge.poll import Poll
 from services.bridge.readiness import Readiness
+from services.bridge.stamp import Receipt
+from services.bridge.timing import Timings
 from services.bridge.translate import BumperFilter, Translator, driver
 from services.bridge.udp import Sockets
 from services.bridge.wheels import Wheels
@@ -40,7 +42,8 @@ class Bridge:
         self._translator = Translator(config.wire, config.vehicle, *limits)
         self._sockets = Sockets(config.board, handover.sockets if handover else ())
         self._heartbeat = Heartbeat(handover.heartbeat, self._on_no_guard) if handover else None
-        self._wheels = Wheels(node, self._sockets, self._framing, self._translator)
+        self._timings = Timings()
+        self._wheels = Wheels(node, self._sockets, self._framing, self._translator, self._timings)
         self._readiness = Readiness(node)
         self._operator = Operator(node, self._readiness, self._wheels.send)
         self._poll = Poll(queries(config.bridge), config.bridge.answer_timeout)
@@ -50,6 +53,7 @@ class Bridge:
         self._rejected: Counter[str] = Counter()
         self._frames: Counter[str] = Counter()
         self._rates: dict[str, float] = {}
+        self._receipt = Receipt(None, 0)  # of the datagram that is being taken in
         self._told: tuple[object, ...] = ()
         self._publish()
         self._begin()
@@ -82,6 +86,7 @@ class Bridge:
         loop.every(TICK_S, self._on_tick)
         loop.every(LINK_S, lambda _: self._tell_link())
         loop.every(1.0, self._on_second)
+        self._node.timing = self._timings.message
         self._node.at_rest = self._wheels.at_rest
         self._node.last_words = self._last_words
 
@@ -92,8 +97,10 @@ class Bridge:
         # take over only because it is looked at first.
         active = self._readiness.link.active
         for port in sorted(range(len(self._sockets.sockets)), key=lambda port: port != active):
-            for datagram in self._sockets.read(port):
+            for datagram, receipt in self._sockets.read(port):
+                self._receipt = receipt
                 self._on_datagram(datagram, port, now_ns)
+                self._timings.on_read(receipt)  # after what must not wait
 
     def _on_datagram(self, datagram: bytes, port: int, now_ns: int) -> None:
         if not self._readiness.believes(port, now_ns):
@@ -119,7 +126,7 @@ class Bridge:
     def _on_bumper(self, frame: reports.BumperReport, raw: bytes, now_ns: int) -> None:
         message, hit = self._bumper.take(frame.on)
         if hit:  # the reflex: before anything else
-            self._wheels.on_hit(self._to_bumper.next_seq, now_ns)
+            self._wheels.on_hit(self._to_bumper.next_seq, now_ns, self._receipt)
         if message is not None:
             # A short hit stays in the samples until safety has judged one: it may have lost some.
             unjudged = self._wheels.lease.hit is not None
@@ -208,6 +215,7 @@ class Bridge:
                 board=f"{board.address}:{board.port}",
             )
         self._rejected["wrong_address"] = self._sockets.refused
+        self._node.counters["wall_clock_set"] = self._sockets.wall.steps
         for name, count in self._poll.missed().items():
             self._node.counters[f"missed_{name}"] = count
 

@@ -2,11 +2,14 @@
 
 import errno
 import socket
+import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 from common.errors import LinkError
 from common.settings import Board
+from services.bridge.stamp import ANCILLARY_MAX, SO_TIMESTAMPNS, Receipt, WallClock, stamp_in
 
 DATAGRAM_MAX = 2048
 # A flood must not keep the loop from its timers: the rest waits for the next round.
@@ -28,21 +31,32 @@ class Sockets:
         self.sockets = [socket.socket(fileno=descriptor) for descriptor in inherited] or [
             _bind(board.listen_address, port) for port in board.listen_ports
         ]
+        self.wall = WallClock()
+        for sock in self.sockets:
+            want_stamps(sock)
 
-    def read(self, port: int) -> Iterator[bytes]:
-        """Yield the datagrams of the board that wait on the port of this index."""
+    def read(self, port: int) -> Iterator[tuple[bytes, Receipt]]:
+        """Yield the datagrams of the board that wait on the port of this index, and their times."""
+        sock = self.sockets[port]
         for _ in range(BURST):
             try:
-                datagram, source = self.sockets[port].recvfrom(DATAGRAM_MAX)
+                datagram, ancillary, _, source = sock.recvmsg(DATAGRAM_MAX, ANCILLARY_MAX)
             except BlockingIOError:
                 return
             except OSError:
                 continue  # an earlier command found no board, or no network
             if source == self._board or (self._any_port and source[0] == self._board[0]):
-                yield datagram
+                yield datagram, self._receipt(ancillary)
             else:
                 self.refused += 1
                 self.last_stranger = source
+
+    def _receipt(self, ancillary: list[tuple[int, int, bytes]]) -> Receipt:
+        before_ns, wall_ns, now_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        self.wall.look(before_ns, wall_ns, now_ns)
+        stamp_ns = stamp_in(ancillary)
+        kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, now_ns)
+        return Receipt(kernel_ns, now_ns)
 
     def send(self, datagram: bytes, port: int) -> None:
         """Send to the board from the port of this index; an absent network loses it."""
@@ -53,6 +67,13 @@ class Sockets:
         """Give the ports back."""
         for sock in self.sockets:
             sock.close()
+
+
+def want_stamps(sock: socket.socket) -> None:
+    """Have the kernel stamp what it receives; a system that does not is done without."""
+    if sys.platform == "linux":  # elsewhere the number means something else
+        with suppress(OSError):
+            sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
 def _bind(address: str, port: int) -> socket.socket:

@@ -13,6 +13,8 @@ from common.wire.framing import Framing
 from services.bridge import lease
 from services.bridge.config import BridgeConfig
 from services.bridge.lease import Lease, Order, Refusal
+from services.bridge.stamp import Receipt
+from services.bridge.timing import Timings
 from services.bridge.translate import Translator, check_finite
 from services.bridge.udp import Sockets
 
@@ -24,7 +26,12 @@ class Wheels:
     """Obeys ``@cmd/motion`` as far as the lease allows; STOP is always on the way."""
 
     def __init__(
-        self, node: Node[BridgeConfig], sockets: Sockets, framing: Framing, translator: Translator
+        self,
+        node: Node[BridgeConfig],
+        sockets: Sockets,
+        framing: Framing,
+        translator: Translator,
+        timings: Timings,
     ) -> None:
         self.lease = Lease(over_since_ns=time.monotonic_ns())
         self.port = 0
@@ -32,6 +39,7 @@ class Wheels:
         self._sockets = sockets
         self._framing = framing
         self._translator = translator
+        self._timings = timings
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
         self._rivals: set[int] = set()  # second senders that were told of already
@@ -50,22 +58,32 @@ class Wheels:
             self._node.log.warning(str(error))
             return
         now_ns = time.monotonic_ns()
-        boot = self._node.bus.boot
+        boot, hit = self._node.bus.boot, self.lease.hit
         self.lease, order, refusal = lease.on_motion(
             self.lease, motion, now_ns, self._lease_ns, boot
         )
         if order is not None:
             self._order(order, motion)
+            judged = hit is not None and self.lease.hit is None and order is Order.BRAKE
+            self._time(arrival, judged)
         self._report(refusal, motion)
+
+    def _time(self, arrival: Arrival[Motion], judged: bool) -> None:
+        motion, sent_ns = arrival.message, time.monotonic_ns()
+        shared = self._node.bus.shares_clock(motion)
+        self._timings.on_motion(motion, shared, arrival.received_ns, sent_ns)
+        if judged:
+            self._timings.on_judged(motion, shared, arrival.received_ns, sent_ns)
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
         """Take in the measured velocity."""
         self._velocity = velocity, now_ns
 
-    def on_hit(self, seq: int, now_ns: int) -> None:
+    def on_hit(self, seq: int, now_ns: int, receipt: Receipt) -> None:
         """BREAK at once: the bumper was hit in the sample that will be published as ``seq``."""
         self.lease, order = lease.on_hit(self.lease, seq, now_ns)
         self._order(order)
+        self._timings.on_reflex(seq, receipt, time.monotonic_ns())
 
     def on_ready(self, ready: bool) -> None:
         """Take in whether the board may be driven."""

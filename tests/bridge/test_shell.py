@@ -59,7 +59,7 @@ def test_a_short_hit_is_told_until_safety_has_judged_it(bridge: Bridge) -> None:
 class Broken:
     """A socket whose network is down."""
 
-    def recvfrom(self, _: int) -> tuple[bytes, tuple[str, int]]:
+    def recvmsg(self, *_: int) -> object:
         raise OSError(100, "Network is down")
 
     def close(self) -> None:

@@ -31,6 +31,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         ("drive", "--source"),
         ("router", "--set"),
         ("sim", "--world"),
+        ("latency", "--once"),
         ("config", "--json"),
         ("wire", "identify-crc"),
     ],

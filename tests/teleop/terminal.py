@@ -1,4 +1,4 @@
-"""Teleop as an operator runs it: the real program in a pseudo terminal."""
+"""A program as an operator runs it: the real one, teleop unless named, in a pseudo terminal."""
 
 import contextlib
 import fcntl
@@ -9,16 +9,18 @@ import sys
 import termios
 from collections.abc import Iterator
 
+TELEOP = ("services.teleop", "--no-gamepad")
+
 
 class Terminal:
-    """A pseudo terminal with teleop in it."""
+    """A pseudo terminal with a program in it: its module and arguments."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, *program: str) -> None:
         self.fd, inner = os.openpty()
         fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         self.process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "services.teleop", "--no-gamepad"),
+                *(sys.executable, "-m", *program),
                 *("--set", f"bus.connect={endpoint}"),
             ],
             stdin=inner,
@@ -63,8 +65,8 @@ class Terminal:
 
 
 @contextlib.contextmanager
-def terminal(endpoint: str) -> Iterator[Terminal]:
-    it = Terminal(endpoint)
+def terminal(endpoint: str, *program: str) -> Iterator[Terminal]:
+    it = Terminal(endpoint, *(program or TELEOP))
     try:
         yield it
     finally:

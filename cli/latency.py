@@ -1,0 +1,195 @@
+"""``t2 latency``: how fast the bridge reacts, hop by hop, live.
+
+On a terminal a table, elsewhere a line of JSON for each of the bridge's health messages, one a
+second. All figures are since the bridge's start. p50 and p99 are bounds of buckets that are a third
+apart: at most so long.
+"""
+
+import argparse
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from common import keys, log
+from common.bus.bus import Arrival, Bus
+from common.config import load
+from common.errors import LinkError, RobotError
+from common.freshness import S
+from common.loop import Loop
+from common.messages import Health, Timing
+from common.options import add_sources, sources
+from common.settings import Shared
+from services.bridge.timing import quantile
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+PATIENCE_S = 5.0  # the bridge tells once a second
+SILENCE = f"the bridge has told nothing for {PATIENCE_S:g} s"
+NAMES = {
+    "board_to_bridge": "board → bridge",
+    "bridge_to_break": "bridge → BREAK",
+    "bridge_to_safety": "bridge → safety",
+    "driver_to_safety": "driver → safety",
+    "in_safety": "safety decides",
+    "safety_to_bridge": "safety → bridge",
+    "bridge_to_frame": "bridge → frame",
+    "contact_to_break": "contact → BREAK, the reflex",
+    "judged_stop": "contact → BREAK, judged",
+    "request_to_frame": "request → frame",
+}
+
+# What the bridge told last, and whether it has told nothing for a while.
+Show = Callable[[Health | None, bool], None]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--once", action="store_true", help="show it once, and end")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show it until SIGINT or SIGTERM; raise ``LinkError`` when there is nothing to show once."""
+    config = load(Shared, sources(options)).config
+    log.configure(config.log, "latency")
+    bus_of = config.bus.endpoints, config.robot.id
+    with (
+        closing(Loop()) as loop,
+        closing(Bus(*bus_of, loop.post, config.bus.lease)) as bus,
+        shown(options.once) as show,
+    ):
+        watch = Watch(loop, show, options.once)
+        bus.subscribe(keys.HEALTH, watch.take, service="bridge")
+        loop.every(1.0, watch.look)
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, lambda *_: loop.stop())
+        bus.open()
+        with until_nobody_reads():
+            loop.run()
+    if options.once and watch.silent:
+        where = ", ".join(config.bus.endpoints)
+        raise LinkError(f"no bridge was heard of at {where} for {PATIENCE_S:g} s: is `t2 up` on?")
+    return 0
+
+
+class Watch:
+    """Passes on what the bridge tells, and notices when it tells nothing."""
+
+    def __init__(self, loop: Loop, show: Show, once: bool) -> None:
+        self.newest: Health | None = None
+        self._loop = loop
+        self._show = show
+        self._once = once
+        self._heard_ns = time.monotonic_ns()
+        self.silent = False
+
+    def take(self, arrival: Arrival[Health]) -> None:
+        """Show what came."""
+        self.newest, self._heard_ns, self.silent = arrival.message, arrival.received_ns, False
+        self._show(self.newest, False)
+        if self._once:
+            self._loop.stop()
+
+    def look(self, now_ns: int) -> None:
+        """Show that nothing comes any more; give up when it is to be shown once."""
+        if self.silent or now_ns - self._heard_ns < PATIENCE_S * S:
+            return
+        self.silent = True
+        if self._once:
+            self._loop.stop()
+        else:
+            self._show(self.newest, True)
+
+
+@contextmanager
+def until_nobody_reads() -> Iterator[None]:
+    """End without a word when the other end of the pipe is gone, as after ``| head``."""
+    try:
+        yield
+    except BrokenPipeError:
+        # Python would write what is left once more on its way out.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def shown(once: bool) -> Iterator[Show]:
+    """Give what shows: a table on a terminal, which it gets back, lines of JSON elsewhere."""
+    if not sys.stdout.isatty():
+        yield print_line
+        return
+    try:
+        from rich.console import Console
+        from rich.live import Live
+    except ImportError as error:
+        raise RobotError(
+            f"the table wants {error.name}: pip install -e '.[demo]', "
+            "or have JSON: t2 latency | cat"
+        ) from None
+    console = Console(highlight=False, markup=False)
+    if once:
+        yield lambda newest, silent: console.print(table(newest, silent))
+        return
+    with Live(table(None, False), console=console, auto_refresh=False) as live:
+        yield lambda newest, silent: live.update(table(newest, silent), refresh=True)
+
+
+def print_line(newest: Health | None, silent: bool) -> None:
+    """Print a line of JSON; silence is told on standard error."""
+    if silent:
+        print(f"t2 latency: {SILENCE}", file=sys.stderr)
+    elif newest:
+        print(json.dumps(figures(newest)), flush=True)
+
+
+def figures(health: Health) -> dict[str, Any]:
+    """Return what one health message tells, durations in seconds; None where there are none."""
+    timing = health.timing or Timing(bounds=(), durations={}, not_counted={})
+    return {
+        "t_ns": health.t_ns,
+        "boot": health.boot,
+        "uptime": health.uptime,
+        "durations": {
+            name: {
+                "count": sum(each.counts),
+                "p50": quantile(timing.bounds, each, 0.5),
+                "p99": quantile(timing.bounds, each, 0.99),
+                "worst": each.worst if any(each.counts) else None,
+            }
+            for name, each in timing.durations.items()
+        },
+        "not_counted": timing.not_counted,
+    }
+
+
+def table(newest: Health | None, silent: bool) -> "Table":
+    """Return the figures as a table, in milliseconds; the hops stand under the whole."""
+    from rich.table import Table
+
+    made = Table(title="Reactions in ms", title_justify="left", caption_justify="left")
+    made.add_column("since the bridge's start")
+    for title in ("count", "p50 ≤", "p99 ≤", "worst"):
+        made.add_column(title, justify="right")
+    made.caption = SILENCE if silent else "waiting for the bridge"
+    if newest is None:
+        return made
+    told = figures(newest)
+    for name, each in told["durations"].items():
+        whole, _, hop = name.partition(".")
+        text = f"  {NAMES.get(hop, hop)}" if hop else NAMES.get(whole, whole)
+        times = (milliseconds(each[key]) for key in ("p50", "p99", "worst"))
+        made.add_row(text, str(each["count"]), *times, style="" if hop else "bold")
+    if not silent:
+        left_out = ", ".join(f"{count} {name}" for name, count in told["not_counted"].items())
+        made.caption = f"up for {told['uptime']:.0f} s; not counted: {left_out or 'nothing'}"
+    return made
+
+
+def milliseconds(seconds: float | None) -> str:
+    """Return a duration for people."""
+    return "" if seconds is None else f"{seconds * 1000:.3f}"

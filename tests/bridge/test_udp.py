@@ -1,0 +1,127 @@
+"""The sockets on loopback: the kernel's stamp, and what is dropped."""
+
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from common.freshness import S
+from common.settings import Board
+from services.bridge.stamp import Receipt
+from services.bridge.udp import Sockets, want_stamps
+from tests.support import free_port, wait_until
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux stamps datagrams by itself")
+
+
+@contextmanager
+def sockets_of(peer: socket.socket) -> Iterator[Sockets]:
+    ports = (free_port(socket.SOCK_DGRAM),)
+    sockets = Sockets(Board(port=peer.getsockname()[1], listen_ports=ports))
+    yield sockets
+    sockets.close()
+
+
+@pytest.fixture
+def peer() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        yield peer
+
+
+def received(sockets: Sockets) -> tuple[bytes, Receipt]:
+    """Wait for one datagram."""
+    came: list[tuple[bytes, Receipt]] = []
+
+    def come() -> list[tuple[bytes, Receipt]]:
+        came.extend(sockets.read(0))
+        return came
+
+    wait_until(come, "a datagram")
+    assert len(came) == 1
+    return came[0]
+
+
+HELD_S = 0.01
+
+
+@LINUX
+def test_a_datagram_came_when_the_kernel_got_it_not_when_it_was_read(peer: socket.socket) -> None:
+    with sockets_of(peer) as sockets:
+
+        def in_time() -> bool:
+            before_ns = time.monotonic_ns()
+            peer.sendto(b"frame", sockets.sockets[0].getsockname())
+            after_ns = time.monotonic_ns()
+            time.sleep(HELD_S)  # a bridge that is held up
+            datagram, receipt = received(sockets)
+            assert datagram == b"frame"
+            assert receipt.kernel_ns is not None
+            assert receipt.read_ns >= after_ns + HELD_S * S
+            return before_ns - 1_000 <= receipt.kernel_ns <= after_ns + 1_000
+
+        # The kernel turns stamping on a moment later than it is asked to.
+        wait_until(in_time, "a stamp of the moment of sending")
+        assert sockets.wall.steps == 0
+
+
+@LINUX
+def test_a_wall_clock_that_is_set_costs_stamps_and_nothing_else(
+    peer: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sockets_of(peer) as sockets:
+        where = sockets.sockets[0].getsockname()
+        peer.sendto(b"before", where)
+        assert received(sockets)[1].kernel_ns is not None
+        true_ns = time.time_ns
+        monkeypatch.setattr(time, "time_ns", lambda: true_ns() - 3 * S)
+        # The kernel goes on by the clock of before: to us, its stamps are of the future.
+        peer.sendto(b"after", where)
+        datagram, receipt = received(sockets)
+        assert (datagram, receipt.kernel_ns, sockets.wall.steps) == (b"after", None, 1)
+        assert receipt.earliest_ns == receipt.read_ns
+        monkeypatch.undo()
+        peer.sendto(b"again", where)
+        assert received(sockets)[1].kernel_ns is None  # stamped before we saw that it was set
+
+        def well() -> bool:
+            peer.sendto(b"well", where)
+            return received(sockets)[1].kernel_ns is not None
+
+        wait_until(well, "stamps again")
+        assert sockets.wall.steps == 2
+
+
+def test_without_stamps_it_came_when_it_was_read(
+    peer: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "darwin")
+    with sockets_of(peer) as sockets:
+        peer.sendto(b"frame", sockets.sockets[0].getsockname())
+        datagram, receipt = received(sockets)
+        assert (datagram, receipt.kernel_ns) == (b"frame", None)
+        assert receipt.read_ns <= time.monotonic_ns()
+
+
+@LINUX
+def test_a_kernel_that_knows_no_stamps_is_done_without() -> None:
+    one, other = socket.socketpair()
+    one.close()  # refuses every option
+    want_stamps(one)
+    other.close()
+
+
+def test_a_strangers_datagram_is_not_yielded(peer: socket.socket) -> None:
+    with (
+        sockets_of(peer) as sockets,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        where = sockets.sockets[0].getsockname()
+        stranger.bind(("127.0.0.1", 0))
+        stranger.sendto(b"stranger", where)
+        peer.sendto(b"board", where)
+        assert received(sockets)[0] == b"board"
+        assert (sockets.refused, sockets.last_stranger) == (1, stranger.getsockname())

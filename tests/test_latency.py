@@ -1,0 +1,82 @@
+"""Reaction times of the whole stack: what is counted, and what ``t2 latency`` says of it."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.bus.host import host_id
+from common.freshness import S
+from sim.requests import Bumper
+from tests.chain import Chain
+from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
+from tests.support import wait_until
+from tests.teleop.terminal import terminal
+from tests.test_chain import Stick, push, stack, stick
+
+__all__ = ["stack", "stick"]  # fixtures
+
+WAYS = {
+    "contact_to_break": ["board_to_bridge", "bridge_to_break"],
+    "judged_stop": [
+        "board_to_bridge", "bridge_to_safety", "in_safety", "safety_to_bridge", "bridge_to_break",
+    ],
+    "request_to_frame": ["driver_to_safety", "in_safety", "safety_to_bridge", "bridge_to_frame"],
+}  # fmt: skip
+
+
+def told_once(stack: Chain) -> dict[str, Any]:
+    """Return what ``t2 latency --once`` prints into a pipe."""
+    result = ran("latency", "--once", *sets(f"bus.connect={stack.endpoint}"))
+    assert result.returncode == 0, result.stderr
+    told: dict[str, Any] = json.loads(result.stdout)
+    return told
+
+
+@pytest.mark.skipif(not host_id(), reason="this system does not name its boot: clocks are not one")
+def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
+    stack: Chain, stick: Stick, tmp_path: Path
+) -> None:
+    before = told_once(stack)["durations"]
+    assert before["contact_to_break"] == {"count": 0, "p50": None, "p99": None, "worst": None}
+    push(stack, stick)
+    pressed_ns = time.monotonic_ns()
+    stack.control.do(Bumper(pressed=True))
+    lines = tmp_path / "lines"
+    with running(t2("latency", *sets(f"bus.connect={stack.endpoint}")), lines):
+        wait_until(lambda: judged(lines), "the judged stop", PATIENCE_S)
+    took_s = (time.monotonic_ns() - pressed_ns) / S
+    told = json.loads(lines.read_text(encoding="utf-8").split("\n")[-2])
+    durations = told["durations"]
+    assert durations["contact_to_break"]["count"] == 1
+    assert 0 < durations["contact_to_break"]["worst"] < took_s
+    assert durations["judged_stop"]["worst"] > durations["contact_to_break"]["worst"]
+    assert durations["request_to_frame"]["count"] > 5
+    assert durations["board_to_bridge"]["count"] > 50
+    assert "foreign_clock" not in told["not_counted"]
+    for way, hops in WAYS.items():
+        counts = {durations[f"{way}.{hop}"]["count"] for hop in hops}
+        assert counts == {durations[way]["count"]}, way
+    for way in ("contact_to_break", "judged_stop"):  # of which there was one
+        parts = [durations[f"{way}.{hop}"]["worst"] for hop in WAYS[way]]
+        assert sum(parts) == pytest.approx(durations[way]["worst"], abs=1e-6)
+
+    assert_the_terminal_shows(stack, told["durations"]["contact_to_break"]["worst"])
+
+
+def judged(lines: Path) -> int:
+    """Return how many judged stops the last whole line has counted."""
+    whole = lines.read_text(encoding="utf-8").split("\n")[:-1]
+    return int(json.loads(whole[-1])["durations"]["judged_stop"]["count"]) if whole else 0
+
+
+def assert_the_terminal_shows(stack: Chain, worst_s: float) -> None:
+    """Look at the table that ``t2 latency`` draws on a terminal."""
+    words = ["Reactions in ms", "contact → BREAK, the reflex", f"{worst_s * 1000:.3f}", "p99 ≤",
+             "driver → safety"]  # fmt: skip
+    with terminal(stack.endpoint, "cli", "latency") as screen:
+        wait_until(
+            lambda: all(screen.shows(word.encode()) for word in words), "the table", PATIENCE_S
+        )
