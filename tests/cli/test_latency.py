@@ -1,0 +1,189 @@
+"""``t2 latency`` without a stack: figures, table, silence, and a reader that goes away."""
+
+import io
+import json
+import subprocess
+import sys
+import time
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from cli import latency
+from cli.__main__ import main
+from cli.latency import SILENCE, Watch, figures, print_line, table
+from common import keys
+from common.bus.bus import Arrival
+from common.freshness import S
+from common.loop import Loop
+from common.messages import Durations, Health, Timing
+from common.options import EXIT_LINK
+from tests.cli.processes import PATIENCE_S, sets, t2
+from tests.support import bus_on, free_port, router_process, running
+
+TIMING = Timing(
+    bounds=(0.001, 0.01),
+    durations={
+        "contact_to_break": Durations(counts=(0, 1, 0), worst=0.0042),
+        "contact_to_break.bridge_to_break": Durations(counts=(98, 1, 1), worst=0.25),
+        "request_to_frame": Durations(counts=(0, 0, 0), worst=0.0),
+        "a_way.of_a_newer_bridge": Durations(counts=(1, 0, 0), worst=0.0005),
+    },
+    not_counted={"foreign_clock": 3, "implausible": 1},
+)
+
+
+def health(timing: Timing | None = TIMING) -> Health:
+    return Health(
+        service="bridge", version="1", uptime=61.4, rates={}, counters={}, lateness=0.0, rss=0,
+        t_ns=7, boot=8, timing=timing,
+    )  # fmt: skip
+
+
+def drawn(newest: Health | None, silent: bool = False) -> str:
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(table(newest, silent))
+    return console.export_text()
+
+
+def test_figures_in_seconds() -> None:
+    told = figures(health())
+    assert (told["t_ns"], told["boot"], told["uptime"]) == (7, 8, 61.4)
+    assert told["not_counted"] == {"foreign_clock": 3, "implausible": 1}
+    durations = told["durations"]
+    assert list(durations) == list(TIMING.durations)
+    assert durations["contact_to_break"] == {
+        "count": 1, "p50": 0.0042, "p99": 0.0042, "worst": 0.0042,
+    }  # fmt: skip
+    assert durations["contact_to_break.bridge_to_break"] == {
+        "count": 100, "p50": 0.001, "p99": 0.01, "worst": 0.25,
+    }  # fmt: skip
+    nothing = {"count": 0, "p50": None, "p99": None, "worst": None}
+    assert durations["request_to_frame"] == nothing
+
+
+def test_a_bridge_that_measures_nothing_has_no_figures() -> None:
+    told = figures(health(None))
+    assert (told["durations"], told["not_counted"]) == ({}, {})
+
+
+def test_the_table_in_milliseconds() -> None:
+    shown = drawn(health())
+    lines = {line.split("│")[1].strip(): line.split("│")[2:6] for line in shown.splitlines()
+             if line.startswith("│")}  # fmt: skip
+    cells = {name: [cell.strip() for cell in row] for name, row in lines.items()}
+    assert cells == {
+        "contact → BREAK, the reflex": ["1", "4.200", "4.200", "4.200"],
+        "bridge → BREAK": ["100", "1.000", "10.000", "250.000"],
+        "request → frame": ["0", "", "", ""],
+        "of_a_newer_bridge": ["1", "0.500", "0.500", "0.500"],
+    }
+    assert "up for 61 s; not counted: 3 foreign_clock, 1 implausible" in shown
+
+
+@pytest.mark.parametrize(
+    ("newest", "silent", "said"),
+    [
+        (None, False, "waiting for the bridge"),
+        (None, True, SILENCE),
+        (health(), True, SILENCE),
+        (health(Timing(bounds=(), durations={}, not_counted={})), False, "not counted: nothing"),
+    ],
+)
+def test_the_table_says_what_is_missing(newest: Health | None, silent: bool, said: str) -> None:
+    assert said in drawn(newest, silent)
+
+
+def test_a_line_is_json_and_silence_is_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+    print_line(health(), False)
+    print_line(health(), True)
+    print_line(None, True)
+    print_line(None, False)
+    said = capsys.readouterr()
+    assert [json.loads(line) for line in said.out.splitlines()] == [figures(health())]
+    assert said.err == f"t2 latency: {SILENCE}\n" * 2
+
+
+# --- silence ----------------------------------------------------------------------------------
+
+
+def watched(once: bool) -> tuple[Watch, Loop, list[tuple[Health | None, bool]]]:
+    shown: list[tuple[Health | None, bool]] = []
+    loop = Loop()
+    return Watch(loop, lambda newest, silent: shown.append((newest, silent)), once), loop, shown
+
+
+def told(received_ns: int) -> Arrival[Health]:
+    return Arrival(health(), "k", received_ns, None)
+
+
+def test_silence_is_said_once_and_again_after_the_next_word() -> None:
+    watch, loop, shown = watched(once=False)
+    begin_ns = time.monotonic_ns()
+    watch.take(told(begin_ns))
+    for seconds in (1, 4.9, 5.1, 6, 7):
+        watch.look(begin_ns + round(seconds * S))
+    assert shown == [(health(), False), (health(), True)]
+    watch.take(told(begin_ns + 8 * S))
+    watch.look(begin_ns + 9 * S)
+    watch.look(begin_ns + 14 * S)
+    assert shown[2:] == [(health(), False), (health(), True)]
+    loop.close()
+
+
+def test_once_gives_up_without_showing_anything() -> None:
+    watch, loop, shown = watched(once=True)
+    watch.look(time.monotonic_ns() + 6 * S)
+    loop.run()  # returns: it was stopped before
+    assert (watch.silent, shown) == (True, [])
+    loop.close()
+
+
+def test_no_bridge_is_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(latency, "PATIENCE_S", 0.0)
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # pytest keeps its own ctrl-c
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    assert main(["latency", "--once", *sets(f"bus.connect={endpoint}")]) == EXIT_LINK
+    assert f"t2 latency: no bridge was heard of at {endpoint}" in capsys.readouterr().err
+
+
+# --- where it is shown ------------------------------------------------------------------------
+
+
+def test_a_table_without_rich_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    for module in ("rich.console", "rich.live"):
+        monkeypatch.setitem(sys.modules, module, None)
+    assert main(["latency", "--once"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("t2 latency: the table wants rich")
+    assert "pip install -e '.[demo]'" in said
+    assert "t2 latency | cat" in said
+
+
+def test_a_reader_that_goes_away_ends_it_without_a_word() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    publishers: list[Any] = []
+    with router_process(endpoint), running(Loop()) as loop:
+
+        def declare(bus: Any) -> None:
+            publishers.append(bus.publisher(keys.HEALTH, service="bridge"))
+
+        with bus_on(endpoint, loop, declare):
+            loop.post(lambda: loop.every(0.02, lambda _: publishers[0].put(health())))
+            with subprocess.Popen(
+                t2("latency", *sets(f"bus.connect={endpoint}")),
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            ) as process:  # fmt: skip
+                assert process.stdout is not None
+                assert process.stderr is not None
+                line = json.loads(process.stdout.readline())
+                process.stdout.close()
+                assert process.wait(PATIENCE_S) == 0
+                assert process.stderr.read() == ""
+    assert line["durations"]["contact_to_break"]["count"] == 1
