@@ -1,10 +1,13 @@
 """The bridge's shell in this process: a board that starts anew, a network that fails."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
 
+from common.bus.bus import Arrival
 from common.config import Sources, load
+from common.messages import Command, Motion
 from common.service import Node
 from common.settings import Board as Settings
 from common.wire.reports import BumperReport, DistanceReport
@@ -12,6 +15,7 @@ from services.bridge import bridge as shell
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.lease import Lease
+from services.bridge.stamp import Receipt
 from services.bridge.udp import Sockets
 from tests.bridge.board import Board, board
 
@@ -54,6 +58,22 @@ def test_a_short_hit_is_told_until_safety_has_judged_it(bridge: Bridge) -> None:
     bridge._on_bumper(BumperReport(False), b"", NOW)
     assert bridge._to_bumper.last is not None
     assert not bridge._to_bumper.last.pressed
+
+
+@pytest.mark.parametrize(("command", "counted"), [("stop", 0), ("brake", 1)])
+def test_only_a_brake_is_the_judged_stop(bridge: Bridge, command: Command, counted: int) -> None:
+    bridge._receipt = Receipt(None, time.monotonic_ns())
+    bridge._on_bumper(BumperReport(True), b"", NOW)
+    hit = bridge._wheels.lease.hit
+    assert hit is not None
+    boot = bridge._node.bus.boot
+    for seq, judged in ((1, hit - 1), (2, hit), (3, hit)):
+        motion = Motion(command=command, seq=seq, boot=1, judged=judged, judged_boot=boot)
+        bridge._wheels.on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
+        durations = bridge._node.timing().durations  # type: ignore[union-attr]
+        judged_already = counted if seq > 1 else 0
+        assert sum(durations["judged_stop"].counts) == judged_already
+    assert sum(durations["contact_to_break"].counts) == 1
 
 
 class Broken:
