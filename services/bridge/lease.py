@@ -86,8 +86,8 @@ def on_motion(
     if motion.boot != lease.boot:
         if lease.boot is not None and now_ns - lease.renewed_ns <= lease_ns:
             return lease, None, Refusal.SECOND_AUTHORITY
-        lease = replace(lease, boot=motion.boot, seq=motion.seq - 1, neutral=False)
-    if motion.seq <= lease.seq:
+        lease = replace(lease, boot=motion.boot)  # the end of the last one's took the neutral
+    elif motion.seq <= lease.seq:
         return lease, None, Refusal.OLD
     lease = expire(lease, now_ns, lease_ns)
     lease = replace(lease, seq=motion.seq, renewed_ns=now_ns, over_since_ns=None)
@@ -96,9 +96,9 @@ def on_motion(
     if motion.latched or lease.latched_by == motion.boot:
         lease = replace(lease, latched_by=motion.boot if motion.latched else None)
     order, refusal = _order(lease, motion)
-    if order is not Order.RUN or (motion.linear == 0 and motion.angular == 0):
-        lease = replace(lease, neutral=lease.neutral or (lease.ready and refusal is None))
-    return replace(lease, sent_ns=now_ns), order, refusal
+    # A RUN that moves is obeyed only when the lease is neutral already.
+    neutral = lease.neutral or (lease.ready and refusal is None)
+    return replace(lease, neutral=neutral, sent_ns=now_ns), order, refusal
 
 
 def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:

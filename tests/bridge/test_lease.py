@@ -129,7 +129,8 @@ def test_neutral_counts_only_while_ready(neutral: Motion) -> None:
 
 def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
     lost = on_ready(replace(ARMED, sent_ns=NOW), False)
-    assert not lost.neutral
+    assert lost == replace(ARMED, ready=False, neutral=False, sent_ns=leases.AT_ONCE)
+    assert on_ready(replace(lost, sent_ns=NOW), True) == replace(ARMED, neutral=False, sent_ns=NOW)
     assert on_tick(lost, NOW, LEASE, COAST, True)[1] is Order.STOP
     again = on_ready(lost, True)
     assert obey(again, run())[1:] == (Order.STOP, Refusal.NOT_NEUTRAL)
@@ -184,6 +185,21 @@ def test_stop_goes_out_at_20_hz(wait: int, due: bool) -> None:
 def test_a_lease_that_lives_but_is_not_ready_still_stops() -> None:
     state = replace(ARMED, ready=False, sent_ns=NOW - 50 * MS)
     assert on_tick(state, NOW, LEASE, COAST, False)[1] is Order.STOP
+
+
+def test_the_frame_of_a_message_counts_for_the_20_hz() -> None:
+    state, order, _ = obey(replace(ARMED, ready=False), stop())
+    assert order is Order.STOP
+    assert on_tick(state, NOW + 50 * MS - 1, LEASE, COAST, False) == (state, None)
+    assert on_tick(state, NOW + 50 * MS, LEASE, COAST, False)[1] is Order.STOP
+
+
+def test_a_message_ends_the_stopping_of_a_lease_that_was_over() -> None:
+    over, order = on_tick(ARMED, NOW + LEASE + 1, LEASE, COAST, True)
+    assert (over.over_since_ns, over.neutral, order) == (NOW + LEASE + 1, False, Order.STOP)
+    alive, _, _ = obey(over, stop(), NOW + S)
+    assert (alive.renewed_ns, alive.over_since_ns, alive.neutral) == (NOW + S, None, True)
+    assert on_tick(alive, NOW + S + LEASE, LEASE, COAST, True) == (alive, None)
 
 
 def test_it_says_what_it_waits_for() -> None:
@@ -244,6 +260,7 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
         else:
             lease, order = on_tick(lease, now, LEASE, COAST, False)
             assert order is not Order.RUN
+        assert lease.over_since_ns is None or not lease.neutral
 
 
 def test_a_latch_is_remembered_until_it_is_reset_by_who_holds_it() -> None:
