@@ -170,17 +170,28 @@ def frame_bytes(command: int, payload: bytes, size: int | None = None) -> bytes:
     return HEADER.pack(MAGIC, size, command, crc) + payload
 
 
+QUERY = "DistanceQuery has 8 bytes, its header says"
+CRC = "header says 0x0001, the bytes give"
+KIND = "motion command is 3, allowed is 0 STOP, 1 RUN,"
 REASONS = [
-    (b"\x00\x01\x02", Reason.NO_MAGIC, "47 53"),
+    (b"\x00\x01\x02", Reason.NO_MAGIC, "does not start with 47 53"),
     (b"GS\x08\x00", Reason.TRUNCATED, "4 bytes of an 8-byte header"),
-    (frame_bytes(0x7426, b"\x01")[:-1], Reason.BAD_SIZE, "MotionCommand has 13 bytes"),
+    (
+        frame_bytes(0x7426, b"\x01")[:-1],
+        Reason.BAD_SIZE,
+        "MotionCommand has 13 bytes, its header says 9",
+    ),
     (framing.pack(DriverQuery(Side.LEFT))[:-1], Reason.TRUNCATED, "8 of 9 bytes"),
     (frame_bytes(0x1234, b""), Reason.UNKNOWN_ID, "id 0x1234"),
-    (frame_bytes(0x7600, b"", size=0), Reason.BAD_SIZE, "its header says 0"),
-    (frame_bytes(0x7600, b"", size=0xFFFF), Reason.BAD_SIZE, "its header says 65535"),
-    (b"GS\x08\x00\x00\x76\x01\x00", Reason.BAD_CRC, "says 0x0001, the bytes give 0x0000"),
-    (frame_bytes(0x7605, b"\x02"), Reason.BAD_VALUE, "motor driver is 2"),
-    (frame_bytes(0x7426, b"\x03\0\0\0\0"), Reason.BAD_VALUE, "motion command is 3"),
+    (frame_bytes(0x7600, b"", size=0), Reason.BAD_SIZE, f"{QUERY} 0"),
+    (frame_bytes(0x7600, b"", size=0xFFFF), Reason.BAD_SIZE, f"{QUERY} 65535"),
+    (b"GS\x08\x00\x00\x76\x01\x00", Reason.BAD_CRC, f"{CRC} 0x0000"),
+    (
+        frame_bytes(0x7605, b"\x02"),
+        Reason.BAD_VALUE,
+        "motor driver is 2, allowed is 0 left, 1 right",
+    ),
+    (frame_bytes(0x7426, b"\x03\0\0\0\0"), Reason.BAD_VALUE, f"{KIND} 2 BREAK"),
 ]
 
 
@@ -189,7 +200,7 @@ def test_each_reason_is_named_with_its_detail(raw: bytes, reason: Reason, detail
     (part,) = read(raw, TO_BOARD)
     assert isinstance(part, Rejected)
     assert part.reason is reason
-    assert detail in part.detail
+    assert part.detail == detail
 
 
 def test_every_reason_is_covered() -> None:

@@ -1,5 +1,7 @@
 """The board's frames: layout, limits, what is refused."""
 
+from collections.abc import Callable
+
 import pytest
 
 from common.errors import WireError
@@ -80,3 +82,54 @@ def test_a_third_driver_is_refused() -> None:
 def test_a_lamp_answer_is_done_or_failed(value: int) -> None:
     with pytest.raises(WireError, match="0x55 or 0xaa"):
         r.LedReport.from_bytes(bytes([value]))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (
+            lambda: r.VelocityReport(0, 32768),
+            "velocity is 32768, allowed is -32767..32767",
+        ),
+        (
+            lambda: r.DistanceReport(2**31, 0),
+            "distance is 2147483648, allowed is 32 bits",
+        ),
+        (
+            lambda: r.DistanceReport(0, 1801),
+            "heading is 1801, allowed is -1800..1800",
+        ),
+        (
+            lambda: r.UltrasonicReport((0,) * 7),  # type: ignore[arg-type]
+            "number of ranges is 7, allowed is 8",
+        ),
+        (
+            lambda: r.UltrasonicReport((0, 0, 0, 0, 0, 0, 0, -1)),
+            "range is -1, allowed is 0..65535",
+        ),
+        (
+            lambda: r.DriverReport(Side.LEFT, 2**32),
+            "fault bits is 4294967296, allowed is 32 bits",
+        ),
+        (
+            lambda: r.DriverReport.from_bytes(bytes(4)),
+            "DriverReport payload size is 4, allowed is 5 bytes",
+        ),
+        (
+            lambda: r.DriverReport.from_bytes(bytes([2, 0, 0, 0, 0])),
+            "motor driver is 2, allowed is 0 left, 1 right",
+        ),
+        (
+            lambda: r.BumperReport.from_bytes(b"\x02"),
+            "BumperReport is 2, allowed is 0 or 1",
+        ),
+        (
+            lambda: r.LedReport.from_bytes(b"\x56"),
+            "LED answer is 0x56, allowed is 0x55 or 0xaa",
+        ),
+    ],
+)
+def test_what_is_refused_is_told_with_its_value(make: Callable[[], Frame], text: str) -> None:
+    with pytest.raises(WireError) as refused:
+        make()
+    assert str(refused.value) == text
