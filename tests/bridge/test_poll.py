@@ -69,6 +69,31 @@ def test_an_answer_is_no_older_than_its_question() -> None:
     assert polled.answered("bumper", S + 310 * MS) == S + 310 * MS
 
 
+def test_a_slow_query_that_is_never_answered_gets_slower_to_a_quarter() -> None:
+    polled = Poll([("slow", BumperQuery(), 2.0)], 0.1)
+    times = [1000, 1500, 2500, 4500, 6500]
+    assert sent(polled, "slow", range(1000, 7000, 10)) == times
+    assert polled.missed() == {"slow": 5}
+
+
+def test_the_round_trip_is_the_median_of_the_queries() -> None:
+    names = "abcde"
+    polled = Poll([(name, BumperQuery(), 1.0) for name in names], 0.1)
+    polled.due(S)
+    for n, name in enumerate(names):
+        polled.answered(name, S + (n + 1) * MS)
+    assert polled.round_trip_s() == 0.003
+
+
+def test_the_beat_is_kept_while_it_is_less_than_a_period_late() -> None:
+    polled = poll()
+    query = polled.queries["bumper"]
+    for tick, next_tick in ((1000, 1020), (1023, 1040), (1059, 1060), (1080, 1100)):
+        polled.due(tick * MS)
+        polled.answered("bumper", tick * MS)
+        assert query.due_ns == next_tick * MS
+
+
 def test_a_pause_is_not_caught_up_in_a_burst() -> None:
     polled = poll()
     for tick in (1000, 5000, 5010, 5020):
