@@ -64,12 +64,12 @@ class Translator:
 
     def ultrasonic(self, frame: UltrasonicReport) -> Ultrasonic:
         """Return the ranges in m; None where there is none, and why."""
-        status = tuple(self._status(raw_mm) for raw_mm in frame.ranges_mm)
         ranges = tuple(
-            raw_mm / MM if state == "ok" else None
-            for raw_mm, state in zip(frame.ranges_mm, status, strict=True)
+            raw_mm / MM if self._status(raw_mm) == "ok" else None for raw_mm in frame.ranges_mm
         )
-        return Ultrasonic(ranges=ranges, status=status)
+        return Ultrasonic(
+            ranges=ranges, status=tuple(self._status(raw_mm) for raw_mm in frame.ranges_mm)
+        )
 
     def _status(self, raw_mm: int) -> RangeStatus:
         if raw_mm == SONAR_FAULT_MM:

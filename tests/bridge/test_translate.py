@@ -15,8 +15,15 @@ from common.wire.reports import DistanceReport, DriverReport, UltrasonicReport, 
 from services.bridge.lease import Order
 from services.bridge.translate import BumperFilter, Translator, check_finite, clamp, driver
 
-BY_MANUAL = Translator(Wire(), Vehicle(), 1.0, 1.0)
-BY_DRIVER = Translator(Wire(angular_unit="milliradian"), Vehicle(), 1.0, 1.0)
+
+@pytest.fixture
+def by_manual() -> Translator:
+    return Translator(Wire(), Vehicle(), 1.0, 1.0)
+
+
+@pytest.fixture
+def by_driver() -> Translator:
+    return Translator(Wire(angular_unit="milliradian"), Vehicle(), 1.0, 1.0)
 
 
 def run(linear: float, angular: float) -> Motion:
@@ -35,16 +42,20 @@ def run(linear: float, angular: float) -> Motion:
         (run(0.0004, 0.0), 0, 0),
     ],
 )
-def test_run_carries_the_motion_clamped(motion: Motion, linear_mmps: int, angular_raw: int) -> None:
-    frame = BY_MANUAL.command(Order.RUN, motion)
+def test_run_carries_the_motion_clamped(
+    by_manual: Translator, motion: Motion, linear_mmps: int, angular_raw: int
+) -> None:
+    frame = by_manual.command(Order.RUN, motion)
     assert frame == MotionCommand(MotionKind.RUN, linear_mmps, angular_raw)
     assert b"\x00\x80" not in frame.to_bytes()
 
 
-def test_the_angular_unit_is_a_setting_both_ways() -> None:
-    assert BY_DRIVER.command(Order.RUN, run(0.0, 0.3)).angular_raw == 300
-    assert BY_DRIVER.velocity(VelocityReport(0, 300)).angular == pytest.approx(0.3)
-    assert BY_MANUAL.velocity(VelocityReport(0, 300)).angular == pytest.approx(math.radians(30))
+def test_the_angular_unit_is_a_setting_both_ways(
+    by_manual: Translator, by_driver: Translator
+) -> None:
+    assert by_driver.command(Order.RUN, run(0.0, 0.3)).angular_raw == 300
+    assert by_driver.velocity(VelocityReport(0, 300)).angular == pytest.approx(0.3)
+    assert by_manual.velocity(VelocityReport(0, 300)).angular == pytest.approx(math.radians(30))
 
 
 def test_the_widest_settings_still_fit_fifteen_bits() -> None:
@@ -56,9 +67,11 @@ def test_the_widest_settings_still_fit_fifteen_bits() -> None:
 @pytest.mark.parametrize(
     ("order", "kind"), [(Order.STOP, MotionKind.STOP), (Order.BRAKE, MotionKind.BREAK)]
 )
-def test_stop_and_brake_carry_no_velocity(order: Order, kind: MotionKind) -> None:
-    assert BY_MANUAL.command(order, run(1.0, 1.0)) == MotionCommand(kind, 0, 0)
-    assert BY_MANUAL.command(order) == MotionCommand(kind, 0, 0)
+def test_stop_and_brake_carry_no_velocity(
+    by_manual: Translator, order: Order, kind: MotionKind
+) -> None:
+    assert by_manual.command(order, run(1.0, 1.0)) == MotionCommand(kind, 0, 0)
+    assert by_manual.command(order) == MotionCommand(kind, 0, 0)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -82,20 +95,31 @@ def test_velocities_come_back_as_they_went(linear_mmps: int, angular_raw: int) -
 @pytest.mark.parametrize(
     "frame", [VelocityReport(5001, 0), VelocityReport(-5001, 0), VelocityReport(0, 5730)]
 )
-def test_a_velocity_that_no_vehicle_has_is_refused(frame: VelocityReport) -> None:
+def test_a_velocity_that_no_vehicle_has_is_refused(
+    by_manual: Translator, frame: VelocityReport
+) -> None:
     with pytest.raises(WireError, match="implausible"):
-        BY_MANUAL.velocity(frame)
+        by_manual.velocity(frame)
 
 
-def test_mileage() -> None:
-    mileage = BY_MANUAL.mileage(DistanceReport(-1234, -1800), epoch=3)
+def test_the_fastest_plausible_velocity_is_taken(by_driver: Translator) -> None:
+    velocity = by_driver.velocity(VelocityReport(-5000, 10_000))
+    assert (velocity.linear, velocity.angular) == (-5.0, 10.0)
+
+
+def test_a_run_without_a_motion_carries_no_velocity(by_manual: Translator) -> None:
+    assert by_manual.command(Order.RUN) == MotionCommand(MotionKind.RUN, 0, 0)
+
+
+def test_mileage(by_manual: Translator) -> None:
+    mileage = by_manual.mileage(DistanceReport(-1234, -1800), epoch=3)
     assert (mileage.distance, mileage.epoch) == (-1.234, 3)
     assert mileage.heading == pytest.approx(-math.pi)
 
 
-def test_ultrasonic_says_why_there_is_no_range() -> None:
+def test_ultrasonic_says_why_there_is_no_range(by_manual: Translator) -> None:
     frame = UltrasonicReport((1000, 0xFFFF, 0, 49, 50, 4999, 5000, 0xFFFE))
-    message = BY_MANUAL.ultrasonic(frame)
+    message = by_manual.ultrasonic(frame)
     assert message.ranges == (1.0, None, None, None, 0.05, 4.999, None, None)
     assert message.status == (
         "ok", "fault", "too_near", "too_near", "ok", "ok", "no_echo", "no_echo",
