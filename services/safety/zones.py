@@ -45,10 +45,9 @@ class Zones:
 
     def allowed(self, distance: float) -> float:
         """Return the speed (m/s) at which it can still stop short of the margin."""
-        if distance <= self.margin:
-            return 0.0
+        room = max(0.0, distance - self.margin)
         lag = self.deceleration * self.react
-        return math.sqrt(lag * lag + 2 * self.deceleration * (distance - self.margin)) - lag
+        return math.sqrt(lag * lag + 2 * self.deceleration * room) - lag
 
     def approach(self, sonar: int, twist: Twist) -> float:
         """Return how fast (m/s) the vehicle closes in on what this sonar sees."""

@@ -1,6 +1,7 @@
 """Allowed speeds: the formula, the geometry of each sonar, and what holds for any twist."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -10,14 +11,18 @@ from common.messages import SONAR_NAMES
 from common.settings import Vehicle
 from services.safety.config import Safety
 from services.safety.twist import Twist
-from services.safety.zones import zones
+from services.safety.zones import GRAZING_MPS, Zones, zones
 
-VEHICLE = Vehicle()
-ZONES = zones(VEHICLE, Safety())
 FREE = (math.inf,) * 8
+ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
 
 distances = st.tuples(*[st.floats(0.0, 6.0) | st.just(math.inf)] * 8)
 twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def field() -> Zones:
+    return zones(Vehicle(), Safety())
 
 
 def only(name: str, distance: float) -> tuple[float, ...]:
@@ -25,20 +30,27 @@ def only(name: str, distance: float) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.199999, 0.2])
-def test_inside_the_margin_nothing_is_allowed(distance: float) -> None:
-    assert ZONES.allowed(distance) == 0.0
+def test_inside_the_margin_nothing_is_allowed(field: Zones, distance: float) -> None:
+    assert field.allowed(distance) == 0.0
+
+
+@given(st.floats(0.01, 10.0), st.floats(0.01, 10.0))
+def test_nothing_is_exactly_nothing_whatever_the_settings(
+    field: Zones, react: float, deceleration: float
+) -> None:
+    assert replace(field, react=react, deceleration=deceleration).allowed(0.2) == 0.0
 
 
 @given(st.floats(0.2, 10.0))
-def test_reacting_and_stopping_takes_the_room_there_is(distance: float) -> None:
-    speed = ZONES.allowed(distance)
+def test_reacting_and_stopping_takes_the_room_there_is(field: Zones, distance: float) -> None:
+    speed = field.allowed(distance)
     assert speed * 0.25 + speed**2 / (2 * 0.6) == pytest.approx(distance - 0.2, abs=1e-9)
 
 
 @given(st.floats(0.0, 6.0), st.floats(0.0, 6.0))
-def test_nearer_is_never_faster(one: float, other: float) -> None:
+def test_nearer_is_never_faster(field: Zones, one: float, other: float) -> None:
     near, far = sorted((one, other))
-    assert ZONES.allowed(near) <= ZONES.allowed(far)
+    assert field.allowed(near) <= field.allowed(far)
 
 
 @pytest.mark.parametrize(
@@ -57,46 +69,66 @@ def test_nearer_is_never_faster(one: float, other: float) -> None:
         ("left", Twist(1.0, 0.0), 0.0),
     ],
 )
-def test_how_fast_a_sonar_closes_in(name: str, twist: Twist, approach: float) -> None:
-    assert ZONES.approach(SONAR_NAMES.index(name), twist) == pytest.approx(approach, abs=1e-12)
+def test_how_fast_a_sonar_closes_in(field: Zones, name: str, twist: Twist, approach: float) -> None:
+    assert field.approach(SONAR_NAMES.index(name), twist) == pytest.approx(approach, abs=1e-12)
 
 
-def test_a_wall_at_the_flank_lets_the_vehicle_pass_but_not_turn() -> None:
+def test_a_wall_at_the_flank_lets_the_vehicle_pass_but_not_turn(field: Zones) -> None:
     wall = only("left", 0.1)
-    assert ZONES.limit(Twist(1.0, 0.0), wall).factor == 1.0
-    assert ZONES.limit(Twist(0.0, 0.5), wall).factor == 0.0
-    assert ZONES.limit(Twist(0.5, -0.5), wall).sonar == SONAR_NAMES.index("left")
+    assert field.limit(Twist(1.0, 0.0), wall).factor == 1.0
+    assert field.limit(Twist(0.0, 0.5), wall).factor == 0.0
+    assert field.limit(Twist(0.5, -0.5), wall).sonar == SONAR_NAMES.index("left")
 
 
-def test_free_space_limits_nothing() -> None:
-    assert ZONES.limit(Twist(1.0, 1.0), FREE).factor == 1.0
-    assert ZONES.limit(Twist(1.0, 1.0), FREE).sonar is None
+@pytest.mark.parametrize(("speed", "factor"), [(GRAZING_MPS, 1.0), (2 * GRAZING_MPS, 0.0)])
+def test_grazing_is_no_approach(field: Zones, speed: float, factor: float) -> None:
+    assert field.limit(Twist(speed, 0.0), only("front", 0.0)).factor == factor
+
+
+@pytest.mark.parametrize("speed", [0.9, 2.0])
+def test_the_factor_brings_the_twist_down_to_what_is_allowed(field: Zones, speed: float) -> None:
+    limit = field.limit(Twist(speed, 0.0), only("front", 1.0))
+    assert limit.factor == pytest.approx(ALLOWED_AT_1M / speed)
+    assert limit.sonar == SONAR_NAMES.index("front")
+
+
+def test_the_first_of_two_equally_near_is_named(field: Zones) -> None:
+    left, right = SONAR_NAMES.index("front_left"), SONAR_NAMES.index("front_right")
+    ranges = tuple(0.4 if n in (left, right) else math.inf for n in range(8))
+    assert field.limit(Twist(1.0, 0.0), ranges).sonar == min(left, right)
+
+
+def test_free_space_limits_nothing(field: Zones) -> None:
+    assert field.limit(Twist(1.0, 1.0), FREE).factor == 1.0
+    assert field.limit(Twist(1.0, 1.0), FREE).sonar is None
 
 
 @given(twists, distances)
 def test_a_limited_twist_is_allowed_toward_every_sonar(
-    twist: Twist, ranges: tuple[float, ...]
+    field: Zones, twist: Twist, ranges: tuple[float, ...]
 ) -> None:
-    limited = twist.scaled(ZONES.limit(twist, ranges).factor)
+    limited = twist.scaled(field.limit(twist, ranges).factor)
     for sonar, distance in enumerate(ranges):
-        assert ZONES.approach(sonar, limited) <= ZONES.allowed(distance) + 1e-5
+        assert field.approach(sonar, limited) <= field.allowed(distance) + 1e-5
 
 
 @given(twists, distances)
-def test_a_limited_twist_stays_on_its_curve(twist: Twist, ranges: tuple[float, ...]) -> None:
-    factor = ZONES.limit(twist, ranges).factor
+def test_a_limited_twist_stays_on_its_curve(
+    field: Zones, twist: Twist, ranges: tuple[float, ...]
+) -> None:
+    factor = field.limit(twist, ranges).factor
     assert 0.0 <= factor <= 1.0
     limited = twist.scaled(factor)
     assert limited.linear * twist.angular == pytest.approx(limited.angular * twist.linear)
 
 
 @given(distances, st.floats(0.01, 1.0))
-def test_the_way_out_stays_open(ranges: tuple[float, ...], speed: float) -> None:
+def test_the_way_out_stays_open(field: Zones, ranges: tuple[float, ...], speed: float) -> None:
     behind_free = tuple(
         math.inf if name.startswith("rear") else distance
         for name, distance in zip(SONAR_NAMES, ranges, strict=True)
     )
-    assert ZONES.limit(Twist(-speed, 0.0), behind_free).factor == 1.0
+    assert field.limit(Twist(-speed, 0.0), behind_free).factor == 1.0
 
 
 @pytest.mark.parametrize(
@@ -105,10 +137,12 @@ def test_the_way_out_stays_open(ranges: tuple[float, ...], speed: float) -> None
         (0.20, 0.05, False),
         (0.20, 0.051, True),
         (0.20, -1.0, False),
-        (1.00, ZONES.allowed(1.0) + 0.199, False),
-        (1.00, ZONES.allowed(1.0) + 0.201, True),
+        (1.00, ALLOWED_AT_1M + 0.199, False),
+        (1.00, ALLOWED_AT_1M + 0.201, True),
     ],
 )
-def test_measured_motion_has_its_own_bounds(distance: float, measured: float, stops: bool) -> None:
-    sonar = ZONES.too_fast(Twist(measured, 0.0), only("front", distance))
+def test_measured_motion_has_its_own_bounds(
+    field: Zones, distance: float, measured: float, stops: bool
+) -> None:
+    sonar = field.too_fast(Twist(measured, 0.0), only("front", distance))
     assert sonar == (SONAR_NAMES.index("front") if stops else None)
