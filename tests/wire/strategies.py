@@ -1,10 +1,16 @@
-"""Hypothesis strategies for every frame of the wire, and plain examples of each."""
+"""Hypothesis strategies for every frame of the wire, plain examples of each, and their reader."""
+
+from collections.abc import Mapping
+from itertools import islice
 
 from hypothesis import strategies as st
 
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
+from common.wire.framing import Framing, Received, Rejected
+
+Part = Received | Rejected
 
 velocities = st.integers(-32767, 32767)
 octets = st.integers(0, 255)
@@ -54,3 +60,10 @@ REPORTS: tuple[Frame, ...] = (
     r.DriverReport(Side.LEFT, 0x8000001F),
     r.LedReport(True),
 )
+
+
+def read_all(framing: Framing, raw: bytes, kinds: Mapping[int, type[Frame]]) -> list[Part]:
+    """Read a datagram; no byte is lost, and each part has one, so that reading ends."""
+    parts = list(islice(framing.read(raw, kinds), len(raw) + 1))
+    assert b"".join(part.raw for part in parts) == raw
+    return parts

@@ -10,6 +10,7 @@ from common.errors import WireError
 from common.wire import commands as c
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
+from tests.wire.strategies import read_all
 
 GOLDEN = json.loads((Path(__file__).parent / "frames.json").read_text(encoding="utf-8"))
 BY_NAME = {each["name"]: each for each in GOLDEN["pc_to_board"]}
@@ -38,7 +39,7 @@ def test_golden_bytes_both_ways(name: str) -> None:
     frame, raw = frame_of(each), bytes.fromhex(each["hex"])
     framing = Framing()
     assert framing.pack(frame) == raw
-    assert list(framing.read(raw, c.TO_BOARD)) == [Received(frame, raw)]
+    assert read_all(framing, raw, c.TO_BOARD) == [Received(frame, raw)]
 
 
 def test_the_golden_bytes_name_their_source() -> None:
