@@ -78,8 +78,8 @@ class Arbiter:
         if drive.boot != channel.boot:
             if channel.is_fresh(now_ns, self.sources[name].lease):
                 return replace(channel, rival_ns=now_ns), "second_publisher"
-            channel = Channel(boot=drive.boot, seq=drive.seq - 1, rival_ns=channel.rival_ns)
-        if drive.seq <= channel.seq:
+            channel = Channel(boot=drive.boot, rival_ns=channel.rival_ns)
+        elif drive.seq <= channel.seq:
             return channel, "seq_not_rising"
         wish = Twist(drive.linear, drive.angular)
         return replace(channel, seq=drive.seq, wish=wish, received_ns=now_ns), ""

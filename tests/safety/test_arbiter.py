@@ -81,6 +81,26 @@ def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
     taken, reason = ask(arbiter, lease_ns + 1, boot=2)
     assert reason == ""
     assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
+    taken, reason = ask(refused, lease_ns + 1, boot=2)
+    assert reason == ""
+    assert taken.rivals(lease_ns + RIVAL_NS - 1) == "teleop"  # the first may still be there
+
+
+@pytest.mark.parametrize("seq", [0, 1, 9])
+def test_a_new_boot_counts_anew(seq: int) -> None:
+    arbiter, _ = ask(Arbiter(SOURCES), 0, seq=5)
+    later = round(SOURCES["teleop"].lease * S) + 1
+    arbiter, reason = ask(arbiter, later, boot=2, seq=seq)
+    assert reason == ""
+    assert ask(arbiter, later, boot=2, seq=seq)[1] == "seq_not_rising"
+
+
+def test_all_rivals_are_named() -> None:
+    arbiter = Arbiter(SOURCES)
+    for source in ("teleop", "web"):
+        arbiter = accepted(arbiter, 0, source)
+        arbiter, _ = ask(arbiter, 0, source=source, boot=2)
+    assert arbiter.rivals(0) == "teleop, web"
 
 
 def test_an_absent_driver_is_none() -> None:
@@ -94,7 +114,7 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
     assert arbiter.channels["teleop"].neutral
     assert not arbiter.channels["web"].neutral
     arbiter = arbiter.disarmed()
-    assert not arbiter.channels["teleop"].neutral
+    assert arbiter.channels["teleop"].neutral is False
     assert not arbiter.armed(S).channels["teleop"].neutral
     assert arbiter.asks_to_move(0)
     assert not arbiter.asks_to_move(S)
