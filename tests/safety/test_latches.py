@@ -53,6 +53,13 @@ def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
     assert held["contact"].since_ns == 0
 
 
+def test_the_sample_that_showed_a_cause_is_no_good_one() -> None:
+    held = see({}, "contact", True, 7, seq=5)
+    assert held["contact"] == Held(7, 7, 0, (1, 5), "The bumper was hit.")
+    assert see(held, "contact", False, 8, seq=5)["contact"].good == 0
+    assert see(held, "contact", False, 8, seq=6)["contact"].good == 1
+
+
 def test_a_reset_clears_what_is_latched_only() -> None:
     held = see(see({}, "estop", True, 0), "link", True, 0)
     assert set(reset(held)) == {"link"}

@@ -1,0 +1,48 @@
+"""The table of causes, once more and by hand: no mutation of it goes unseen."""
+
+import pytest
+
+from common.messages import Action
+from services.safety.causes import RULES, Clears, severity, wants_neutral
+
+RESET, SETTLED, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.AT_ONCE
+TABLE: list[tuple[str, Action, Clears]] = [
+    ("contact", "brake", RESET),
+    ("estop", "brake", RESET),
+    ("estop_reader", "brake", RESET),
+    ("predecessor", "brake", RESET),
+    ("runaway", "brake", RESET),
+    ("driver_left", "stop", RESET),
+    ("driver_right", "stop", RESET),
+    ("flapping", "stop", RESET),
+    ("leaving", "stop", SETTLED),
+    ("starting", "stop", SETTLED),
+    ("link", "stop", SETTLED),
+    ("switches", "stop", SETTLED),
+    ("bumper", "stop", SETTLED),
+    ("silent", "stop", SETTLED),
+    ("unarmed", "stop", SETTLED),
+    ("two_publishers", "stop", AT_ONCE),
+    ("neutral", "stop", AT_ONCE),
+    ("blocked", "stop", AT_ONCE),
+    ("no_request", "stop", AT_ONCE),
+    ("release", "slow", AT_ONCE),
+    ("obstacle", "slow", AT_ONCE),
+    ("sonar", "slow", AT_ONCE),
+]
+
+
+def test_the_table() -> None:
+    assert [(rule.name, rule.action, rule.clears) for rule in RULES] == TABLE
+
+
+def test_a_brake_is_worse_than_a_stop_and_a_stop_than_slow() -> None:
+    names = [name for name, _, _ in TABLE]
+    assert sorted(names, key=severity) == names
+    worst = {action: severity(name)[0] for name, action, _ in TABLE}
+    assert worst["brake"] < worst["stop"] < worst["slow"]
+
+
+@pytest.mark.parametrize(("name", "clears"), [(name, clears) for name, _, clears in TABLE])
+def test_only_passing_causes_go_without_a_neutral_request(name: str, clears: Clears) -> None:
+    assert wants_neutral(name) == (clears is not AT_ONCE)
