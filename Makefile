@@ -8,7 +8,7 @@ INSTALL = $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/pytho
 INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-url 2>/dev/null))
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test check cover lint format types docs lock clean help
+.PHONY: demo up test check cover mutants lint format types docs lock clean help
 
 docs: $(STAMP) ## renew the tables of docs/bus.md and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -34,7 +34,8 @@ up: $(STAMP) ## router, simulated vehicle, bridge, safety and odometry, until ct
 test: $(STAMP) ## all tests
 	$(BIN)/pytest
 
-check: lint types cover ## what CI runs: format, lint, types, import rules, tests, coverage
+check: lint types cover ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
+	@$(MAKE) --no-print-directory mutants CHANGED=1
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -46,6 +47,9 @@ cover: $(STAMP) ## all tests, with what they cover
 	$(BIN)/pytest --cov --cov-report=
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
+
+mutants: $(STAMP) ## break each line of the cores and see a test fail; CHANGED=1: of changed files
+	$(BIN)/python -m tests.mutants $(if $(CHANGED),--changed)
 
 # The cores that decide, as the import rules name them: not a branch of theirs is untested.
 PURE = $(BIN)/python -c 'import tomllib; \
@@ -69,4 +73,4 @@ lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, 
 	$(LOCK) --constraint requirements.lock --extra teleop -o requirements-laptop.lock
 
 clean: ## remove what was made
-	rm -rf .venv out .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
+	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
