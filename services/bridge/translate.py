@@ -89,7 +89,7 @@ def driver(frame: DriverReport) -> Driver:
     """Return the faults of a driver by name, all 32 bits of them (manual 2.7)."""
     names = tuple(
         FAULT_NAMES[bit] if bit < len(FAULT_NAMES) else f"bit_{bit}"
-        for bit in range(32)
+        for bit in range(frame.fault_bits.bit_length())
         if frame.fault_bits >> bit & 1
     )
     return Driver(faults=names, bits=frame.fault_bits)

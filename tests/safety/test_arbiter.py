@@ -95,6 +95,18 @@ def test_a_new_boot_counts_anew(seq: int) -> None:
     assert ask(arbiter, later, boot=2, seq=seq)[1] == "seq_not_rising"
 
 
+def test_the_wish_is_what_was_asked_for() -> None:
+    arbiter, _ = ask(Arbiter(SOURCES), 0)
+    assert not arbiter.asks_to_move(0)
+    for linear, angular in ((0.1, -0.2), (0.0, 0.3), (0.4, 0.0)):
+        drive = Drive(
+            linear=linear, angular=angular, echo=41, boot=1, seq=arbiter.channels["teleop"].seq + 1
+        )
+        arbiter, refused = arbiter.take(Ask("teleop", drive), BEAT, AGE_NS, 0)
+        assert (arbiter.channels["teleop"].wish, refused) == (Twist(linear, angular), "")
+        assert arbiter.asks_to_move(0)
+
+
 def test_all_rivals_are_named() -> None:
     arbiter = Arbiter(SOURCES)
     for source in ("teleop", "web"):

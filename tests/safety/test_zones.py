@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from common.messages import SONAR_NAMES
 from common.settings import Vehicle
+from common.vehicle import sonar_mounts
 from services.safety.config import Safety
 from services.safety.twist import Twist
 from services.safety.zones import GRAZING_MPS, Zones, zones
@@ -23,6 +24,12 @@ twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 @pytest.fixture(scope="module")
 def field() -> Zones:
     return zones(Vehicle(), Safety())
+
+
+def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
+    vehicle = Vehicle(length=1.2, width=0.8)
+    settings = Safety(margin=0.3, react=0.2, deceleration=0.5, i_accept=("deceleration",))
+    assert zones(vehicle, settings) == Zones(sonar_mounts(vehicle), 0.6, 0.3, 0.2, 0.5)
 
 
 def only(name: str, distance: float) -> tuple[float, ...]:
