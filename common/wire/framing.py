@@ -72,7 +72,7 @@ class Framing:
 
     def __init__(self, crc: str = "crc-16", covers: Covers = "payload") -> None:
         self._crc = crc_function(crc)
-        self._covers_header = covers == "header_and_payload"
+        self._covers_header = covers != "payload"
 
     def pack(self, frame: Frame) -> bytes:
         """Return the frame with its header."""
@@ -144,5 +144,5 @@ def crc_function(name: str) -> Callable[[bytes], int]:
 def _reject(datagram: bytes, start: int, reason: Reason, detail: str) -> Rejected:
     """Give up everything from ``start`` to the next magic behind it."""
     following = datagram.find(MAGIC, start + 1)
-    end = len(datagram) if following < 0 else following
+    end = len(datagram) if following == -1 else following
     return Rejected(reason, datagram[start:end], detail)

@@ -94,6 +94,15 @@ def test_every_truncation_is_refused(kinds: Kinds, frame: Frame) -> None:
 
 
 @pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
+def test_every_truncation_behind_a_whole_frame_is_refused(kinds: Kinds, frame: Frame) -> None:
+    raw = framing.pack(frame)
+    for length in range(1, len(raw)):
+        parts = read(raw + raw[:length], kinds)
+        assert frames(parts) == [frame]
+        assert rejected(parts) == [Reason.NO_MAGIC if length < 2 else Reason.TRUNCATED]
+
+
+@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
 def test_every_flipped_bit_of_a_payload_is_refused(kinds: Kinds, frame: Frame) -> None:
     raw = framing.pack(frame)
     for bit in range(HEADER.size * 8, len(raw) * 8):
