@@ -54,6 +54,25 @@ def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order 
     return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT)
 
 
+def test_at_first_nobody_may_drive() -> None:
+    assert Lease() == Lease(
+        boot=None,
+        seq=0,
+        renewed_ns=0,
+        over_since_ns=0,
+        ready=False,
+        neutral=False,
+        hit=None,
+        sent_ns=0,
+        latched_by=None,
+    )
+
+
+def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
+    lost = on_ready(replace(ARMED, renewed_ns=0), False)
+    assert on_tick(lost, 0, LEASE, COAST, True)[1] is Order.STOP
+
+
 @pytest.mark.parametrize(
     ("state", "motion", "order", "refusal"),
     [
