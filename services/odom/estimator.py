@@ -22,6 +22,7 @@ nearest to what the velocities saw.
 """
 
 import math
+from dataclasses import replace
 from enum import StrEnum
 
 from common import messages as m
@@ -70,7 +71,7 @@ class Estimator:
         self._lead = self._anchor
         self._legs: list[Leg] = []  # from anchor to lead
         self._at_ns: int | None = None  # the time of lead
-        self._counters: Latest[m.Mileage] | None = None
+        self._counters: m.Mileage | None = None
         self._velocity: Latest[m.Velocity] | None = None
         self._comparison = Comparison(settings)
         self._news = False  # counters came since the last estimate
@@ -89,21 +90,17 @@ class Estimator:
         """Take the counters."""
         if not finite(mileage.distance, mileage.heading):
             return Outcome.NO_NUMBER
-        before = self._counters.value if self._counters else None
+        before = self._counters
         if before and before.boot == mileage.boot and mileage.seq <= before.seq:
             return Outcome.LATE
         self._advance(now_ns)
-        integrated = total(self._legs)
-        distance, turn = step(before, mileage, integrated) if before else (0.0, 0.0)
-        outcome = judge(before, mileage, distance, integrated.time_s)
-        if outcome is Outcome.USED:
-            self._count(distance, turn, integrated, now_ns)
-        else:
+        outcome = self._count(before, mileage, now_ns) if before else Outcome.FIRST
+        if outcome is not Outcome.USED:
             self._anchor = self._lead
             self._comparison.clear()
         self._lead = self._anchor
         self._legs = []
-        self._counters = Latest(mileage, now_ns)
+        self._counters = mileage
         self._news = True
         return outcome
 
@@ -131,7 +128,7 @@ class Estimator:
         self._news = False
         belief = self._lead
         for leg in self._ahead(now_ns):
-            belief = belief.moved(leg.distance, leg.turn, self._spread(leg, counted=False))
+            belief = belief.moved(leg.distance, leg.turn, self._spread(leg))
         self._comparison.look_back(now_ns)
         return m.Odometry(
             x=belief.pose.x,
@@ -146,18 +143,23 @@ class Estimator:
             slip=self._comparison.slip,
         )
 
-    def _count(self, distance: float, turn: float, integrated: Leg, now_ns: int) -> None:
-        """Move the anchor on by what was counted."""
-        for leg in fitted(self._legs, distance, turn):
-            spread = self._spread(leg, counted=True)
-            self._anchor = self._anchor.moved(leg.distance, leg.turn, spread)
-        counted = Leg(distance, turn, integrated.time_s, seen=True)
-        self._comparison.add(now_ns, counted, integrated)
+    def _count(self, before: m.Mileage, after: m.Mileage, now_ns: int) -> Outcome:
+        """Move the anchor on by what was counted, if the counters go on from those before."""
+        integrated = total(self._legs)
+        distance, turn = step(before, after, integrated)
+        outcome = judge(before, after, distance, integrated.time_s)
+        if outcome is Outcome.USED:
+            for leg in fitted(self._legs, distance, turn):
+                spread = self._spread_of_counters(leg)
+                self._anchor = self._anchor.moved(leg.distance, leg.turn, spread)
+            counted = replace(integrated, distance=distance, turn=turn)
+            self._comparison.add(now_ns, counted, integrated)
+        return outcome
 
     def _advance(self, now_ns: int) -> None:
         """Carry the lead on to now."""
         for leg in self._ahead(now_ns):
-            spread = self._spread(leg, counted=False)
+            spread = self._spread(leg)
             self._lead = self._lead.moved(leg.distance, leg.turn, spread)
             self._legs.append(leg)
         if len(self._legs) > LEGS_MAX:
@@ -186,17 +188,24 @@ class Estimator:
             return Twist(velocity.linear, velocity.angular, *variances)
         return self._comparison.twist(now_ns) if self._news else None
 
-    def _spread(self, leg: Leg, counted: bool) -> Spread:
-        """Return how well an arc is known, ``counted`` or by velocities alone, seen or not."""
-        of = self._settings
-        gap_s = 0.0 if leg.seen else max(0.0, leg.time_s - of.hold)
-        distance = of.distance_noise**2 * abs(leg.distance)
-        turn = of.turn_noise**2 * abs(leg.turn) + of.drift_noise**2 * abs(leg.distance)
-        if counted:  # its ends are known, not its shape
-            return Spread(distance, turn, of.gap_noise**2 * abs(leg.distance) if gap_s else 0.0)
-        distance += of.velocity_noise**2 * leg.time_s
-        turn += of.angular_noise**2 * leg.time_s + of.gap_turn_noise**2 * gap_s
-        return Spread(distance, turn, of.gap_noise**2 * gap_s)
+    def _spread(self, leg: Leg) -> Spread:
+        """Return how well an arc is known by velocities alone, or while there was none."""
+        of, way, gap_s = self._settings, self._spread_of_counters(leg), self._gap_s(leg)
+        return Spread(
+            way.distance + of.velocity_noise**2 * leg.time_s,
+            way.turn + of.angular_noise**2 * leg.time_s + of.gap_turn_noise**2 * gap_s,
+            of.gap_noise**2 * gap_s,
+        )
+
+    def _spread_of_counters(self, leg: Leg) -> Spread:
+        """Return how well an arc is known that was counted: its ends, not its shape in a gap."""
+        of, way = self._settings, abs(leg.distance)
+        turn = of.turn_noise**2 * abs(leg.turn) + of.drift_noise**2 * way
+        place = of.gap_noise**2 * way if self._gap_s(leg) else 0.0
+        return Spread(of.distance_noise**2 * way, turn, place)
+
+    def _gap_s(self, leg: Leg) -> float:
+        return 0.0 if leg.seen else max(0.0, leg.time_s - self._settings.hold)
 
 
 def step(before: m.Mileage, after: m.Mileage, integrated: Leg) -> tuple[float, float]:
@@ -207,10 +216,8 @@ def step(before: m.Mileage, after: m.Mileage, integrated: Leg) -> tuple[float, f
     return distance, turn
 
 
-def judge(before: m.Mileage | None, after: m.Mileage, distance: float, time_s: float) -> Outcome:
+def judge(before: m.Mileage, after: m.Mileage, distance: float, time_s: float) -> Outcome:
     """Tell whether counters go on from those before, and if not, why."""
-    if before is None:
-        return Outcome.FIRST
     if before.boot != after.boot:
         return Outcome.BRIDGE_RESTARTED
     if before.epoch != after.epoch:

@@ -160,7 +160,9 @@ def test_a_long_gap_of_the_counters_is_bounded_and_exact() -> None:
     listener = started()
     listener.board.linear, listener.board.angular = 1.0, 0.8
     listener.hear(counters=False)
-    listener.drive(LEGS_MAX + 100, counters=False)
+    listener.drive(LEGS_MAX, counters=False)
+    assert len(listener.estimator._legs) == LEGS_MAX == 512
+    listener.drive(100, counters=False)
     assert len(listener.estimator._legs) <= LEGS_MAX
     listener.board.tick()
     listener.hear()
@@ -341,6 +343,19 @@ def test_counters_alone_are_told_once_each_with_the_twist_that_they_make() -> No
     assert listener.estimator.estimate(listener.board.now_ns) is None
     listener.drive(1, velocity=False)
     assert listener.off() == EXACT
+
+
+def test_wheels_that_turn_without_counts_slip() -> None:
+    listener = driving()
+    assert listener.odometry().slip is False
+    listener.board.linear = 0.0
+    for _ in range(20):
+        listener.board.tick()
+        listener.hear(velocity=False)
+        listener.estimator.on_velocity(Velocity(linear=1.0, angular=0.0), listener.board.now_ns)
+    odometry = listener.odometry()
+    assert odometry.slip is True
+    assert odometry.residual == pytest.approx(-0.4, abs=0.03)
 
 
 def test_velocities_alone_are_followed_with_growing_doubt() -> None:
