@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.freshness import S
 from common.messages import Drive
-from services.safety.arbiter import RIVAL_NS, Arbiter
+from services.safety.arbiter import RIVAL_NS, Arbiter, Channel
 from services.safety.config import Safety
 from services.safety.heartbeat import Heartbeat
 from services.safety.inputs import Ask
@@ -113,6 +113,11 @@ def test_all_rivals_are_named() -> None:
         arbiter = accepted(arbiter, 0, source)
         arbiter, _ = ask(arbiter, 0, source=source, boot=2)
     assert arbiter.rivals(0) == "teleop, web"
+
+
+def test_a_source_is_at_first_unheard() -> None:
+    assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False)
+    assert RIVAL_NS == 500_000_000
 
 
 def test_an_absent_driver_is_none() -> None:

@@ -41,6 +41,7 @@ def test_an_inhibiting_cause_settles(now_ns: int, stays: bool) -> None:
 
 
 def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
+    assert GOOD_SAMPLES == 3
     held = see({}, "contact", True, 0, seq=1)
     for seq in range(2, 2 + GOOD_SAMPLES):
         assert still_there(held) == "Not gone yet: The bumper was hit."

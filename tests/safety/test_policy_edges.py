@@ -1,0 +1,86 @@
+"""The policy where one wrong sign or number would show: ages, edges, what is remembered."""
+
+import pytest
+
+from common.freshness import S
+from common.messages import SONAR_NAMES
+from tests.safety.scene import Scene, hit
+
+
+def test_a_decision_without_a_request_refuses_none() -> None:
+    scene = Scene().ready()
+    assert scene.decide().refused == ""
+
+
+def test_an_old_velocity_is_no_runaway() -> None:
+    scene = Scene().ready()
+    scene.linear = 0.9
+    scene.tick()
+    scene.muted = {"velocity"}
+    scene.tick(40)
+    assert "silent" in scene.state.latches
+    assert "runaway" not in scene.state.latches
+
+
+def test_a_reading_that_stays_the_same_while_driving_is_not_believed() -> None:
+    scene = Scene()
+    scene.sonar(front=3.0)
+    assert scene.ready().drive(0.3, seconds=1.0).command == "run"
+    assert scene.drive(0.3, seconds=1.5).command == "stop"
+    assert scene.state.heard.sonars[SONAR_NAMES.index("front")].fault == "stuck"
+
+
+def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
+    scene = hit()
+    scene.linear = 0.3
+    scene.tick(5)
+    assert scene.state.release.travelled == 0.0
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "trips"),
+    [
+        (0.79, 0.5, False), (0.81, 0.5, True), (-0.09, 0.5, False), (-0.11, 0.5, True),
+        (0.5, 0.99, False), (0.5, 1.01, True), (0.5, -0.19, False), (0.5, -0.21, True),
+    ],
+)  # fmt: skip
+def test_a_runaway_is_one_of_either_axis(linear: float, angular: float, trips: bool) -> None:
+    scene = Scene().running(0.5, 0.5)
+    scene.linear, scene.angular = linear, angular
+    scene.drive(0.5, 0.5, seconds=0.28)
+    assert "runaway" not in scene.state.latches
+    scene.drive(0.5, 0.5, seconds=0.04)
+    assert ("runaway" in scene.state.latches) is trips
+
+
+def test_two_publishers_are_named() -> None:
+    scene = Scene().running()
+    scene.driver_boot, scene.driver_seq = 100, 0
+    scene.ask(0.5)
+    held = scene.state.latches["two_publishers"]
+    assert held.text == "Two publishers ask on teleop."
+    assert held.token == (0, scene.now_ns)
+
+
+def test_what_no_sample_shows_is_known_by_the_time() -> None:
+    scene = Scene().running(0.5)
+    scene.linear = 0.9
+    scene.drive(0.5, seconds=0.4)
+    assert scene.state.latches["runaway"].token == (0, scene.now_ns)
+
+
+def test_the_first_bumper_sample_follows_none() -> None:
+    """Numbers start anywhere: only between two samples can one be lost."""
+    scene = Scene()
+    scene.seq = 1000
+    scene.tick()
+    assert "bumper" not in scene.state.latches
+
+
+def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
+    scene = Scene().ready()
+    before = scene.drive(0.5).twist.linear
+    scene.now_ns += S // 5
+    scene.feed()
+    after = scene.ask(0.5).twist.linear
+    assert after - before == pytest.approx(0.05)
