@@ -39,9 +39,12 @@ Latches = Mapping[str, Held]
 
 
 def observe(
-    held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int
+    held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int = 0
 ) -> dict[str, Held]:
-    """Return what is held after these observations; causes that were not observed stay."""
+    """Return what is held after these observations; causes that were not observed stay.
+
+    ``settle_ns`` is for causes that settle.
+    """
     result = dict(held)
     for one in seen:
         old = held.get(one.name)

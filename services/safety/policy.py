@@ -114,7 +114,7 @@ class Policy:
         held = observe(state.latches, seen, now_ns, settle_ns)
         was_good, is_good = not _settling(state.latches), not _settling(held)
         credit = state.credit.after(now_ns, was_good and not is_good, is_good)
-        held = observe(held, [Observation("flapping", credit.is_spent, tick)], now_ns, settle_ns)
+        held = observe(held, [Observation("flapping", credit.is_spent, tick)], now_ns)
         release = _press(state, inputs)
         return replace(state, latches=held, credit=credit, release=release)
 
@@ -134,7 +134,7 @@ class Policy:
         if wish and not barred:
             plan = self.planner.plan(state, inputs.measured or STILL, wish, step_s)
         seen = observations(state, wish, plan, barred, now_ns)
-        held = observe(state.latches, seen, now_ns, 0)
+        held = observe(state.latches, seen, now_ns)
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command: Command = "run" if worst in ("run", "slow") else _COMMANDS[worst]

@@ -40,6 +40,11 @@ def test_an_inhibiting_cause_settles(now_ns: int, stays: bool) -> None:
     assert held["link"].since_ns == 0
 
 
+def test_without_a_time_to_settle_none_is_needed() -> None:
+    held = see({}, "link", True, 0)
+    assert observe(held, [Observation("link", False, (1, 1))], 0) == {}
+
+
 def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
     assert GOOD_SAMPLES == 3
     held = see({}, "contact", True, 0, seq=1)

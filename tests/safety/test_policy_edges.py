@@ -4,6 +4,8 @@ import pytest
 
 from common.freshness import S
 from common.messages import SONAR_NAMES
+from services.safety.latches import Held
+from services.safety.twist import STILL
 from tests.safety.scene import Scene, hit
 
 
@@ -84,3 +86,55 @@ def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
     scene.feed()
     after = scene.ask(0.5).twist.linear
     assert after - before == pytest.approx(0.05)
+
+
+def test_what_is_held_knows_since_when() -> None:
+    scene = Scene().ready()
+    while "no_request" not in scene.state.latches:
+        scene.tick()
+    since_ns = scene.now_ns
+    scene.tick(3)
+    now_ns = scene.now_ns
+    expected = Held(since_ns, now_ns, 0, (0, now_ns), "Nobody asks to move.")
+    assert scene.state.latches["no_request"] == expected
+
+
+def test_flapping_knows_since_when() -> None:
+    scene = Scene().ready()
+    while "flapping" not in scene.state.latches:
+        scene.muted = {"bumper"}
+        scene.tick(8)
+        scene.muted = set()
+        scene.tick(40 * ("flapping" not in scene.state.latches))
+    held = scene.state.latches["flapping"]
+    assert scene.now_ns - S // 5 < held.since_ns <= held.bad_ns == scene.now_ns
+    assert held.token == (0, scene.now_ns)
+
+
+def test_room_is_not_looked_for_while_motion_is_barred() -> None:
+    scene = Scene().running()
+    scene.estop()
+    scene.linear = 0.0
+    scene.sonar(front=0.1)
+    assert scene.drive(0.5).command == "brake"
+    assert "blocked" not in scene.state.latches
+    assert scene.verdict.twist == STILL
+
+
+def test_a_wish_that_is_not_followed_is_not_told_as_a_motion() -> None:
+    scene = Scene()
+    scene.tick(40)
+    assert scene.drive(0.5).name == "inhibited"
+    assert "neutral" in scene.state.latches
+    assert scene.verdict.twist == STILL
+
+
+def test_nothing_creeps_while_two_publishers_ask() -> None:
+    scene = hit()
+    scene.ask(0.0)
+    assert scene.hold() == ""
+    assert "release" in scene.state.latches
+    scene.driver_boot, scene.driver_seq = 100, 0
+    assert scene.ask(0.0).refused == "second_publisher"
+    assert scene.verdict.command == "stop"
+    assert "release" not in scene.state.latches
