@@ -32,6 +32,10 @@ def test_payloads_both_ways(frame: Frame, payload: str) -> None:
     assert type(frame).from_bytes(raw) == frame
 
 
+def test_a_faulty_sonar_shows_all_ones() -> None:
+    assert r.SONAR_FAULT_MM == 0xFFFF
+
+
 def test_minus_zero_is_zero() -> None:
     assert r.VelocityReport.from_bytes(bytes.fromhex("00800080")) == r.VelocityReport(0, 0)
 
