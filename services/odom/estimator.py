@@ -91,10 +91,10 @@ class Estimator:
         if not finite(mileage.distance, mileage.heading):
             return Outcome.NO_NUMBER
         before = self._counters
-        if before and before.boot == mileage.boot and mileage.seq <= before.seq:
+        if before is not None and before.boot == mileage.boot and mileage.seq <= before.seq:
             return Outcome.LATE
         self._advance(now_ns)
-        outcome = self._count(before, mileage, now_ns) if before else Outcome.FIRST
+        outcome = Outcome.FIRST if before is None else self._count(before, mileage, now_ns)
         if outcome is not Outcome.USED:
             self._anchor = self._lead
             self._comparison.clear()
