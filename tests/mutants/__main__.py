@@ -84,7 +84,7 @@ def main(words: list[str]) -> None:
         print(f"\n{complaint}")
     if wrong:
         sys.exit(
-            f"mutants: {len(wrong)} complaints; write a test, or see docs/adr/0008-mutation.md"
+            f"mutants: {len(wrong)} complaints; write a test, or see docs/adr/0009-mutation.md"
         )
 
 
