@@ -19,7 +19,7 @@ from common.bus.publisher import Publisher, qos
 from common.bus.ring import Ring
 from common.bus.session import LEASE_S, Opener
 from common.errors import MessageError
-from common.keys import ESTOP_CLASS, Call, Topic, estop_key
+from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.messages import Message
 
 M = TypeVar("M", bound=Message)
@@ -163,16 +163,24 @@ class Bus:
         timeout_s: float = 2.0,
     ) -> None:
         """Make a call; exactly one of the two handlers follows."""
-        if self._session is None:
-            self._hand_over(lambda: on_refusal("there is no router"))
-            return
-        answers = Answers(call, on_reply, on_refusal, self._hand_over)
-        self._session.get(
-            call.on(self.robot),
-            zenoh.handlers.Callback(answers.queue, answers.end),
-            payload=codec.encode(request),
-            timeout=timeout_s,
-        )
+
+        def read(payload: bytes) -> R:
+            return codec.decode(payload, call.reply)
+
+        answers = Answers(call.server, read, on_reply, on_refusal, self._hand_over)
+        self._query(call.on(self.robot), codec.encode(request), answers, timeout_s)
+
+    def look_up(
+        self,
+        service: str,
+        part: str,
+        on_answer: Callable[[bytes], None],
+        on_refusal: Callable[[str], None],
+        timeout_s: float = 2.0,
+    ) -> None:
+        """Ask for a service's ``schema``, ``config`` or ``last``, as JSON; one handler follows."""
+        answers = Answers(service, bytes, on_answer, on_refusal, self._hand_over)
+        self._query(info_key(self.robot, service, part), None, answers, timeout_s)
 
     def estop(self) -> None:
         """Stop this robot; latches in safety."""
@@ -246,6 +254,15 @@ class Bus:
             )
 
         self._declare(declare)
+
+    def _query(
+        self, key: str, payload: bytes | None, answers: Answers[Any], timeout_s: float
+    ) -> None:
+        if self._session is None:
+            answers.fail("there is no router")
+            return
+        callback = zenoh.handlers.Callback(answers.queue, answers.end)
+        self._session.get(key, callback, payload=payload, timeout=timeout_s)
 
     def _queryable(self, key: str, take: Callable[[zenoh.Query], None]) -> None:
         def queue(query: zenoh.Query) -> None:

@@ -2,16 +2,16 @@
 
 import contextlib
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import zenoh
 from msgspec import Struct
 
 from common import codec
 from common.errors import MessageError
-from common.keys import Call
 
 R = TypeVar("R", bound=Struct)
+A = TypeVar("A")  # an answer, read: a call's reply, or bare bytes
 
 
 class Caller(Generic[R]):
@@ -35,17 +35,22 @@ class Caller(Generic[R]):
         self._query.drop()
 
 
-class Answers(Generic[R]):
-    """Takes what comes back for a call; exactly one of the two handlers follows."""
+class Answers(Generic[A]):
+    """Takes what comes back for a query; exactly one of the two handlers follows.
+
+    ``read`` makes an answer of the payload, or raises ``MessageError``.
+    """
 
     def __init__(
         self,
-        call: Call[Any, R],
-        on_reply: Callable[[R], None],
+        server: str,
+        read: Callable[[bytes], A],
+        on_reply: Callable[[A], None],
         on_refusal: Callable[[str], None],
         hand_over: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._call = call
+        self._server = server
+        self._to_answer = read
         self._on_reply = on_reply
         self._on_refusal = on_refusal
         self._hand_over = hand_over
@@ -62,7 +67,11 @@ class Answers(Generic[R]):
     def end(self) -> None:
         """Take the end of the answers, on a thread of Zenoh's."""
         if not self._answered:
-            self._hand_over(lambda: self._on_refusal(f"{self._call.server} does not answer"))
+            self.fail(f"{self._server} does not answer")
+
+    def fail(self, reason: str) -> None:
+        """Let the refusal follow, from any thread."""
+        self._hand_over(lambda: self._on_refusal(reason))
 
     def _read(self, reply: zenoh.Reply) -> None:
         if reply.ok is None:
@@ -70,7 +79,7 @@ class Answers(Generic[R]):
             self._on_refusal(error.decode(errors="replace"))
             return
         try:
-            message = codec.decode(reply.ok.payload.to_bytes(), self._call.reply)
+            message = self._to_answer(reply.ok.payload.to_bytes())
         except MessageError as wrong:
             self._on_refusal(str(wrong))
         else:

@@ -7,6 +7,7 @@ import zenoh
 from common import keys
 from common.bus.bus import Bus
 from common.bus.calls import Caller
+from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
 from tests.common.rig import Rig, until_heard
 from tests.support import wait_until
@@ -231,3 +232,25 @@ def test_any_query_on_an_answer_is_answered(rig: Rig) -> None:
     assert found[0].payload.to_bytes() == b'{"a": 1}'
     assert str(found[0].key_expr) == key
     assert str(found[0].encoding) == "application/json"
+
+
+def test_what_a_newcomer_asks_is_answered_as_it_stands(rig: Rig) -> None:
+    rig.bus(lambda bus: bus.answer(info_key(rig.robot, "bridge", "config"), lambda: b"{}", "text"))
+    asker = rig.bus()
+    answers: list[bytes] = []
+
+    def once() -> bool:
+        refusals: list[str] = []
+        asker.look_up("bridge", "config", answers.append, refusals.append)
+        wait_until(lambda: answers or refusals, "an answer")
+        return bool(answers)
+
+    wait_until(once, "the bridge's answer")
+    assert answers == [b"{}"]
+
+
+def test_who_tells_nothing_is_named(rig: Rig) -> None:
+    refusals: list[str] = []
+    rig.bus().look_up("odom", "config", lambda _: None, refusals.append, timeout_s=0.3)
+    wait_until(lambda: refusals, "the refusal")
+    assert refusals == ["odom does not answer"]
