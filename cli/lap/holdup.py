@@ -33,7 +33,7 @@ def settings(holdup_s: float) -> list[str]:
     longer = min(3.0, max(1.0, 3.0 * holdup_s))
     react = min(1.5, max(0.5, 2.0 * holdup_s))
     accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
-                "sources.teleop.lease"]  # fmt: skip
+                "sources.teleop.lease", "sources.checkout.lease"]  # fmt: skip
     return [
         "bus.lease=10",
         "bridge.i_accept=lease,silence,heartbeat",
@@ -48,6 +48,7 @@ def settings(holdup_s: float) -> list[str]:
         f"safety.release_lease={longer}",
         f"safety.sources.demo.lease={longer}",
         f"safety.sources.teleop.lease={longer}",
+        f"safety.sources.checkout.lease={longer}",
         f"safety.react={react}",
     ]
 

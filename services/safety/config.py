@@ -51,6 +51,7 @@ class Source(settings.Section, frozen=True, kw_only=True):
 def _sources() -> dict[str, Source]:
     return {
         "teleop": Source(priority=30, lease=0.3),
+        "checkout": Source(priority=25, lease=0.3),
         "web": Source(priority=20, lease=0.3),
         "demo": Source(priority=15, lease=0.3),
         "nav": Source(priority=10, lease=0.2),
