@@ -34,6 +34,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         ("latency", "--once"),
         ("config", "--json"),
         ("wire", "identify-crc"),
+        ("checkout", "watchdog"),
     ],
 )
 def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixture[str]) -> None:

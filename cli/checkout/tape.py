@@ -1,0 +1,67 @@
+"""What is heard on the bus since the last mark, each message with its local receive time."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival, Bus
+from common.freshness import Latest
+
+DEPTH = 64  # more than comes between two rounds of the loop
+ZEROS_FROM = 8  # where a frame's payload begins
+
+
+class Tape:
+    """Records every message that the checkout judges by; in the loop's thread."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.links: list[Latest[m.Link]] = []
+        self.safety: list[Latest[m.SafetyState]] = []
+        self.motions: list[Latest[m.Motion]] = []
+        self.velocities: list[Latest[m.Velocity]] = []
+        self.mileages: list[Latest[m.Mileage]] = []
+        self.ultrasonics: list[Latest[m.Ultrasonic]] = []
+        self.bumpers: list[Latest[m.Bumper]] = []
+        self.drivers: list[Latest[m.Driver]] = []
+        self.switches: list[Latest[m.Switches]] = []
+        self.health: list[Latest[m.Health]] = []
+        self.frames = 0  # heard with the board's own bytes
+        self.telling = 0  # of these, with a payload that is not zeros
+        self._marked_ns = 0
+        self._lists: list[list[Any]] = []
+        for topic, heard in (
+            (keys.LINK, self.links),
+            (keys.SAFETY, self.safety),
+            (keys.MOTION, self.motions),
+            (keys.VELOCITY, self.velocities),
+            (keys.MILEAGE, self.mileages),
+            (keys.ULTRASONIC, self.ultrasonics),
+            (keys.BUMPER, self.bumpers),
+            (keys.SWITCHES, self.switches),
+        ):
+            bus.subscribe(topic, self._into(heard), depth=DEPTH)
+        bus.subscribe(keys.DRIVER, self._into(self.drivers), depth=DEPTH, side="*")
+        bus.subscribe(keys.HEALTH, self._into(self.health), depth=DEPTH, service="*")
+
+    def mark(self) -> int:
+        """Forget everything until now, what waits to be read too; return the time."""
+        self._marked_ns = time.monotonic_ns()
+        for heard in self._lists:
+            heard.clear()
+        self.frames = self.telling = 0
+        return self._marked_ns
+
+    def _into(self, heard: list[Latest[Any]]) -> Callable[[Arrival[Any]], None]:
+        self._lists.append(heard)
+
+        def take(arrival: Arrival[Any]) -> None:
+            if arrival.received_ns < self._marked_ns:
+                return
+            heard.append(Latest(arrival.message, arrival.received_ns))
+            if arrival.raw:
+                self.frames += 1
+                self.telling += any(arrival.raw[ZEROS_FROM:])
+
+        return take

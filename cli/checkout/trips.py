@@ -1,0 +1,35 @@
+"""Resets: the one that a step judges, and the one that makes room for a step."""
+
+from cli.checkout.bench import Bench
+from cli.checkout.latches import Reset
+from cli.checkout.operator import Operator
+from common import keys
+from common import messages as m
+
+AFTER_S = 2.0  # for safety to say that nothing is latched any more
+PHRASE = "reset"
+
+
+def reset(bench: Bench) -> Reset:
+    """Ask for a reset, and say what stayed latched after it."""
+    tape = bench.tape
+    asked_ns = tape.mark()
+    granted, text = bench.call(keys.RESET, m.ResetRequest())
+    if granted:
+        bench.until(lambda: tape.safety and not bench.latched(), AFTER_S)
+    else:
+        bench.until(lambda: tape.safety, AFTER_S)
+    return Reset(asked_ns, granted, text, bench.latched())
+
+
+def unlatch(bench: Bench, operator: Operator) -> str:
+    """Have what is latched reset on the operator's word; return why not, or an empty text."""
+    bench.tape.mark()
+    bench.until(lambda: bench.tape.safety, AFTER_S)
+    if not bench.latched():
+        return ""
+    fact = f"Safety holds, from before: {', '.join(bench.latched())}. It must be reset first."
+    if not operator.confirm(fact, PHRASE):
+        return "What safety held from before was not reset."
+    done = reset(bench)
+    return "" if done.granted and not done.latched else f"The reset was refused: {done.text}"
