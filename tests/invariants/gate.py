@@ -1,0 +1,80 @@
+"""The oracle's book on one bridge: what it was told, and which RUN it may therefore pass on."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from common.freshness import S
+from common.messages import Motion
+from common.wire import reports as r
+from common.wire.frame import Frame
+
+LEASE_NS, SILENCE_NS = S // 5, S // 5
+SLACK_NS = S // 40  # the bridge looks every 10 ms
+CLEAR_SAMPLES = 3
+
+
+@dataclass(slots=True)
+class Gate:
+    """What one bridge was told, by the time of delivery."""
+
+    boot: int
+    heard_ns: int | None = None
+    ultrasonic: bool | None = None
+    bumper: bool | None = None
+    authority: int | None = None
+    seq: int = 0
+    renewed_ns: int = 0
+    neutral: bool = False
+    clear: int = CLEAR_SAMPLES  # samples in a row
+    published: int = 0  # bumper samples
+    brake_due: bool = False  # whether a hit was told and no BREAK has left yet
+
+    def on_report(self, frame: Frame, now_ns: int) -> bool:
+        """Take a frame of the board in; tell whether a hit begins with it."""
+        if self.heard_ns is None or now_ns - self.heard_ns > SILENCE_NS + SLACK_NS:
+            self.ultrasonic = self.bumper = None
+            self.neutral = False
+        self.heard_ns = now_ns
+        if isinstance(frame, r.UltrasonicBrakeReport):
+            self.ultrasonic = frame.on
+        elif isinstance(frame, r.BumperBrakeReport):
+            self.bumper = frame.on
+        elif isinstance(frame, r.BumperReport):
+            return self._on_bumper(frame.on)
+        if not (self.ultrasonic and self.bumper):
+            self.neutral = False
+        return False
+
+    def _on_bumper(self, pressed: bool) -> bool:
+        hit = pressed and self.clear >= CLEAR_SAMPLES
+        self.clear = 0 if pressed else self.clear + 1
+        self.brake_due = self.brake_due or hit
+        return hit
+
+    def on_motion(self, motion: Motion, now_ns: int) -> bool:
+        """Take a motion in; tell whether it comes from who has the say, and in order."""
+        over = now_ns - self.renewed_ns > LEASE_NS
+        if motion.boot != self.authority:
+            if self.authority is not None and not over:
+                return False
+            self.authority, self.seq, self.neutral = motion.boot, motion.seq - 1, False
+        if motion.seq <= self.seq:
+            return False
+        self.seq, self.renewed_ns = motion.seq, now_ns
+        if over:
+            self.neutral = False
+        if motion.command != "run" or motion.linear == 0 == motion.angular:
+            self.neutral = self.neutral or self.ready(now_ns)
+        return True
+
+    def ready(self, now_ns: int) -> bool:
+        """Tell whether the board is there, with both of its brakes on."""
+        heard = self.heard_ns is not None and now_ns - self.heard_ns <= SILENCE_NS + SLACK_NS
+        return heard and self.ultrasonic is True and self.bumper is True
+
+    def complaints(self, now_ns: int) -> Iterator[str]:
+        """Say why no RUN must leave now."""
+        if not self.ready(now_ns):
+            yield "the board is silent, or its brakes are not both on"
+        if not self.neutral:
+            yield "no neutral motion came since the bridge began, lost something or changed hands"

@@ -1,0 +1,239 @@
+"""The real shells of bridge and safety, a vehicle, and people, in one thread and simulated time."""
+
+import sys
+import time as real_time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest.mock import patch
+
+import msgspec
+
+from common import keys
+from common import messages as m
+from common.freshness import S
+from common.wire.commands import MotionCommand, MotionKind
+from common.wire.framing import Framing, Received
+from common.wire.reports import FROM_BOARD
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from services.safety.config import SafetyConfig
+from services.safety.ports import Ports
+from tests.invariants.judge import STEP_NS, Judge
+from tests.invariants.net import MS, Letter, Net
+from tests.invariants.process import ROBOT, Process
+from tests.invariants.vehicle import Vehicle
+
+START_NS = 100 * S
+ASK_NS = 50 * MS
+BREAK_NS = 50 * MS
+
+
+# The modules of the services that look at the clock.
+TIMED = [
+    module
+    for name, module in sys.modules.items()
+    if name.startswith("services.") and getattr(module, "time", None) is real_time
+]
+
+
+class Sockets:
+    """The bridge's end of the cable; one port is enough here."""
+
+    refused = 0
+    last_stranger = None
+
+    def __init__(self, stack: "Stack", process: Process) -> None:
+        self.sockets = [object()]
+        self._stack = stack
+        self._process = process
+        self._framing = Framing()
+
+    def read(self, port: int) -> Iterator[bytes]:
+        """Yield what waits, after the judge has seen it."""
+        inbox = self._stack.vehicle.inbox
+        while inbox:
+            datagram = inbox.popleft()
+            parts = self._framing.read(datagram, FROM_BOARD)
+            frames = [part.frame for part in parts if isinstance(part, Received)]
+            self._stack.judge.on_report(self._process, datagram, frames)
+            yield datagram
+
+    def send(self, datagram: bytes, port: int) -> None:
+        """Send to the board, with the judge's complaints."""
+        complaints = self._stack.judge.on_leaving(self._process, datagram)
+        self._stack.vehicle.hear(datagram, complaints)
+
+
+class Stick:
+    """Someone who asks to drive while ``asks`` is set."""
+
+    def __init__(self, name: str, process: Process) -> None:
+        self.name = name
+        self.process = process
+        self.asks: tuple[float, float] | None = None
+        self.echo = 0
+        self.seq = 0
+        process.subscribe(keys.SAFETY, self._listen)
+
+    def _listen(self, arrival: Any) -> None:
+        self.echo = arrival.message.heartbeat
+
+    def ask(self) -> None:
+        """Put one request, if it asks at all."""
+        if self.asks is not None:
+            self.seq += 1
+            linear, angular = self.asks
+            self.put(m.Drive(linear=linear, angular=angular, echo=self.echo, seq=self.seq))
+
+    def put(self, drive: m.Drive, source: str = "") -> None:
+        """Put any request."""
+        process = self.process
+        drive = msgspec.structs.replace(drive, boot=drive.boot or process.boot)
+        key = keys.DRIVE.on(ROBOT, source=source or self.name)
+        process.send(Letter(key, drive, process.boot, process.net.now_ns))
+
+
+class Stack:
+    """Everything, turned by hand; ``run`` lets time pass."""
+
+    def __init__(self) -> None:
+        self.net = Net(START_NS)
+        self.judge = Judge(START_NS)
+        self.vehicle = Vehicle(self.net)
+        self.vehicle.on_motion = self.judge.on_board
+        self._boots = 1000
+        self._brake_ns: int | None = None  # when the guard brakes next
+        self._starts: dict[str, int] = {}
+        self.safety = self._start("safety")
+        self.bridge = self._start("bridge")
+        self.sticks = {
+            name: Stick(name, self._process("stick", None)) for name in ("teleop", "nav")
+        }
+        self.hand = self._process("hand", None)
+
+    def run(self, duration_ms: int) -> None:
+        """Let time pass."""
+        end_ns = self.net.now_ns + duration_ms * MS
+        while self.net.now_ns < end_ns:
+            self.net.now_ns += STEP_NS
+            self.judge.now_ns = self.net.now_ns
+            with self.time():
+                self._turn()
+
+    def _turn(self) -> None:
+        for name, due_ns in list(self._starts.items()):
+            if due_ns <= self.net.now_ns:
+                setattr(self, name, self._start(name))
+                del self._starts[name]
+        self.vehicle.turn()
+        self._guard()
+        self.net.turn()
+        for process in (self.bridge, self.safety):
+            process.turn()
+            self.net.turn()
+        if self.net.now_ns % ASK_NS == 0:
+            for stick in self.sticks.values():
+                stick.ask()
+            self.net.turn()
+        self.judge.on_step(self.vehicle.silent)
+
+    def _guard(self) -> None:
+        """Brake while there is no bridge: a model, the real one is tested in ``tests/bridge``."""
+        if self.bridge.alive or (self._brake_ns or 0) > self.net.now_ns:
+            return
+        self._brake_ns = self.net.now_ns + BREAK_NS
+        self.vehicle.hear(Framing().pack(MotionCommand(MotionKind.BREAK)), ())
+
+    # --- processes --------------------------------------------------------------------------
+
+    def _process(self, name: str, config: Any) -> Process:
+        self._boots += 1
+        return Process(name, self.net, config, self._boots, self.judge)
+
+    def _start(self, name: str) -> Process:
+        config = SafetyConfig() if name == "safety" else BridgeConfig()
+        process = self._process(name, config)
+        self.judge.on_start(process)
+        with self.time():
+            if name == "safety":
+                Ports(process, process)  # type: ignore[arg-type]
+            else:
+                made = Sockets(self, process)
+                with patch("services.bridge.bridge.Sockets", lambda *_, **__: made):
+                    Bridge(process)  # type: ignore[arg-type]
+        return process
+
+    def kill(self, name: str, pause_ms: int) -> None:
+        """Kill a process; another one starts after a pause."""
+        process: Process = getattr(self, name)
+        if not process.alive:
+            return
+        process.alive = False
+        self.judge.on_end(process)
+        self._starts[name] = self.net.now_ns + pause_ms * MS
+        self._brake_ns = None
+        if name == "bridge":
+            self.vehicle.inbox.clear()
+
+    def hang(self, name: str, duration_ms: int) -> None:
+        """Let a process do nothing for so long."""
+        getattr(self, name).hung_until_ns = self.net.now_ns + duration_ms * MS
+
+    def power_cycle(self, duration_ms: int) -> None:
+        """Start the board anew."""
+        self.vehicle.power_cycle(duration_ms)
+        self.judge.on_power_cycle()
+        self.run(duration_ms)
+        self.judge.comeback_ns = self.net.now_ns
+
+    def router(self, up: bool) -> None:
+        """Take the router away, or bring it back."""
+        self.net.up = self.judge.reader_up = up
+
+    # --- people -----------------------------------------------------------------------------
+
+    def estop(self) -> None:
+        """Press the emergency stop."""
+        self.hand.send(Letter(keys.estop_key(ROBOT), m.Message(), self.hand.boot, self.net.now_ns))
+        self.run(5)
+
+    def reset(self) -> bool:
+        """Ask for a reset."""
+        with self.time():
+            caller = self.safety.call(keys.RESET, m.ResetRequest())
+        self.judge.on_reset(self.safety, caller.done is True)
+        self.run(5)
+        return caller.done is True
+
+    def hold(self, held: bool) -> bool:
+        """Hold the release, or let it go."""
+        self.judge.on_hold(self.safety, held)
+        with self.time():
+            caller = self.safety.call(keys.RELEASE, m.ReleaseRequest(held=held))
+        self.judge.on_hold(self.safety, held and caller.done is True)
+        self.run(5)
+        return caller.done is True
+
+    @contextmanager
+    def time(self) -> Iterator[None]:
+        """Let the services' code see the simulated time."""
+        clock = Clock(self.net)
+        try:
+            for module in TIMED:
+                module.time = clock  # type: ignore[attr-defined]
+            yield
+        finally:
+            for module in TIMED:
+                module.time = real_time  # type: ignore[attr-defined]
+
+
+class Clock:
+    """Stands for the module ``time``."""
+
+    def __init__(self, net: Net) -> None:
+        self._net = net
+
+    def monotonic_ns(self) -> int:
+        """Return the simulated time."""
+        return self._net.now_ns

@@ -1,0 +1,43 @@
+"""What the machine draws from: few values, dense where something tips over."""
+
+import math
+
+from hypothesis import strategies as st
+
+from common import messages as m
+from tests.invariants.net import CLEAR, Weather
+from tests.invariants.vehicle import NO_ECHO_MM
+
+BUS = st.sampled_from(["drive", "motion", "state", "streams"])
+CABLE = st.sampled_from(["to_board", "from_board"])
+ON_BUS = st.sampled_from(
+    [CLEAR, Weather(late_ms=30), Weather(late_ms=120), Weather(lose=2), Weather(lose=3),
+     Weather(double=2), Weather(hold=3), Weather(late_ms=20, lose=5, double=3, hold=4),
+     Weather(lose=1)]
+)  # fmt: skip
+ON_CABLE = st.sampled_from(
+    [CLEAR, Weather(late_ms=20), Weather(lose=2), Weather(lose=3), Weather(double=2)]
+)
+SPEEDS = st.sampled_from([0.0, 0.3, 1.0, -0.5, 5.0])
+FAST = st.sampled_from([1.0, 0.6, -1.0])
+TURNS = st.sampled_from([0.0, 0.0, 0.4, -1.0, 9.0])
+SOURCES = st.sampled_from(["teleop", "nav"])
+PROCESSES = st.sampled_from(["safety", "bridge"])
+SHORT = st.sampled_from([5, 20, 60, 150, 210, 320])
+LONG = st.sampled_from([400, 700, 1200])
+RANGES_MM = st.sampled_from([NO_ECHO_MM, 0xFFFF, 0, 120, 190, 210, 260, 400, 800, 1500])
+NEAR_MM = st.sampled_from([190, 210, 260, 400, 800])
+HOSTILE = {
+    "nan": m.Drive(linear=math.nan, angular=0.0, echo=0),
+    "infinite": m.Drive(linear=math.inf, angular=0.0, echo=0),
+    "unknown echo": m.Drive(linear=0.5, angular=0.0, echo=-7),
+    "old echo": m.Drive(linear=0.5, angular=0.0, echo=-12),
+    "again": m.Drive(linear=0.5, angular=0.0, echo=0),
+    "rival": m.Drive(linear=0.5, angular=0.0, echo=0, boot=5),
+    "rival zero": m.Drive(linear=0.0, angular=0.0, echo=0, boot=6),
+}
+FORGED = [
+    m.Motion(command="run", linear=0.7, judged=2**40, boot=666),
+    m.Motion(command="stop", boot=666),
+    m.Motion(command="run", linear=math.nan, boot=666),
+]
