@@ -1,4 +1,4 @@
-"""Writes what is made from the code: the tables of ``docs/bus.md`` and the JSON schemas.
+"""Writes what is made from the code: tables of ``docs/bus.md`` and ``docs/safety.md``, schemas.
 
 ``make docs`` runs it; a test runs it against what is committed. The prose around the tables is
 written by hand, the tables stand between ``<!-- name -->`` and ``<!-- end -->``.
@@ -8,13 +8,14 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
 
+from cli import states
 from common import codec, keys
 from common import messages as m
 
@@ -32,24 +33,26 @@ def main() -> int:
 
 def generated() -> dict[Path, str]:
     """Return the text that each generated file should have."""
-    bus = DOCS / "bus.md"
-    return {bus: filled(bus.read_text(encoding="utf-8"))} | {
-        DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()
-    }
-
-
-def filled(text: str) -> str:
-    """Return the page with its tables made anew."""
-    tables = {
+    schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
+    bus = {
         "topics": topics(),
         "calls": calls(),
         "classes": classes(),
         "fields": "\n".join(fields(kind) for kind in kinds()),
     }
-    for name, table in tables.items():
+    safety = {"states": states.diagram(), "causes": causes()}
+    pages = {DOCS / "bus.md": bus, DOCS / "safety.md": safety}
+    return {
+        page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()
+    } | schemas
+
+
+def filled(text: str, blocks: Mapping[str, str]) -> str:
+    """Return the page with its blocks made anew."""
+    for name, block in blocks.items():
         begin = text.index(f"<!-- {name} -->\n") + len(f"<!-- {name} -->\n")
         end = text.index("<!-- end -->", begin)
-        text = f"{text[:begin]}{table}\n{text[end:]}"
+        text = f"{text[:begin]}{block}\n{text[end:]}"
     return text
 
 
@@ -112,6 +115,11 @@ def fields(kind: type[Struct]) -> str:
     carried = f" Encoding `{codec.encoding(kind)}`." if kind is not m.Message else ""
     head = f"### {kind.__name__}\n\n{summary}{carried}\n"
     return head + (f"\n{table(('field', 'type', 'default', ''), rows)}\n" if rows else "")
+
+
+def causes() -> str:
+    """Return the table of what holds the vehicle back."""
+    return table(("cause", "action", "latched", "clears", "in words"), states.causes())
 
 
 def spelt(kind: str) -> str:

@@ -1,0 +1,210 @@
+"""The states of safety, found by walking the real policy: for the diagram in ``docs/safety.md``.
+
+From its start the policy is put through every stimulus of a short list, from every situation that
+is found on the way, until nothing new is found. A state of the diagram is a verdict, told apart by
+whether a reset is due; what is drawn is what happened.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TypeVar
+
+from msgspec.structs import replace as with_fields
+
+from common.freshness import Latest, S
+from common.messages import (
+    Bumper,
+    Drive,
+    Driver,
+    Link,
+    Message,
+    RangeStatus,
+    Switches,
+    Ultrasonic,
+    Velocity,
+)
+from common.settings import Vehicle
+from services.safety.causes import RULES, SEVERITY, Clears, clears
+from services.safety.config import Safety
+from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.latches import latched
+from services.safety.policy import Policy
+from services.safety.state import State
+
+TICK_NS = S // 20
+QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease, than inputs take to settle
+FREE_M, NEAR_M, INSIDE_M = None, 0.3, 0.1
+FRONT = (1, 2, 3)  # of the sonars
+M = TypeVar("M", bound=Message)
+DRIVER_BOOT, BRIDGE_BOOT = 1, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is so around the policy, and its memory."""
+
+    state: State
+    now_ns: int = 10 * S
+    seq: int = 0
+    asks: float | None = None  # m/s; None for nobody
+    holds: bool = False  # the release
+    link: bool = True
+    pressed: bool = False
+    faulty: bool = False
+    ahead_m: float | None = FREE_M
+
+    @property
+    def troubles(self) -> int:
+        """Count what is not as it should be; the walk goes no farther than one at a time."""
+        blocked = self.ahead_m is not FREE_M
+        aimless = 2 * (self.holds and not self.pressed)
+        return (not self.link) + self.pressed + self.faulty + blocked + aimless
+
+    @property
+    def name(self) -> str:
+        """Name the state of the diagram that this is in."""
+        verdict = self.state.verdict
+        if verdict.source == "release":
+            return "creeping"
+        if verdict.name == "stop" and latched(self.state.latches):
+            return "stop_latched"
+        return verdict.name
+
+
+Stimulus = Callable[[Scene], tuple[Scene, Event | None]]
+
+STIMULI: dict[str, Stimulus] = {
+    "inputs good": lambda it: (replace(it, link=True), None),
+    "an input is lost": lambda it: (replace(it, link=False), None),
+    "zero is asked": lambda it: (replace(it, asks=0.0), None),
+    "motion is asked": lambda it: (replace(it, asks=0.3), None),
+    "nobody asks": lambda it: (replace(it, asks=None), None),
+    "bumper hit": lambda it: (replace(it, pressed=True), None),
+    "bumper free": lambda it: (replace(it, pressed=False), None),
+    "driver fault": lambda it: (replace(it, faulty=True), None),
+    "driver well": lambda it: (replace(it, faulty=False), None),
+    "obstacle near": lambda it: (replace(it, ahead_m=NEAR_M), None),
+    "obstacle in the margin": lambda it: (replace(it, ahead_m=INSIDE_M), None),
+    "way free": lambda it: (replace(it, ahead_m=FREE_M), None),
+    "emergency stop": lambda it: (it, Estop()),
+    "reset": lambda it: (it, Reset()),
+    "release held": lambda it: (replace(it, holds=True), None),
+    "release let go": lambda it: (replace(it, holds=False), Hold(False)),
+}
+
+
+@cache
+def transitions() -> list[tuple[str, str, str]]:
+    """Return from, stimulus and to of everything that changes the state; sorted."""
+    policy = Policy(Safety(), Vehicle())
+    first = _run(policy, Scene(policy.start(), link=False), None)
+    known, due = {_situation(first)}, [first]
+    found = {("[*]", "", first.name)}
+    while due:
+        before = due.pop()
+        idle = _run(policy, before, None).name
+        if idle != before.name:
+            found.add((before.name, "time", idle))
+        for name, stimulus in STIMULI.items():
+            changed, event = stimulus(before)
+            if changed == before and event is None:
+                continue
+            after = _run(policy, changed, event)
+            if after.name not in (before.name, idle):
+                found.add((before.name, name, after.name))
+            if after.troubles <= 1 and _situation(after) not in known:
+                known.add(_situation(after))
+                due.append(after)
+    return sorted(found)
+
+
+def diagram() -> str:
+    """Return the states as a Mermaid diagram; stimuli with the same ends share an arrow."""
+    arrows: dict[tuple[str, str], list[str]] = {}
+    for before, why, after in transitions():
+        arrows.setdefault((before, after), []).append(why)
+    lines = ["```mermaid", "stateDiagram-v2"]
+    for (before, after), reasons in arrows.items():
+        label = f" : {', '.join(reasons)}" if any(reasons) else ""
+        lines.append(f"    {before} --> {after}{label}")
+    return "\n".join([*lines, "```"])
+
+
+def causes() -> Iterator[tuple[str, str, str, str, str]]:
+    """Yield each cause as a row: name, action, latched, how it clears, words; the worst first."""
+    how = {
+        Clears.RESET: "reset",
+        Clears.SETTLED: "by itself after 0.5 s, then a neutral request",
+        Clears.AT_ONCE: "by itself",
+    }
+    for rule in sorted(RULES, key=lambda rule: -SEVERITY[rule.action]):
+        yes = "yes" if rule.clears is Clears.RESET else "no"
+        yield f"`{rule.name}`", rule.action.upper(), yes, how[rule.clears], rule.text
+
+
+def _situation(scene: Scene) -> tuple[object, ...]:
+    """Return what tells situations apart; the rest is history."""
+    armed = any(one.neutral for one in scene.state.arbiter.channels.values())
+    around = scene.asks, scene.holds, scene.link, scene.pressed, scene.faulty, scene.ahead_m
+    has_moved = scene.state.moved is not None  # a release knows the way back only then
+    return scene.name, armed, has_moved, latched(scene.state.latches), around
+
+
+def _run(policy: Policy, scene: Scene, event: Event | None) -> Scene:
+    """Let a stimulus act, with an event at its beginning, until it has settled."""
+    for tick in range(PATIENCE):
+        settling = any(clears(name) is Clears.SETTLED for name in scene.state.latches)
+        if tick >= QUICK and not (scene.link and settling):
+            break
+        scene = replace(scene, now_ns=scene.now_ns + TICK_NS, seq=scene.seq + 1)
+        beat = scene.state.heartbeat.beat(scene.now_ns)
+        scene = replace(scene, state=replace(scene.state, heartbeat=beat))
+        for one in _events(scene, event if tick == 0 else None):
+            inputs = replace(_inputs(scene), event=one)
+            state, _ = policy.decide(scene.state, inputs, scene.now_ns)
+            scene = replace(scene, state=state)
+    return scene
+
+
+def _events(scene: Scene, event: Event | None) -> Iterator[Event | None]:
+    yield event
+    if scene.asks is not None:
+        drive = Drive(
+            linear=scene.asks,
+            angular=0.0,
+            echo=scene.state.heartbeat.number,
+            seq=scene.seq,
+            boot=DRIVER_BOOT,
+        )
+        yield Ask("teleop", drive)
+    if scene.holds:
+        yield Hold(True)
+
+
+def _inputs(scene: Scene) -> Inputs:
+    status: list[RangeStatus] = ["no_echo"] * 8
+    ranges: list[float | None] = [None] * 8
+    for sonar in FRONT if scene.ahead_m is not None else ():
+        status[sonar], ranges[sonar] = "ok", scene.ahead_m
+    way = "" if scene.link else "link lost"
+    link = Link(
+        state="up" if scene.link else "lost", board="", epoch=0, armed=scene.link, waiting=way,
+        rates={}, rejected={}, round_trip=None,
+    )  # fmt: skip
+    twist = scene.state.verdict.twist
+    return Inputs(
+        velocity=_new(Velocity(linear=twist.linear, angular=twist.angular), scene),
+        ultrasonic=_new(Ultrasonic(ranges=tuple(ranges), status=tuple(status)), scene),
+        bumper=_new(Bumper(pressed=scene.pressed), scene),
+        left=_new(Driver(faults=(), bits=int(scene.faulty)), scene),
+        right=_new(Driver(faults=(), bits=0), scene),
+        switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), scene),
+        link=_new(link, scene),
+        reader=True,
+    )
+
+
+def _new(message: M, scene: Scene) -> Latest[M]:
+    """Return a sample that has just come."""
+    return Latest(with_fields(message, seq=scene.seq, boot=BRIDGE_BOOT), scene.now_ns)
