@@ -94,7 +94,7 @@ def _from_file(file: Path) -> dict[str, Setting]:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"{origin}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
         raise ConfigError(f"{origin}: is no TOML: {error}") from None
     return _leaves("", table, origin)
 
@@ -107,12 +107,16 @@ def _nearby(file: Path) -> str:
 
 def _leaves(path: str, value: Any, origin: str) -> dict[str, Setting]:
     """Return every setting in a value; an empty file has none."""
-    return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
+    try:
+        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
+    except RecursionError:
+        raise ConfigError(f"{origin}: tables are nested too deep") from None
 
 
 def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> dict[str, Setting]:
     given: dict[str, Setting] = {}
     for name in sorted(name for name in environ if name.upper().startswith(ENV_PREFIX)):
+        _check_text(f"environment {name}", name + environ[name])
         path = name[len(ENV_PREFIX) :].lower().replace("__", ".")
         given |= _leaves(path, _parse(root, path, environ[name]), f"environment {name}")
     return given
@@ -121,11 +125,21 @@ def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> dict[str, S
 def _from_sets(root: type[Struct], sets: Sequence[str]) -> dict[str, Setting]:
     given: dict[str, Setting] = {}
     for text in sets:
+        _check_text(f"--set {text}", text)
         path, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not path:
             raise ConfigError(f"--set {text}: should look like board.port=4002")
         given |= _leaves(path, _parse(root, path, value), f"--set {text}")
     return given
+
+
+def _check_text(origin: str, text: str) -> None:
+    """Refuse what came from the system as bytes that are no UTF-8."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        shown = origin.encode(errors="backslashreplace").decode()
+        raise ConfigError(f"{shown}: is no UTF-8") from None
 
 
 def _parse(root: type[Struct], path: str, text: str) -> Any:
@@ -141,7 +155,7 @@ def _parse(root: type[Struct], path: str, text: str) -> Any:
 def _toml(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # as in a file
         return text
 
 
@@ -187,7 +201,8 @@ def _explain(
     error: str, root: type[Struct], tree: Any, given: Mapping[str, Setting]
 ) -> ConfigError:
     """Turn msgspec's sentence into origin, field, value and what is allowed."""
-    what, _, at = error.partition(" - at `$")
+    head, mark, tail = error.rpartition(" - at `$")  # the last one: a field may be called so
+    what, at = (head, tail) if mark else (tail, "")
     path, kind = _locate(at.rstrip("`"), root, tree)
     unknown = re.search(r"unknown field `(.*)`", what)
     if unknown:
