@@ -1,0 +1,1 @@
+"""Hostile bytes for all that reads bytes from outside: frames, messages, settings."""
