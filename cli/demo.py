@@ -1,7 +1,6 @@
 """``t2 demo``: a simulated T2 drives a lap through the real services."""
 
 import argparse
-import signal
 import socket
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from cli.interrupt import interruptible
 from cli.lap import holdup
 from cli.lap.driver import PERIOD_S, Driver
 from cli.lap.score import good, read, results
@@ -88,13 +88,7 @@ def drive(
 ) -> int:
     """Keep the processes running until the lap is over, or patience is; return a signal or 0."""
     began_ns = time.monotonic_ns()
-    signals: list[int] = []
-
-    def leave(number: int, _: object) -> None:
-        signals.append(number)
-        loop.stop()
-
-    with log_file(options).open("wb") as output:
+    with log_file(options).open("wb") as output, interruptible(loop) as signals:
         supervisor = Supervisor(traced(options), output)
 
         def look(now_ns: int) -> None:
@@ -103,7 +97,6 @@ def drive(
             if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * S:
                 loop.stop()
 
-        before = {name: signal.signal(name, leave) for name in (signal.SIGINT, signal.SIGTERM)}
         loop.every(LOOK_S, look)
         loop.every(PERIOD_S, driver.on_beat)
         loop.every(DRAW_S, lambda now_ns: draw(driver, now_ns))
@@ -111,8 +104,6 @@ def drive(
             loop.run()
         finally:
             supervisor.end()
-            for name, handler in before.items():
-                signal.signal(name, handler)
     return signals[0] if signals else 0
 
 
@@ -148,8 +139,8 @@ def log_file(options: argparse.Namespace) -> Path:
 
 def own_ports() -> list[str]:
     """Return settings with ports of the demo's own, so that it runs beside ``t2 up``."""
-    board, first, second = (_free(socket.SOCK_DGRAM) for _ in range(3))
-    router = _free(socket.SOCK_STREAM)
+    board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
+    router = free_port(socket.SOCK_STREAM)
     return [
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
@@ -160,7 +151,8 @@ def own_ports() -> list[str]:
     ]
 
 
-def _free(kind: socket.SocketKind) -> int:
+def free_port(kind: socket.SocketKind) -> int:
+    """Return a port of 127.0.0.1 that was free a moment ago."""
     with socket.socket(socket.AF_INET, kind) as sock:
         sock.bind(("127.0.0.1", 0))
         port: int = sock.getsockname()[1]
