@@ -8,7 +8,7 @@ INSTALL = $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/pytho
 INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-url 2>/dev/null))
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz check cover mutants lint format types docs lock clean help
+.PHONY: demo up test fuzz soak check cover mutants lint format types docs lock clean help
 
 docs: $(STAMP) ## renew the tables of docs/bus.md and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -36,6 +36,9 @@ test: $(STAMP) ## all tests
 
 fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
+
+soak: $(STAMP) ## laps with random faults and kill -9 for MINUTES=30, watching memory and more
+	$(BIN)/t2 soak --minutes $(or $(MINUTES),30)
 
 check: lint types cover ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

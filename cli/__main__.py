@@ -17,6 +17,7 @@ from common.options import EXIT_CONFIG, EXIT_LINK
 COMMANDS = {
     "up": "router, simulated vehicle, bridge, safety and odometry, until ctrl-c",
     "demo": "a simulated T2 drives a lap through the real services",
+    "soak": "lap after lap with random faults and kill -9, watching memory and more",
     "drive": "drive from this terminal, by keys or gamepad",
     "router": "the embedded Zenoh router alone",
     "sim": "the simulated vehicle alone",

@@ -83,9 +83,9 @@ def picture(canvas: Canvas, driver: Driver, now_ns: int) -> RenderableType:
     return Panel(grid, title="T2 drives a lap", border_style="bright_black", expand=False)
 
 
-def results_table(rows: list[Result]) -> Table:
+def results_table(rows: list[Result], title: str = "The lap") -> Table:
     """Return the results as a table."""
-    table = Table(title="The lap", title_justify="left", show_header=False)
+    table = Table(title=title, title_justify="left", show_header=False)
     marks = {True: Text("ok", "green"), False: Text("WRONG", "bold red"), None: Text("")}
     for what, amount, fine in rows:
         table.add_row(what, Text(amount, justify="right"), marks[fine])

@@ -28,6 +28,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     [
         ("up", "--no-sim"),
         ("demo", "--fast"),
+        ("soak", "--minutes"),
         ("drive", "--source"),
         ("router", "--set"),
         ("sim", "--world"),

@@ -1,0 +1,78 @@
+"""``t2 soak``: one short real one, and every way in which it cannot run."""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cli import soak
+from cli.__main__ import main
+from common.options import EXIT_CONFIG
+from tests.cli.processes import children, running, t2, wait_gone
+from tests.support import wait_until
+
+SOAK_S = 50
+PATIENCE_S = 160.0
+
+
+@pytest.mark.timeout(PATIENCE_S + 20)
+def test_a_short_soak(tmp_path: Path) -> None:
+    """Half a minute of life says nothing of growth, so that alone may be called wrong."""
+    out = tmp_path / "out"
+    result = subprocess.run(
+        t2("soak", "--minutes", str(SOAK_S / 60), "--seed", "19", "--out", str(out)),
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    everything = result.stdout + result.stderr
+    lines = result.stdout.splitlines()
+    wrong = [line for line in lines if "WRONG" in line]
+    growth = ("memory", "threads, descriptors")
+    assert [line for line in wrong if not any(word in line for word in growth)] == [], everything
+    assert "never lived long enough" not in everything
+    assert result.returncode == (1 if wrong else 0), everything
+    assert "Traceback" not in everything
+    assert "kill " in result.stdout
+    assert "wire " in result.stdout
+    for name in ("router", "sim", "bridge", "safety", "odom", "driver"):
+        assert any(f" {name}: memory" in line for line in lines), everything
+    assert {"soak.png", "soak.svg", "processes.log", "trace.jsonl"} == {
+        file.name for file in out.iterdir()
+    }
+
+
+@pytest.mark.parametrize("minutes", ["0", "-1", "nan", "1e9", "long"])
+def test_a_length_that_is_none_is_refused(minutes: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["soak", "--minutes", minutes])
+    assert end.value.code == 2
+    assert minutes in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert main(["soak", "--out", str(tmp_path / "file")]) == EXIT_CONFIG
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_system_without_proc_is_told_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(soak, "PROC", tmp_path)
+    assert main(["soak", "--out", str(tmp_path)]) == 1
+    assert "reads /proc" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_with_what_is_known_and_leaves_nothing(tmp_path: Path) -> None:
+    words = t2("soak", "--minutes", "5", "--out", str(tmp_path / "out"))
+    with running(words, tmp_path / "said") as process:
+        wait_until(lambda: len(children(process.pid)) == 6, "all processes", PATIENCE_S)
+        pids = children(process.pid)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 128 + signal.SIGINT
+        wait_gone(list(pids.values()))
+    said = (tmp_path / "said").read_text()
+    assert "laps finished" in said
+    assert "Traceback" not in said
