@@ -5,7 +5,7 @@ the safety case (``docs/safety.md``) and are written down here a second time, on
 """
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -25,6 +25,7 @@ from common.messages import (
 LEASES_S = {"teleop": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
+GOOD_SAMPLES = 3
 ECHO_AGE_S, SETTLE_S, RIVAL_S, HOLD_S = 0.4, 0.5, 0.5, 0.3
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
 MOST_MPS, MOST_RADPS, CREEP_MPS = 1.0, 1.0, 0.1
@@ -75,6 +76,7 @@ class Desk:
     held_ns: int | None = None  # when a release was last granted
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     reader_was_up: bool = False
+    well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
 
     def on_drive(self, source: str, drive: Drive, now_ns: int) -> None:
         """Take a request in, if it is a good one."""
@@ -102,9 +104,20 @@ class Desk:
         if isinstance(message, Velocity):
             too_fast = abs(message.linear) > FAST_MPS
             self.fast_ns = (self.fast_ns or now_ns) if too_fast else None
+        if isinstance(message, Driver):
+            self._on_driver(name, message)
         if isinstance(message, Ultrasonic):
             self.ranges.append((now_ns, message))
         self.samples[name] = now_ns, message
+
+    def _on_driver(self, side: str, message: Driver) -> None:
+        _, before = self.samples.get(side, (0, None))
+        if message.bits:
+            self.well[side] = 0
+        elif before is None:
+            self.well[side] = GOOD_SAMPLES  # there never was a fault
+        elif (before.boot, before.seq) != (message.boot, message.seq):
+            self.well[side] += 1
 
     def _on_bumper(self, message: Bumper, now_ns: int) -> None:
         before = self.bumpers[-1] if self.bumpers else message
@@ -150,7 +163,8 @@ class Desk:
         asked = any(
             self.is_fresh(source, now_ns) and not wish.still for source, wish in self.wishes.items()
         )
-        return stands and clear and not asked and not any(self._faulty())
+        well = all(self.well[side] >= GOOD_SAMPLES for side in ("left", "right"))
+        return stands and clear and well and not asked
 
     def _faulty(self) -> Iterator[str]:
         for side in ("left", "right"):

@@ -108,7 +108,7 @@ class Judge(Watch):
         if not any(trip.name == "contact" for trip in self._held_by(desk.boot)):
             self.trip("contact", desk.boot)
 
-    def on_report(self, process: Process, datagram: bytes, frames: Iterable[Frame]) -> None:
+    def on_report(self, process: Process, frames: Iterable[Frame]) -> None:
         """Note what the board tells a bridge, before it knows."""
         gate = self.gates[process.boot]
         for frame in frames:
@@ -209,7 +209,7 @@ class Judge(Watch):
             return ["bridge: a RUN without a motion"]
         motion = cause.message
         record = self._records.get((motion.boot, motion.seq))
-        if record is None or cause.sender not in (motion.boot,):
+        if record is None or cause.sender != motion.boot:
             return ["bridge: a RUN that no safety sent"]
         complaints = [*record.complaints, *gate.complaints(self.now_ns)]
         if gate.authority != motion.boot or gate.seq != motion.seq:

@@ -113,7 +113,7 @@ class Net:
         self.weather: dict[str, Weather] = {}
         self.ears: list[Ear] = []
         self._under_way: list[tuple[int, int, Ear | None, Callable[[], None]]] = []
-        self._counts: Counter[str] = Counter()
+        self._counts: Counter[tuple[str, str]] = Counter()
         self._order = 0
 
     def put(self, letter: Letter) -> None:
@@ -124,10 +124,12 @@ class Net:
             if ear.owner.alive and ear.hears(letter.key):
                 self.later(route(letter.key), lambda ear=ear: ear.hand_over(letter), ear)  # type: ignore[misc]
 
-    def later(self, name: str, arrive: Callable[[], None], ear: Ear | None = None) -> None:
-        """Let something arrive by the weather of a route."""
-        self._counts[name] += 1
-        for delay_ms in self.weather.get(name, CLEAR).delays_ms(self._counts[name]):
+    def later(
+        self, name: str, arrive: Callable[[], None], ear: Ear | None = None, kind: str = ""
+    ) -> None:
+        """Let something arrive by the weather of a route; each kind is counted on its own."""
+        self._counts[name, kind] += 1
+        for delay_ms in self.weather.get(name, CLEAR).delays_ms(self._counts[name, kind]):
             self._order += 1
             entry = (self.now_ns + delay_ms * MS, self._order, ear, arrive)
             heapq.heappush(self._under_way, entry)

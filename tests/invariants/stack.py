@@ -17,6 +17,7 @@ from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
+from services.bridge.stamp import Receipt, WallClock
 from services.safety.config import SafetyConfig
 from services.safety.ports import Ports
 from tests.invariants.judge import STEP_NS, Judge
@@ -45,19 +46,20 @@ class Sockets:
 
     def __init__(self, stack: "Stack", process: Process) -> None:
         self.sockets = [object()]
+        self.wall = WallClock()
         self._stack = stack
         self._process = process
         self._framing = Framing()
 
-    def read(self, port: int) -> Iterator[bytes]:
+    def read(self, port: int) -> Iterator[tuple[bytes, Receipt]]:
         """Yield what waits, after the judge has seen it."""
         inbox = self._stack.vehicle.inbox
         while inbox:
             datagram = inbox.popleft()
             parts = self._framing.read(datagram, FROM_BOARD)
             frames = [part.frame for part in parts if isinstance(part, Received)]
-            self._stack.judge.on_report(self._process, datagram, frames)
-            yield datagram
+            self._stack.judge.on_report(self._process, frames)
+            yield datagram, Receipt(None, self._stack.net.now_ns)
 
     def send(self, datagram: bytes, port: int) -> None:
         """Send to the board, with the judge's complaints."""
@@ -217,15 +219,16 @@ class Stack:
 
     @contextmanager
     def time(self) -> Iterator[None]:
-        """Let the services' code see the simulated time."""
+        """Let the services' code see the simulated time; contexts may stand in each other."""
+        before = [(module, module.time) for module in TIMED]
         clock = Clock(self.net)
         try:
             for module in TIMED:
                 module.time = clock  # type: ignore[attr-defined]
             yield
         finally:
-            for module in TIMED:
-                module.time = real_time  # type: ignore[attr-defined]
+            for module, time in before:
+                module.time = time  # type: ignore[attr-defined]
 
 
 class Clock:

@@ -22,11 +22,13 @@ SPEEDS = st.sampled_from([0.0, 0.3, 1.0, -0.5, 5.0])
 FAST = st.sampled_from([1.0, 0.6, -1.0])
 TURNS = st.sampled_from([0.0, 0.0, 0.4, -1.0, 9.0])
 SOURCES = st.sampled_from(["teleop", "nav"])
+KINDS = st.sampled_from(["estop", "bumper", "driver", "runaway", "router"])
+HASTY = st.sampled_from([5, 90, 320, 700, 1000])
 PROCESSES = st.sampled_from(["safety", "bridge"])
 SHORT = st.sampled_from([5, 20, 60, 150, 210, 320])
 LONG = st.sampled_from([400, 700, 1200])
 RANGES_MM = st.sampled_from([NO_ECHO_MM, 0xFFFF, 0, 120, 190, 210, 260, 400, 800, 1500])
-NEAR_MM = st.sampled_from([190, 210, 260, 400, 800])
+NEAR_MM = st.sampled_from([0xFFFF, 190, 210, 260, 400, 800])
 HOSTILE = {
     "nan": m.Drive(linear=math.nan, angular=0.0, echo=0),
     "infinite": m.Drive(linear=math.inf, angular=0.0, echo=0),
@@ -37,7 +39,6 @@ HOSTILE = {
     "rival zero": m.Drive(linear=0.0, angular=0.0, echo=0, boot=6),
 }
 FORGED = [
-    m.Motion(command="run", linear=0.7, judged=2**40, boot=666),
-    m.Motion(command="stop", boot=666),
-    m.Motion(command="run", linear=math.nan, boot=666),
+    [m.Motion(command="stop", boot=666), m.Motion(command="run", linear=0.7, boot=666)],
+    [m.Motion(command="run", linear=math.nan, boot=666)],
 ]

@@ -67,7 +67,9 @@ class Vehicle:
 
     def hear(self, datagram: bytes, complaints: Complaints) -> None:
         """Let a datagram travel to the board."""
-        self._net.later("to_board", lambda: self._take(datagram, complaints))
+        moves = any(isinstance(frame, MotionCommand) for frame in frames(self._framing, datagram))
+        kind = "motion" if moves else "query"  # or all that is lost might be of one kind
+        self._net.later("to_board", lambda: self._take(datagram, complaints), kind=kind)
 
     def turn(self) -> None:
         """Move on to now."""

@@ -1,0 +1,190 @@
+"""What may go wrong around the stack, as rules; what people do is in ``test_machine.py``."""
+
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
+from msgspec.structs import replace
+
+from common import keys
+from common import messages as m
+from common.wire.frame import Side
+from sim.vehicle import Twist
+from tests.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Letter, Weather
+from tests.invariants.process import ROBOT
+from tests.invariants.stack import Stack
+from tests.invariants.strategies import (
+    BUS,
+    CABLE,
+    FORGED,
+    HOSTILE,
+    LONG,
+    ON_BUS,
+    ON_CABLE,
+    PROCESSES,
+    RANGES_MM,
+    SHORT,
+)
+
+
+class Troubles(RuleBasedStateMachine):
+    """Sensors, board, processes, bus, cable and strangers."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stack = Stack()
+        self.judge = self.stack.judge
+
+    # --- what the board sees ----------------------------------------------------------------
+
+    @rule(pressed=st.booleans(), ms=SHORT)
+    def bumper(self, pressed: bool, ms: int) -> None:
+        """Press the bumper, or free it."""
+        self.stack.vehicle.pressed = pressed
+        self.stack.run(ms)
+
+    @rule(sonar=st.integers(0, 7), mm=RANGES_MM)
+    def sonar(self, sonar: int, mm: int) -> None:
+        """Let one sonar see something, or be faulty."""
+        self.stack.vehicle.ranges[sonar] = mm
+        self.stack.run(60)
+
+    @rule(mm=RANGES_MM)
+    def sonars(self, mm: int) -> None:
+        """Let all sonars see the same."""
+        self.stack.vehicle.ranges[:] = [mm] * 8
+        self.stack.run(60)
+
+    @rule(side=st.sampled_from(Side), bits=st.sampled_from([0, 1, 1 << 31]), ms=SHORT)
+    def driver(self, side: Side, bits: int, ms: int) -> None:
+        """Let a motor driver report a fault, or none."""
+        self.stack.vehicle.fault(side, bits)
+        self.stack.run(ms)
+
+    @rule(linear=st.sampled_from([1.5, -1.5, 0.0, None]), ms=SHORT)
+    def runaway(self, linear: float | None, ms: int) -> None:
+        """Let the board measure another speed than it was told."""
+        self.stack.vehicle.measured = None if linear is None else Twist(linear)
+        self.stack.run(ms)
+
+    @rule(on=st.booleans())
+    def brakes(self, on: bool) -> None:
+        """Switch one of the board's own brakes by the bridge's call."""
+        with self.stack.time():
+            self.stack.bridge.call(keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=on))
+        self.stack.run(60)
+
+    def trip(self, kind: str) -> None:
+        """Let something latch that is gone at once."""
+        vehicle = self.stack.vehicle
+        if kind == "estop":
+            self.stack.estop()
+        elif kind == "bumper":
+            self.bumper(pressed=True, ms=60)
+            vehicle.pressed = False
+        elif kind == "driver":
+            self.driver(Side.LEFT, 1 << 31, 60)
+            vehicle.fault(Side.LEFT, 0)
+        elif kind == "router":
+            self.router(60)
+        else:
+            self.runaway(1.5, 700)
+            vehicle.measured = None
+
+    @rule(ms=SHORT | LONG)
+    def freeze(self, ms: int) -> None:
+        """Let the board hear and say nothing."""
+        self.stack.vehicle.freeze(ms)
+        self.stack.run(60)
+
+    @rule(ms=st.sampled_from([300, 600, 1000]))
+    def power_cycle(self, ms: int) -> None:
+        """Start the board anew."""
+        self.stack.power_cycle(ms)
+
+    @rule(garbage=st.binary(max_size=40))
+    def garbage(self, garbage: bytes) -> None:
+        """Let the cable bring nonsense."""
+        self.stack.vehicle.say_bytes(b"GS" + garbage)
+        self.stack.run(5)
+
+    # --- processes and what is between them -------------------------------------------------
+
+    @rule(name=PROCESSES, ms=SHORT | LONG)
+    def kill(self, name: str, ms: int) -> None:
+        """Kill a process; another one starts later."""
+        self.stack.kill(name, ms)
+        self.stack.run(60)
+
+    @rule(ms=SHORT | LONG)
+    def hang_safety(self, ms: int) -> None:
+        """Let safety do nothing, and then go on as if nothing was."""
+        self.stack.hang("safety", ms)
+        self.stack.run(60)
+
+    @rule(ms=st.sampled_from([50, 120, 180]))
+    def hang_bridge(self, ms: int) -> None:
+        """Let the bridge do nothing, for less than its guard bears."""
+        self.stack.hang("bridge", ms)
+        self.judge.slack_ns = max(self.judge.slack_ns, ms * MS)
+        self.stack.run(60)
+
+    @rule(ms=SHORT | LONG)
+    def router(self, ms: int) -> None:
+        """Take the router away for a while."""
+        self.stack.router(False)
+        self.stack.run(ms)
+        self.stack.router(True)
+        self.stack.run(5)
+
+    @rule(route=BUS, weather=ON_BUS, ms=SHORT)
+    def bus_weather(self, route: str, weather: Weather, ms: int) -> None:
+        """Let messages be late, lost, doubled or out of order."""
+        self.stack.net.weather[route] = weather
+        self.stack.run(ms)
+
+    @rule(route=CABLE, weather=ON_CABLE, ms=SHORT)
+    def cable_weather(self, route: str, weather: Weather, ms: int) -> None:
+        """Let datagrams be late, lost or doubled; a cable keeps their order."""
+        self.stack.net.weather[route] = weather
+        # Every second one lost: a STOP of 20 Hz may be the third one that goes out.
+        slack_ms = weather.late_ms + (100 if weather.lose else 0)
+        self.judge.slack_ns = max(self.judge.slack_ns, slack_ms * MS)
+        self.stack.run(ms)
+
+    @rule(route=BUS, ms=SHORT)
+    def cut(self, route: str, ms: int) -> None:
+        """Let everything on one route get lost for a while."""
+        before = self.stack.net.weather.get(route, CLEAR)
+        self.bus_weather(route, Weather(lose=1), ms)
+        self.stack.net.weather[route] = before
+
+    @precondition(lambda self: self.stack.net.weather)
+    @rule(settled=st.booleans())
+    def fine_weather(self, settled: bool) -> None:
+        """Let everything arrive at once again, before what is late or after it."""
+        self.stack.run(ECHO_MS + HOLD_MS + 120 if settled else 0)
+        self.stack.net.weather.clear()
+
+    # --- hostile values ---------------------------------------------------------------------
+
+    @rule(source=st.sampled_from(["teleop", "nav", "nobody"]), kind=st.sampled_from([*HOSTILE]))
+    def hostile_request(self, source: str, kind: str) -> None:
+        """Put a request that must not be taken."""
+        stick = self.stack.sticks.get(source, self.stack.sticks["teleop"])
+        bad = HOSTILE[kind]
+        step = 0 if kind == "again" else 1
+        stick.seq += step
+        echo = stick.echo + bad.echo
+        stick.put(replace(bad, echo=echo, seq=stick.seq), source)
+        self.stack.run(5)
+
+    @precondition(
+        lambda self: self.judge.has_authority() and "motion" not in self.stack.net.weather
+    )
+    @rule(forged=st.sampled_from(FORGED), seq=st.integers(1, 2**40))
+    def forged_motion(self, forged: list[m.Motion], seq: int) -> None:
+        """Let somebody else publish motions while safety lives."""
+        hand = self.stack.hand
+        for step, motion in enumerate(forged):
+            message = replace(motion, seq=seq + step)
+            hand.send(Letter(keys.MOTION.on(ROBOT), message, hand.boot, hand.net.now_ns))
+        self.stack.run(5)
