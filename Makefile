@@ -10,7 +10,7 @@ INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-
 .DEFAULT_GOAL := help
 .PHONY: demo up test fuzz soak check cover mutants lint format types docs lock clean help
 
-docs: $(STAMP) ## renew the tables of docs/bus.md and the JSON schemas
+docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
 
 help: ## what can be made
