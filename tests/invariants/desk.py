@@ -22,8 +22,8 @@ from common.messages import (
     Velocity,
 )
 
-LEASES_S = {"teleop": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
-PRIORITIES = {"teleop": 30, "web": 20, "demo": 15, "nav": 10}
+LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
+PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES = 3
 ECHO_AGE_S, SETTLE_S, RIVAL_S, HOLD_S = 0.4, 0.5, 0.5, 0.3
