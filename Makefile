@@ -8,7 +8,7 @@ INSTALL = $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/pytho
 INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-url 2>/dev/null))
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak check cover mutants lint format types docs lock clean help
+.PHONY: demo up test fuzz soak faults check cover mutants lint format types docs lock clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -39,6 +39,9 @@ fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each ta
 
 soak: $(STAMP) ## laps with random faults and kill -9 for MINUTES=30, watching memory and more
 	$(BIN)/t2 soak --minutes $(or $(MINUTES),30)
+
+faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faults.md
+	$(BIN)/python -m tests.faults --out docs/faults.md
 
 check: lint types cover ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

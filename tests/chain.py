@@ -7,16 +7,16 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from cli.lap import holdup
 from cli.lap.score import Trace, read
+from cli.settings import Everything
 from cli.up import commands
 from common.config import Sources, load
 from common.freshness import S
-from services.bridge.config import BridgeConfig
 from sim.control import Control
 from tests.support import free_port, wait_until
 
@@ -30,8 +30,9 @@ class Chain:
     control: Control
     commands: dict[str, list[str]]
     log: Path
-    lease_s: float  # that the bridge obeys a motion message
+    config: Everything  # in force
     processes: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
+    others: list["subprocess.Popen[bytes]"] = field(default_factory=list)  # beside the stack
 
     def start(self, name: str) -> None:
         """Start one of them, or start it again."""
@@ -63,30 +64,37 @@ class Chain:
 
     def end(self) -> None:
         """End them all."""
-        for process in self.processes.values():
+        for process in (*self.processes.values(), *self.others):
             process.kill()
-            process.wait()
+            process.communicate()  # closes its pipes, too
 
 
 @contextlib.contextmanager
-def chain(folder: Path, world: str = "empty") -> Iterator[Chain]:
-    """Run the stack while the context lasts, as shipped unless this machine cannot bear it."""
-    holdup_s = holdup.measured()
+def chain(
+    folder: Path, world: str = "empty", *, sets: Sequence[str] = (), shipped: bool = False
+) -> Iterator[Chain]:
+    """Run the stack while the context lasts, as shipped unless this machine cannot bear it.
+
+    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides.
+    """
+    holdup_s = 0.0 if shipped else holdup.measured()
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     sets = [
+        *sets,
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
         f"bus.listen={endpoint}",
         f"sim.control_port={control}",
         *holdup.settings(holdup_s),
     ]
-    lease_s = load(BridgeConfig, Sources(sets=sets)).config.bridge.lease
-    options = Namespace(no_sim=False, world=world, config=None, sets=sets)
+    config = load(Everything, Sources(sets=sets)).config
+    files = [file for file in (folder / "lane.toml",) if file.exists()]
+    options = Namespace(no_sim=False, world=world, config=files, sets=sets)
     made = {name: list(command) for name, command in commands(options)}
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file)]
-    it = Chain(endpoint, trace_file, Control(control), made, folder / "log.jsonl", lease_s)
+    it = Chain(endpoint, trace_file, Control(control), made, folder / "log.jsonl", config)
     for name in made:
         it.start(name)
     try:

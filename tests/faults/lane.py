@@ -1,0 +1,170 @@
+"""A stack of its own to try faults on: the chain, a driver at the stick, an operator."""
+
+import contextlib
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Self
+
+from common import keys
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.messages import Done, ResetRequest, SafetyState
+from sim.requests import Bumper, Driver, Place, Wire
+from tests.chain import Chain, chain
+from tests.faults.frames import SPEED, Frames, moves
+from tests.support import bus_on, running
+
+# Only to be at speed sooner: no limit of time is touched.
+QUICK = [
+    "safety.i_accept=linear_acceleration",
+    "safety.linear_acceleration=5",
+    "sim.drive.acceleration=10",
+]
+ROOM_M = 900.0  # the vehicle is put back to the origin from there
+READY_S = 30.0
+
+
+class Lane:
+    """One stack, and hands that drive it."""
+
+    def __init__(self, stack: Chain, bus: Bus, folder: Path) -> None:
+        self.stack = stack
+        self.bus = bus
+        self.folder = folder
+        self.frames = Frames(stack.trace_file)
+        self.state: SafetyState | None = None
+        self.asked = 0.0
+        stack.commands["driver"] = []
+        self.start_driver()
+
+    def start_driver(self) -> None:
+        """Put a driver at the stick."""
+        if "driver" in self.stack.processes:
+            self.stack.processes["driver"].communicate()  # closes its pipe, too
+        command = [sys.executable, "-m", "tests.faults.driver", self.stack.endpoint]
+        self.stack.processes["driver"] = subprocess.Popen(command, stdin=subprocess.PIPE)
+        self.ask(self.asked)
+
+    def ask(self, speed: float) -> None:
+        """Push the stick."""
+        self.asked = speed
+        pipe = self.stack.processes["driver"].stdin
+        assert pipe is not None
+        with contextlib.suppress(OSError):  # the driver may be dead
+            pipe.write(b"%f\n" % speed)
+            pipe.flush()
+
+    def dead(self) -> tuple[str, ...]:
+        """Return what has ended."""
+        ended = [
+            name for name, process in self.stack.processes.items() if process.poll() is not None
+        ]
+        return tuple(ended)
+
+    def revive(self) -> Self:
+        """Start what has ended, as whoever supervises would."""
+        for name in self.dead():
+            if name == "driver":
+                self.start_driver()
+            else:
+                self.stack.start(name)
+        return self
+
+    def moving(self) -> bool:
+        """Tell whether the board holds a command to move."""
+        self.frames.follow()
+        return bool(self.frames.commands) and moves(self.frames.commands[-1])
+
+    def at_speed(self) -> bool:
+        """Tell whether the board was told to go as fast as asked."""
+        return self.moving() and self.frames.commands[-1].linear > SPEED - 0.01
+
+    def neutral(self) -> bool:
+        """Tell whether the board holds a RUN of zero: the neutral was taken."""
+        self.frames.follow()
+        last = self.frames.commands[-1:]
+        return bool(last) and last[0].kind == "run" and not moves(last[0])
+
+    def latched(self) -> bool:
+        """Tell whether safety wants a reset."""
+        return self.state is not None and bool(self.state.latched)
+
+    def flapping(self) -> bool:
+        """Tell whether a reset is due only because the campaign makes faults again and again."""
+        return self.state is not None and self.state.latched == ("flapping",)
+
+    def reset(self) -> None:
+        """Ask safety for a reset, as the operator does."""
+        done: list[Done | str] = []
+        self.bus.ask(keys.RESET, ResetRequest(), done.append, done.append, 1.0)
+        until(lambda: done, 1.5)
+
+    def rearm(self, patience_s: float) -> bool:
+        """Center the stick and push it again; tell whether the vehicle drives."""
+        self.ask(0.0)
+        until(self.neutral, patience_s)
+        self.ask(SPEED)
+        return until(self.at_speed, patience_s)
+
+    def ready(self) -> None:
+        """Bring the vehicle to speed, whatever that takes; AssertionError when nothing helps."""
+        self.mend()
+        if self.at_speed() and not self.latched():
+            self.frames.forget()
+            return
+        end_s = time.monotonic() + READY_S
+        while time.monotonic() < end_s:
+            self.revive()
+            if self.latched():
+                self.ask(0.0)
+                time.sleep(0.1)
+                self.reset()
+            if self.rearm(2.0):
+                self.frames.forget()
+                return
+        said = self.stack.log.read_text()[-2000:]
+        raise AssertionError(f"does not drive: {self.state}\n{said}")
+
+    def mend(self) -> None:
+        """Undo whatever was done to the simulated board, and put the vehicle back in its room."""
+        self.stack.control.do(Wire())
+        self.stack.control.do(Bumper(pressed=False))
+        for side in ("left", "right"):
+            self.stack.control.do(Driver(side=side, bits=0))
+        if abs(self.stack.control.truth().x) > ROOM_M:
+            self.stack.control.do(Place(x=0.0, y=0.0))
+
+
+def until(true: Callable[[], object], patience_s: float) -> bool:
+    """Return whether it becomes true in time."""
+    end_s = time.monotonic() + patience_s
+    while time.monotonic() < end_s:
+        if true():
+            return True
+        time.sleep(0.004)
+    return False
+
+
+@contextlib.contextmanager
+def lane(folder: Path, sets: Sequence[str] = (), *, shipped: bool = True) -> Iterator[Lane]:
+    """Run a lane while the context lasts."""
+    with contextlib.ExitStack() as stack:
+        made = stack.enter_context(chain(folder, sets=[*QUICK, *sets], shipped=shipped))
+        loop = stack.enter_context(running(Loop()))
+        states: list[SafetyState] = []
+
+        def declare(bus: Bus) -> None:
+            bus.subscribe(keys.SAFETY, lambda arrival: take(arrival.message))
+
+        def take(state: SafetyState) -> None:
+            states[:] = [state]
+            if it:
+                it[0].state = state
+
+        it: list[Lane] = []
+        bus = stack.enter_context(bus_on(made.endpoint, loop, declare))
+        it.append(Lane(made, bus, folder))
+        yield it[0]

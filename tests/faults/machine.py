@@ -1,0 +1,60 @@
+"""How long the machine holds up a process that only wants to sleep, and when."""
+
+import subprocess
+import sys
+import threading
+from types import TracebackType
+from typing import Self
+
+from common.freshness import S
+
+WITNESS = """
+import sys, time
+last = time.monotonic_ns()
+while True:
+    time.sleep(0.002)
+    now = time.monotonic_ns()
+    if now - last > 4_000_000:
+        print(last, now, flush=True)
+    last = now
+"""
+
+
+class HoldUps:
+    """A witness beside the campaign, in a process of its own."""
+
+    def __init__(self) -> None:
+        self._gaps: list[tuple[int, int]] = []
+
+    def __enter__(self) -> Self:
+        self._process = subprocess.Popen(
+            [sys.executable, "-S", "-c", WITNESS], stdout=subprocess.PIPE, text=True
+        )
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._thread.join()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    def worst_s(self, since_ns: int, seconds: float) -> float:
+        """Return the longest hold-up that touches this time, in seconds."""
+        until_ns = since_ns + round(seconds * S)
+        return max(
+            ((b - a) / S for a, b in list(self._gaps) if b > since_ns and a < until_ns), default=0.0
+        )
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            first, last = map(int, line.split())
+            self._gaps.append((first, last))

@@ -1,0 +1,46 @@
+"""The core of the campaign: real processes, each of the worst faults a few times.
+
+`make faults` tries the whole catalogue, twenty times each, with the shipped limits.
+"""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.faults.catalogue import FAULTS, Fault
+from tests.faults.lane import Lane, lane
+from tests.faults.machine import HoldUps
+from tests.faults.table import Row
+from tests.faults.trial import tried
+
+CORE = (
+    "contact in one sample", "estop", "bridge SIGKILL", "bridge SIGSTOP", "guard SIGKILL",
+    "safety SIGKILL", "router SIGKILL", "driver SIGKILL", "odom SIGKILL", "board not heard",
+    "left driver fault", "front sonar faulty", "NaN on every key",
+)  # fmt: skip
+TIMES = 2
+
+
+@pytest.fixture(scope="module")
+def holdups() -> Iterator[HoldUps]:
+    with HoldUps() as it:
+        yield it
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lane]:
+    with lane(tmp_path_factory.mktemp("lane"), shipped=False) as it:
+        yield it
+
+
+@pytest.mark.parametrize("fault", [f for f in FAULTS if f.name in CORE], ids=lambda f: f.name)
+def test_the_vehicle_is_told_to_stop(stack: Lane, holdups: HoldUps, fault: Fault) -> None:
+    samples = [tried(stack, fault) for _ in range(TIMES)]
+    budget_s = fault.budget(stack.stack.config) if fault.budget else None
+    held = [holdups.worst_s(s.fault_ns, fault.hold_s) for s in samples]
+    assert Row(fault.name, budget_s, fault.outcome, samples, held).faults == []
+
+
+def test_the_core_is_in_the_catalogue() -> None:
+    assert {fault.name for fault in FAULTS} >= set(CORE)
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
