@@ -95,7 +95,8 @@ PROCESSES = [
     Fault("guard SIGKILL", kill("guard", signal.SIGKILL), NEUTRAL, within(0.05), hold_s=HOLD_S),
     Fault("guard SIGSTOP", kill("guard", signal.SIGSTOP), ON, None, deeds.go_on("guard")),
     Fault("guard SIGTERM", kill("guard", signal.SIGTERM), NEUTRAL, within(0.05), hold_s=HOLD_S),
-    *signals("safety", NEUTRAL, MOTION_LEASE),
+    # A safety that stood still for long could hear no emergency stop, and its latches outlive it.
+    *signals("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
     # Safety that loses its bus can hear no emergency stop: that is latched.
     *signals("router", (*NEUTRAL, *RESET), MOTION_LEASE),
     Fault("router gone for 5 s", kill("router", signal.SIGKILL), RESET, MOTION_LEASE, hold_s=5.0),
@@ -118,7 +119,8 @@ BOARD = [
     Fault("board not heard", wire(drop=1.0), NEUTRAL, SILENCE),
     Fault("board answers 0.5 s late", wire(delay=0.5), NEUTRAL, SILENCE, hold_s=1.0),
     Fault("board's datagrams from elsewhere", wire(foreign=1.0), NEUTRAL, SILENCE),
-    Fault("board's datagrams all damaged", wire(corrupt=1.0), NEUTRAL, SILENCE),
+    # The header has no CRC: an echo whose id is damaged can read as a bumper that is hit.
+    Fault("board's datagrams all damaged", wire(corrupt=1.0), (*NEUTRAL, *RESET), SILENCE),
     Fault("board's datagrams twice, out of order", wire(duplicate=0.5, reorder=0.3),
           (*ON, *ITSELF, *NEUTRAL), None),
     Fault("left driver fault", do(Driver(side="left", bits=1)), RESET, within(0.1)),

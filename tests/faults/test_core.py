@@ -3,7 +3,9 @@
 `make faults` tries the whole catalogue, twenty times each, with the shipped limits.
 """
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -39,6 +41,13 @@ def test_the_vehicle_is_told_to_stop(stack: Lane, holdups: HoldUps, fault: Fault
     budget_s = fault.budget(stack.stack.config) if fault.budget else None
     held = [holdups.worst_s(s.fault_ns, fault.hold_s) for s in samples]
     assert Row(fault.name, budget_s, fault.outcome, samples, held).faults == []
+
+
+def test_the_rows_that_the_safety_case_names_are_in_the_catalogue() -> None:
+    case = (Path(__file__).parents[2] / "docs" / "safety.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"faults\.md, row `([^`]+)`", case))
+    assert named
+    assert named <= {fault.name for fault in FAULTS}
 
 
 def test_the_core_is_in_the_catalogue() -> None:
