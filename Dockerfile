@@ -12,7 +12,7 @@ COPY services services
 COPY sim sim
 COPY cli cli
 COPY config config
-RUN useradd --system --no-create-home t2
+RUN useradd --system --no-create-home t2 && install -d -o t2 /recordings
 USER t2
 ENTRYPOINT ["python", "-m"]
 

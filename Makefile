@@ -2,13 +2,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
-# uv installs in seconds what pip does in minutes; pip, which the venv brings, only installs uv.
-INSTALL = $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python $(INDEX)
-# A mirror that pip is configured for serves uv too.
-INDEX = $(addprefix --default-index ,$(shell $(BIN)/pip config get global.index-url 2>/dev/null))
+# uv installs in seconds what takes pip most of a minute. It does not read pip's settings: where it
+# finds nothing, pip has the last word.
+UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --python $(BIN)/python
+PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults check cover search mutants lint format types docs lock clean help
+.PHONY: demo up test fuzz soak faults check cover search mutants lint format types docs pictures lock clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -20,19 +20,24 @@ $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "T2 needs Python 3.11 or newer; say make PYTHON=/path/to/python3.11")'
 	$(PYTHON) -m venv --clear .venv
 	awk '/^[^ #]/{on = /^uv==/} on' requirements.lock > .venv/uv.lock
-	$(BIN)/pip install --quiet --require-hashes -r .venv/uv.lock
-	$(INSTALL) --require-hashes -r requirements.lock
-	$(INSTALL) --no-deps --no-build-isolation -e .
+	$(PIP_INSTALL) --require-hashes -r .venv/uv.lock
+	$(UV_INSTALL) --require-hashes -r requirements.lock || \
+	  $(PIP_INSTALL) --require-hashes -r requirements.lock
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
 
 demo: $(STAMP) ## a simulated T2 drives a lap through the real services
 	$(BIN)/t2 demo
 
-up: $(STAMP) ## router, simulated vehicle, bridge, safety and odometry, until ctrl-c
+up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c
 	$(BIN)/t2 up
 
+# Most tests wait for other processes most of the time; some measure, and no other may run then.
+TOGETHER = -n 3 --dist worksteal -m "not alone"
+
 test: $(STAMP) ## all tests
-	$(BIN)/pytest
+	$(BIN)/pytest $(TOGETHER)
+	$(BIN)/pytest -m alone
 
 fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
@@ -52,16 +57,20 @@ lint: $(STAMP)
 	$(BIN)/lint-imports
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants
+SEARCH = tests/invariants tests/safety/test_walk.py
 
 search: $(STAMP) ## the search for holes in the invariants
-	$(BIN)/pytest $(SEARCH)
+	$(BIN)/pytest -n 2 $(SEARCH)
 
 cover: $(STAMP) ## all tests but the search, with what they cover
 	$(BIN)/coverage erase
-	$(BIN)/pytest --cov --cov-report= --ignore=$(SEARCH)
+	$(BIN)/pytest --cov --cov-report= $(addprefix --ignore=,$(SEARCH)) $(TOGETHER)
+	$(BIN)/pytest --cov --cov-report= --cov-append $(addprefix --ignore=,$(SEARCH)) -m alone
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
+
+pictures: $(STAMP) ## renew the README's pictures of both operator's screens; wants chromium
+	$(BIN)/python -m tests.pictures
 
 mutants: $(STAMP) ## break each line of the cores and see a test fail; CHANGED=1: of changed files
 	$(BIN)/python -m tests.mutants $(if $(CHANGED),--changed)
@@ -79,13 +88,14 @@ format: $(STAMP) ## let ruff write the format
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+LAPTOP = teleop dashboard record report foxglove
+LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
 lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, laptop
 	$(LOCK) --upgrade --all-extras -o requirements.lock
-	$(LOCK) --constraint requirements.lock -o requirements-robot.lock
-	$(LOCK) --constraint requirements.lock --extra teleop -o requirements-laptop.lock
+	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
+	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 
 clean: ## remove what was made
 	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
