@@ -12,6 +12,7 @@ from common.errors import MessageError
 S = TypeVar("S", bound=Struct)
 
 ENCODING = "application/msgpack"
+PREFIX = f"{ENCODING};t2.v1."
 EMPTY = b"\x80"  # an empty map: every field at its default
 
 _encoder = msgspec.msgpack.Encoder()
@@ -33,7 +34,12 @@ def decode(payload: bytes, kind: type[S]) -> S:
 
 def encoding(kind: type[Struct]) -> str:
     """Return the encoding string that goes with a message, ``application/msgpack;t2.v1.Kind``."""
-    return f"{ENCODING};t2.v1.{kind.__name__}"
+    return PREFIX + kind.__name__
+
+
+def kind_of(encoding: str) -> str:
+    """Return the type that an encoding names, ``Odometry``, or nothing."""
+    return encoding.removeprefix(PREFIX) if encoding.startswith(PREFIX) else ""
 
 
 def finite(*values: float) -> bool:

@@ -29,7 +29,7 @@ ENV_PREFIX = "T2__"
 # Whose sections may stand in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "bus", "board", "wire", "log", "vehicle",
-    "bridge", "safety", "odom", "teleop", "sim",
+    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "sim",
 )  # fmt: skip
 
 

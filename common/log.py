@@ -3,6 +3,7 @@
 import atexit
 import contextlib
 import logging
+import os
 import queue
 import sys
 import threading
@@ -47,9 +48,17 @@ class Lossy:
         while True:
             line = self._lines.get()
             with contextlib.suppress(OSError, ValueError):
-                self._file.write(line)
-                self._file.flush()
+                self._pass_on(line)
             self._lines.task_done()
+
+    def _pass_on(self, line: str) -> None:
+        try:
+            self._file.write(line)
+            self._file.flush()
+        except BrokenPipeError:
+            # Nobody reads any more. Python would write what is left once more on its way out, and
+            # make its failure the exit code.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._file.fileno())
 
 
 def configure(settings: Log, service: str) -> Lossy:

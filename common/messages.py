@@ -167,6 +167,7 @@ class Motion(Message, frozen=True, kw_only=True):
     judged: int = 0  # ``seq`` of the newest bumper sample that the verdict knows
     judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
     latched: bool = False  # whether an operator's reset is due
+    predecessor: int | None = None  # what the newest ``Link.latched_by`` was that the verdict knows
     # For measuring only, on the clock of ``mono_ns``.
     asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
     heard_ns: int = 0  # when safety received that request; 0 when this answers none

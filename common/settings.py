@@ -14,6 +14,10 @@ from common.errors import WireError
 from common.wire.framing import Covers, crc_function
 
 Limits = Mapping[str, tuple[float, float]]
+
+# See ``check_protections``.
+PROTECTIVE_OF_BUS: Limits = {"lease": (0.0, 2.0)}
+PROTECTIVE_OF_BOARD: Limits = {"any_source_port": (False, False)}
 Port = Annotated[int, Meta(ge=1, le=65535)]
 
 # What the wheel of eclipse-zenoh can carry; a client would look for anything else forever.
@@ -51,11 +55,13 @@ class Robot(Section, frozen=True, kw_only=True):
 class Bus(Section, frozen=True, kw_only=True):
     """Where the Zenoh router is."""
 
+    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
     lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is noticed
 
     def __post_init__(self) -> None:
+        check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.i_accept)
         for endpoint in (*self.listen, *self.connect):
             if not ENDPOINT.fullmatch(endpoint):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
@@ -74,6 +80,7 @@ class Bus(Section, frozen=True, kw_only=True):
 class Board(Section, frozen=True, kw_only=True):
     """The vehicle's main board and our side of its cable (manual 1)."""
 
+    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
@@ -81,6 +88,8 @@ class Board(Section, frozen=True, kw_only=True):
     any_source_port: bool = False  # take frames from every port of the board's address
 
     def __post_init__(self) -> None:
+        given = {"any_source_port": self.any_source_port}
+        check_protections(given, PROTECTIVE_OF_BOARD, self.i_accept)
         for name in ("address", "listen_address"):
             value = getattr(self, name)
             try:

@@ -17,10 +17,12 @@ from common.bus.calls import Answers, Caller
 from common.bus.host import host_id
 from common.bus.publisher import Publisher, qos
 from common.bus.ring import Ring
+from common.bus.sample import copied
 from common.bus.session import LEASE_S, Opener
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.messages import Message
+from common.sample import Sample
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
@@ -106,6 +108,18 @@ class Bus:
             handler(Arrival(message, key, received_ns, raw))
 
         self._subscribe(topic.on(self.robot, **names), take, depth, topic.service.history)
+
+    def tap(self, expression: str, handler: Callable[[Sample], None], *, depth: int) -> None:
+        """Call the handler with each sample on these keys, just as it came; see ``subscribe``.
+
+        ``**`` in an expression passes by what begins with ``@``.
+        """
+
+        def take(sample: zenoh.Sample, received_ns: int) -> None:
+            late_ns = time.monotonic_ns() - received_ns
+            handler(copied(sample, received_ns, time.time_ns() - late_ns))
+
+        self._subscribe(expression, take, depth, history=0)
 
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler with the receive time for any PUT or DELETE on a key."""

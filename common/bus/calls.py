@@ -58,7 +58,7 @@ class Answers(Generic[A]):
 
     def queue(self, reply: zenoh.Reply) -> None:
         """Take one answer, on a thread of Zenoh's."""
-        if _is_timeout(reply):
+        if is_timeout(reply):
             return  # the end follows
         if not self._answered:
             self._answered = True
@@ -86,7 +86,7 @@ class Answers(Generic[A]):
             self._on_reply(message)
 
 
-def _is_timeout(reply: zenoh.Reply) -> bool:
+def is_timeout(reply: zenoh.Reply) -> bool:
     """Tell Zenoh's own "Timeout", said by our session or by the router, from a server's refusal."""
     if reply.err is None or reply.err.encoding == zenoh.Encoding.TEXT_PLAIN:
         return False

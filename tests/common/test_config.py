@@ -123,7 +123,7 @@ def test_a_service_leaves_the_sections_of_others_alone(desk: Desk) -> None:
         ("board.listen_ports=[4002]", "board.listen_ports", (4002,)),
         ("bus.listen=tcp/a:1,tcp/[::1]:2", "bus.listen", ("tcp/a:1", "tcp/[::1]:2")),
         ("bus.connect=", "bus.connect", ()),
-        ("board.any_source_port=true", "board.any_source_port", True),
+        ("teleop.gamepad=false", "teleop.gamepad", False),
         ("odom.hold=5e-2", "odom.hold", 0.05),
         ("log.format=json", "log.format", "json"),
         ("safety.sources.web.priority=3", "safety.sources.web.priority", 3),

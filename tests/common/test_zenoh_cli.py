@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,6 +64,20 @@ def test_it_shows_our_messages(rig: Rig, watching: "subprocess.Popen[str]") -> N
     shown = json.loads(found[2])
     assert shown["pressed"] is True
     assert shown["boot"] == bus.boot
+
+
+def test_it_shows_what_is_no_message_and_lives_on(
+    rig: Rig, watching: "subprocess.Popen[str]"
+) -> None:
+    key = f"t2/v1/{rig.robot}/tel/mine"
+    publisher: Any = rig.session().declare_publisher(key)  # its type says that matching is a bool
+    wait_until(lambda: publisher.matching_status.matching, "the subscription")
+    publisher.put(b"\xc1")
+    publisher.delete()
+    publisher.put(b"\x81\xa1a\x01")
+    assert watching.stdout is not None
+    shown = [watching.stdout.readline() for _ in range(3)]
+    assert shown == [f"{key}: {each}\n" for each in ('{"not_msgpack": "c1"}', "null", '{"a": 1}')]
 
 
 def test_it_puts_a_message_that_we_understand(rig: Rig) -> None:

@@ -1,0 +1,62 @@
+"""Requests to move, with the echo of safety's heartbeat."""
+
+import math
+
+import pytest
+
+from common import keys
+from common.bus.bus import Arrival
+from common.loop import Loop
+from common.messages import Drive
+from common.source import DriveSource
+from tests.support import bus_on, running, wait_until
+from tests.teleop.support import FakeBus, safety_state
+
+
+@pytest.fixture
+def bus() -> FakeBus:
+    return FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+
+
+def test_before_safety_was_heard_the_echo_is_zero(bus: FakeBus) -> None:
+    sent = DriveSource(bus, "demo").ask(0.2, -0.1)
+    assert (sent.linear, sent.angular, sent.echo, sent.seq) == (0.2, -0.1, 0, 1)
+
+
+def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
+    source = DriveSource(bus, "demo")
+    for heartbeat in (7, 8):
+        bus.tell(keys.SAFETY, safety_state(heartbeat=heartbeat))
+    assert source.ask(0.0, 0.0).echo == 8
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_no_motion_is_refused(bus: FakeBus, wrong: float) -> None:
+    source = DriveSource(bus, "demo")
+    with pytest.raises(ValueError, match="is no motion"):
+        source.ask(wrong, 0.0)
+    with pytest.raises(ValueError, match="is no motion"):
+        source.ask(0.0, wrong)
+
+
+def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
+    loop = Loop()
+    heard: list[Arrival[Drive]] = []
+    sources: list[DriveSource] = []
+    with (
+        running(loop),
+        bus_on(
+            endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*")
+        ) as safety,
+        bus_on(endpoint, loop, lambda bus: sources.append(DriveSource(bus, "demo"))),
+    ):
+        state = safety.publisher(keys.SAFETY)
+
+        def echoed() -> bool:
+            state.put(safety_state(heartbeat=41))
+            sources[0].ask(0.3, 0.0)
+            return bool(heard) and heard[-1].message.echo == 41
+
+        wait_until(echoed, "an echo of the heartbeat")
+    assert heard[-1].key.endswith("@cmd/drive/demo")
+    assert heard[-1].message.linear == 0.3
