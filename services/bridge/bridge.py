@@ -145,12 +145,17 @@ class Bridge:
         asked_ns = self._poll.answered("mileage", now_ns)
         after = self._translator.mileage(frame, self._readiness.epoch)
         before = self._mileage
-        if before is not None and restarted(before.value, after, before.age_s(now_ns)):
+        if before is not None and self._is_new_board(before, after, now_ns):
             self._readiness.on_restart(now_ns)
+            self._bumper = BumperFilter()
             self._wheels.on_ready(False)  # not only at the next tick: no RUN in between
             after = self._translator.mileage(frame, self._readiness.epoch)
         self._mileage = Latest(after, asked_ns)
         self._to_mileage.put(after, raw)
+
+    def _is_new_board(self, before: Latest[m.Mileage], after: m.Mileage, now_ns: int) -> bool:
+        unbroken = self._readiness.link.up_ns <= before.received_ns
+        return restarted(before.value, after, before.age_s(now_ns), unbroken=unbroken)
 
     def _on_ultrasonic(self, frame: reports.UltrasonicReport, raw: bytes, now_ns: int) -> None:
         self._poll.answered("ultrasonic", now_ns)
@@ -183,6 +188,8 @@ class Bridge:
         # silence for the board's.
         self._read(now_ns)
         due = self._readiness.on_tick(now_ns)
+        if self._readiness.link.state != "up":
+            self._bumper = BumperFilter()  # what was heard before the gap is no part of a row
         self._wheels.on_ready(self._readiness.ready)
         self._wheels.on_tick(now_ns)
         for frame in (*due, *self._poll.due(now_ns)):

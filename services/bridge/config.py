@@ -15,6 +15,12 @@ PROTECTIVE: settings.Limits = {
     "silence": (0.0, 0.5),
     "coast": (0.0, 3.0),
     "heartbeat": (0.0, 0.2),
+    "max_linear": (0.0, 1.5),
+    "max_angular": (0.0, 2.0),
+    # Asked less often, a short hit, a near wall and a board that has started anew are seen late.
+    "bumper_rate": (20.0, 200.0),
+    "ultrasonic_rate": (10.0, 200.0),
+    "mileage_rate": (10.0, 200.0),
 }
 
 

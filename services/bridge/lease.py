@@ -13,14 +13,17 @@ neutral    start, not ready, lease over,    a STOP or a RUN of zero from the aut
            a new authority                  ready: nothing moves because something came back
 judged     a bumper hit (the reflex: BREAK  a motion message whose ``judged`` covers that hit:
            at once)                         a RUN that was under way must not undo the BREAK
+heir       an authority that ended with a   its successor has latched in its place, and says
+           latch that nobody has reset      by ``predecessor`` that it knows whose latch it is
 ========== ================================ ==================================================
 
 When the lease is over: STOP at once and at 20 Hz for ever, and BREAK from ``coast_ns`` on while the
-vehicle still moves. The authority is the ``boot`` of the sender; as long as its lease lives another
-is refused.
+vehicle is not known to stand. The authority is the ``boot`` of the sender; as long as its lease
+lives another is refused.
 
-A latch must outlive the safety service that holds it: who latched last is remembered here, until
-the same one says that it was reset, or its successor has latched in its place.
+A latch must outlive the safety service that holds it: whose it is, is remembered here until the
+same one says that it was reset, or its heir has taken it on. A successor that latches for a reason
+of its own, before it has heard of the latch that is due, takes nothing on.
 """
 
 from dataclasses import dataclass, replace
@@ -51,6 +54,7 @@ class Refusal(StrEnum):
     NOT_READY = "not_ready"
     NOT_NEUTRAL = "waiting_for_neutral"
     NOT_JUDGED = "hit_not_judged"
+    NOT_HEIR = "latch_not_taken_on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +78,8 @@ class Lease:
             return "the board is not ready"
         if self.hit is not None:
             return "safety has not judged the bumper hit"
+        if self.latched_by not in (None, self.boot):
+            return "safety has not taken on the latch of the one before it"
         if not self.neutral:
             return "a neutral motion from safety is due"
         return ""
@@ -93,12 +99,19 @@ def on_motion(
     lease = replace(lease, seq=motion.seq, renewed_ns=now_ns, over_since_ns=None)
     if motion.judged_boot == own_boot and lease.hit is not None and motion.judged >= lease.hit:
         lease = replace(lease, hit=None)
-    if motion.latched or lease.latched_by == motion.boot:
-        lease = replace(lease, latched_by=motion.boot if motion.latched else None)
+    lease = replace(lease, latched_by=_latched_by(lease, motion))
     order, refusal = _order(lease, motion)
     # A RUN that moves is obeyed only when the lease is neutral already.
     neutral = lease.neutral or (lease.ready and refusal is None)
     return replace(lease, neutral=neutral, sent_ns=now_ns), order, refusal
+
+
+def _latched_by(lease: Lease, motion: Motion) -> int | None:
+    """Return whose latch waits for a reset after this motion of the authority."""
+    if not motion.latched:
+        return None if lease.latched_by == motion.boot else lease.latched_by
+    knows = lease.latched_by in (None, motion.boot, motion.predecessor)
+    return motion.boot if knows else lease.latched_by
 
 
 def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
@@ -106,6 +119,8 @@ def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
         return Order.BRAKE, Refusal.NOT_JUDGED if motion.command == "run" else None
     if motion.command != "run":
         return Order(motion.command), None
+    if lease.latched_by not in (None, motion.boot):
+        return Order.STOP, Refusal.NOT_HEIR
     if not lease.ready:
         return Order.STOP, Refusal.NOT_READY
     if not lease.neutral and (motion.linear != 0 or motion.angular != 0):

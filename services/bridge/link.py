@@ -18,6 +18,7 @@ class Link:
 
     state: LinkState = "never"
     heard_ns: int = 0
+    up_ns: int = 0  # when it came up last
     active: int = 0  # index of the port that is believed
 
 
@@ -29,7 +30,8 @@ def believes(link: Link, port: int, now_ns: int, failover_ns: int) -> bool:
 
 def on_frame(link: Link, port: int, now_ns: int) -> Link:
     """Take in a valid frame on a port that is believed."""
-    return replace(link, state="up", heard_ns=now_ns, active=port)
+    up_ns = link.up_ns if link.state == "up" else now_ns
+    return replace(link, state="up", heard_ns=now_ns, up_ns=up_ns, active=port)
 
 
 def on_tick(link: Link, now_ns: int, silence_ns: int) -> Link:

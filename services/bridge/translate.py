@@ -101,7 +101,10 @@ def clamp(value: float, limit: float) -> float:
 
 
 class BumperFilter:
-    """A hit needs one sample, a clear bumper three in a row: the header of a frame has no CRC."""
+    """A hit needs one sample, a clear bumper three in a row: the header of a frame has no CRC.
+
+    A board that was gone or has started anew wants a new filter.
+    """
 
     CLEAR_SAMPLES = 3
 

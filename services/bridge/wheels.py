@@ -44,6 +44,7 @@ class Wheels:
         self._stopping_ns: int | None = None
         self._rivals: set[int] = set()  # second senders that were told of already
         self._lease_ns = round(node.config.bridge.lease * S)
+        self._silence_ns = round(node.config.bridge.silence * S)
         self._coast_ns = round(node.config.bridge.coast * S)
         self._order(Order.STOP)
         node.bus.subscribe(keys.MOTION, self.on_motion, depth=8)
@@ -92,7 +93,7 @@ class Wheels:
     def on_tick(self, now_ns: int) -> None:
         """Send what is due although nobody asked."""
         self.lease, order = lease.on_tick(
-            self.lease, now_ns, self._lease_ns, self._coast_ns, self._standing()
+            self.lease, now_ns, self._lease_ns, self._coast_ns, self._standing(now_ns)
         )
         if order is not None:
             self._order(order)
@@ -114,7 +115,7 @@ class Wheels:
         """Tell whether the vehicle was seen to stand since the bridge began to stop."""
         measured_ns = self._velocity[1] if self._velocity else 0
         stopped = self._stopping_ns is not None and measured_ns > self._stopping_ns
-        return stopped and self._standing()
+        return stopped and self._standing(time.monotonic_ns())
 
     def send(self, frame: Frame) -> None:
         """Send any frame to the board."""
@@ -123,12 +124,16 @@ class Wheels:
     def _order(self, order: Order, motion: Motion | None = None) -> None:
         self.send(self._translator.command(order, motion))
 
-    def _standing(self) -> bool:
-        """Judge by the last measured velocity; one never heard of counts as standing."""
+    def _standing(self, now_ns: int) -> bool:
+        """Judge by the measured velocity; one that has dried up tells nothing any more.
+
+        One never heard of counts as standing: this bridge has moved nothing yet.
+        """
         if self._velocity is None:
             return True
-        velocity, _ = self._velocity
-        return lease.standing(velocity.linear, velocity.angular)
+        velocity, measured_ns = self._velocity
+        heard = now_ns - measured_ns <= self._silence_ns
+        return heard and lease.standing(velocity.linear, velocity.angular)
 
     def _report(self, refusal: Refusal | None, motion: Motion) -> None:
         if refusal is not None:

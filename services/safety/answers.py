@@ -1,4 +1,9 @@
-"""What an operator's reset or held release is answered, and why not."""
+"""What an operator's reset or held release is answered, and why not.
+
+A reset clears all that is latched, or nothing. A pressed bumper is the exception: its ``contact``
+stays, and what else is latched and gone is cleared. Otherwise each would wait for the other, the
+reset for the bumper and the release that frees the bumper for the reset.
+"""
 
 from dataclasses import replace
 
@@ -16,7 +21,7 @@ def answer(
     """Carry out the call that came with the inputs, if one did."""
     match inputs.event:
         case Reset():
-            return _reset(state, inputs, now_ns)
+            return _reset(state, inputs, settings, now_ns)
         case Hold(held=True):
             return _hold(state, inputs, settings, now_ns)
         case Hold():
@@ -38,23 +43,47 @@ def room(state: State, settings: Safety) -> float:
     return state.release.left(settings.release_distance - stopping)
 
 
-def _reset(state: State, inputs: Inputs, now_ns: int) -> tuple[State, Reply]:
+def _reset(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> tuple[State, Reply]:
     if not latched(state.latches):
         return state, Reply(True, "Nothing is latched.")
-    reason = still_there(state.latches) or _not_at_rest(inputs)
+    reason = _no_reset(state, inputs, settings, now_ns) or _not_at_rest(inputs, settings, now_ns)
     if not reason and state.arbiter.asks_to_move(now_ns):
         reason = "Motion is requested: release the controls first."
     if reason:
         return state, Reply(False, reason)
-    cleared = replace(_let_go(state), latches=reset(state.latches), credit=Credit())
+    held = reset(state.latches)
+    credit = state.credit if "flapping" in held else Credit()
+    cleared = replace(_let_go(state), latches=held, credit=credit)
+    if latched(held):
+        return cleared, Reply(True, f"Reset all but this: {_pressed(cleared, inputs, settings)}")
     # Who was armed before the trip is not armed any more, by ``disarmed`` while it was held.
     return cleared, Reply(True, "Reset: a neutral request is due before the vehicle moves.")
+
+
+def _no_reset(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> str:
+    """Say which cause speaks against a reset; empty when there is something to clear."""
+    stays = still_there(state.latches)
+    if not stays:
+        return ""
+    # A hit that comes with the reset wins: nobody has seen it yet.
+    known = "contact" in stays and state.latches["contact"].since_ns < now_ns
+    if not known or not _is_pressed(inputs):
+        return f"Not gone yet: {state.latches[stays[0]].text}"
+    if stays == latched(state.latches):
+        return f"Not gone yet: {_pressed(state, inputs, settings)}"
+    return ""
+
+
+def _pressed(state: State, inputs: Inputs, settings: Safety) -> str:
+    """Say that the bumper is still pressed, and what to do about it."""
+    what = _no_release(state, inputs, settings) or "Hold release to creep off."
+    return f"{state.latches['contact'].text} {what}"
 
 
 def _hold(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> tuple[State, Reply]:
     reason = _no_release(state, inputs, settings)
     if not reason and not state.release.is_held(now_ns, settings.release_lease):
-        reason = _not_at_rest(inputs)
+        reason = _not_at_rest(inputs, settings, now_ns)
     if reason:
         return _let_go(state), Reply(False, reason)
     state = replace(state, release=replace(state.release, held_ns=now_ns))
@@ -69,19 +98,28 @@ def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
     """Say why the vehicle may not creep off; empty when it may."""
     if "contact" not in state.latches:
         return "There is no contact to release."
-    if inputs.bumper is None or not inputs.bumper.value.pressed:
+    if not _is_pressed(inputs):
         return "The bumper is free: reset instead."
     others = ordered(n for n in state.latches if wants_neutral(n) and n != "contact")
     if others:
-        return state.latches[others[0]].text
+        due = others[0] in latched(state.latches) and others[0] not in still_there(state.latches)
+        return state.latches[others[0]].text + (" Reset first." if due else "")
     if state.release.before is None:
-        return "It is not known which way leads off: the vehicle has not moved."
+        return (
+            "It is not known which way leads off, because no motion was measured before the "
+            "bumper was pressed. Push the vehicle off by hand, then reset."
+        )
     if room(state, settings) <= 0:
         return "The way off is used up: free the bumper by hand."
     return ""
 
 
-def _not_at_rest(inputs: Inputs) -> str:
-    if inputs.measured is None:
-        return "It is not known whether the vehicle stands."
-    return "" if inputs.measured.is_standing else "The vehicle still moves."
+def _is_pressed(inputs: Inputs) -> bool:
+    return inputs.bumper is not None and inputs.bumper.value.pressed
+
+
+def _not_at_rest(inputs: Inputs, settings: Safety, now_ns: int) -> str:
+    velocity = inputs.known_velocity(now_ns, settings.velocity_age)
+    if velocity is None:
+        return "It is not known whether the vehicle stands: its velocity is not heard."
+    return "" if velocity.is_standing else "The vehicle still moves."

@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from typing import TypeVar
 
-from common.freshness import Latest, fresh
+from common.freshness import Latest, S, fresh
 from common.messages import Driver
 from services.safety.config import Safety
 from services.safety.inputs import Estop, Inputs
 from services.safety.latches import Observation, Token
+from services.safety.state import State
 
 T = TypeVar("T")
 
@@ -17,13 +18,14 @@ LOST_SAMPLES = 3
 
 
 def observe_inputs(
-    inputs: Inputs, settings: Safety, judged: Token | None, reader_was_up: bool, now_ns: int
+    inputs: Inputs, settings: Safety, state: State, now_ns: int
 ) -> Iterator[Observation]:
-    """Yield each cause that inputs raise, present or not; ``judged`` is the last bumper sample."""
+    """Yield each cause that inputs raise, present or not, after what the state remembers."""
     tick = (0, now_ns)
+    judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
     yield _contact(inputs, tick)
     yield Observation("estop", isinstance(inputs.event, Estop), tick)
-    yield Observation("estop_reader", reader_was_up and not inputs.reader, tick)
+    yield Observation("estop_reader", state.reader_was_up and not inputs.reader, tick)
     yield _driver("left", inputs.left, tick)
     yield _driver("right", inputs.right, tick)
     yield Observation("leaving", inputs.leaving, tick)
@@ -31,7 +33,7 @@ def observe_inputs(
     yield from _link(inputs, tick)
     yield _switches(inputs, settings, tick)
     yield _bumper(inputs, settings, judged, now_ns)
-    yield _silent(inputs, settings, now_ns)
+    yield _silent(inputs, settings, state.decided_ns, now_ns)
 
 
 def _contact(inputs: Inputs, tick: Token) -> Observation:
@@ -102,7 +104,11 @@ def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int)
     return Observation("bumper", lost, tick, "Samples of the bumper were lost.")
 
 
-def _silent(inputs: Inputs, settings: Safety, now_ns: int) -> Observation:
+def _silent(inputs: Inputs, settings: Safety, decided_ns: int | None, now_ns: int) -> Observation:
+    # A sample counts from its arrival, and what had to wait for us arrives when we go on.
+    if decided_ns is not None and now_ns - decided_ns > settings.bumper_age * S:
+        text = "Safety itself was held up: what was heard meanwhile may be old."
+        return Observation("silent", True, (0, now_ns), text)
     too_old = {
         "velocity": _is_old(inputs.velocity, settings.velocity_age, now_ns),
         "link": _is_old(inputs.link, settings.link_age, now_ns),

@@ -35,6 +35,7 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "release_speed": (0.0, 0.15),
     "release_distance": (0.0, 0.3),
     "release_lease": (0.0, 0.5),
+    "hysteresis": (0.02, 10.0),
     "stuck_travel": (0.0, 1.0),
     "require_switches": (True, True),
 }

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from common import codec
-from common.freshness import Latest
+from common.freshness import Latest, fresh
 from common.messages import Bumper, Drive, Driver, Link, Switches, Ultrasonic, Velocity
 from services.safety.twist import Twist
 
@@ -53,6 +53,10 @@ class Inputs:
     leaving: bool = False  # whether this service is on its way out
     event: Event | None = None
     boot: int = 0  # this service's own
+
+    def known_velocity(self, now_ns: int, age_s: float) -> Twist | None:
+        """Return the measured velocity; None when it is no number or older than ``age_s``."""
+        return self.measured if fresh(self.velocity, now_ns, age_s) else None
 
     @property
     def measured(self) -> Twist | None:

@@ -75,14 +75,14 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(names, key=severity))
 
 
-def still_there(held: Latches) -> str:
-    """Say which latched cause is not gone yet; empty when a reset may clear them all."""
-    for name in latched(held):
-        if held[name].good < GOOD_SAMPLES:
-            return f"Not gone yet: {held[name].text}"
-    return ""
+def still_there(held: Latches) -> tuple[str, ...]:
+    """Return the names of the latched causes that are not gone yet, the worst first."""
+    return tuple(name for name in latched(held) if held[name].good < GOOD_SAMPLES)
 
 
 def reset(held: Latches) -> dict[str, Held]:
-    """Return what is held once the latched causes are cleared."""
-    return {name: one for name, one in held.items() if clears(name) is not Clears.RESET}
+    """Return what is held once the latched causes that are gone are cleared."""
+    stays = still_there(held)
+    return {
+        name: one for name, one in held.items() if clears(name) is not Clears.RESET or name in stays
+    }

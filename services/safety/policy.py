@@ -17,7 +17,7 @@ there is a fresh wish.
 from collections.abc import Iterable
 from dataclasses import replace
 
-from common.freshness import S, fresh
+from common.freshness import S
 from common.messages import Command
 from common.messages import Verdict as VerdictName
 from common.settings import Vehicle
@@ -82,7 +82,7 @@ class Policy:
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         settings, sent = self.settings, state.verdict
-        known = inputs.measured if fresh(inputs.velocity, now_ns, settings.velocity_age) else None
+        known = inputs.known_velocity(now_ns, settings.velocity_age)
         measured = known or STILL
         heard = self._ears.hear(state.heard, inputs.ultrasonic, known, now_ns)
         release = state.release
@@ -105,9 +105,8 @@ class Policy:
         tick = (0, now_ns)
         bad_s = max(state.linear.bad_s, state.angular.bad_s)
         rivals = state.arbiter.rivals(now_ns)
-        judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
         seen = [
-            *observe_inputs(inputs, self.settings, judged, state.reader_was_up, now_ns),
+            *observe_inputs(inputs, self.settings, state, now_ns),
             Observation("runaway", bad_s >= self.settings.runaway_time, tick),
             Observation("two_publishers", bool(rivals), tick, f"Two publishers ask on {rivals}."),
         ]
@@ -132,7 +131,8 @@ class Policy:
         barred = _worst(_guards(state.latches) - suspended) != "run"
         plan = Plan()
         if wish and not barred:
-            plan = self.planner.plan(state, inputs.measured or STILL, wish, step_s)
+            measured = inputs.known_velocity(now_ns, self.settings.velocity_age) or STILL
+            plan = self.planner.plan(state, measured, wish, step_s)
         seen = observations(state, wish, plan, barred, now_ns)
         held = observe(state.latches, seen, now_ns)
         state = replace(state, latches=held)

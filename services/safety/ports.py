@@ -22,7 +22,9 @@ M = TypeVar("M", bound=Message)
 
 DECIDE_S = 1 / 50
 TELL_S = 1 / 20
-BUMPER_DEPTH = 64  # a hit of one sample must not be pushed out, even after a second's stall
+# One sample latches, a hit or a driver's fault, and the next one may say that it is over: none must
+# be pushed out or left undecided, even after a second's stall.
+LATCHING_DEPTH = 64
 DRIVE_DEPTH = 64
 
 
@@ -48,9 +50,11 @@ class Ports:
         bus, robot = self._node.bus, self._node.config.robot.id
         bus.subscribe(keys.VELOCITY, self._keep("velocity"))
         bus.subscribe(keys.ULTRASONIC, self._keep("ultrasonic", at_once=True))
-        bus.subscribe(keys.BUMPER, self._keep("bumper", at_once=True), depth=BUMPER_DEPTH)
-        bus.subscribe(keys.DRIVER, self._keep("left"), side="left")
-        bus.subscribe(keys.DRIVER, self._keep("right"), side="right")
+        bus.subscribe(keys.BUMPER, self._keep("bumper", at_once=True), depth=LATCHING_DEPTH)
+        for side in ("left", "right"):
+            bus.subscribe(
+                keys.DRIVER, self._keep(side, at_once=True), depth=LATCHING_DEPTH, side=side
+            )
         bus.subscribe(keys.SWITCHES, self._keep("switches"))
         bus.subscribe(keys.LINK, self._keep("link"))
         bus.subscribe(
@@ -101,7 +105,7 @@ class Ports:
         inputs = replace(self._inputs, reader=self._reader.connected, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)
-        self._motion.put(timed(motion_message(self._state), self._state, inputs))
+        self._motion.put(timed(motion_message(self._state, inputs), self._state, inputs))
         if verdict.refused:
             self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:

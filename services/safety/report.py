@@ -30,8 +30,8 @@ class Note:
     about: dict[str, str | None]
 
 
-def motion_message(state: State) -> Motion:
-    """Return what the bridge is told."""
+def motion_message(state: State, inputs: Inputs) -> Motion:
+    """Return what the bridge is told of a decision on these inputs."""
     verdict = state.verdict
     return Motion(
         command=verdict.command,
@@ -41,6 +41,7 @@ def motion_message(state: State) -> Motion:
         judged=verdict.judged[1],
         judged_boot=verdict.judged[0],
         latched=bool(latched(state.latches)),
+        predecessor=inputs.link.value.latched_by if inputs.link else None,
     )
 
 

@@ -28,7 +28,7 @@ class Board:
         self.to_ports = [0, 1]  # indices of the ports that it sends to
         self.pressed = False
         self.distance_mm = 1000
-        self.speed_mmps = 0
+        self.speed_mmps: int | None = 0  # None: its velocity is not told
         self.echo = True
         self.led_done: bool | None = True
         self.switch_asks = 0
@@ -38,7 +38,8 @@ class Board:
     def run(self) -> None:
         """Serve until ``end``."""
         while not self._ended.is_set():
-            self.say(reports.VelocityReport(self.speed_mmps, 0))
+            if self.speed_mmps is not None:
+                self.say(reports.VelocityReport(self.speed_mmps, 0))
             try:
                 datagram, source = self.sock.recvfrom(2048)
             except TimeoutError:

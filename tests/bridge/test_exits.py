@@ -11,9 +11,7 @@ from common.wire.commands import MotionKind
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from tests.bridge.board import board
-from tests.bridge.test_bridge import Rig, endpoint, rig
-
-__all__ = ["endpoint", "rig"]  # fixtures
+from tests.bridge.rig import Rig
 
 
 def end(rig: Rig, *signals: signal.Signals) -> int:

@@ -5,53 +5,25 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace as replace_message
 
 from common.freshness import S
 from common.messages import Motion
 from services.bridge import lease as leases
 from services.bridge.lease import Lease, Order, Refusal, on_hit, on_motion, on_ready, on_tick
-
-MS = S // 1000
-LEASE = 200 * MS
-COAST = 1000 * MS
-OWN_BOOT = 7
-NOW = 100 * S
-
-ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
-HIT = replace(ARMED, hit=5)
-
-
-def run(
-    linear: float = 0.5,
-    angular: float = 0.0,
-    *,
-    seq: int = 11,
-    boot: int = 1,
-    judged: int = 0,
-    judged_boot: int = 0,
-) -> Motion:
-    return Motion(
-        command="run",
-        linear=linear,
-        angular=angular,
-        seq=seq,
-        boot=boot,
-        judged=judged,
-        judged_boot=judged_boot,
-    )
-
-
-def stop(seq: int = 11, boot: int = 1) -> Motion:
-    return Motion(command="stop", seq=seq, boot=boot)
-
-
-def brake(seq: int = 11, boot: int = 1) -> Motion:
-    return Motion(command="brake", seq=seq, boot=boot)
-
-
-def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order | None, object]:
-    return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT)
+from tests.bridge.motions import (
+    ARMED,
+    COAST,
+    HIT,
+    LEASE,
+    MS,
+    NOW,
+    OWED,
+    OWN_BOOT,
+    brake,
+    obey,
+    run,
+    stop,
+)
 
 
 def test_at_first_nobody_may_drive() -> None:
@@ -227,9 +199,11 @@ def test_it_says_what_it_waits_for() -> None:
         replace(ARMED, ready=False).waiting,
         HIT.waiting,
         replace(ARMED, neutral=False).waiting,
+        OWED.waiting,
     ]
     assert all(texts)
-    assert len(set(texts)) == 3
+    assert len(set(texts)) == 4
+    assert replace(ARMED, latched_by=1).waiting == ""
 
 
 @pytest.mark.parametrize(
@@ -251,6 +225,8 @@ motions = st.builds(
     boot=st.integers(1, 2),
     judged=st.integers(0, 20),
     judged_boot=st.sampled_from([OWN_BOOT, 8]),
+    latched=st.booleans(),
+    predecessor=st.sampled_from([None, 1, 2]),
 )
 events = st.lists(
     st.one_of(motions, st.booleans(), st.integers(1, 20), st.just("tick")), max_size=40
@@ -271,6 +247,7 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
                 assert lease.neutral
                 assert lease.hit is None
                 assert event.boot == lease.boot
+                assert lease.latched_by in (None, event.boot)
         elif isinstance(event, bool):
             lease = on_ready(lease, event)
         elif isinstance(event, int):
@@ -280,20 +257,3 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
             lease, order = on_tick(lease, now, LEASE, COAST, False)
             assert order is not Order.RUN
         assert lease.over_since_ns is None or not lease.neutral
-
-
-def test_a_latch_is_remembered_until_it_is_reset_by_who_holds_it() -> None:
-    latched, _, _ = obey(ARMED, replace_message(brake(), latched=True))
-    assert latched.latched_by == 1
-    later = NOW + LEASE + 1
-    started, _, _ = obey(latched, stop(1, boot=2), later)  # has not heard of it yet
-    assert (started.boot, started.latched_by) == (2, 1)
-    taken, _, _ = obey(started, replace_message(brake(2, boot=2), latched=True), later)
-    assert taken.latched_by == 2
-    reset, _, _ = obey(taken, stop(3, boot=2), later)
-    assert reset.latched_by is None
-
-
-def test_the_latch_of_a_second_authority_is_not_taken_in() -> None:
-    lease, _, refusal = obey(ARMED, replace_message(brake(boot=2), latched=True))
-    assert (lease.latched_by, refusal) == (None, Refusal.SECOND_AUTHORITY)

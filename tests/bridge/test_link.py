@@ -13,7 +13,7 @@ UP = Link("up", heard_ns=S, active=0)
 @pytest.mark.parametrize("port", [0, 1])
 def test_before_anything_was_heard_either_port_may_begin(port: int) -> None:
     assert believes(Link(), port, S, FAILOVER)
-    assert on_frame(Link(), port, S) == Link("up", S, port)
+    assert on_frame(Link(), port, S) == Link("up", heard_ns=S, up_ns=S, active=port)
 
 
 @pytest.mark.parametrize(("age", "taken"), [(0, False), (FAILOVER, False), (FAILOVER + 1, True)])
@@ -37,4 +37,6 @@ def test_never_stays_never_and_lost_comes_back() -> None:
     assert on_tick(Link(), 9 * S, SILENCE).state == "never"
     lost = on_tick(UP, 9 * S, SILENCE)
     assert on_tick(lost, 10 * S, SILENCE) == lost
-    assert on_frame(lost, 0, 10 * S).state == "up"
+    back = on_frame(lost, 0, 10 * S)
+    assert (back.state, back.up_ns) == ("up", 10 * S)
+    assert on_frame(back, 0, 11 * S).up_ns == 10 * S

@@ -36,6 +36,7 @@ def at(distance: float, degrees: float = 0.0) -> Mileage:
         (at(5.0), at(6.101), 0.02, True),
         (at(5.0), at(6.9), 0.2, False),
         (at(5.0), at(7.1), 0.2, True),
+        (at(5.0), at(7.1), 60.0, True),
         (at(5.0, 0.0), at(5.0, 62.0), 0.02, False),
         (at(5.0, 0.0), at(5.0, 64.0), 0.02, True),
         # the wrap is no jump
@@ -45,4 +46,22 @@ def at(distance: float, degrees: float = 0.0) -> Mileage:
     ],
 )
 def test_restarted(before: Mileage, after: Mileage, gap_s: float, anew: bool) -> None:
-    assert restarted(before, after, gap_s) is anew
+    assert restarted(before, after, gap_s, unbroken=False) is anew
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "gap_s", "anew"),
+    [
+        (at(5.0), at(8.2), 4.0, False),
+        (at(5.0), at(25.9), 4.0, False),
+        (at(5.0), at(26.1), 4.0, True),
+        (at(5.0, 0.0), at(5.0, 179.0), 4.0, False),
+        (at(5.0, 0.0), at(5.0, 62.0), 0.02, False),
+        (at(5.0, 0.0), at(5.0, 64.0), 0.02, True),
+        (at(0.33), at(0.0), 60.0, True),
+    ],
+)
+def test_counters_alone_that_were_silent_went_on_as_far_as_it_can_drive(
+    before: Mileage, after: Mileage, gap_s: float, anew: bool
+) -> None:
+    assert restarted(before, after, gap_s, unbroken=True) is anew

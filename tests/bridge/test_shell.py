@@ -1,13 +1,14 @@
 """The bridge's shell in this process: a board that starts anew, a network that fails."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from common.bus.bus import Arrival
 from common.config import Sources, load
-from common.messages import Command, Motion
+from common.freshness import S
+from common.messages import Bumper, Command, Motion
 from common.service import Node
 from common.settings import Board as Settings
 from common.wire.reports import BumperReport, DistanceReport
@@ -15,11 +16,13 @@ from services.bridge import bridge as shell
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.lease import Lease
+from services.bridge.link import Link
 from services.bridge.stamp import Receipt
 from services.bridge.udp import Sockets
 from tests.bridge.board import Board, board
 
 NOW = 1_000_000_000
+Gap = Callable[[Bridge, pytest.MonkeyPatch], None]
 
 
 @pytest.fixture
@@ -44,7 +47,7 @@ def test_a_board_that_starts_anew_disarms_at_once(
     bridge._wheels.lease = Lease(boot=1, ready=True, neutral=True, over_since_ns=None)
     bridge._on_distance(DistanceReport(1000, 0), b"", NOW)
     assert bridge._wheels.lease.waiting == ""
-    monkeypatch.setattr(shell, "restarted", lambda *_: True)
+    monkeypatch.setattr(shell, "restarted", lambda *_, **__: True)
     bridge._on_distance(DistanceReport(0, 0), b"", NOW + 1)
     assert (bridge._wheels.lease.ready, bridge._wheels.lease.neutral) == (False, False)
 
@@ -58,6 +61,42 @@ def test_a_short_hit_is_told_until_safety_has_judged_it(bridge: Bridge) -> None:
     bridge._on_bumper(BumperReport(False), b"", NOW)
     assert bridge._to_bumper.last is not None
     assert not bridge._to_bumper.last.pressed
+
+
+def link_lost(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bridge, "_read", lambda _: None)
+    bridge._readiness.link = Link("up", heard_ns=NOW)
+    bridge._on_tick(NOW + S)
+    assert bridge._readiness.link.state == "lost"
+
+
+def board_restarted(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    bridge._on_distance(DistanceReport(1000, 0), b"", NOW)
+    monkeypatch.setattr(shell, "restarted", lambda *_, **__: True)
+    bridge._on_distance(DistanceReport(0, 0), b"", NOW + 1)
+    assert bridge._readiness.epoch > 0
+
+
+@pytest.mark.parametrize("gap", [link_lost, board_restarted])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_row_of_clear_samples_begins_anew_after_a_gap(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch, gap: Gap, first: bool
+) -> None:
+    told: list[Bumper] = []
+    monkeypatch.setattr(bridge._to_bumper, "put", lambda message, _: told.append(message))
+    for pressed in (first, False, False, *[False] * (not first)):
+        bridge._on_bumper(BumperReport(pressed), b"", NOW)
+    bridge._wheels.lease = Lease(boot=1)  # safety has judged the hit, if there was one
+    told.clear()
+    gap(bridge, monkeypatch)
+    for _ in range(2):
+        bridge._on_bumper(BumperReport(False), b"", NOW)
+    assert told == []
+    bridge._on_bumper(BumperReport(False), b"", NOW)
+    assert told == [Bumper(pressed=False)]
+    gap(bridge, monkeypatch)
+    bridge._on_bumper(BumperReport(True), b"", NOW)
+    assert bridge._wheels.lease.hit is not None
 
 
 @pytest.mark.parametrize(("command", "counted"), [("stop", 0), ("brake", 1)])

@@ -22,6 +22,7 @@ def test_the_file_holds_the_defaults() -> None:
         ("margin", 0.04),
         ("margin", 0.0),
         ("react", 0.09),
+        ("hysteresis", 0.019),
         ("max_linear", 1.51),
         ("bumper_age", 0.26),
         ("settle", 0.09),
@@ -45,8 +46,8 @@ def test_zero_never_means_off(name: str) -> None:
 
 
 def test_only_protections_can_be_given_up() -> None:
-    with pytest.raises(ConfigError, match="i_accept names 'hysteresis'"):
-        read("safety.i_accept=hysteresis")
+    with pytest.raises(ConfigError, match="i_accept names 'sources'"):
+        read("safety.i_accept=sources")
 
 
 def test_priorities_are_unique() -> None:

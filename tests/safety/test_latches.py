@@ -49,13 +49,13 @@ def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
     assert GOOD_SAMPLES == 3
     held = see({}, "contact", True, 0, seq=1)
     for seq in range(2, 2 + GOOD_SAMPLES):
-        assert still_there(held) == "Not gone yet: The bumper was hit."
+        assert still_there(held) == ("contact",)
         held = see(held, "contact", False, seq, seq)
         held = see(held, "contact", False, seq, seq)  # the same sample again
-    assert still_there(held) == ""
+    assert still_there(held) == ()
     assert latched(held) == ("contact",)
     held = see(held, "contact", True, 99, seq=9)
-    assert still_there(held) != ""
+    assert still_there(held) == ("contact",)
     assert held["contact"].since_ns == 0
 
 
@@ -67,8 +67,19 @@ def test_the_sample_that_showed_a_cause_is_no_good_one() -> None:
 
 
 def test_a_reset_clears_what_is_latched_only() -> None:
-    held = see(see({}, "estop", True, 0), "link", True, 0)
+    held = see(see({}, "estop", True, 0, seq=1), "link", True, 0)
+    for seq in range(2, 2 + GOOD_SAMPLES):
+        held = see(held, "estop", False, seq, seq)
     assert set(reset(held)) == {"link"}
+
+
+def test_a_reset_leaves_what_is_not_gone() -> None:
+    held = see(see({}, "estop", True, 0, seq=1), "contact", True, 0, seq=1)
+    held = see(held, "driver_left", True, 0, seq=1)
+    for seq in range(2, 2 + GOOD_SAMPLES):
+        held = see(held, "estop", False, seq, seq)
+    assert still_there(held) == ("contact", "driver_left")
+    assert set(reset(held)) == {"contact", "driver_left"}
 
 
 def test_an_observation_may_have_words_of_its_own() -> None:

@@ -1,9 +1,12 @@
 """The policy where one wrong sign or number would show: ages, edges, what is remembered."""
 
+from dataclasses import replace
+
 import pytest
 
 from common.freshness import S
 from common.messages import SONAR_NAMES
+from services.safety.config import Safety
 from services.safety.flapping import FAILURES
 from services.safety.latches import Held
 from services.safety.twist import STILL
@@ -83,10 +86,26 @@ def test_the_first_bumper_sample_follows_none() -> None:
 def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
     scene = Scene().ready()
     before = scene.drive(0.5).twist.linear
-    scene.now_ns += S // 5
+    scene.now_ns += S // 8
     scene.feed()
     after = scene.ask(0.5).twist.linear
     assert after - before == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("late_ns", "command"), [(0, "run"), (1, "stop")])
+def test_what_waited_for_a_stalled_process_is_not_taken_for_fresh(
+    late_ns: int, command: str
+) -> None:
+    scene = Scene().running()
+    scene.now_ns += round(Safety().bumper_age * S) + late_ns
+    scene.feed()
+    scene.state = replace(scene.state, heartbeat=scene.state.heartbeat.beat(scene.now_ns))
+    assert scene.ask(0.5).command == command
+    if late_ns:
+        assert "held up" in scene.state.latches["silent"].text
+        assert scene.drive(0.5, seconds=2.0).command == "stop"
+        scene.drive()
+    assert scene.drive(0.5).command == "run"
 
 
 def test_what_is_held_knows_since_when() -> None:

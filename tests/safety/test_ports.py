@@ -1,6 +1,7 @@
 """The shell in this process: what goes in and what comes out of one loop."""
 
 import contextlib
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -43,8 +44,15 @@ def safety_on(endpoint: str) -> Iterator[Node[SafetyConfig]]:
             bus.open()
         wait_until(lambda: node.bus.connected and reader.connected, "both sessions")
         yield node
-        for bus in (reader, node.bus):
-            bus.close()
+        closed = threading.Event()
+
+        def close() -> None:
+            for bus in (reader, node.bus):
+                bus.close()
+            closed.set()
+
+        node.loop.post(close)  # where they are used: a put must not meet a session that ends
+        wait_until(closed.is_set, "closed sessions")
 
 
 @dataclass

@@ -21,12 +21,12 @@ def successor(latched_by: int | None) -> Scene:
 
 def test_a_latch_is_told_until_it_is_reset() -> None:
     scene = Scene().running()
-    assert not motion_message(scene.state).latched
+    assert not motion_message(scene.state, scene.inputs).latched
     scene.estop()
-    assert motion_message(scene.state).latched
+    assert motion_message(scene.state, scene.inputs).latched
     scene.drive(0.0, seconds=1.0)
     assert scene.reset() == ""
-    assert not motion_message(scene.state).latched
+    assert not motion_message(scene.state, scene.inputs).latched
 
 
 def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
@@ -35,6 +35,8 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     scene.drive(0.0)
     assert scene.drive(0.5, seconds=1.0).command == "brake"
     assert latched(scene.state.latches) == ("predecessor",)
+    motion = motion_message(scene.state, scene.inputs)
+    assert (motion.latched, motion.predecessor) == (True, OLD)
     assert scene.reset() == "Not gone yet: Safety started anew with a reset still due."
     scene.link = with_fields(scene.link, latched_by=OWN)  # the bridge has heard of it from us
     scene.tick(100)
@@ -42,6 +44,15 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     scene.link = with_fields(scene.link, latched_by=None)
     scene.drive(0.0)
     assert scene.drive(0.5).command == "run"
+
+
+def test_a_successor_that_has_heard_nothing_names_no_predecessor() -> None:
+    scene = successor(latched_by=OLD)
+    scene.muted = {"link"}
+    scene.tick()
+    scene.estop()
+    motion = motion_message(scene.state, scene.inputs)
+    assert (motion.latched, motion.predecessor) == (True, None)
 
 
 def test_without_a_latch_a_successor_needs_no_reset() -> None:

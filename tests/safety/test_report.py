@@ -44,7 +44,7 @@ def test_the_state_tells_verdict_causes_and_limits() -> None:
 
 def test_the_motion_tells_what_was_judged() -> None:
     scene = Scene().running()
-    motion = motion_message(scene.state)
+    motion = motion_message(scene.state, scene.inputs)
     assert (motion.command, motion.source) == ("run", "teleop")
     assert motion.linear == pytest.approx(scene.verdict.twist.linear)
     assert (motion.judged_boot, motion.judged) == (scene.boot, scene.seq)
@@ -55,7 +55,7 @@ REQUEST = Drive(linear=0.1, angular=0.0, echo=0, mono_ns=40)
 
 def timed_by(scene: Scene, ask: Ask) -> tuple[int, int, int]:
     inputs = replace(scene.inputs, event=ask)
-    motion = timed(motion_message(scene.state), scene.state, inputs)
+    motion = timed(motion_message(scene.state, scene.inputs), scene.state, inputs)
     assert (motion.command, motion.judged) == ("run", scene.seq)  # what was there stays
     return motion.asked_ns, motion.heard_ns, motion.judged_ns
 
@@ -77,7 +77,9 @@ def test_only_a_request_that_drives_is_answered() -> None:
 
 def test_a_motion_that_answers_nothing_carries_no_times() -> None:
     scene = Scene()
-    motion = timed(motion_message(scene.state), scene.state, replace(scene.inputs, event=Reset()))
+    motion = timed(
+        motion_message(scene.state, scene.inputs), scene.state, replace(scene.inputs, event=Reset())
+    )
     assert (motion.asked_ns, motion.heard_ns, motion.judged_ns) == (0, 0, 0)
 
 

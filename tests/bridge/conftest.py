@@ -1,0 +1,30 @@
+"""A bridge of its own for each test, and one router for all of a file."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from common.loop import Loop
+from tests.bridge.board import board
+from tests.bridge.rig import Rig, bridge_process
+from tests.support import bus_on, free_port, router_process, running
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Share one router among these tests: each has a bridge of its own."""
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(where):
+        yield where
+
+
+@pytest.fixture
+def rig(endpoint: str) -> Iterator[Rig]:
+    with (
+        board() as made,
+        bridge_process(made, endpoint) as process,
+        running(Loop()) as loop,
+    ):
+        rig = Rig(made, endpoint, loop, process)
+        with bus_on(endpoint, loop, rig.declare):
+            yield rig

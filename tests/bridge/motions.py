@@ -1,0 +1,56 @@
+"""Motions and leases that the tests of the lease begin with."""
+
+from dataclasses import replace
+
+from msgspec.structs import replace as replace_message
+
+from common.freshness import S
+from common.messages import Motion
+from services.bridge.lease import Lease, Order, on_motion
+
+MS = S // 1000
+LEASE = 200 * MS
+COAST = 1000 * MS
+OWN_BOOT = 7
+NOW = 100 * S
+
+ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
+HIT = replace(ARMED, hit=5)
+OWED = replace(ARMED, latched_by=3)  # by one that has ended
+
+
+def run(
+    linear: float = 0.5,
+    angular: float = 0.0,
+    *,
+    seq: int = 11,
+    boot: int = 1,
+    judged: int = 0,
+    judged_boot: int = 0,
+) -> Motion:
+    return Motion(
+        command="run",
+        linear=linear,
+        angular=angular,
+        seq=seq,
+        boot=boot,
+        judged=judged,
+        judged_boot=judged_boot,
+    )
+
+
+def stop(seq: int = 11, boot: int = 1) -> Motion:
+    return Motion(command="stop", seq=seq, boot=boot)
+
+
+def brake(seq: int = 11, boot: int = 1) -> Motion:
+    return Motion(command="brake", seq=seq, boot=boot)
+
+
+def taking_on(motion: Motion, predecessor: int | None) -> Motion:
+    """Return it from a sender that has latched, and knows of this one before it."""
+    return replace_message(motion, latched=True, predecessor=predecessor)
+
+
+def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order | None, object]:
+    return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT)

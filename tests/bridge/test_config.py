@@ -1,0 +1,61 @@
+"""Settings: the file is the defaults, and a protection is not taken away by accident."""
+
+import pytest
+
+from common.config import Sources, load
+from common.errors import ConfigError
+from common.settings import Board, Bus
+from services.bridge.config import Bridge, BridgeConfig
+
+
+def read(*sets: str) -> BridgeConfig:
+    return load(BridgeConfig, Sources(environ={}, sets=sets)).config
+
+
+def test_the_file_holds_the_defaults() -> None:
+    config = read()
+    assert (config.bridge, config.board, config.bus) == (Bridge(), Board(), Bus())
+
+
+@pytest.mark.parametrize(
+    ("path", "good", "bad"),
+    [
+        ("bridge.lease", 0.5, 0.51),
+        ("bridge.silence", 0.5, 0.51),
+        ("bridge.coast", 3.0, 3.1),
+        ("bridge.heartbeat", 0.2, 0.21),
+        ("bridge.max_linear", 1.5, 1.51),
+        ("bridge.max_angular", 2.0, 2.01),
+        ("bridge.bumper_rate", 20.0, 19.9),
+        ("bridge.ultrasonic_rate", 10.0, 9.9),
+        ("bridge.mileage_rate", 10.0, 9.9),
+        ("board.any_source_port", "false", "true"),
+        ("bus.lease", 2.0, 2.1),
+    ],
+)
+def test_what_takes_a_protection_away_must_be_owned_up_to(
+    path: str, good: object, bad: object
+) -> None:
+    section, name = path.split(".")
+    read(f"{path}={good}")
+    with pytest.raises(ConfigError, match=f"{section}: {name} = .* or name it in i_accept"):
+        read(f"{path}={bad}")
+    read(f"{path}={bad}", f"{section}.i_accept={name}")
+
+
+@pytest.mark.parametrize(
+    "path", ["bridge.max_linear", "bridge.max_angular", "bridge.lease", "bus.lease"]
+)
+def test_a_stricter_limit_wants_no_word(path: str) -> None:
+    read(f"{path}=0.25" if path == "bus.lease" else f"{path}=0.1")
+
+
+@pytest.mark.parametrize("section", ["bridge", "board", "bus"])
+def test_only_protections_can_be_given_up(section: str) -> None:
+    with pytest.raises(ConfigError, match="i_accept names 'port'"):
+        read(f"{section}.i_accept=port")
+
+
+def test_the_other_port_is_taken_before_the_board_counts_as_lost() -> None:
+    with pytest.raises(ConfigError, match=r"failover 0\.2 s must be under silence"):
+        read("bridge.failover=0.2")
