@@ -60,6 +60,11 @@ class Cable:
             arrived.append(heapq.heappop(self._under_way)[2])
         return arrived
 
+    @property
+    def due_ns(self) -> int | None:
+        """Return when the next one arrives; None when nothing is under way."""
+        return self._under_way[0][0] if self._under_way else None
+
     def _happens(self, chance: float) -> bool:
         # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.
         return chance > 0 and self._random.random() < chance

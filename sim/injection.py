@@ -3,6 +3,8 @@
 from msgspec import Struct
 
 from common.freshness import S
+from common.wire import reports as r
+from common.wire.frame import Frame
 from sim import requests as q
 from sim.board import DRIVER_SIDES
 from sim.geometry import Pose
@@ -10,6 +12,14 @@ from sim.simulation import Simulation
 from sim.trace import Disturbed, Truth
 from sim.vehicle import Twist
 from sim.world import World
+
+REPORTS: dict[q.ReportName, type[Frame]] = {
+    "velocity": r.VelocityReport,
+    "mileage": r.DistanceReport,
+    "ultrasonic": r.UltrasonicReport,
+    "bumper": r.BumperReport,
+    "driver": r.DriverReport,
+}
 
 
 class Reply(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -75,8 +85,12 @@ class Injection:
                 simulation.set_driver(DRIVER_SIDES[request.side], request.bits, now_ns)
             case q.Freeze():
                 simulation.freeze(request.seconds, now_ns)
-            case q.PowerCycle():  # pragma: no branch - there is no other
+            case q.PowerCycle():
                 simulation.power_cycle(request.seconds, now_ns)
+            case q.Mute():
+                simulation.muted = frozenset(REPORTS[name] for name in request.reports)
+            case q.Flood():  # pragma: no branch - there is no other
+                simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
 
     def _wire(self, faults: q.Wire) -> None:
         if faults.direction in ("to_pc", "both"):

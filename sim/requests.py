@@ -18,6 +18,7 @@ from sim.world import Angle, Box, Coordinate
 SonarName = Literal[
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left"
 ]
+ReportName = Literal["velocity", "mileage", "ultrasonic", "bumper", "driver"]
 Seconds = Annotated[float, Meta(ge=0.0, le=3600.0)]
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -58,6 +59,20 @@ class PowerCycle(Request, frozen=True, kw_only=True, tag="power_cycle"):
     """Take the board's power away, and give it back: counters, switches, command, faults at 0."""
 
     seconds: Seconds = 1.0  # until it speaks again
+
+
+class Mute(Request, frozen=True, kw_only=True, tag="mute"):
+    """Let the board not say these reports any more, asked or not; it says all without any."""
+
+    reports: tuple[ReportName, ...] = ()
+
+
+class Flood(Request, frozen=True, kw_only=True, tag="flood"):
+    """Let the board send that many datagrams a second besides, for a time."""
+
+    rate: Annotated[int, Meta(ge=100, le=100_000)] = 20_000
+    seconds: Seconds = 1.0
+    garbage: bool = False  # otherwise its velocity, true each time
 
 
 class Wire(Request, frozen=True, kw_only=True, tag="wire"):
@@ -103,7 +118,10 @@ class AskTruth(Request, frozen=True, kw_only=True, tag="truth"):
     """Ask how things really are; changes nothing."""
 
 
-Asked = Bumper | Sonar | Driver | Freeze | PowerCycle | Wire | Place | AddBox | RemoveBox | AskTruth
+Asked = (
+    Bumper | Sonar | Driver | Freeze | PowerCycle | Mute | Flood | Wire
+    | Place | AddBox | RemoveBox | AskTruth
+)  # fmt: skip
 
 
 class Step(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -30,6 +30,7 @@ STREAM_STEPS = 2  # velocity at 50 Hz
 SONAR_STEPS = 5  # a round of echoes takes about that long: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = S // 2  # a longer hole is skipped: the world stood still meanwhile
+GARBAGE = b"GS" + bytes(20)  # begins as a frame does
 
 KINDS: tuple[t.Kind, ...] = ("stop", "run", "break")
 
@@ -58,6 +59,9 @@ class Simulation:
         self._contact = self.world.contact(self.body, self.pose)
         self._silent_until_ns = now_ns
         self._powered = True
+        self.muted: frozenset[type[Frame]] = frozenset()
+        self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
+        self._flood_until_ns = now_ns
         self._said_pressed = False
         self._command = t.Command(mono_ns=now_ns, kind="stop", linear=0.0, angular=0.0)
 
@@ -109,6 +113,11 @@ class Simulation:
         self.freeze(seconds, now_ns)
         self.record(t.Power(mono_ns=now_ns, on=False))
 
+    def flood(self, rate: int, seconds: float, garbage: bool, now_ns: int) -> None:
+        """Send so many datagrams a second besides, for that long."""
+        self._flood = rate * STEP_NS // S, GARBAGE if garbage else None
+        self._flood_until_ns = now_ns + round(seconds * S)
+
     def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
         """Set a driver's fault bits; the board reports a fault unasked."""
         changed = bits != self.board.driver_bits[side]
@@ -152,6 +161,8 @@ class Simulation:
         self.board.sense(self.twist, self._ranges, self._pressed())
         if self._steps % STREAM_STEPS == 0:
             self._send_to_all(self.board.velocity(), self.now_ns)
+        if self.now_ns < self._flood_until_ns:
+            self._pour(*self._flood)
         if self._steps % TRUTH_STEPS == 0:
             self.record(self.truth(self.now_ns))
 
@@ -208,8 +219,14 @@ class Simulation:
         for port in self._config.board.listen_ports:
             self._send(frame, port, now_ns)
 
+    def _pour(self, count: int, garbage: bytes | None) -> None:
+        payload = garbage or self._framing.pack(self.board.velocity())
+        ports = self._config.board.listen_ports
+        for number in range(0 if self._silent(self.now_ns) else count):
+            self.to_pc.put(Datagram(payload, ports[number % len(ports)]), self.now_ns)
+
     def _send(self, frame: Frame, port: int, now_ns: int) -> None:
-        if not self._silent(now_ns):
+        if not self._silent(now_ns) and type(frame) not in self.muted:
             self.to_pc.put(Datagram(self._framing.pack(frame), port), now_ns)
 
     def _note_bumper(self, datagram: Datagram, now_ns: int) -> None:

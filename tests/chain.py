@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -31,6 +31,7 @@ class Chain:
     commands: dict[str, list[str]]
     log: Path
     config: Everything  # in force
+    env: Mapping[str, str] | None = None  # of the processes; ours when None
     processes: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
     others: list["subprocess.Popen[bytes]"] = field(default_factory=list)  # beside the stack
 
@@ -38,7 +39,7 @@ class Chain:
         """Start one of them, or start it again."""
         with self.log.open("ab") as output:
             self.processes[name] = subprocess.Popen(
-                self.commands[name], stdout=output, stderr=output
+                self.commands[name], stdout=output, stderr=output, env=self.env
             )
 
     def kill(self, name: str) -> int:
@@ -71,20 +72,29 @@ class Chain:
 
 @contextlib.contextmanager
 def chain(
-    folder: Path, world: str = "empty", *, sets: Sequence[str] = (), shipped: bool = False
+    folder: Path,
+    world: str = "empty",
+    *,
+    sets: Sequence[str] = (),
+    shipped: bool = False,
+    listen: str = "127.0.0.1",
+    log: str = "log.jsonl",
+    env: Mapping[str, str] | None = None,
 ) -> Iterator[Chain]:
     """Run the stack while the context lasts, as shipped unless this machine cannot bear it.
 
-    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides.
+    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides. The router
+    listens on the address ``listen``; ``log`` is a file in the folder.
     """
     holdup_s = 0.0 if shipped else holdup.measured()
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    port = free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
     sets = [
         *sets,
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
-        f"bus.listen={endpoint}",
+        f"bus.listen=tcp/{listen}:{port}",
         f"sim.control_port={control}",
         *holdup.settings(holdup_s),
     ]
@@ -94,7 +104,7 @@ def chain(
     made = {name: list(command) for name, command in commands(options)}
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file)]
-    it = Chain(endpoint, trace_file, Control(control), made, folder / "log.jsonl", config)
+    it = Chain(endpoint, trace_file, Control(control), made, folder / log, config, env)
     for name in made:
         it.start(name)
     try:

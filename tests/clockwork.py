@@ -160,7 +160,7 @@ class Clockwork:
             self.answers.append((type(event).__name__, verdict.reply.done, verdict.reply.text))
         self._seq["motion"] += 1
         motion = msgspec.structs.replace(
-            motion_message(self._state), seq=self._seq["motion"], boot=1
+            motion_message(self._state, inputs), seq=self._seq["motion"], boot=1
         )
         self._lease, order, _ = leases.on_motion(
             self._lease, motion, self.now_ns, self._lease_ns, BOOT

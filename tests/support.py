@@ -1,34 +1,56 @@
 """What integration tests need: a router of their own, a loop in a thread, and waiting-until."""
 
 import contextlib
+import itertools
+import os
+import random
 import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import TypeVar
 
 from common.bus.bus import Bus
 from common.loop import Loop
 
 PATIENCE_S = 20.0
+WORKERS = 8  # whose ports do not meet
+T = TypeVar("T")
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
-    """Return a port of 127.0.0.1 that was free a moment ago."""
-    with socket.socket(socket.AF_INET, kind) as sock:
-        sock.bind(("127.0.0.1", 0))
-        port: int = sock.getsockname()[1]
-        return port
+    """Return a port of 127.0.0.1 that nobody has, and that nobody else is given meanwhile."""
+    while True:
+        port = next(PORTS)
+        with socket.socket(socket.AF_INET, kind) as sock, contextlib.suppress(OSError):
+            sock.bind(("127.0.0.1", port))
+            return port
 
 
-def wait_until(true: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Return once it is true; fail with ``what`` when that takes too long."""
+def ports() -> Iterator[int]:
+    """Yield the ports of this process, in turn and from anywhere on.
+
+    They lie below those that the kernel gives out (32768); each worker of a test run has its own.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % WORKERS
+    mine = range(10_000 + worker, 32_000, WORKERS)
+    first = random.randrange(len(mine))
+    return itertools.cycle([*mine[first:], *mine[:first]])
+
+
+PORTS = ports()
+
+
+def wait_until(true: Callable[[], T], what: str, patience_s: float = PATIENCE_S) -> T:
+    """Return what is true once it is; fail with ``what`` when that takes too long."""
     deadline = time.monotonic() + patience_s
-    while not true():
+    while not (found := true()):
         if time.monotonic() > deadline:
             raise AssertionError(f"waited {patience_s:.0f} s for: {what}")
         time.sleep(0.005)
+    return found
 
 
 @contextlib.contextmanager

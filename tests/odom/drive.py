@@ -4,6 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import pytest
+from hypothesis import strategies as st
+
 from common.freshness import S
 from common.messages import Mileage, Odometry, Velocity
 from services.odom.config import Odom
@@ -11,6 +14,12 @@ from services.odom.estimator import DISTANCE_WRAP_M, Estimator, Outcome
 from services.odom.pose import Pose
 
 TICK_NS = S // 50
+EXACT = pytest.approx((0.0, 0.0), abs=1e-6)
+
+speeds = st.floats(-1.5, 1.5)
+turnings = st.floats(-1.5, 1.5)
+losses = st.lists(st.tuples(st.booleans(), st.booleans()), max_size=40)
+parts = st.lists(st.tuples(speeds, turnings, losses), max_size=5)
 
 
 @dataclass
@@ -102,3 +111,18 @@ def minors(rows: Sequence[float]) -> list[float]:
     a, b, c, _, d, e, _, _, f = rows
     whole = a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)
     return [a, d, f, a * d - b * b, a * f - c * c, d * f - e * e, whole]
+
+
+def started(**board: float) -> Listener:
+    """Return a listener that has heard the counters once, beside a board at rest."""
+    listener = Listener(Board(**board))  # type: ignore[arg-type]
+    listener.hear()
+    return listener
+
+
+def driving() -> Listener:
+    """Return a listener beside a board that has driven a while."""
+    listener = started(distance=70.0, heading=2.0)
+    listener.board.linear, listener.board.angular = 0.8, 0.3
+    listener.drive(100)
+    return listener

@@ -34,6 +34,9 @@ def room(*boxes: dict[str, Any], **plan: Any) -> Plan:
     return msgspec.convert({"title": "a room", "boxes": boxes, **plan}, Plan)
 
 
+WALL_AHEAD = room(walls=[{"points": [[3.0, -5.0], [3.0, 5.0]]}])
+
+
 class Rig:
     """A simulation with its script, the PC's side of the wire, and all that came of it."""
 

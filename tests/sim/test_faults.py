@@ -102,3 +102,14 @@ def test_the_same_seed_does_the_same() -> None:
 def test_wrong_chances_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert({"do": "wire", **wrong}, Wire)
+
+
+def test_it_tells_when_the_next_one_arrives() -> None:
+    assert Cable(1).due_ns is None
+    cable = Cable(1)
+    cable.faults = Wire(delay=0.2)
+    cable.put(Datagram(b"x", 4002), 5)
+    cable.put(Datagram(b"y", 4002), 9)
+    assert cable.due_ns == 5 + S // 5
+    cable.take(5 + S // 5)
+    assert cable.due_ns == 9 + S // 5
