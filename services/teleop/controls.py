@@ -5,9 +5,10 @@ of the two that was pressed counts. Turbo is armed by ``t`` and good for one hol
 drives off fast by a key of ten minutes ago; CapsLock changes nothing.
 """
 
+from common.requests import Phase, Requests, Twist
 from services.teleop.config import Teleop
-from services.teleop.hold import Deadman, Keys, Phase, Requests
-from services.teleop.mapping import DIRECTIONS, Stick, Twist, deflection, shaped, twist
+from services.teleop.hold import Deadman, Keys
+from services.teleop.mapping import DIRECTIONS, Stick, deflection, shaped, twist
 
 CREEP = "f"
 TURBO = "t"

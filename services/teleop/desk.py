@@ -11,13 +11,14 @@ from common import keys
 from common.bus.bus import Arrival
 from common.freshness import S
 from common.messages import Done, Event, ReleaseRequest, ResetRequest
+from common.requests import Twist
 from common.service import Node
+from common.source import DriveSource
 from services.teleop.config import TeleopConfig
 from services.teleop.controls import Controls
 from services.teleop.gamepad import Gamepad, NoGamepad
 from services.teleop.logbook import Logbook
-from services.teleop.mapping import Deflection, Stick, Twist, twist
-from services.teleop.source import DriveSource
+from services.teleop.mapping import Deflection, Stick, twist
 from services.teleop.view import Ear, View
 
 PERIOD_S = 0.05  # 20 Hz, as safety's lease of 0.3 s wants it

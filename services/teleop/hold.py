@@ -1,4 +1,4 @@
-"""Hold to drive: which keys are held, and what is sent while they are and after.
+"""Hold to drive: which keys are held, and whether a gamepad counts.
 
 **Keys.** A terminal sends a key when it goes down and again while it stays down, but nothing when
 it comes up. A key is therefore held until a deadline: ``first`` seconds after it came out of the
@@ -8,29 +8,11 @@ still held then is an old wish.
 
 **Deadman.** A gamepad's button tells both ways, but it counts only after it was seen up: one that
 is down when the gamepad is found, or after a stop, must be let go first.
-
-**Requests.** On every tick, 20 times a second, at most one request goes out:
-
-========== ========================= =========================================
-phase      tick, something is held   tick, nothing is held
-========== ========================= =========================================
-SILENT     send zero; DRIVING        send nothing
-DRIVING    send the twist            send zero; RELEASING, two zeros are left
-RELEASING  send zero; DRIVING        send zero; SILENT once none is left
-========== ========================= =========================================
-
-The zero ahead of a drive is neutral: it lets safety and the bridge arm. ``stop`` is RELEASING with
-three zeros, in any phase.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from enum import Enum
 
 from common.freshness import S
-from services.teleop.mapping import STILL, Twist
-
-ZEROS = 3  # on release: one may be lost, two are a doubt
 
 
 class Keys:
@@ -78,38 +60,3 @@ class Deadman:
     def drop(self) -> None:
         """Want it let go before it counts again."""
         self._seen_up = False
-
-
-class Phase(Enum):
-    """What the last tick left behind."""
-
-    SILENT = "silent"
-    DRIVING = "driving"
-    RELEASING = "releasing"
-
-
-@dataclass
-class Requests:
-    """What to send, tick by tick."""
-
-    phase: Phase = Phase.SILENT
-    zeros: int = 0  # left to send while RELEASING
-
-    def tick(self, held: Twist | None) -> Twist | None:
-        """Return the request to send now, or None for silence; ``held`` is None when let go."""
-        if held is not None:
-            first = self.phase is not Phase.DRIVING
-            self.phase = Phase.DRIVING
-            return STILL if first else held
-        if self.phase is Phase.DRIVING:
-            self.stop()
-        if self.phase is Phase.SILENT:
-            return None
-        self.zeros -= 1
-        if self.zeros == 0:
-            self.phase = Phase.SILENT
-        return STILL
-
-    def stop(self) -> None:
-        """Send zeros and then fall silent, whatever went before."""
-        self.phase, self.zeros = Phase.RELEASING, ZEROS

@@ -8,15 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from common import codec
+from common.requests import Twist
 from services.teleop.config import Teleop
-
-
-@dataclass(frozen=True, slots=True)
-class Twist:
-    """A motion in the plane."""
-
-    linear: float = 0.0  # m/s
-    angular: float = 0.0  # rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +29,6 @@ class Stick:
     turbo: bool
 
 
-STILL = Twist()
 # The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal
 # repeats one key only, so an arc needs a key of its own.
 DIRECTIONS = {

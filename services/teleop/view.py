@@ -17,7 +17,7 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from services.teleop.mapping import Twist
+from common.requests import Twist
 
 M = TypeVar("M", bound=Message)
 

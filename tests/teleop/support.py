@@ -11,10 +11,10 @@ from common.bus.bus import Arrival, Bus
 from common.config import Loaded
 from common.keys import Call, Topic
 from common.messages import Drive, Limits, Link, Message, Odometry, SafetyState
+from common.requests import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.logbook import Logbook
-from services.teleop.mapping import Twist
 from services.teleop.view import View
 
 

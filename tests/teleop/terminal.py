@@ -1,4 +1,4 @@
-"""A program as an operator runs it: the real one, teleop unless named, in a pseudo terminal."""
+"""A program as an operator runs it, in a pseudo terminal; teleop unless another is named."""
 
 import contextlib
 import fcntl
@@ -7,26 +7,30 @@ import struct
 import subprocess
 import sys
 import termios
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 TELEOP = ("services.teleop", "--no-gamepad")
 
 
 class Terminal:
-    """A pseudo terminal with a program in it: its module and arguments."""
+    """A pseudo terminal with a program in it."""
 
-    def __init__(self, endpoint: str, *program: str) -> None:
+    def __init__(
+        self,
+        command: Sequence[str],
+        folder: Path | None = None,
+        env: Mapping[str, str] = os.environ,
+    ) -> None:
         self.fd, inner = os.openpty()
         fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         self.process = subprocess.Popen(
-            [
-                *(sys.executable, "-m", *program),
-                *("--set", f"bus.connect={endpoint}"),
-            ],
+            command,
             stdin=inner,
             stdout=inner,
             stderr=inner,
-            env=os.environ | {"TERM": "xterm-256color"},
+            cwd=folder,
+            env={**env, "TERM": "xterm-256color"},
             start_new_session=True,
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
         )
@@ -66,7 +70,15 @@ class Terminal:
 
 @contextlib.contextmanager
 def terminal(endpoint: str, *program: str) -> Iterator[Terminal]:
-    it = Terminal(endpoint, *(program or TELEOP))
+    """Run a module with its arguments on the bus at an endpoint while the context lasts."""
+    module = [sys.executable, "-m", *(program or TELEOP)]
+    with at_terminal(Terminal([*module, "--set", f"bus.connect={endpoint}"])) as it:
+        yield it
+
+
+@contextlib.contextmanager
+def at_terminal(it: Terminal) -> Iterator[Terminal]:
+    """End what runs in a terminal with the context."""
     try:
         yield it
     finally:

@@ -3,9 +3,10 @@
 import pytest
 
 from common.freshness import S
+from common.requests import STILL, Twist
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls
-from services.teleop.mapping import STILL, Deflection, Stick, Twist
+from services.teleop.mapping import Deflection, Stick
 
 PERIOD_NS = S // 20
 FIRST_GEAR = Twist(0.2, 0.0)

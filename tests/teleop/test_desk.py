@@ -18,8 +18,9 @@ from common.messages import (
     ResetRequest,
     Velocity,
 )
+from common.requests import Twist
 from services.teleop.desk import ESTOP_TICKS, Desk
-from services.teleop.mapping import Deflection, Stick, Twist
+from services.teleop.mapping import Deflection, Stick
 from tests.teleop.support import FakeNode, link, safety_state
 
 PERIOD_NS = S // 20

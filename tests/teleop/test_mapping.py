@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.requests import Twist
 from services.teleop.config import GEARS, Teleop
-from services.teleop.mapping import DIRECTIONS, Deflection, Twist, deflection, shaped, twist
+from services.teleop.mapping import DIRECTIONS, Deflection, deflection, shaped, twist
 
 SETTINGS = Teleop()
 

@@ -3,8 +3,8 @@
 import pytest
 
 from common.messages import Bumper, Cause
+from common.requests import Twist
 from services.teleop import panels
-from services.teleop.mapping import Twist
 from services.teleop.view import Line
 from tests.teleop.support import link, safety_state, view
 

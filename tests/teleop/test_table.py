@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Driver, Limits, Velocity
-from services.teleop.mapping import Twist
+from common.requests import Twist
 from services.teleop.table import motion
 from services.teleop.view import View
 from tests.teleop.support import link, odometry, safety_state, view
