@@ -156,15 +156,22 @@ class Desk:
         yield from self._of_zones(motion, now_ns)
 
     def may_reset(self, now_ns: int) -> bool:
-        """Tell whether a reset may be granted: the causes gone, standing, nobody asking."""
-        _, velocity = self.samples.get("velocity", (0, None))
-        stands = isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
-        clear = len(self.bumpers) == 3 and not any(one.pressed for one in self.bumpers)
+        """Tell whether a reset may be granted at all: standing, nobody asking."""
+        at_ns, velocity = self.samples.get("velocity", (0, None))
+        heard = now_ns - at_ns <= AGES_S["velocity"] * S
+        stands = heard and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
         asked = any(
             self.is_fresh(source, now_ns) and not wish.still for source, wish in self.wishes.items()
         )
-        well = all(self.well[side] >= GOOD_SAMPLES for side in ("left", "right"))
-        return stands and clear and well and not asked
+        return stands and not asked
+
+    def is_gone(self, trip: str) -> bool:
+        """Tell whether the cause of a trip is gone, so that a reset may clear it."""
+        if trip == "contact":
+            return len(self.bumpers) == 3 and not any(one.pressed for one in self.bumpers)
+        if trip == "driver":
+            return all(self.well[side] >= GOOD_SAMPLES for side in ("left", "right"))
+        return True
 
     def _faulty(self) -> Iterator[str]:
         for side in ("left", "right"):

@@ -116,10 +116,14 @@ class Judge(Watch):
                 self.trip("contact", gate.boot, (gate.boot, gate.published + 1))
 
     def on_reset(self, process: Process, done: bool) -> None:
-        """Note that an operator's reset was granted; one that must not be clears nothing."""
+        """Note that an operator's reset was granted; what it must not clear stays."""
         desk = self.desks.get(process.boot)
         if done and self.reader_up and desk is not None and desk.may_reset(self.now_ns):
-            self.trips = [trip for trip in self.trips if desk.boot not in trip.holders]
+            self.trips = [
+                trip
+                for trip in self.trips
+                if desk.boot not in trip.holders or not desk.is_gone(trip.name)
+            ]
 
     def on_hold(self, process: Process, done: bool) -> None:
         """Note that an operator holds the release, or was refused."""

@@ -69,7 +69,7 @@ class Anything(Troubles):
     def cure(self) -> None:
         """Cure everything, reset, and drive: there must be something at stake."""
         vehicle = self.stack.vehicle
-        vehicle.pressed, vehicle.measured = False, None
+        vehicle.pressed, vehicle.measured, vehicle.tells_velocity = False, None, True
         vehicle.ranges[:] = [NO_ECHO_MM] * 8
         for side in Side:
             vehicle.fault(side, 0)
@@ -97,6 +97,21 @@ class Anything(Troubles):
         self.stack.run(gone_ms)
         self.stack.reset()
         self.off_we_go("teleop", 1.0, 0.0, 400)
+
+    @rule(kind=KINDS, resets=st.booleans(), dies=st.booleans())
+    def stuck(self, kind: str, resets: bool, dies: bool) -> None:
+        """Drive into something, with more amiss, and creep off with or without a reset."""
+        self.off_we_go("teleop", 1.0, 0.0, 400)
+        self.stack.vehicle.pressed = True
+        self.trip("estop" if kind == "bumper" else kind)
+        if dies:
+            self.stack.kill("safety", 20)
+        self.let_go("teleop", 1200)
+        self.release(2)
+        if resets:
+            self.stack.reset()
+        self.release(6)
+        self.bumper(pressed=False, ms=320)
 
     @rule(linear=FAST, route=BUS, weather=ON_BUS, hits=st.booleans())
     def storm(self, linear: float, route: str, weather: Weather, hits: bool) -> None:

@@ -65,6 +65,12 @@ class Troubles(RuleBasedStateMachine):
         self.stack.vehicle.measured = None if linear is None else Twist(linear)
         self.stack.run(ms)
 
+    @rule(tells=st.booleans(), ms=SHORT | LONG)
+    def velocities(self, tells: bool, ms: int) -> None:
+        """Let the board tell its velocity no more, or again."""
+        self.stack.vehicle.tells_velocity = tells
+        self.stack.run(ms)
+
     @rule(on=st.booleans())
     def brakes(self, on: bool) -> None:
         """Switch one of the board's own brakes by the bridge's call."""

@@ -29,6 +29,7 @@ class Vehicle:
         self.measured: Twist | None = None  # what the board says instead of the truth
         self.pressed = False
         self.silent_until_ns = 0
+        self.tells_velocity = True
         self.inbox: deque[bytes] = deque()  # for the bridge
         self.on_motion: Callable[[MotionCommand, Complaints], None] = lambda *_: None
         self._net = net
@@ -78,7 +79,8 @@ class Vehicle:
             self._move()
         if self._stream_ns <= self._net.now_ns:
             self._stream_ns += STREAM_NS
-            self.say(self._velocity())
+            if self.tells_velocity:
+                self.say(self._velocity())
 
     def _take(self, datagram: bytes, complaints: Complaints) -> None:
         if self.silent:
