@@ -7,13 +7,24 @@ limit of time is waited for, less where the news is pushed.
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from cli.settings import Everything
-from sim.requests import Driver, Freeze, PowerCycle, Sonar, SonarName, Wire
+from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar, SonarName, Wire
 from tests.faults import deeds
 from tests.faults.deeds import do, kill, second
+from tests.faults.enclosure import Need
 from tests.faults.lane import Lane
+from tests.faults.surroundings import (
+    cable,
+    cut_and_let_go,
+    empty_disk,
+    fill_disk,
+    mend_cable,
+    set_clocks_right,
+    starve,
+    step_clock,
+)
 
 # How the vehicle came to drive again, by rising effort.
 Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
@@ -33,6 +44,7 @@ class Fault:
     mend: Callable[[Lane], None] = lambda lane: lane.mend()
     hold_s: float = 0.5  # how long the stick is held on after the fault
     harmless: bool = False  # no process may end by it
+    needs: Need = "nothing"
 
 
 def by_limit(limit: Callable[[Everything], float]) -> Budget:
@@ -48,10 +60,14 @@ def within(seconds: float) -> Budget:
 MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
 HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
 SILENCE = by_limit(lambda config: config.bridge.silence)
+BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
+VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
+ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
 REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
+# Who lets go says three zeros, 50 ms apart; the last of them holds for its lease.
+ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
 
-
-HOLD_S = 0.8
+HOLD_S = 0.6
 FREEZE_S = 0.5
 OFF_S = 0.3
 
@@ -61,13 +77,23 @@ NEUTRAL: tuple[Outcome, ...] = ("after a neutral",)
 RESET: tuple[Outcome, ...] = ("after a reset",)
 
 
-def signals(name: str, then: tuple[Outcome, ...], budget: Budget | None) -> list[Fault]:
-    """Return what comes of a part that is killed, stopped, or asked to end."""
+def signals(
+    name: str,
+    then: tuple[Outcome, ...],
+    budget: Budget | None,
+    *,
+    asked: Budget | None = None,
+    needs: Need = "nothing",
+) -> list[Fault]:
+    """Return what comes of a part that is killed, stopped, or ``asked`` to end."""
+    told = asked or budget
     return [
-        Fault(f"{name} SIGKILL", kill(name, signal.SIGKILL), then, budget, hold_s=HOLD_S),
+        Fault(f"{name} SIGKILL", kill(name, signal.SIGKILL), then, budget, hold_s=HOLD_S,
+              needs=needs),
         Fault(f"{name} SIGSTOP", kill(name, signal.SIGSTOP), then, budget, deeds.go_on(name),
-              hold_s=HOLD_S),
-        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, budget, hold_s=HOLD_S),
+              hold_s=HOLD_S, needs=needs),
+        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, told, hold_s=HOLD_S,
+              needs=needs),
     ]  # fmt: skip
 
 
@@ -77,16 +103,20 @@ def wire(**what: float) -> Callable[[Lane], int]:
 
 
 FORWARD: tuple[SonarName, ...] = ("front_left", "front", "front_right")
+ELSEWHERE = tuple(name for name in get_args(SonarName) if name not in FORWARD)
 
-# Budgets of milliseconds: nothing else runs beside these.
-QUIET = [
+MILLISECONDS = [
     Fault("contact", deeds.hit(0.3), RESET, within(0.02)),
     Fault("contact in one sample", deeds.hit(0.0), RESET, within(0.02)),
     Fault("estop", deeds.estop, RESET, within(0.02)),
+    Fault("estop by anybody's DELETE", deeds.estop_by(lambda session, key: session.delete(key)),
+          RESET, within(0.02)),
+    Fault("estop of all, garbage in it", deeds.estop_by(
+        lambda session, _: session.put("t2/v1/*/estop", b"\xc1", encoding="text/plain")),
+          RESET, within(0.02)),
     Fault("bridge SIGKILL", kill("bridge", signal.SIGKILL), NEUTRAL, within(0.01)),
     Fault("settings spoilt, bridge SIGKILL", deeds.spoil_config, NEUTRAL, within(0.01),
           deeds.restore_config),
-    Fault("bridge out of memory", deeds.starve, NEUTRAL, within(0.01), hold_s=1.0),
 ]  # fmt: skip
 
 PROCESSES = [
@@ -100,14 +130,53 @@ PROCESSES = [
     # Safety that loses its bus can hear no emergency stop: that is latched.
     *signals("router", (*NEUTRAL, *RESET), MOTION_LEASE),
     Fault("router gone for 5 s", kill("router", signal.SIGKILL), RESET, MOTION_LEASE, hold_s=5.0),
+    Fault("estop with 1 MB in it", deeds.estop_by(
+        lambda session, key: session.put(key, b"x" * 1_000_000)), RESET, within(0.1)),
     # A driver that goes on has a stick that is still held: its next request counts.
     *signals("driver", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
+    # The real one in a terminal, a finger on W; whoever only asks, as it does, is the driver.
+    *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, asked=ZEROS, needs="a teleop"),
     *signals("odom", ON, None),
     Fault("a second bridge", second("bridge"), ON, None, deeds.end_others, hold_s=HOLD_S),
     # Its heartbeats mix with the first one's in what drivers echo; it never reaches the wheels.
     Fault("a second safety", second("safety"), (*ON, *ITSELF), None, deeds.end_others, hold_s=1.5),
     Fault("a second driver of one name", deeds.second_driver, (*ON, *ITSELF), None,
           deeds.end_others, hold_s=1.5),
+    # What cannot be written is lost; nobody waits for it.
+    Fault("disk full, then contact", fill_disk, RESET, within(0.05), empty_disk, harmless=True,
+          needs="a small disk"),
+]  # fmt: skip
+
+NETWORK = [
+    Fault("driver's network cut for 3 s", cable(Wire(drop=1.0)), (*ITSELF, *NEUTRAL),
+          REQUEST_LEASE, mend_cable, hold_s=3.0, needs="a far driver"),
+    # The stick was let go meanwhile: of all that was asked before, nothing may move it any more.
+    *(
+        Fault(f"driver's network cut for {seconds:g} s, then the burst", cut_and_let_go(seconds),
+              NEUTRAL, REQUEST_LEASE, mend_cable, hold_s=seconds + 1.0, needs="a far driver")
+        for seconds in (0.8, 3.0)
+    ),
+    Fault("all from the driver 1 s late", cable(Wire(direction="to_pc", delay=1.0)),
+          (*ITSELF, *NEUTRAL), REQUEST_LEASE, mend_cable, hold_s=2.0, needs="a far driver"),
+    *(
+        Fault(f"driver's network: {what}", cable(faults), (*ON, *ITSELF, *NEUTRAL), None,
+              mend_cable, hold_s=1.5, needs="a far driver")
+        for what, faults in {
+            "1 % lost": Wire(drop=0.01),
+            "10 % lost": Wire(drop=0.1),
+            "30 % lost": Wire(drop=0.3),
+            "200 ms late, up to 50 ms more": Wire(direction="to_pc", delay=0.2, jitter=0.05),
+            "25 % twice, 25 % out of order": Wire(duplicate=0.25, reorder=0.25),
+        }.items()
+    ),
+]  # fmt: skip
+
+# A faked clock makes its processes slow, and then any load can stop the vehicle.
+CLOCKS = [
+    Fault(f"{whose}'s clock stepped by {hours:+d} h", step_clock(whose, 3600 * hours), ON, None,
+          set_clocks_right, hold_s=1.5, needs="other clocks")
+    for whose in ("robot", "driver")
+    for hours in (1, -1)
 ]  # fmt: skip
 
 BOARD = [
@@ -130,18 +199,55 @@ BOARD = [
               deeds.sonar_well(name))
         for name in FORWARD
     ),
-    Fault("rear sonar faulty", do(Sonar(name="rear", fault=True)), ON, None,
-          deeds.sonar_well("rear")),
     # Noticed after 0.5 m without a change.
-    Fault("front sonar stuck", do(Sonar(name="front", range=3.0)), ITSELF, within(1.0),
-          deeds.sonar_well("front"), hold_s=1.3),
+    *(
+        Fault(f"{name} sonar stuck", do(Sonar(name=name, range=3.0)), ITSELF, within(1.0),
+              deeds.sonar_well(name), hold_s=1.3)
+        for name in FORWARD
+    ),
+    *(
+        Fault(f"{name} sonar {what}", do(sonar), ON, None, deeds.sonar_well(name), hold_s=0.8)
+        for name in ELSEWHERE
+        for what, sonar in {
+            "faulty": Sonar(name=name, fault=True), "stuck": Sonar(name=name, range=3.0),
+        }.items()
+    ),
+    # One frame tells of all eight.
+    Fault("sonars silent", do(Mute(reports=("ultrasonic",))), ITSELF, ULTRASONIC_AGE),
+    Fault("bumper silent", do(Mute(reports=("bumper",))), NEUTRAL, BUMPER_AGE),
+    Fault("velocity silent", do(Mute(reports=("velocity",))), NEUTRAL, VELOCITY_AGE),
+    # Long enough to drive further than a step of the counters may be.
+    Fault("mileage silent for 4 s", deeds.silent("mileage", 4.0), ON, None, hold_s=4.8),
+]  # fmt: skip
+
+# These take the machine's time as well.
+GREEDY = [
+    Fault("bridge out of memory", starve("bridge"), NEUTRAL, within(0.01), hold_s=1.0,
+          needs="a memory group"),
+    *(
+        Fault(f"{name} out of memory", starve(name), then, budget, hold_s=HOLD_S,
+              needs="a memory group")
+        for name, then, budget in (
+            ("guard", NEUTRAL, within(0.05)),
+            ("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
+            ("router", (*NEUTRAL, *RESET), MOTION_LEASE),
+            ("driver", NEUTRAL, REQUEST_LEASE),
+            ("odom", ON, None),
+        )
+    ),
     Fault("a stranger's 20 000 datagrams/s", deeds.flood, ON, None, deeds.end_others, hold_s=1.0),
+    Fault("board's 20 000 datagrams/s of garbage", do(Flood(seconds=0.9, garbage=True)),
+          (*ON, *NEUTRAL), None, hold_s=1.0, harmless=True),
+    # More than the bridge can publish: what it asks for is lost among them, the bumper first.
+    Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
+          (*ON, *ITSELF, *NEUTRAL), None, hold_s=1.0, harmless=True),
 ]  # fmt: skip
 
 HOSTILE = [
-    Fault(f"{what} on every key", deeds.say(payload), (*ON, *ITSELF, *NEUTRAL, *RESET), None,
-          harmless=True)
-    for what, payload in deeds.HOSTILE.items()
+    Fault(f"{what} on every key", saying, (*ON, *ITSELF, *NEUTRAL, *RESET), None, harmless=True)
+    for what, saying in deeds.HOSTILE.items()
 ]  # fmt: skip
 
-FAULTS = [*QUIET, *PROCESSES, *BOARD, *HOSTILE]
+# What is tried beside each other, the most delicate first.
+PARTS = [[*MILLISECONDS, *CLOCKS], GREEDY, [*PROCESSES, *NETWORK, *BOARD, *HOSTILE]]
+FAULTS = [fault for part in PARTS for fault in part]

@@ -1,7 +1,6 @@
 """How faults are made: to processes, to the simulated board, on the bus, to the machine."""
 
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -10,25 +9,29 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgpack
+import msgspec
 import zenoh
 
 from common import keys
 from common.bus.session import client_config
-from sim.requests import Bumper, Driver, Freeze, PowerCycle, Sonar, SonarName, Wire
+from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
 from tests.faults.lane import Lane, until
+from tests.support import wait_until
 
 
 def child(pid: int) -> int:
     """Return the process that a guard watches, once there is one."""
     path = Path(f"/proc/{pid}/task/{pid}/children")
-    until(lambda: path.read_text().split(), 5.0)
-    return int(path.read_text().split()[0])
+    return int(wait_until(lambda: path.read_text().split(), f"a child of {pid}", 5.0)[0])
 
 
 def pid_of(lane: Lane, name: str) -> int:
-    """Return a process by its part in the stack; ``guard`` is the bridge's parent."""
-    if name == "bridge":
-        return child(lane.stack.processes["bridge"].pid)
+    """Return a process by its part in the stack.
+
+    ``guard`` is the bridge's parent, and ``teleop`` a child of the driver who types.
+    """
+    if name in ("bridge", "teleop"):
+        return child(lane.stack.processes["bridge" if name == "bridge" else "driver"].pid)
     return lane.stack.processes["bridge" if name == "guard" else name].pid
 
 
@@ -49,13 +52,25 @@ def go_on(name: str) -> Callable[[Lane], None]:
     return lambda lane: os.kill(pid_of(lane, name), signal.SIGCONT)
 
 
-def do(*requests: Bumper | Driver | Freeze | PowerCycle | Sonar | Wire) -> Callable[[Lane], int]:
+def do(*requests: Asked) -> Callable[[Lane], int]:
     """Ask the simulated vehicle for something."""
 
     def inject(lane: Lane) -> int:
         at_ns = time.monotonic_ns()
         for request in requests:
             lane.stack.control.do(request)
+        return at_ns
+
+    return inject
+
+
+def silent(report: ReportName, seconds: float) -> Callable[[Lane], int]:
+    """Let the board leave out a report for a while; what comes of its return is seen, too."""
+
+    def inject(lane: Lane) -> int:
+        at_ns = do(Mute(reports=(report,)))(lane)
+        time.sleep(seconds)
+        lane.stack.control.do(Mute())
         return at_ns
 
     return inject
@@ -76,9 +91,24 @@ def hit(held_s: float) -> Callable[[Lane], int]:
 
 
 def estop(lane: Lane) -> int:
+    """Stop it as our own tools do."""
     at_ns = time.monotonic_ns()
     lane.bus.estop()
     return at_ns
+
+
+def estop_by(put: Callable[[zenoh.Session, str], None]) -> Callable[[Lane], int]:
+    """Stop it as any program can that knows the key and nothing else."""
+
+    def inject(lane: Lane) -> int:
+        with zenoh.open(client_config([lane.stack.endpoint])) as session:
+            time.sleep(0.1)  # the router knows the session
+            at_ns = time.monotonic_ns()
+            put(session, keys.estop_key("001"))
+            time.sleep(0.1)
+        return at_ns
+
+    return inject
 
 
 def second(*words: str) -> Callable[[Lane], int]:
@@ -133,36 +163,6 @@ def restore_config(lane: Lane) -> None:
     lane.mend()
 
 
-def starve(lane: Lane) -> int:
-    """Let the kernel kill the bridge for want of memory, in a group of its own."""
-    pid = pid_of(lane, "bridge")
-    group = Path(f"/sys/fs/cgroup/memory/t2-faults-{os.getpid()}")
-    group.mkdir(exist_ok=True)
-    (group / "memory.limit_in_bytes").write_text(str(64 << 20))
-    Path(f"/proc/{pid}/oom_score_adj").write_text("1000")
-    (group / "cgroup.procs").write_text(str(pid))
-    hungry = "import os; x = []\nwhile True: x.append(os.urandom(1 << 20))"
-    waiting = os.pidfd_open(pid)
-    with subprocess.Popen(
-        [sys.executable, "-c", hungry],
-        preexec_fn=lambda: (group / "cgroup.procs").write_text(str(os.getpid())),
-    ) as eater:
-        at_ns = time.monotonic_ns()
-        while not select.select([waiting], [], [], 0.0005)[0]:
-            at_ns = time.monotonic_ns()  # it was alive then
-        eater.kill()
-    os.close(waiting)
-    return at_ns
-
-
-def no_starving() -> str:
-    """Return why memory cannot be withheld here; empty when it can."""
-    root = Path("/sys/fs/cgroup/memory")
-    if not os.access(root, os.W_OK) or not (root / "memory.limit_in_bytes").exists():
-        return "no memory control group can be made here"
-    return ""
-
-
 def sonar_well(name: SonarName) -> Callable[[Lane], None]:
     """Let a sonar see the world again."""
 
@@ -194,13 +194,19 @@ def say(payload: bytes, encoding: str = "application/msgpack") -> Callable[[Lane
 
 MOTION = {"command": "run", "linear": 0.5, "angular": 0.0, "echo": 0, "seq": 1, "boot": 1}
 HOSTILE = {
-    "no MessagePack": b"\xc1" * 20,
-    "1 MB": msgpack.packb({"text": "x" * 1_000_000}),
-    "deep nesting": b"\x81\xa1x" + b"\x91" * 100_000,
-    "wrong types": msgpack.packb({name: [] for name in MOTION}),
-    "NaN": msgpack.packb(MOTION | {"linear": float("nan"), "angular": float("nan")}),
-    "infinity": msgpack.packb(MOTION | {"linear": float("inf")}),
-    "negative zero": msgpack.packb(MOTION | {"linear": -0.0, "angular": -0.0}),
-    "huge integers": msgpack.packb(MOTION | {"linear": 2**63, "seq": 2**64 - 1}),
-    "too fast": msgpack.packb(MOTION | {"linear": 50.0, "seq": 2**62}),
+    "no MessagePack": say(b"\xc1" * 20),
+    "nothing": say(b""),
+    "1 MB": say(msgpack.packb({"text": "x" * 1_000_000})),
+    "deep nesting": say(b"\x81\xa1x" + b"\x91" * 100_000),
+    "wrong types": say(msgpack.packb({name: [] for name in MOTION})),
+    "NaN": say(msgpack.packb(MOTION | {"linear": float("nan"), "angular": float("nan")})),
+    "infinity": say(msgpack.packb(MOTION | {"linear": float("inf")})),
+    "negative zero": say(msgpack.packb(MOTION | {"linear": -0.0, "angular": -0.0})),
+    "huge integers": say(msgpack.packb(MOTION | {"linear": 2**63, "seq": 2**64 - 1})),
+    "too fast": say(msgpack.packb(MOTION | {"linear": 50.0, "seq": 2**62})),
+    "JSON": say(msgspec.json.encode(MOTION), "application/json"),
+    "an encoding of text": say(msgpack.packb(MOTION), "text/plain"),
+    "an encoding nobody knows": say(
+        msgpack.packb(MOTION), "x" * 200
+    ),  # more, and Zenoh cannot send it
 }

@@ -8,7 +8,7 @@ import threading
 
 from common.bus.bus import Bus
 from common.loop import Loop
-from services.teleop.source import DriveSource
+from common.source import DriveSource
 
 
 def main() -> None:

@@ -1,19 +1,23 @@
 """A stack of its own to try faults on: the chain, a driver at the stick, an operator."""
 
 import contextlib
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Self
+
+import msgspec
 
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.messages import Done, ResetRequest, SafetyState
-from sim.requests import Bumper, Driver, Place, Wire
+from sim.requests import Bumper, Driver, Mute, Place, Wire
 from tests.chain import Chain, chain
+from tests.faults.enclosure import Need, clock, small_disk
 from tests.faults.frames import SPEED, Frames, moves
 from tests.support import bus_on, running
 
@@ -25,36 +29,47 @@ QUICK = [
 ]
 ROOM_M = 900.0  # the vehicle is put back to the origin from there
 READY_S = 30.0
+DRIVERS: dict[Need, str] = {"a far driver": "tests.faults.far", "a teleop": "tests.faults.keyboard"}
 
 
 class Lane:
     """One stack, and hands that drive it."""
 
-    def __init__(self, stack: Chain, bus: Bus, folder: Path) -> None:
+    def __init__(
+        self, stack: Chain, bus: Bus, folder: Path, driver: Sequence[str], env: Mapping[str, str]
+    ) -> None:
         self.stack = stack
+        self._driver, self._env = [sys.executable, "-m", *driver], env
         self.bus = bus
         self.folder = folder
         self.frames = Frames(stack.trace_file)
         self.state: SafetyState | None = None
         self.asked = 0.0
-        stack.commands["driver"] = []
         self.start_driver()
 
     def start_driver(self) -> None:
         """Put a driver at the stick."""
         if "driver" in self.stack.processes:
             self.stack.processes["driver"].communicate()  # closes its pipe, too
-        command = [sys.executable, "-m", "tests.faults.driver", self.stack.endpoint]
-        self.stack.processes["driver"] = subprocess.Popen(command, stdin=subprocess.PIPE)
+        self.stack.processes["driver"] = subprocess.Popen(
+            self._driver, stdin=subprocess.PIPE, env=self._env
+        )
         self.ask(self.asked)
 
     def ask(self, speed: float) -> None:
         """Push the stick."""
         self.asked = speed
+        self._tell_driver(b"%f" % speed)
+
+    def cable(self, faults: Wire) -> None:
+        """Let this happen to the packets between a far driver and the robot from now on."""
+        self._tell_driver(msgspec.json.encode(faults))
+
+    def _tell_driver(self, line: bytes) -> None:
         pipe = self.stack.processes["driver"].stdin
         assert pipe is not None
         with contextlib.suppress(OSError):  # the driver may be dead
-            pipe.write(b"%f\n" % speed)
+            pipe.write(line + b"\n")
             pipe.flush()
 
     def dead(self) -> tuple[str, ...]:
@@ -111,7 +126,7 @@ class Lane:
 
     def ready(self) -> None:
         """Bring the vehicle to speed, whatever that takes; AssertionError when nothing helps."""
-        self.mend()
+        self.revive().mend()
         if self.at_speed() and not self.latched():
             self.frames.forget()
             return
@@ -131,6 +146,7 @@ class Lane:
     def mend(self) -> None:
         """Undo whatever was done to the simulated board, and put the vehicle back in its room."""
         self.stack.control.do(Wire())
+        self.stack.control.do(Mute())
         self.stack.control.do(Bumper(pressed=False))
         for side in ("left", "right"):
             self.stack.control.do(Driver(side=side, bits=0))
@@ -149,10 +165,22 @@ def until(true: Callable[[], object], patience_s: float) -> bool:
 
 
 @contextlib.contextmanager
-def lane(folder: Path, sets: Sequence[str] = (), *, shipped: bool = True) -> Iterator[Lane]:
-    """Run a lane while the context lasts."""
+def lane(folder: Path, *, shipped: bool = True, need: Need = "nothing") -> Iterator[Lane]:
+    """Run a lane while the context lasts, on the machine that some faults need."""
+    far, clocks, disk = (need == one for one in ("a far driver", "other clocks", "a small disk"))
+    if clocks:
+        for whose in ("robot", "driver"):
+            (folder / whose).write_text("+0")
     with contextlib.ExitStack() as stack:
-        made = stack.enter_context(chain(folder, sets=[*QUICK, *sets], shipped=shipped))
+        if disk:
+            stack.enter_context(small_disk(folder / "disk"))
+        made = stack.enter_context(
+            chain(
+                folder, sets=QUICK, shipped=shipped, log="disk/log.jsonl" if disk else "log.jsonl",
+                listen="0.0.0.0" if far else "127.0.0.1",
+                env=clock(folder / "robot") if clocks else None,
+            )
+        )  # fmt: skip
         loop = stack.enter_context(running(Loop()))
         states: list[SafetyState] = []
 
@@ -166,5 +194,7 @@ def lane(folder: Path, sets: Sequence[str] = (), *, shipped: bool = True) -> Ite
 
         it: list[Lane] = []
         bus = stack.enter_context(bus_on(made.endpoint, loop, declare))
-        it.append(Lane(made, bus, folder))
+        driver = [DRIVERS.get(need, "tests.faults.driver"), made.endpoint]
+        env = clock(folder / "driver") if clocks else os.environ
+        it.append(Lane(made, bus, folder, driver, env))
         yield it[0]

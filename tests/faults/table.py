@@ -59,6 +59,26 @@ def markdown(rows: Sequence[Row]) -> str:
     return "\n".join(lines + [_line(row) for row in rows]) + "\n"
 
 
+def verdict(wrong: Sequence[str]) -> str:
+    """Return the last line of the document: which rows are wrong, by name."""
+    if not wrong:
+        return "All are as they should be."
+    return f"Not as it should be: {', '.join(wrong)}."
+
+
+def renewed(document: str, rows: Sequence[Row], date: str) -> str:
+    """Return a document with some of its rows measured again; it says which."""
+    anew = {row.name: _line(row) for row in rows}
+    lines = [anew.get(_name(line), line) for line in document.splitlines()]
+    wrong = [_name(line) for line in lines if line.endswith("| WRONG |")]
+    again = f"Measured again by themselves on {date}: {', '.join(anew)}."
+    return "\n".join([*lines[:-1], again, "", verdict(wrong), ""])
+
+
+def _name(line: str) -> str:
+    return line.split(" | ")[0].removeprefix("| ")
+
+
 def _line(row: Row) -> str:
     took = times(row.samples)
     timed = row.budget_s is not None

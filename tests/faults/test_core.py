@@ -15,6 +15,8 @@ from tests.faults.machine import HoldUps
 from tests.faults.table import Row
 from tests.faults.trial import tried
 
+pytestmark = pytest.mark.alone
+
 CORE = (
     "contact in one sample", "estop", "bridge SIGKILL", "bridge SIGSTOP", "guard SIGKILL",
     "safety SIGKILL", "router SIGKILL", "driver SIGKILL", "odom SIGKILL", "board not heard",

@@ -1,12 +1,13 @@
 """What a row says of its samples."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from sim.trace import Command, Kind
 from tests.faults.frames import first_stop_s, last_move_s, strayed
-from tests.faults.table import Row, markdown, rank, times
+from tests.faults.table import Row, markdown, rank, renewed, times, verdict
 from tests.faults.trial import Sample
 
 
@@ -87,3 +88,16 @@ def test_a_table_for_people() -> None:
     assert "| it | 2 |  |  |  |  | 0.0 ms |" in text
     assert "would not drive again 1" in text
     assert "WRONG" in text
+
+
+def test_rows_that_are_measured_again_take_their_places_and_it_is_said() -> None:
+    good = replace(row(sample()), name="a")
+    bad = replace(row(sample(outcome="by itself")), name="b")
+    before = f"# Faults\n\n{markdown([good, bad])}\n{verdict(['b'])}\n"
+    after = renewed(before, [replace(good, name="b")], "2026-01-02")
+    assert after == (
+        f"# Faults\n\n{markdown([good, replace(good, name='b')])}\n"
+        "Measured again by themselves on 2026-01-02: b.\n\nAll are as they should be.\n"
+    )
+    still = renewed(before, [good], "2026-01-02")
+    assert still.endswith("2026-01-02: a.\n\nNot as it should be: b.\n")
