@@ -10,13 +10,13 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from cli.demo import WORLD, free_port, log_file, make_room, own_ports, trace_file, traced
+from cli.demo import WORLD, free_ports, log_file, make_room, own_ports, trace_file, traced
 from cli.interrupt import interruptible
 from cli.lap import holdup
 from cli.lap.script import PATIENT, QUICK
 from cli.settings import Everything
 from cli.soak_driver import STEP_S
-from cli.soak_record import Record
+from cli.soak_record import Record, encoded
 from cli.soak_verdict import Limits, good, results
 from cli.soak_watch import PROC
 from cli.soak_yard import Yard
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     make_room(options)
     holdup_s = holdup.measured()
     pace = PATIENT if holdup_s > holdup.LIMIT_S else QUICK
-    control = free_port(socket.SOCK_DGRAM)
+    (control,) = free_ports(socket.SOCK_DGRAM)
     options.sets = [
         *own_ports(), f"sim.control_port={control}", *holdup.settings(holdup_s), *options.sets
     ]  # fmt: skip
@@ -76,6 +76,7 @@ def run(options: argparse.Namespace) -> int:
     interrupted = soak(options, config, pace is PATIENT, record, show.tell)
     limits = Limits(min(WARM_UP_S, seconds / 10), LAP_S[pace], 2 * STEP_S[pace] + 15)
     rows = results(record, limits)
+    (options.out / "samples.json").write_bytes(encoded(record))
     files = [options.out / "soak.png", options.out / "soak.svg"]
     soak_plot.save(files, record)
     show.results(rows, files)

@@ -116,6 +116,8 @@ KINDS: dict[str, Draw] = dict(
         _kill("safety", still=True),
         _kill("bridge", still=True),
         _kill("driver", still=True),
+        _kill("router", still=True),
+        _kill("sim", still=False),  # a board that is dead holds no command
         _kill("odom", still=False),  # safety needs no odometry; the operator stops without it
     ]
 )

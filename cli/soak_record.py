@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import msgspec
+
 
 @dataclass(frozen=True, slots=True)
 class Life:
@@ -54,3 +56,9 @@ class Record:
     faults: list[tuple[float, str]] = field(default_factory=list)
     late_s: float = 0.0  # how late the watcher itself was at worst
     seconds: float = 0.0  # that it lasted
+
+
+def encoded(record: Record) -> bytes:
+    """Return all of it as JSON; ``lives`` is a list of pairs there."""
+    fields = {name: getattr(record, name) for name in record.__dataclass_fields__}
+    return msgspec.json.encode(fields | {"lives": list(record.lives.items())})

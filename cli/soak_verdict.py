@@ -1,8 +1,9 @@
 """What came of a soak: whether anything grew, got stuck, broke down or moved when it must not.
 
-A process is judged life by life. Its first minute is warm-up; of what follows, the median of the
-first fifth is held against the median of the last. Every process must have lived long enough once,
-or nothing is known about it.
+A process is judged by the longest of its lives: the shorter ones end with a kill and are filled
+with the deaths of others, when sessions come and go. Its first minute is warm-up; of what follows,
+the median of the first fifth is held against the median of the last. Every process must have lived
+long enough once, or nothing is known about it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -87,19 +88,19 @@ def _median(samples: Sequence[Sample]) -> Sample:
 def _processes(lives: Mapping[Life, Sequence[Sample]], warm_up_s: float) -> list[Result]:
     rows: list[Result] = []
     for name in dict.fromkeys(life.name for life in lives):
-        spans = [growth(samples, warm_up_s) for life, samples in lives.items() if life.name == name]
-        judged = [span for span in spans if span is not None]
-        if not judged:
+        longest = max((lives[life] for life in lives if life.name == name), key=len)
+        span = growth(longest, warm_up_s)
+        if span is None:
             rows.append((f"{name}: memory", "never lived long enough to be judged", False))
             continue
-        first, last = max(judged, key=lambda span: (span[1].rss - span[0].rss, span[1].at_s))
+        first, last = span
         grown = last.rss - first.rss
         amount = (
             f"{last.rss / 2**20:.1f} MB, {grown / 2**20:+.2f} in {last.at_s - first.at_s:.0f} s"
         )
         rows.append((f"{name}: memory", amount, grown < GROWTH_MAX))
-        threads = max(b.threads - a.threads for a, b in judged)
-        descriptors = max(b.descriptors - a.descriptors for a, b in judged)
+        threads = last.threads - first.threads
+        descriptors = last.descriptors - first.descriptors
         held = f"{last.threads} {threads:+d}, {last.descriptors} {descriptors:+d}"
         rows.append((f"{name}: threads, descriptors", held, threads <= 0 and descriptors <= 0))
     return rows

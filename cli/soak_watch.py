@@ -47,7 +47,7 @@ def _children(pid: int) -> list[int]:
 
 
 class Tail:
-    """Reads a growing file, whole lines at a time."""
+    """Reads a growing file, whole lines at a time; one that was begun anew, from its start."""
 
     def __init__(self, file: Path) -> None:
         self.bytes = 0  # read so far
@@ -57,6 +57,8 @@ class Tail:
         """Return the lines that have come since the last call; a half one waits."""
         try:
             with self._file.open("rb") as file:
+                if os.fstat(file.fileno()).st_size < self.bytes:
+                    self.bytes = 0
                 file.seek(self.bytes)
                 new = file.read()
         except FileNotFoundError:

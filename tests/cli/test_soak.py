@@ -4,6 +4,7 @@ import signal
 import subprocess
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from cli import soak
@@ -16,6 +17,7 @@ SOAK_S = 50
 PATIENCE_S = 160.0
 
 
+@pytest.mark.alone
 @pytest.mark.timeout(PATIENCE_S + 20)
 def test_a_short_soak(tmp_path: Path) -> None:
     """Half a minute of life says nothing of growth, so that alone may be called wrong."""
@@ -36,9 +38,11 @@ def test_a_short_soak(tmp_path: Path) -> None:
     assert "wire " in result.stdout
     for name in ("router", "sim", "bridge", "safety", "odom", "driver"):
         assert any(f" {name}: memory" in line for line in lines), everything
-    assert {"soak.png", "soak.svg", "processes.log", "trace.jsonl"} == {
+    assert {"soak.png", "soak.svg", "samples.json", "processes.log", "trace.jsonl"} == {
         file.name for file in out.iterdir()
     }
+    lives = msgspec.json.decode((out / "samples.json").read_bytes())["lives"]
+    assert {life["name"] for life, _ in lives} >= {"router", "safety", "driver"}
 
 
 @pytest.mark.parametrize("minutes", ["0", "-1", "nan", "1e9", "long"])

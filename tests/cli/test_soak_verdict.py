@@ -100,13 +100,14 @@ def test_a_thread_that_stays_is_growth(threads_at: int, fine: bool) -> None:
     assert row(record, "safety: threads, descriptors")[2] is fine
 
 
-def test_the_worst_of_several_lives_counts() -> None:
+@pytest.mark.parametrize(("seconds", "fine"), [(151, False), (149, True)])
+def test_the_longest_of_several_lives_counts(seconds: int, fine: bool) -> None:
     record = well()
-    grows = life(150, rss_per_s=MB / 10, since_s=150)
-    record.lives = {SAFETY: life(150), Life("safety", 11, 5): grows}
-    assert row(record, "safety: memory")[2] is False
-    record.lives = {Life("safety", 11, 5): grows, SAFETY: life(150)}
-    assert row(record, "safety: memory")[2] is False
+    grows = life(seconds, rss_per_s=MB / 10, threads_at=120, since_s=150)
+    for lives in ([SAFETY, Life("safety", 11, 5)], [Life("safety", 11, 5), SAFETY]):
+        record.lives = {one: life(150) if one is SAFETY else grows for one in lives}
+        assert row(record, "safety: memory")[2] is fine
+        assert row(record, "safety: threads, descriptors")[2] is fine
 
 
 def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> None:

@@ -67,3 +67,11 @@ def test_a_growing_file_is_read_by_whole_lines(tmp_path: Path) -> None:
         file.write(b"o\nthree\n")
         assert tail.read() == b"two\nthree\n"
     assert tail.bytes == 14
+
+
+def test_a_file_that_was_begun_anew_is_read_from_its_start(tmp_path: Path) -> None:
+    file, tail = tmp_path / "trace", Tail(tmp_path / "trace")
+    file.write_bytes(b"a long line\n")
+    assert tail.read() == b"a long line\n"
+    file.write_bytes(b"new\n")
+    assert tail.read() == b"new\n"
