@@ -2,7 +2,9 @@
 
 from common import settings
 from services.bridge.config import Bridge
+from services.dashboard.config import Dashboard
 from services.odom.config import Odom
+from services.recorder.config import Recorder
 from services.safety.config import Safety
 from services.teleop.config import Teleop
 from sim.config import Sim
@@ -18,4 +20,6 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     safety: Safety = Safety()
     odom: Odom = Odom()
     teleop: Teleop = Teleop()
+    dashboard: Dashboard = Dashboard()
+    recorder: Recorder = Recorder()
     sim: Sim = Sim()

@@ -1,0 +1,79 @@
+"""Which keys the operator means: short or whole, one robot or all."""
+
+import argparse
+
+from common import keys
+from common.bus.probe import valid
+from common.messages import Message
+
+# An expression's `**` passes by what begins with "@", on purpose: both are needed for all.
+EVERYTHING = ("**", "@cmd/**")
+
+
+def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """Add the argument that names a key or many."""
+    parser.add_argument(
+        "key", metavar="KEY", nargs="?" if optional else None, type=keys_meant,
+        help="tel/odom/odometry, odometry, 'tel/**', or a whole key t2/v1/001/...",
+    )  # fmt: skip
+
+
+def keys_meant(word: str) -> str:
+    """Read a key or key expression; short ones are below a robot."""
+    if not word.strip("/") or not valid(expression(word, "001")):
+        raise argparse.ArgumentTypeError(f"{word!r} is no key; `t2 ls` shows what there is")
+    return word
+
+
+def one_key(word: str) -> str:
+    """Read a key that is no expression."""
+    if "*" in keys_meant(word):
+        raise argparse.ArgumentTypeError(f"{word!r} means many keys, name one")
+    return word
+
+
+def expression(word: str, robot: str) -> str:
+    """Return the whole key or key expression for what was typed.
+
+    ``/tel/odom/odometry`` is taken for ``tel/odom/odometry``, as in ROS; the last part alone will
+    do where one row of the table ends with it (``odometry``, ``health``).
+    """
+    path = word.strip("/")
+    if path.startswith(f"{keys.ROOT}/"):
+        return path
+    return f"{keys.ROOT}/{robot}/{_path(path)}"
+
+
+def short(key: str, robot: str) -> str:
+    """Return a key as it is shown: without what all keys of this robot begin with."""
+    return key.removeprefix(f"{keys.ROOT}/{robot}/")
+
+
+def chunks(key: str) -> tuple[str, str]:
+    """Return a whole key's robot and the path below it; two empty ones when it is none of ours."""
+    parts = key.split("/", 3)
+    return (parts[2], parts[3]) if len(parts) == 4 and key.startswith(f"{keys.ROOT}/") else ("", "")
+
+
+def topic_of(key: str) -> keys.Topic[Message] | None:
+    """Return the row of the table that a whole key belongs to."""
+    path = chunks(key)[1].split("/")
+    for topic in keys.TOPICS:
+        row = topic.path.split("/")
+        same = len(row) == len(path) and all(
+            ours == theirs or ours.startswith("{") for ours, theirs in zip(row, path, strict=True)
+        )
+        if same:
+            return topic
+    return None
+
+
+def _path(word: str) -> str:
+    if "/" in word or "*" in word:
+        return word
+    wild = [
+        "/".join("*" if part.startswith("{") else part for part in topic.path.split("/"))
+        for topic in keys.TOPICS
+    ]
+    found = [path for path in wild if path.split("/")[-1] == word]
+    return found[0] if len(found) == 1 else word

@@ -1,0 +1,99 @@
+"""What all these tools share: their options, their session, their end."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from common.bus.probe import Probe, probe
+from common.config import load
+from common.options import add_sources, sources
+from common.settings import Shared
+
+EVERY_ROBOT = "*"
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """Where a tool sits: its session, and the robot that it looks at, ``*`` for all."""
+
+    probe: Probe
+    robot: str
+
+
+def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
+    """Add the options that every tool takes; ``every`` says whether all robots will do."""
+    all_of_them = ", '*' for all" if every else ""
+    parser.add_argument(
+        "--robot", type=str if every else one_robot, help=f"which robot, such as 001{all_of_them}"
+    )
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--json", action="store_true", help="JSON lines, as in a pipe")
+    shown.add_argument("--text", action="store_true", help="text, as on a terminal")
+    add_sources(parser)
+
+
+def one_robot(text: str) -> str:
+    """Read a robot's name where all of them will not do."""
+    if text == EVERY_ROBOT:
+        raise argparse.ArgumentTypeError("this is for one robot at a time, name it")
+    return text
+
+
+def add_end(parser: argparse.ArgumentParser) -> None:
+    """Add the options that end a tool by itself."""
+    parser.add_argument("--duration", type=positive, metavar="S", help="end after so long")
+    parser.add_argument(
+        "--count", "--times", "-n", "-t", type=whole, metavar="N", help="end after so many"
+    )
+
+
+def positive(text: str) -> float:
+    """Read seconds or hertz: more than none, and finite."""
+    number = float(text)
+    if not 0 < number < 1e9:
+        raise argparse.ArgumentTypeError(f"{text} should be more than 0 and less than 1e9")
+    return number
+
+
+def whole(text: str) -> int:
+    """Read a count of one or more."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} should be 1 or more")
+    return number
+
+
+def wants_json(options: argparse.Namespace) -> bool:
+    """Tell whether programs read what is shown."""
+    return bool(options.json) or not (options.text or sys.stdout.isatty())
+
+
+def settings(options: argparse.Namespace) -> Shared:
+    """Return the shared settings in force; ``--robot`` names one robot there, too."""
+    if options.robot and options.robot != EVERY_ROBOT:
+        options.sets = [*options.sets, f"robot.id={options.robot}"]
+    return load(Shared, sources(options)).config
+
+
+@contextmanager
+def seated(options: argparse.Namespace) -> Iterator[Seat]:
+    """Join the bus while the context lasts; raise ``LinkError`` without a router."""
+    config = settings(options)
+    robot = EVERY_ROBOT if options.robot == EVERY_ROBOT else config.robot.id
+    with probe(config.bus.endpoints, config.bus.lease) as opened:
+        yield Seat(opened, robot)
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Let ctrl-c or SIGTERM end what is inside, and go on behind it."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        signal.signal(signal.SIGTERM, before)

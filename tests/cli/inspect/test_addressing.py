@@ -1,0 +1,55 @@
+"""Short keys, whole keys, and what is none."""
+
+import argparse
+
+import pytest
+
+from cli.inspect.addressing import chunks, expression, keys_meant, one_key, short, topic_of
+from common import keys
+
+
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [
+        ("tel/odom/odometry", "t2/v1/7/tel/odom/odometry"),
+        ("/tel/odom/odometry", "t2/v1/7/tel/odom/odometry"),
+        ("odometry", "t2/v1/7/tel/odom/odometry"),
+        ("state", "t2/v1/7/tel/safety/state"),
+        ("health", "t2/v1/7/tel/*/health"),
+        ("estop", "t2/v1/7/estop"),
+        ("**", "t2/v1/7/**"),
+        ("@cmd/motion", "t2/v1/7/@cmd/motion"),
+        ("t2/v1/2/tel/**", "t2/v1/2/tel/**"),
+    ],
+)
+def test_what_is_meant(word: str, key: str) -> None:
+    assert keys_meant(word) == word
+    assert expression(word, "7") == key
+
+
+@pytest.mark.parametrize("word", ["", "/", "tel//odom", "tel/a*b", "tel/#", "tel/$*$*"])
+def test_what_is_no_key(word: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="is no key"):
+        keys_meant(word)
+
+
+def test_many_keys_are_not_one() -> None:
+    assert one_key("tel/x") == "tel/x"
+    with pytest.raises(argparse.ArgumentTypeError, match="many keys"):
+        one_key("tel/*")
+
+
+def test_keys_as_they_are_shown() -> None:
+    assert short("t2/v1/7/tel/x", "7") == "tel/x"
+    assert short("t2/v1/8/tel/x", "7") == "t2/v1/8/tel/x"
+    assert chunks("t2/v1/7/tel/x") == ("7", "tel/x")
+    assert chunks("other/v1/7/tel/x") == chunks("t2/v1/7") == ("", "")
+
+
+def test_the_row_of_the_table() -> None:
+    assert topic_of("t2/v1/7/tel/bridge/driver/left") is keys.DRIVER
+    assert topic_of("t2/v1/7/tel/mine/health") is keys.HEALTH
+    assert topic_of("t2/v1/7/@cmd/drive/web") is keys.DRIVE
+    assert topic_of("t2/v1/7/tel/mine/x/y") is None
+    assert topic_of("t2/v1/7/tel/mine/temperature") is None
+    assert topic_of("elsewhere") is None

@@ -1,0 +1,184 @@
+"""``t2 doctor`` on the real stack, with one fault after the other; and before there is a stack."""
+
+import signal
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli.inspect import advice
+from cli.inspect.dial import dial
+from common import keys
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.messages import Drive
+from sim.requests import Bumper, Freeze, Sonar
+from tests.chain import Chain, chain
+from tests.cli.inspect.tool import Tool
+from tests.support import bus_on, free_port, router_process, running, wait_until
+
+TRIES_S = 30.0
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
+    with chain(tmp_path_factory.mktemp("doctor")) as it:
+        yield it
+
+
+@pytest.fixture
+def doctor(stack: Chain, capsys: pytest.CaptureFixture[str]) -> Callable[[], "list[Any]"]:
+    tool = Tool(stack.endpoint, "001", capsys)
+
+    def look() -> list[Any]:
+        result = tool("doctor", "--duration", "2")
+        assert result.err == ""
+        assert result.code == (1 if wrong(result.lines) else 0)
+        return result.lines
+
+    return look
+
+
+Doctor = Callable[[], "list[Any]"]
+
+
+def wrong(found: list[Any]) -> list[tuple[str, str]]:
+    """Return where something is wrong and what to do about it."""
+    return [(each["where"], each["todo"]) for each in found if each["level"] == "wrong"]
+
+
+def until_wrong(doctor: Doctor, where: str, todo: str) -> list[Any]:
+    """Look until that is found; a fault takes a moment, on these machines sometimes more."""
+    found: list[Any] = []
+    begin_s = time.monotonic()
+    while (where, todo) not in wrong(found):
+        assert time.monotonic() - begin_s < TRIES_S, found
+        found = doctor()
+    return found
+
+
+def until_well(doctor: Doctor) -> None:
+    begin_s = time.monotonic()
+    while wrong(found := doctor()):
+        assert time.monotonic() - begin_s < TRIES_S, found
+
+
+def test_all_is_well_but_for_a_bumper_and_a_sonar(stack: Chain, doctor: Doctor) -> None:
+    until_well(doctor)
+
+    stack.control.do(Bumper(pressed=True))
+    found = until_wrong(doctor, "bumper", advice.BUMPER)
+    assert ("safety", advice.BUMPER) in wrong(found)
+    stack.control.do(Bumper(pressed=False))
+    reset(doctor, stack)
+
+    stack.control.do(Sonar(name="rear_left", fault=True))
+    found = until_wrong(doctor, "sonar", advice.SONAR_FAULT)
+    assert "the rear left sonar is faulty" in [each["text"] for each in found]
+    stack.control.do(Sonar(name="rear_left"))
+
+
+def reset(doctor: Doctor, stack: Chain) -> None:
+    """Reset as the doctor says, until safety does."""
+    from cli.__main__ import main
+
+    where = ["--set", f"bus.connect={stack.endpoint}"]
+    wait_until(lambda: main(["call", "safety/reset", *where]) == 0, "a reset")
+    until_well(doctor)
+
+
+def test_a_frozen_board(stack: Chain, doctor: Doctor) -> None:
+    stack.control.do(Freeze(seconds=3600.0))
+    found = until_wrong(doctor, "link", advice.BOARD_LOST)
+    assert any(each["where"] == "sensors" and each["level"] == "unknown" for each in found)
+    stack.control.do(Freeze(seconds=0.0))
+
+
+def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
+    sources: list[Any] = []
+
+    def ask(_: int) -> None:
+        for source in sources:
+            source.put(Drive(linear=0.0, angular=0.0, echo=0))
+
+    def declare(bus: Bus) -> None:
+        sources.append(bus.publisher(keys.DRIVE, source="web"))
+
+    with (
+        running(Loop()) as loop,
+        bus_on(stack.endpoint, loop, declare),
+        bus_on(stack.endpoint, loop, declare),
+    ):
+        loop.post(lambda: loop.every(0.05, ask))
+        until_wrong(doctor, "driving", advice.ONE_DRIVER)
+
+
+def test_services_that_are_not_there_and_all_is_well_once_they_are(
+    stack: Chain, doctor: Doctor
+) -> None:
+    # A process that is stopped whole is given up by the router; one whose loop hangs is not.
+    stack.processes["odom"].send_signal(signal.SIGSTOP)
+    begin_s = time.monotonic()
+    while not wrong(found := doctor()):
+        assert time.monotonic() - begin_s < TRIES_S, found
+    assert any(each["text"].startswith("odom is") for each in found if each["level"] == "wrong")
+    stack.processes["odom"].send_signal(signal.SIGCONT)
+    stack.processes["bridge"].terminate()
+    stack.processes["bridge"].wait()
+    found = until_wrong(doctor, "services", advice.START)
+    assert ("link", "unknown") in {(each["where"], each["level"]) for each in found}
+    stack.start("bridge")
+    until_well(doctor)
+
+
+# --- without a stack --------------------------------------------------------------------------
+
+
+def test_no_router(capsys: pytest.CaptureFixture[str]) -> None:
+    result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)("doctor", "--text")
+    assert (result.code, result.err) == (1, "")
+    lines = result.out.splitlines()
+    assert "WRONG" in lines[0]
+    assert "nothing listens" in lines[0]
+    assert lines[1].strip() == f"-> {advice.REFUSED}"
+    assert lines[-1] == "1 thing wrong."
+
+
+def test_a_router_and_nobody_on_it(capsys: pytest.CaptureFixture[str]) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(endpoint):
+        result = Tool(endpoint, "001", capsys)("doctor", "--duration", "0.2")
+    assert result.code == 1
+    assert wrong(result.lines) == [("services", advice.START)] * 3
+
+
+def test_what_answers_is_no_router(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        result = Tool(f"tcp/127.0.0.1:{port}", "001", capsys)("doctor")
+    assert wrong(result.lines) == [("router", advice.NOT_A_ROUTER)]
+
+
+def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not dial("udp/127.0.0.1:7447").tried
+    assert dial(f"unixsock-stream/{tmp_path}/no.sock").todo == advice.NO_SOCKET
+    assert dial(f"unixsock-stream/{tmp_path}").trouble == ""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        reached = dial(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1")
+    assert (reached.trouble, reached.tried) == ("", True)
+    for error, todo in (
+        (socket.gaierror(), advice.NO_NAME),
+        (TimeoutError(), advice.NO_WAY),
+        (OSError(101, "Network is unreachable"), advice.NO_WAY),
+    ):
+
+        def fail(*_: object, error: OSError = error) -> None:
+            raise error
+
+        monkeypatch.setattr(socket, "create_connection", fail)
+        told = dial("tcp/robot:7447")
+        assert told.trouble
+        assert told.todo == todo

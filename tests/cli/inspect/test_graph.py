@@ -1,0 +1,80 @@
+"""Who is there, from tokens and the router's admin space."""
+
+from typing import Any
+
+from cli.inspect.graph import Edge, Member, by_boot, dot, edges, members, publishers, title
+
+TOKENS = ["t2/v1/7/live/bridge/1a", "t2/v1/7/live/safety/2b", "t2/v1/7/live/odd"]
+
+
+def entry(role: str, key: str, *zids: str) -> tuple[str, Any]:
+    return f"@/r0/router/{role}/{key}", {"routers": ["r0"], "peers": [], "clients": list(zids)}
+
+
+DECLARED = dict(
+    [
+        entry("token", "t2/v1/7/live/bridge/1a", "zb"),
+        entry("token", "t2/v1/7/live/safety/2b", "zs"),
+        entry("token", "t2/v1/7/live/other/3c", "zx"),
+        entry("publisher", "t2/v1/7/tel/bridge/bumper", "zb"),
+        entry("publisher", "t2/v1/7/tel/safety/state", "zs"),
+        entry("subscriber", "t2/v1/7/tel/bridge/bumper", "zs", "me"),
+        entry("subscriber", "t2/v1/7/tel/**", "stranger-1"),
+        entry("queryable", "t2/v1/7/srv/safety/reset", "zs"),
+        entry("queryable", "t2/v1/7/evt/safety/@adv/pub/x", "zs"),
+        ("@/r0/router", {"version": "v1"}),
+        ("@/r0/router/linkstate/x", "graph {}"),
+    ]
+)  # fmt: skip
+
+
+def who() -> list[Member]:
+    return members(TOKENS, DECLARED, without=("me",))
+
+
+def same(one: str, other: str) -> bool:
+    return one == other or other.endswith("**")
+
+
+def test_services_bear_their_names_and_strangers_their_ids() -> None:
+    bridge, safety, stranger = who()
+    assert (bridge.name, bridge.robot, bridge.instance, bridge.zid) == ("bridge", "7", "1a", "zb")
+    assert bridge.publishes == {"t2/v1/7/tel/bridge/bumper"}
+    assert safety.reads == {"t2/v1/7/tel/bridge/bumper"}
+    assert safety.answers == {"t2/v1/7/srv/safety/reset"}
+    assert (stranger.name, stranger.instance) == ("stranger", "")
+
+
+def test_without_the_admin_space_the_tokens_are_left() -> None:
+    assert [each.name for each in members(TOKENS, {})] == ["bridge", "safety"]
+
+
+def test_every_way_from_one_to_another() -> None:
+    assert edges(who(), same) == [
+        Edge("bridge", "t2/v1/7/tel/bridge/bumper", "safety"),
+        Edge("bridge", "t2/v1/7/tel/bridge/bumper", "stranger"),
+        Edge("safety", "t2/v1/7/tel/safety/state", "stranger"),
+    ]
+
+
+def test_two_of_one_name_are_told_apart() -> None:
+    two = [Member("safety", robot="7", instance=each) for each in ("aaaa1", "bbbb2")]
+    assert [title(each, two) for each in two] == ["safety:aaaa", "safety:bbbb"]
+    assert title(two[0], [two[0], Member("safety", robot="8", instance="cc")]) == "safety"
+
+
+def test_the_graph_for_graphviz() -> None:
+    shown = dot(who(), edges(who(), same), "7")
+    assert shown.startswith("digraph t2 {")
+    assert '  "bridge" -> "safety" [label="tel/bridge/bumper"];' in shown
+    assert '  "stranger" [style=dashed];' in shown
+    assert shown.count("{") == shown.count("}") == 1
+
+
+def test_publishers_by_key_and_by_boot() -> None:
+    assert publishers(who())["t2/v1/7/tel/bridge/bumper"] == ["bridge"]
+    strange = Member("x", instance="no number")
+    assert {boot: member.name for boot, member in by_boot([*who(), strange]).items()} == {
+        0x1A: "bridge",
+        0x2B: "safety",
+    }

@@ -1,0 +1,53 @@
+"""The tools where there is no router, nobody who speaks, and nothing that can be carried."""
+
+import contextlib
+import threading
+
+import pytest
+
+from cli.inspect import echo, estop
+from common.options import EXIT_LINK
+from tests.cli.inspect.tool import Tool
+from tests.support import free_port, router_process
+
+
+@pytest.mark.parametrize("word", ["ls", "services", "health", "estop"])
+def test_without_a_router(word: str, tool: Tool) -> None:
+    nowhere = Tool(f"tcp/127.0.0.1:{free_port()}", "001", tool.capsys)
+    result = nowhere(word)
+    assert (result.code, result.out) == (EXIT_LINK, "")
+    assert f"no router answers at {nowhere.endpoint}" in result.err
+    assert "t2 doctor" in result.err
+
+
+@pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
+def test_a_stop_that_cannot_be_sent_says_what_else_stops_it(
+    words: tuple[str, ...], tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(estop, "PATIENCE_S", 0.1)
+    result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", tool.capsys)(*words)
+    assert (result.code, result.out) == (EXIT_LINK, "")
+    assert "NOT SENT, USE THE VEHICLE'S OWN SWITCH" in result.err
+
+
+def test_a_stop_waits_for_a_router_that_comes_back(tool: Tool) -> None:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with contextlib.ExitStack() as stack:
+        late = threading.Timer(1.0, lambda: stack.enter_context(router_process(where)))
+        late.start()
+        result = Tool(where, "001", tool.capsys)("estop")
+        late.join()
+    assert "sent, but safety of robot 001 does not confirm" in result.err
+
+
+def test_a_number_that_messagepack_cannot_carry_is_refused(tool: Tool) -> None:
+    result = tool("pub", "tel/mine/x", '{"a": 99999999999999999999999}')
+    assert result.code == 2
+    assert "MessagePack cannot carry it" in result.err
+
+
+def test_echo_says_that_nothing_comes_yet(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(echo, "SOON_S", 0.1)
+    result = tool("echo", "tel/nothing", "--duration", "0.3")
+    assert result.code == 1
+    assert "yet; it goes on listening" in result.err

@@ -1,0 +1,39 @@
+"""Aligned text and JSON lines."""
+
+import json
+
+import pytest
+
+from cli.inspect import output
+
+
+def test_a_table_is_aligned_and_numbers_stand_to_the_right() -> None:
+    shown = output.table(("key", "Hz"), [("tel/a", "5.0"), ("b", "120.5"), ("c", "-")])
+    assert shown.splitlines() == ["key       Hz", "tel/a    5.0", "b      120.5", "c          -"]
+
+
+def test_a_table_without_rows_is_its_head() -> None:
+    assert output.table(("a", "b"), []) == "a  b"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        ({"x": 1.23456789, "ok": True, "who": None}, "x: 1.23457\nok: true\nwho: null"),
+        ({"a": [1.0, 2.5], "b": []}, "a: [1, 2.5]\nb: []"),
+        ({"a": {"b": {"c": 1}}, "d": {}}, "a:\n  b:\n    c: 1\nd: {}"),
+        ({"a": [{"b": 1}]}, "a:\n  -\n    b: 1"),
+        ("words", "words"),
+        ("", '""'),
+        (b"\x01\xff", "01ff"),
+        (float("nan"), "nan"),
+    ],
+)
+def test_fields(value: object, shown: str) -> None:
+    assert output.fields(value) == shown
+
+
+def test_a_line_is_json_whatever_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    output.line({"a": float("nan"), 1: b"\x01\xff", "s": {2}, "t": (1, 2)})
+    shown = json.loads(capsys.readouterr().out)
+    assert shown == {"a": None, "1": "01ff", "s": "{2}", "t": [1, 2]}

@@ -1,0 +1,365 @@
+"""The tools on a real router, looking at services that only pretend to be there."""
+
+import json
+import signal
+import subprocess
+import sys
+from functools import partial
+
+import pytest
+
+from cli.inspect import estop, info, measure
+from common import codec, keys
+from common.bus.bus import Bus
+from common.bus.calls import Caller
+from common.messages import Bumper, Cause, Done, Event, Limits, ReleaseRequest, SafetyState
+from tests.cli.inspect.tool import Tool, health, pretend
+from tests.cli.processes import PATIENCE_S, t2
+from tests.common.rig import Rig
+from tests.support import wait_until
+
+
+def bumper() -> Bumper:
+    return Bumper(pressed=True)
+
+
+def state(*latched: str) -> SafetyState:
+    causes = tuple(Cause(name=n, action="brake", age=0.0, text=n) for n in latched)
+    return SafetyState(
+        verdict="brake", latched=latched, causes=causes, source=None, heartbeat=1, text="",
+        limits=Limits(forward=0, backward=0, angular=0),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def bridge(rig: Rig) -> Bus:
+    return pretend(rig, "bridge", {keys.BUMPER: bumper})
+
+
+# --- echo -------------------------------------------------------------------------------------
+
+
+def test_echo_shows_a_message_as_json_in_a_pipe(bridge: Bus, tool: Tool) -> None:
+    result = tool("echo", "bumper", "--once")
+    (line,) = result.lines
+    assert (result.code, result.err) == (0, "")
+    assert (line["key"], line["type"]) == ("tel/bridge/bumper", "Bumper")
+    assert (line["message"]["pressed"], line["message"]["boot"]) == (True, bridge.boot)
+
+
+def test_echo_shows_a_message_to_people(bridge: Bus, tool: Tool) -> None:
+    head, *fields = tool("echo", "bumper", "--once", "--text").out.splitlines()
+    assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
+    assert fields == ["pressed: true", "---"]
+    assert "boot: " in tool("echo", "bumper", "--once", "--text", "--header").out
+
+
+def test_echo_shows_one_field(bridge: Bus, tool: Tool) -> None:
+    assert tool("echo", "bumper", "--field", "pressed", "--count", "2").out == "true\ntrue\n"
+    result = tool("echo", "bumper", "--field", "presed")
+    assert (result.code, result.out) == (1, "")
+    assert "there is no 'presed'" in result.err
+    assert "pressed" in result.err
+
+
+def test_echo_shows_what_is_no_message(rig: Rig, tool: Tool) -> None:
+    session = rig.session()
+    payloads = [(b"\xc1", "zenoh/bytes"), (b"\x81\xa1a\x01", codec.encoding(Bumper))]
+
+    def put(_: int) -> None:
+        for payload, encoding in payloads:
+            session.put(f"t2/v1/{rig.robot}/tel/x", payload, encoding=encoding)
+        session.delete(f"t2/v1/{rig.robot}/tel/x")
+
+    rig.loop.post(lambda: rig.loop.every(0.1, put))
+    lines = tool("echo", "tel/x", "--count", "6").lines
+    assert {(line["type"], json.dumps(line["message"])) for line in lines} == {
+        ("bytes", '"c1"'), ("Bumper", '{"a": 1}'), ("empty", "null"),
+    }  # fmt: skip
+    complaints = {line["type"]: line.get("complaint", "") for line in lines}
+    assert complaints["bytes"] == "no MessagePack"
+    assert "pressed" in complaints["Bumper"]
+    assert any(line.get("deleted") for line in lines)
+    shown = tool("echo", "tel/x", "--count", "6", "--text").out
+    assert "# not as it should be: not a Bumper" in shown
+    assert "DELETE" in shown
+
+
+def test_echo_shows_events_that_were_before_it(rig: Rig, tool: Tool) -> None:
+    def tell(bus: Bus) -> None:
+        bus.publisher(keys.EVENTS, service="mine").put(
+            Event(name="x", level="info", text="long ago")
+        )
+
+    rig.bus(tell)
+    assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
+
+
+def test_silence_is_said(tool: Tool) -> None:
+    result = tool("echo", "tel/none", "--duration", "0.2")
+    assert (result.code, result.out) == (1, "")
+    assert "nothing was heard on t2/v1/" in result.err
+
+
+# --- hz, delay, bw, ls ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("word", "fields"),
+    [
+        ("hz", {"hz", "min", "max", "std_dev", "lost", "window"}),
+        ("delay", {"mean", "min", "p50", "p99", "max", "clock", "window"}),
+        ("bw", {"bytes_per_s", "mean", "min", "max", "window"}),
+    ],
+)
+def test_what_is_measured(word: str, fields: set[str], bridge: Bus, tool: Tool) -> None:
+    result = tool(word, "tel/**", "--count", "20")
+    assert (result.code, result.err) == (0, "")
+    line = result.lines[-1]
+    assert line.keys() == fields | {"key"}
+    assert line["key"] == "tel/bridge/bumper"
+    assert all(line[name] is not None for name in fields)
+    assert "tel/bridge/bumper" in tool("topic", word, "bumper", "--count", "3", "--text").out
+
+
+def test_the_delay_is_by_the_host_s_own_clock_where_it_is_shared(bridge: Bus, tool: Tool) -> None:
+    line = tool("delay", "bumper", "--count", "5").lines[-1]
+    assert line["clock"] == ("host" if bridge.host else "wall")
+    assert 0 < line["min"] < 5
+
+
+def test_it_tells_once_a_second_and_says_when_nothing_comes(
+    tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "TELL_S", 0.05)
+    result = tool("hz", "tel/none", "--duration", "0.3")
+    assert (result.code, result.out) == (1, "")
+    assert "t2 hz: no new messages" in result.err
+    assert "nothing was heard" in result.err
+
+
+def test_ls_names_type_rate_and_publisher(rig: Rig, bridge: Bus, tool: Tool) -> None:
+    rig.bus(lambda bus: bus.publisher(keys.VELOCITY))  # declared, silent, by a stranger
+    stranger = rig.session()
+    rig.loop.post(
+        lambda: rig.loop.every(0.1, lambda _: stranger.put(f"t2/v1/{rig.robot}/tel/x", b"\x01"))
+    )
+    found = {line["key"]: line for line in tool("ls", "--duration", "1").lines}
+    assert found.keys() == {"tel/bridge/bumper", "tel/bridge/velocity", "tel/x"}
+    told = found["tel/bridge/bumper"]
+    assert (told["type"], told["expected_hz"]) == ("Bumper", 50)
+    assert told["publishers"] == ["bridge"]
+    assert told["hz"] > 1
+    assert (found["tel/bridge/velocity"]["hz"], found["tel/x"]["expected_hz"]) == (None, None)
+    shown = tool("list", "bumper", "--duration", "0.5", "--text").out.splitlines()
+    assert shown[0].split() == ["key", "type", "Hz", "of", "publisher"]
+    assert shown[1].split()[::4] == ["tel/bridge/bumper", "bridge"]
+    every = tool("ls", "bumper", "--duration", "0.5", robot="*").lines
+    assert keys.BUMPER.on(rig.robot) in {line["key"] for line in every}
+
+
+def test_ls_of_nothing(tool: Tool) -> None:
+    result = tool("ls", "--duration", "0.2")
+    assert (result.code, result.out) == (1, "")
+    assert "t2 doctor" in result.err
+
+
+def test_topic_info(bridge: Bus, rig: Rig, tool: Tool) -> None:
+    rig.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
+    (told,) = tool("topic", "info", "/tel/bridge/bumper").lines
+    assert (told["type"], told["hz"], told["class"]) == ("Bumper", 50, "fast")
+    assert told["publishers"] == ["bridge"]
+    assert len(told["readers"]) == 1
+
+
+def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(info, "LISTEN_S", 0.1)
+    result = tool("topic", "info", "tel/none")
+    assert (result.code, result.lines[0]["publishers"]) == (1, [])
+
+
+# --- pub, call, estop -------------------------------------------------------------------------
+
+
+def test_pub_fills_in_the_header(rig: Rig, tool: Tool) -> None:
+    watched: list[tuple[bytes, str]] = []
+    session = rig.session()
+    subscriber = session.declare_subscriber(
+        f"t2/v1/{rig.robot}/tel/mine/t",
+        lambda sample: watched.append((sample.payload.to_bytes(), str(sample.encoding))),
+    )
+    result = tool("pub", "tel/mine/t", '{"celsius": 21.5}', "--rate", "50", "--times", "2")
+    assert (result.code, result.err) == (0, "")
+    assert [line["published"] for line in result.lines] == [1, 2]
+    wait_until(lambda: len(watched) == 2, "both messages")
+    from cli.inspect.reading import read
+
+    values = [read(*each).value for each in watched]
+    assert [(each["celsius"], each["seq"] > 0) for each in values] == [(21.5, True)] * 2
+    assert values[1]["seq"] == values[0]["seq"] + 1
+    subscriber.undeclare()
+
+
+def test_pub_says_when_nobody_reads(tool: Tool) -> None:
+    result = tool("pub", "tel/mine/t", "--once", "--text")
+    assert (result.code, result.out) == (0, "published 1 on tel/mine/t\n")
+    assert "nobody reads tel/mine/t" in result.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("pub", "tel/*", "{}"), "means many keys"),
+        (("pub", "tel/mine", "{"), "is no JSON"),
+        (("pub", "tel/mine", "[1]"), "is no object"),
+        (("pub", "tel/mine/health", '{"service": 1}'), "not a Health"),
+        (("pub", "tel/mine", "--rate", "0"), "--rate"),
+        (("echo", "tel//x"), "is no key"),
+        (("echo", "tel/x", "--count", "0"), "--count"),
+        (("hz", "tel/x", "--duration", "nan"), "--duration"),
+        (("call", "bridge/led", '{"chanel": 1}'), "not a LedRequest"),
+    ],
+)
+def test_what_is_no_good_is_said(words: tuple[str, ...], said: str, tool: Tool) -> None:
+    result = tool(*words)
+    assert (result.code, result.out) == (2, "")
+    assert said in result.err
+
+
+@pytest.mark.parametrize("words", [("call", "safety/reset"), ("pub", "tel/mine"), ("doctor",)])
+def test_what_is_for_one_robot_at_a_time(words: tuple[str, ...], tool: Tool) -> None:
+    result = tool(*words, robot="*")
+    assert (result.code, result.out) == (2, "")
+    assert "one robot at a time" in result.err
+
+
+def test_call(rig: Rig, tool: Tool) -> None:
+    def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
+        if request.held:
+            caller.refuse("the bumper is free")
+        else:
+            caller.reply(Done(text="ended"))
+
+    rig.bus(lambda bus: bus.serve(keys.RELEASE, release))
+    for key in ("safety/release", "/srv/safety/release"):
+        result = tool("call", key, '{"held": false}')
+        assert (result.code, result.lines) == (0, [{"text": "ended"}])
+    assert tool("call", "safety/release", '{"held": false}', "--text").out == "text: ended\n"
+    result = tool("call", "safety/release")
+    assert (result.code, result.out) == (1, "")
+    assert result.err == "t2 call: refused: the bumper is free\n"
+
+
+def test_a_call_that_nobody_answers(tool: Tool) -> None:
+    result = tool("call", "safety/reset", "--timeout", "0.3")
+    assert (result.code, result.out) == (1, "")
+    assert "safety does not answer" in result.err
+    assert "nobody answers" in tool("call", "mine/x", "--timeout", "0.3").err
+
+
+def test_what_there_is_to_call(tool: Tool) -> None:
+    assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
+    assert "clear the latches" in tool("call", "--text").out
+
+
+@pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
+def test_estop_is_sent_until_safety_confirms(words: tuple[str, ...], rig: Rig, tool: Tool) -> None:
+    stopped: list[int] = []
+
+    def latch(bus: Bus) -> None:
+        bus.on_any(keys.estop_key(rig.robot), stopped.append)
+
+    pretend(rig, "safety", {keys.SAFETY: lambda: state(*["estop"] * bool(stopped))}, latch)
+    result = tool(*words)
+    assert (result.code, result.err) == (0, "")
+    assert f"Robot {rig.robot} is stopped." in result.out
+    assert stopped
+
+
+def test_an_estop_that_nobody_confirms(
+    rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(estop, "PATIENCE_S", 0.3)
+    pretend(rig, "safety", {keys.SAFETY: state})
+    result = tool("estop")
+    assert (result.code, result.out) == (1, "")
+    assert "USE THE VEHICLE'S OWN SWITCH" in result.err
+
+
+# --- services, health, schema -----------------------------------------------------------------
+
+
+def test_services(rig: Rig, bridge: Bus, tool: Tool) -> None:
+    pretend(rig, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
+    pretend(rig, "nav", {keys.MOTION: lambda: keys.MOTION.message(command="stop")})
+    found = {line["name"]: line for line in tool("services").lines}
+    assert found.keys() >= {"bridge", "safety", "nav"}
+    assert found["bridge"]["publishes"]["tel/bridge/bumper"] == ["safety"]
+    assert found["safety"]["reads"] == ["tel/bridge/bumper"]
+    assert "@cmd/motion" in found["nav"]["publishes"]
+    assert '"bridge" -> "safety" [label="tel/bridge/bumper"];' in tool("services", "--dot").out
+    shown = tool("services", "--text").out
+    assert "publishes  tel/bridge/bumper            -> safety" in shown
+    assert "publishes  @cmd/motion                  -> nobody" in shown
+
+
+def test_nobody_is_there(tool: Tool) -> None:
+    result = tool("services")
+    assert (result.code, result.out) == (1, "")
+    assert "nobody is there" in result.err
+
+
+def test_health(rig: Rig, tool: Tool) -> None:
+    for name in ("bridge", "safety"):
+        pretend(rig, name, {keys.HEALTH: partial(health, name)}, service=name)
+    pretend(rig, "odom", {})
+    result = tool("health", "--text")
+    assert result.code == 1
+    rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
+    assert rows["bridge"] == ["ok", "1", "0m03s", "0.0", "5", "0", "overrun=2"]
+    assert rows["odom"] == ["hangs"]
+    assert "odom of robot" in result.err
+    assert "it hangs" in result.err
+
+
+def test_schema_by_type_and_by_key(tool: Tool) -> None:
+    (by_type,) = tool("schema", "odometry").lines
+    assert tool("schema", "tel/odom/odometry").lines == [by_type]
+    assert by_type["$ref"].endswith("Odometry")
+    shown = tool("schema", "Odometry", "--text").out
+    assert shown.startswith("Odometry: Pose in")
+    assert "rad, wrapped to -pi..pi" in shown
+    assert tool("schema", "safety/release").lines[0]["$ref"].endswith("ReleaseRequest")
+    assert "Odometry" in {line["type"] for line in tool("schema").lines}
+
+
+def test_a_type_that_there_is_not(tool: Tool) -> None:
+    result = tool("schema", "Odomtry")
+    assert (result.code, result.out) == (1, "")
+    assert "did you mean Odometry?" in result.err
+
+
+# --- how they end -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_without_a_word(number: signal.Signals, bridge: Bus, rig: Rig) -> None:
+    where = ("--set", f"bus.connect={rig.endpoint}", "--robot", rig.robot)
+    with subprocess.Popen(
+        t2("echo", "bumper", *where), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        process.send_signal(number)
+        _, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, err) == (0, "")
+
+
+def test_a_reader_that_goes_away_ends_it_without_a_word(bridge: Bus, rig: Rig) -> None:
+    words = f"echo bumper --set bus.connect={rig.endpoint} --robot {rig.robot}"
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["type"] == "Bumper"

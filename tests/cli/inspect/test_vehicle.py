@@ -1,0 +1,174 @@
+"""From what was seen to findings: bridge to wheels."""
+
+from typing import Any, get_args
+
+import pytest
+
+from cli.inspect import advice
+from cli.inspect.diagnosis import Finding, Seen
+from cli.inspect.vehicle import STREAMS, at_the_vehicle, drivers, driving, link, safety, switches
+from common import messages as m
+from common.messages import FaultName
+from services.safety.causes import RULES
+
+CLEAR: Any = ("ok",) * 8
+
+
+def link_of(state: Any = "up", **given: Any) -> m.Link:
+    well: dict[str, Any] = {"board": "10.7.5.224:4002", "epoch": 0, "armed": True, "waiting": "",
+                            "rates": {}, "rejected": {}, "round_trip": 0.002}  # fmt: skip
+    return m.Link(state=state, **(well | given))
+
+
+def state_of(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
+    texts = {rule.name: (rule.action, rule.text) for rule in RULES}
+    causes = tuple(
+        m.Cause(
+            name=n, action=texts.get(n, ("stop", ""))[0], age=1.0, text=texts.get(n, ("", n))[1]
+        )
+        for n in names
+    )
+    return m.SafetyState(
+        verdict="stop", latched=latched, causes=causes, source=None, heartbeat=1,
+        limits=m.Limits(forward=1, backward=1, angular=1), text="All is well.",
+    )  # fmt: skip
+
+
+def seen(**given: Any) -> Seen:
+    """Return a robot that is well, but for what is given."""
+    well: dict[str, Any] = {
+        "link": link_of(), "switches": m.Switches(ultrasonic_brake=True, bumper_brake=True),
+        "bumper": m.Bumper(pressed=False),
+        "ultrasonic": m.Ultrasonic(ranges=(1.0,) * 8, status=CLEAR),
+        "drivers": {side: m.Driver(faults=(), bits=0) for side in ("left", "right")},
+        "instances": {"bridge": 1}, "safety": state_of("no_request"),
+        "rates": {topic.path: topic.rate_hz for topic in STREAMS},
+    }  # fmt: skip
+    return Seen(zenoh="1", t2="1", **(well | given))
+
+
+def wrong(found: Any) -> list[tuple[str, str]]:
+    """Return what is wrong and what to do."""
+    return [(each.text, each.todo) for each in found if each.level == "wrong"]
+
+
+def test_all_is_well() -> None:
+    assert {each.level for each in at_the_vehicle(seen())} == {"ok"}
+
+
+def test_without_a_bridge_nothing_is_known() -> None:
+    found = list(at_the_vehicle(Seen(zenoh="1", t2="1")))
+    assert [(each.where, each.level) for each in found] == [
+        ("link", "unknown"), ("driving", "ok"), ("safety", "unknown"),
+    ]  # fmt: skip
+
+
+def test_a_bridge_that_tells_nothing() -> None:
+    (found,) = (each for each in at_the_vehicle(seen(link=None)) if each.where == "link")
+    assert (found.level, found.text) == ("unknown", "the bridge tells nothing of the board")
+
+
+@pytest.mark.parametrize(
+    ("state", "todo"), [("never", advice.BOARD_NEVER), ("lost", advice.BOARD_LOST)]
+)
+def test_a_board_that_is_not_there(state: str, todo: str) -> None:
+    found = list(at_the_vehicle(seen(link=link_of(state), bumper=m.Bumper(pressed=True))))
+    assert [each[1] for each in wrong(found)] == [todo]
+    assert Finding("sensors", "unknown", "not to be read without the board") in found
+
+
+def test_frames_that_are_refused_while_it_listens() -> None:
+    before, now = link_of(rejected={"bad_crc": 4, "no_magic": 1}), {"bad_crc": 9, "no_magic": 1}
+    first, second = link(link_of(rejected=now), before)
+    assert (first.level, first.todo) == ("note", advice.BOARD_REFUSED)
+    assert first.text.endswith("sends: 5 bad_crc")
+    assert second.text.endswith("is there, answers in 2.0 ms")
+    assert [each.level for each in link(link_of(round_trip=None), None)] == ["ok"]
+
+
+def test_a_bridge_that_waits() -> None:
+    found = list(link(link_of(armed=False, waiting="link lost"), None))
+    assert found[-1].level == "note"
+    assert "link lost" in found[-1].text
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        (m.Switches(ultrasonic_brake=False, bumper_brake=True), ["ultrasonic brake is off"]),
+        (m.Switches(ultrasonic_brake=True), ["bumper brake is not confirmed"]),
+        (None, ["ultrasonic brake is not confirmed", "bumper brake is not confirmed"]),
+    ],
+)
+def test_switches(told: m.Switches | None, said: list[str]) -> None:
+    found = wrong(switches(seen(switches=told)))
+    assert [text for text, _ in found] == [f"the board's {each}" for each in said]
+    assert {todo for _, todo in found} == {advice.SWITCHES}
+
+
+def test_streams_that_are_missing_or_thin() -> None:
+    rates = {topic.path: topic.rate_hz for topic in STREAMS}
+    rates |= {"tel/bridge/bumper": 0.0, "tel/bridge/mileage": 24.0, "tel/bridge/velocity": 25.0}
+    found = [each for each in at_the_vehicle(seen(rates=rates)) if each.where == "sensors"]
+    assert [(each.level, each.text) for each in found] == [
+        ("note", "tel/bridge/mileage comes at 24 of 50 Hz"),
+        ("wrong", "tel/bridge/bumper comes at 0 of 50 Hz"),
+    ]
+
+
+def test_what_is_not_heard_has_no_words() -> None:
+    where = {each.where for each in at_the_vehicle(seen(bumper=None, ultrasonic=None))}
+    assert not where & {"bumper", "sonar"}
+
+
+def test_a_pressed_bumper_and_sonars_that_cannot_be_trusted() -> None:
+    status: Any = ("fault", "too_near", "no_echo", *CLEAR[3:])
+    told = m.Ultrasonic(ranges=(None,) * 3 + (1.0,) * 5, status=status)
+    found = wrong(at_the_vehicle(seen(bumper=m.Bumper(pressed=True), ultrasonic=told)))
+    assert found == [
+        ("the bumper is pressed", advice.BUMPER),
+        ("the left sonar is faulty", advice.SONAR_FAULT),
+        ("the front left sonar sees something too near to measure", advice.SONAR_NEAR),
+    ]
+
+
+def test_driver_faults_say_what_they_mean() -> None:
+    told = {"left": m.Driver(faults=("encoder", "bit_9"), bits=0x204)}
+    texts = [text for text, _ in wrong(drivers(told))]
+    assert "left driver reports encoder: its encoder is not understood" in texts[0]
+    assert "bit_9: a bit that the manual does not explain" in texts[1]
+
+
+def test_one_driver_too_many() -> None:
+    (found,) = driving(seen(asking={"web": {1, 2}}))
+    assert (found.level, found.todo) == ("wrong", advice.ONE_DRIVER)
+    (found,) = driving(seen(asking={"web": {1}, "teleop": {2}}))
+    assert (found.level, found.text.split(" ask")[0]) == ("note", "teleop, web")
+    (found,) = driving(seen(asking={"web": {1}}))
+    assert (found.level, found.text) == ("ok", "web asks to move")
+    found = next(driving(seen(deciding={1, 2})))
+    assert (found.level, found.todo) == ("wrong", advice.TWICE)
+
+
+def test_safety_s_causes_with_what_to_do() -> None:
+    latched, passing = safety(seen(safety=state_of("contact", "neutral", latched=("contact",))))
+    assert (latched.level, latched.todo) == ("wrong", advice.BUMPER)
+    assert latched.text == "The bumper was hit. (brake, latched)"
+    assert (passing.level, passing.todo) == ("note", advice.CAUSES["neutral"])
+
+
+def test_a_cause_of_a_newer_safety() -> None:
+    (found,) = safety(seen(safety=state_of("smoke", latched=("smoke",))))
+    assert (found.level, found.todo) == ("wrong", advice.RESET)
+    (found,) = safety(seen(safety=state_of("smoke")))
+    assert (found.level, found.todo) == ("wrong", "")
+
+
+def test_nothing_holds_it_back() -> None:
+    (found,) = safety(seen(safety=state_of()))
+    assert (found.level, found.text) == ("ok", "All is well.")
+
+
+def test_every_cause_and_every_fault_has_its_advice() -> None:
+    assert advice.CAUSES.keys() == {rule.name for rule in RULES}
+    assert advice.FAULTS.keys() == set(get_args(FaultName))

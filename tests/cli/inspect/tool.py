@@ -1,0 +1,83 @@
+"""``t2`` in this process, and services that only pretend to be there."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from cli.__main__ import main
+from common import keys
+from common.bus.bus import Bus
+from common.keys import Topic
+from common.messages import Health, Message
+from tests.common.rig import Rig
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command gave."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def lines(self) -> list[Any]:
+        """Read JSON lines."""
+        return [json.loads(line) for line in self.out.splitlines()]
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Runs ``t2`` on one robot."""
+
+    endpoint: str
+    robot: str
+    capsys: pytest.CaptureFixture[str]
+
+    def __call__(self, *words: str, robot: str | None = None) -> Result:
+        """Run it to its end, as in a pipe."""
+        where = ("--set", f"bus.connect={self.endpoint}", "--robot", robot or self.robot)
+        self.capsys.readouterr()
+        try:
+            code = main([*words, *where])
+        except SystemExit as end:  # the command line is no good
+            code = int(str(end.code))
+        told = self.capsys.readouterr()
+        return Result(code, told.out, told.err)
+
+
+def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
+    """Return what a service tells of itself."""
+    return Health(
+        service=service, version=version, uptime=3.0, rates={}, counters={"overrun": 2},
+        lateness=lateness, rss=5_000_000,
+    )  # fmt: skip
+
+
+def pretend(
+    rig: Rig,
+    name: str,
+    streams: dict[Topic[Any], Callable[[], Message]],
+    declare: Callable[[Bus], object] = lambda _: None,
+    hz: float = 50.0,
+    **names: str,
+) -> Bus:
+    """Be a service of that name, which puts these messages again and again."""
+    publishers: list[tuple[Any, Callable[[], Message]]] = []
+
+    def everything(bus: Bus) -> None:
+        bus.live(keys.live_key(rig.robot, name, f"{bus.boot:x}"))
+        for topic, make in streams.items():
+            publishers.append((bus.publisher(topic, **names), make))
+        declare(bus)
+
+    def put(_: int) -> None:
+        for publisher, make in publishers:
+            publisher.put(make())
+
+    bus = rig.bus(everything)
+    rig.loop.post(lambda: rig.loop.every(1 / hz, put))
+    return bus
