@@ -1,0 +1,1 @@
+"""Recordings onto the bus again, or their raw frames to a bridge."""

@@ -1,0 +1,82 @@
+"""What is in a recording, in short. Pure."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from common.freshness import S
+from common.messages import Event, Health, Message, SafetyState
+from services.recorder.latches import Latches
+
+
+@dataclass(slots=True)
+class Stream:
+    """What was heard on one key."""
+
+    kind: str
+    count: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    raw: int = 0  # messages with a raw frame beside them
+
+    @property
+    def hz(self) -> float | None:
+        """Return how often it came; None for a single one."""
+        past_ns = self.last_ns - self.first_ns
+        return (self.count - 1) * S / past_ns if past_ns > 0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Something that happened, so many seconds after the beginning."""
+
+    at_s: float
+    who: str
+    level: str
+    text: str
+
+
+@dataclass(slots=True)
+class Summary:
+    """Fed with message after message."""
+
+    begin_ns: int | None = None  # on the recorder's wall clock
+    end_ns: int = 0
+    streams: dict[str, Stream] = field(default_factory=dict)  # by key
+    events: list[Note] = field(default_factory=list)
+    latched: list[Note] = field(default_factory=list)
+    versions: dict[str, str] = field(default_factory=dict)  # by service
+    faulty: Counter[str] = field(default_factory=Counter)  # not as they should be, by key
+    _latches: Latches = field(default_factory=Latches)
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time from the first message to the last."""
+        return (self.end_ns - (self.begin_ns or self.end_ns)) / S
+
+    @property
+    def messages(self) -> int:
+        """Return how many messages of the bus there are."""
+        return sum(stream.count for stream in self.streams.values())
+
+    def take(self, key: str, kind: str, message: Message | None, log_ns: int, *, raw: bool) -> None:
+        """Take the next message; None for one that is none of ours, or damaged."""
+        if self.begin_ns is None:
+            self.begin_ns = log_ns
+        self.end_ns = max(self.end_ns, log_ns)
+        stream = self.streams.setdefault(key, Stream(kind, first_ns=log_ns))
+        stream.count, stream.last_ns = stream.count + 1, log_ns
+        stream.raw += raw
+        if kind and message is None:
+            self.faulty[key] += 1
+        self._note(key, message, (log_ns - self.begin_ns) / S)
+
+    def _note(self, key: str, message: Message | None, at_s: float) -> None:
+        match message:
+            case Event():
+                text = f"{message.name}: {message.text}"
+                self.events.append(Note(at_s, key.rpartition("/")[2], message.level, text))
+            case Health():
+                self.versions[message.service] = message.version
+            case SafetyState():
+                for name in self._latches.take(message):
+                    self.latched.append(Note(at_s, "safety", "error", name))

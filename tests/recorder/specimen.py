@@ -1,0 +1,67 @@
+"""Samples as they come from the bus."""
+
+from common import codec
+from common import messages as m
+from common.freshness import S
+from common.sample import Sample
+
+ROOT = "t2/v1/001"
+BEGIN_NS = 1_700_000_000 * S  # on the wall clock
+MONO_NS = 1000 * S
+
+
+def sample(
+    path: str,
+    message: m.Message,
+    at_s: float = 0.0,
+    raw: bytes | None = None,
+) -> Sample:
+    """Return what a message is on the bus, so long after the beginning."""
+    payload, encoding = codec.encode(message), codec.encoding(type(message))
+    return bare(path, payload, encoding, at_s, raw=raw)
+
+
+def bare(
+    path: str,
+    payload: bytes,
+    encoding: str = "",
+    at_s: float = 0.0,
+    *,
+    raw: bytes | None = None,
+    deleted: bool = False,
+) -> Sample:
+    """Return any bytes as they would come."""
+    past_ns = round(at_s * S)
+    return Sample(
+        key=f"{ROOT}/{path}",
+        payload=payload,
+        encoding=encoding,
+        deleted=deleted,
+        raw=raw,
+        received_ns=MONO_NS + past_ns,
+        wall_ns=BEGIN_NS + past_ns,
+    )
+
+
+def velocity(linear: float = 0.5, seq: int = 1) -> m.Velocity:
+    return m.Velocity(seq=seq, t_ns=BEGIN_NS - 5, linear=linear, angular=0.0)
+
+
+def odometry(x: float = 1.0, heading: float = 0.0) -> m.Odometry:
+    return m.Odometry(
+        x=x, y=2.0, heading=heading, linear=0.5, angular=-0.25,
+        pose_covariance=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0),
+        twist_covariance=(10.0, 11.0, 12.0, 13.0), epoch=0, residual=None, slip=False,
+    )  # fmt: skip
+
+
+def ultrasonic() -> m.Ultrasonic:
+    ranges = (1.0, None, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+    return m.Ultrasonic(ranges=ranges, status=("ok", "no_echo", "ok", "ok", "ok", "ok", "ok", "ok"))
+
+
+def state(*latched: str, verdict: m.Verdict = "run") -> m.SafetyState:
+    return m.SafetyState(
+        verdict=verdict, latched=latched, causes=(), source=None,
+        limits=m.Limits(forward=1.0, backward=1.0, angular=1.0), heartbeat=1, text="",
+    )  # fmt: skip

@@ -1,0 +1,232 @@
+"""The recorder on a real bus: what it writes, when it stops, and what kill -9 leaves."""
+
+import errno
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from common import codec, keys
+from common import messages as m
+from common.config import Sources, load
+from common.freshness import S
+from common.messages import Event
+from common.service import Node
+from services.recorder.config import RecorderConfig
+from services.recorder.reading import Reader, Recorded
+from services.recorder.recorder import Recorder
+from services.recorder.recording import Recording
+from tests.chain import Witness
+from tests.cli.inspect.tool import pretend
+from tests.common.rig import Rig, until_heard
+from tests.recorder import specimen
+from tests.support import PATIENCE_S, running, wait_until
+
+
+def sets(rig: Rig, folder: Path, *more: str) -> list[str]:
+    return [
+        f"bus.connect={rig.endpoint}",
+        f"robot.id={rig.robot}",
+        f"recorder.folder={folder}",
+        "recorder.free=1",
+        *more,
+    ]
+
+
+@contextmanager
+def recorder(rig: Rig, folder: Path, *more: str) -> Iterator[None]:
+    """Record in this process while the context lasts."""
+    node = Node("recorder", load(RecorderConfig, Sources(sets=sets(rig, folder, *more))))
+    Recorder(node)
+    node.bus.open()
+    with running(node.loop):
+        wait_until(lambda: node.bus.connected, "the recorder's session")
+        yield
+    node.last_words()
+    node.bus.close()
+
+
+def told(rig: Rig) -> list[Event]:
+    """Return what the recorder tells, from now on and before."""
+    found: list[Event] = []
+    rig.bus(
+        lambda bus: bus.subscribe(
+            keys.EVENTS, lambda a: found.append(a.message), depth=64, service="recorder"
+        )
+    )
+    return found
+
+
+def read(folder: Path) -> list[Recorded]:
+    """Return what is in all files, in order."""
+    found: list[Recorded] = []
+    for path in sorted(folder.glob("*.mcap")):
+        with Reader(path) as reader:
+            found += reader
+    return found
+
+
+def is_whole(path: Path) -> bool:
+    with Reader(path) as reader:
+        found = list(reader)
+    return bool(found) and not reader.cut
+
+
+def paths(found: list[Recorded]) -> set[str]:
+    return {each.key.split("/", 3)[3] for each in found}
+
+
+def test_every_key_is_recorded_raw_frames_too(rig: Rig, tmp_path: Path) -> None:
+    stranger = rig.session()
+    root = f"t2/v1/{rig.robot}"
+    with recorder(rig, tmp_path, "recorder.everything=true"):
+        stranger.put(f"{root}/estop", b"")
+        stranger.put(f"{root}/@cmd/motion", b"\x80", encoding="x/y")
+        stranger.put(f"{root}/tel/bridge/velocity", b"\x80", attachment=b"frame")
+        stranger.delete(f"{root}/tel/mine/gone")
+        stranger.put("t2/v1/another/tel/x", b"")
+        until_heard(
+            lambda: stranger.put(f"{root}/tel/mine/last", b""),
+            lambda: "tel/mine/last" in paths(read(tmp_path)),
+            "all of it in a file that is still being written",
+        )
+    found = {each.key: each.sample for each in read(tmp_path)}
+    assert f"{root}/estop" in found
+    assert found[f"{root}/@cmd/motion"].encoding == "x/y"
+    assert found[f"{root}/tel/bridge/velocity"].raw == b"frame"
+    assert found[f"{root}/tel/mine/gone"].deleted
+    assert "t2/v1/another/tel/x" not in found
+
+
+def test_a_latch_writes_what_was_before_it(rig: Rig, tmp_path: Path) -> None:
+    events, numbers = told(rig), count()
+    latched: list[str] = []
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
+    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    with recorder(rig, tmp_path, "recorder.tail=1"):
+        heard: list[m.Velocity] = []
+        rig.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: heard.append(a.message)))
+        wait_until(lambda: len(heard) > 50, "some history")
+        assert read(tmp_path) == []
+        latched.append("contact")
+        wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
+    (path,) = tmp_path.glob("*.mcap")
+    assert path.name.endswith("-latch-contact.mcap")
+    found = read(tmp_path)
+    states = [each.message.latched for each in found if isinstance(each.message, m.SafetyState)]
+    velocities = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
+    assert states[0] == ()
+    assert states[-1] == ("contact",)
+    assert len(velocities) > 50
+    assert velocities == sorted(velocities)
+    with Reader(path) as reader:
+        list(reader)
+    assert reader.about["robot"] == rig.robot
+    assert reader.about["why"] == "latch-contact"
+
+
+def test_no_room_is_told_and_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
+    events = told(rig)
+    latched: list[str] = []
+    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    all_of_it = "recorder.free=1000000"  # a terabyte
+    with recorder(rig, tmp_path, all_of_it, "recorder.everything=true"):
+        wait_until(lambda: "disk_full" in [each.name for each in events], "the first event")
+        heard: list[m.SafetyState] = []
+        rig.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: heard.append(a.message)))
+        wait_until(lambda: len(heard) > 10, "safety's word")
+        latched.append("estop")
+        wait_until(lambda: "black_box_lost" in [each.name for each in events], "the second event")
+    assert list(tmp_path.iterdir()) == []
+    (full,) = (each for each in events if each.name == "disk_full")
+    assert full.level == "error"
+    assert "recorder.free is 1e+06" in full.text
+
+
+def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
+    numbers = count(1)
+    put: list[m.Velocity] = []
+
+    def velocity() -> m.Velocity:
+        put.append(specimen.velocity(next(numbers)))
+        return put[-1]
+
+    pretend(rig, "bridge", {keys.VELOCITY: velocity})
+    words = [w for each in sets(rig, tmp_path, "recorder.everything=true") for w in ("--set", each)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "services.recorder", *words], stderr=subprocess.DEVNULL
+    ) as process:
+        witness = Witness()
+        try:
+            wait_until(lambda: len(read(tmp_path)) > 200, "some seconds of recording")
+        finally:
+            killed_ns = time.time_ns()
+            process.kill()
+            held_up_s = witness.stop()
+    (path,) = tmp_path.glob("*.mcap")
+    with Reader(path) as reader:
+        found = list(reader)
+    assert reader.cut
+    assert len(found) > 200
+    numbers_read = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
+    assert numbers_read == list(range(int(numbers_read[0]), int(numbers_read[-1]) + 1))
+    assert (killed_ns - found[-1].log_ns) / S < 1.0 + 2 * held_up_s
+
+
+def test_what_safety_says_wrongly_is_recorded_and_not_believed(rig: Rig, tmp_path: Path) -> None:
+    stranger, key = rig.session(), keys.SAFETY.on(rig.robot)
+    with recorder(rig, tmp_path, "recorder.everything=true"):
+        until_heard(
+            lambda: stranger.put(key, b"\x80", encoding=codec.encoding(m.SafetyState)),
+            lambda: [each for each in read(tmp_path) if each.key == key],
+            "it in the file",
+        )
+    assert all(each.message is None for each in read(tmp_path) if each.key == key)
+
+
+def test_a_disk_that_refuses_ends_the_file_and_nothing_else(
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events, numbers = told(rig), count()
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
+
+    def refuse(_: Recording) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with recorder(rig, tmp_path, "recorder.everything=true"):
+        wait_until(lambda: read(tmp_path), "a recording")
+        monkeypatch.setattr(Recording, "flush", refuse)
+        wait_until(lambda: "disk_full" in [each.name for each in events], "the event")
+        monkeypatch.undo()
+        (path,) = tmp_path.glob("*.mcap")
+        wait_until(lambda: is_whole(path), "the end of the file")
+    assert list(tmp_path.glob("*.mcap")) == [path]
+    (full,) = (each for each in events if each.name == "disk_full")
+    assert "No space left on device" in full.text
+
+
+def test_t2_record_writes_whole_files_until_ctrl_c(rig: Rig, tmp_path: Path) -> None:
+    numbers = count()
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
+    where = ["--set", f"bus.connect={rig.endpoint}", "--set", "recorder.free=1"]
+    words = ["record", "--folder", str(tmp_path), "--robot", rig.robot, *where]
+    with subprocess.Popen(
+        [sys.executable, "-m", "cli", *words], stderr=subprocess.DEVNULL
+    ) as process:
+        try:
+            wait_until(lambda: read(tmp_path), "a recording")
+            process.send_signal(signal.SIGINT)
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+    (path,) = tmp_path.glob("*.mcap")
+    with Reader(path) as reader:
+        assert [each for each in reader if each.kind == "Velocity"]
+    assert not reader.cut
+    assert reader.about["why"] == "everything"

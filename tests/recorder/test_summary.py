@@ -1,0 +1,54 @@
+"""What is in a recording, in short."""
+
+import pytest
+
+from common.freshness import S
+from common.messages import Event, Health
+from services.recorder.summary import Note, Summary
+from tests.recorder import specimen
+from tests.recorder.specimen import BEGIN_NS, ROOT
+
+VELOCITY = f"{ROOT}/tel/bridge/velocity"
+
+
+def test_nothing_is_nothing() -> None:
+    summary = Summary()
+    assert (summary.messages, summary.duration_s, summary.streams) == (0, 0.0, {})
+
+
+def test_keys_are_counted_with_their_rates() -> None:
+    summary = Summary()
+    for number in range(11):
+        at_ns = BEGIN_NS + number * S // 10
+        message = specimen.velocity()
+        summary.take(VELOCITY, "Velocity", message, at_ns, raw=number > 5)
+    summary.take("t2/v1/001/tel/mine", "", None, BEGIN_NS + 2 * S, raw=False)
+    assert (summary.messages, summary.duration_s) == (12, 2.0)
+    assert summary.streams[VELOCITY].hz == pytest.approx(10.0)
+    assert (summary.streams[VELOCITY].count, summary.streams[VELOCITY].raw) == (11, 5)
+    assert summary.streams["t2/v1/001/tel/mine"].hz is None
+    assert summary.begin_ns == BEGIN_NS
+    assert not summary.faulty
+
+
+def test_what_is_not_as_it_should_be_is_counted() -> None:
+    summary = Summary()
+    summary.take(VELOCITY, "Velocity", None, BEGIN_NS, raw=False)
+    assert summary.faulty == {VELOCITY: 1}
+
+
+def test_events_latches_and_versions_are_told() -> None:
+    summary = Summary()
+    health = Health(
+        service="odom", version="1.2", uptime=0, rates={}, counters={}, lateness=0, rss=0
+    )
+    event = Event(name="contact", level="error", text="the bumper is hit")
+    state = f"{ROOT}/tel/safety/state"
+    at_ns = BEGIN_NS + S
+    summary.take(f"{ROOT}/tel/odom/health", "Health", health, BEGIN_NS, raw=False)
+    summary.take(state, "SafetyState", specimen.state(), BEGIN_NS, raw=False)
+    summary.take(f"{ROOT}/evt/bridge", "Event", event, at_ns, raw=False)
+    summary.take(state, "SafetyState", specimen.state("contact"), at_ns, raw=False)
+    assert summary.versions == {"odom": "1.2"}
+    assert summary.events == [Note(1.0, "bridge", "error", "contact: the bumper is hit")]
+    assert summary.latched == [Note(1.0, "safety", "error", "contact")]
