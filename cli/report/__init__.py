@@ -1,0 +1,1 @@
+"""``t2 report``: a recording as one page."""
