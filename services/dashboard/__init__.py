@@ -1,0 +1,1 @@
+"""Dashboard: the robot in a browser, to see, to drive and to stop."""

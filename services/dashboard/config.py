@@ -1,0 +1,52 @@
+"""The dashboard's settings."""
+
+from ipaddress import ip_address
+from typing import Annotated
+
+from msgspec import Meta
+
+from common import settings
+
+Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
+GEARS = 5
+
+
+class Dashboard(settings.Section, frozen=True, kw_only=True):
+    """Where the page is served, and how fast its gears are.
+
+    A token stands in a file and not among the settings, because these are answered on the bus.
+    """
+
+    host: str = "127.0.0.1"  # 0.0.0.0 for everybody on the network, who then need a token
+    port: settings.Port = 8080
+    token_file: str = ""  # one line; empty: a new token at each start, which is printed
+    certificate: str = ""  # PEM files for https; both or none
+    private_key: str = ""
+    source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "web"
+    gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
+    gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
+    round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a browser's later echo lets go
+
+    def __post_init__(self) -> None:
+        try:
+            ip_address(self.host)
+        except ValueError:
+            raise ValueError(f"host is {self.host!r}, allowed is an IP address") from None
+        for name in ("gears_linear", "gears_angular"):
+            gears = getattr(self, name)
+            if len(gears) != GEARS or list(gears) != sorted(gears):
+                raise ValueError(f"{name} {list(gears)} should be {GEARS} rising speeds")
+        if bool(self.certificate) != bool(self.private_key):
+            raise ValueError("certificate and private_key belong together: give both or none")
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine can reach the page."""
+        return ip_address(self.host).is_loopback
+
+
+class DashboardConfig(settings.Shared, frozen=True, kw_only=True):
+    """All sections that the dashboard reads."""
+
+    vehicle: settings.Vehicle = settings.Vehicle()
+    dashboard: Dashboard = Dashboard()

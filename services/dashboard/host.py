@@ -1,0 +1,110 @@
+"""The dashboard's process: the node's loop in a thread of its own, the web server in the main one.
+
+So a slow browser never delays a zero. The end of either ends the other: a signal ends the server,
+then the loop comes to rest with zeros; an error of ours in the loop ends the server, too.
+"""
+
+import signal
+import ssl
+import threading
+from pathlib import Path
+
+from common import log
+from common.config import Loaded
+from common.errors import ConfigError
+from common.service import REST_S, Node
+from services.dashboard.config import Dashboard, DashboardConfig
+from services.dashboard.fleet import Fleet
+from services.dashboard.gate import TOKEN_MIN, Gate, new_token
+from services.dashboard.server import listen, reachable, serving
+from services.dashboard.viewers import Viewers
+
+
+class Host:
+    """One run of the dashboard."""
+
+    def __init__(self, loaded: Loaded[DashboardConfig]) -> None:
+        settings = loaded.config.dashboard
+        self._gate = Gate(token(settings))
+        check_certificate(settings)
+        self._socket = listen(settings.host, settings.port)
+        log.configure(loaded.config.log, "dashboard")
+        self._node = node = Node("dashboard", loaded)
+        viewers = Viewers(node.loop.post)
+        self._fleet = viewers.fleet = Fleet(node, viewers.show)
+        node.present()
+        self._server = serving(
+            settings,
+            loaded.config.robot.id,
+            self._gate,
+            viewers,
+            lambda robot, who: node.loop.post(lambda: self._fleet.estop(robot, who)),
+        )
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._serve, name="fleet", daemon=True)
+
+    def lead(self) -> int:
+        """Run the server in front of the loop, and return the exit code."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # The server takes the signal, and passes it on to here when it has ended.
+            signal.signal(number, lambda *_: None)
+        self._node.bus.open()
+        self._thread.start()
+        self._say_where()
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._node.loop.post(self._fleet.end)
+            self._thread.join(REST_S)
+        if self._error:
+            raise self._error
+        return 0
+
+    def _serve(self) -> None:
+        try:
+            self._node.loop.run()
+        except BaseException as error:  # raised again in the main thread, once the server is down
+            self._error = error
+            self._server.should_exit = True
+        self._fleet.close()
+        self._node.bus.close()
+        self._node.loop.close()
+        self._node.log.info("stopped")
+
+    def _say_where(self) -> None:
+        settings = self._node.config.dashboard
+        scheme = "https" if settings.certificate else "http"
+        where = f"{scheme}://{reachable(settings.host)}:{settings.port}/"
+        if self._gate.token and not settings.token_file:
+            where += f"?token={self._gate.token}"
+        self._node.log.info("started", robot=self._node.config.robot.id, open=where)
+
+
+def token(settings: Dashboard) -> str:
+    """Return the token to ask for: none on this machine alone, else the file's or a new one."""
+    if not settings.token_file:
+        return "" if settings.is_local else new_token()
+    try:
+        given = Path(settings.token_file).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeError) as error:
+        raise ConfigError(f"dashboard.token_file {settings.token_file}: {error}") from None
+    if len(given) < TOKEN_MIN:
+        raise ConfigError(
+            f"dashboard.token_file {settings.token_file}: the token has {len(given)} characters, "
+            f"at least {TOKEN_MIN} are wanted"
+        )
+    return given
+
+
+def check_certificate(settings: Dashboard) -> None:
+    """Raise ``ConfigError`` when the files for https cannot be used."""
+    if not settings.certificate:
+        return
+    try:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(settings.certificate, settings.private_key)
+    except OSError as error:
+        raise ConfigError(
+            f"dashboard.certificate {settings.certificate}, "
+            f"dashboard.private_key {settings.private_key}: {error.strerror or error}"
+        ) from None

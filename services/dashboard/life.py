@@ -1,0 +1,62 @@
+"""The dashboard's beginning: options, settings, and the sentence for whatever is in the way."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from common.config import load
+from common.errors import ConfigError, LinkError, RobotError
+from common.options import EXIT_CONFIG, EXIT_LINK, add_sources, sources
+from services.dashboard.config import DashboardConfig
+
+if TYPE_CHECKING:
+    from services.dashboard.host import Host
+
+EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
+EXTRA = {"nicegui", "fastapi", "starlette", "uvicorn"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options; all are settings."""
+    parser.add_argument("--host", help="where to listen; 0.0.0.0 for the whole network")
+    parser.add_argument("--port", help="the port to listen on")
+    parser.add_argument("--robot", help="which robot to look at first, such as 001")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve until SIGINT or SIGTERM; raise ``RobotError`` when that cannot even begin."""
+    for name, path in (
+        ("host", "dashboard.host"),
+        ("port", "dashboard.port"),
+        ("robot", "robot.id"),
+    ):
+        if getattr(options, name) is not None:
+            options.sets = [*options.sets, f"{path}={getattr(options, name)}"]
+    loaded = load(DashboardConfig, sources(options))
+    return _host_class()(loaded).lead()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve with these arguments, with the exit codes of every service."""
+    parser = argparse.ArgumentParser(prog="dashboard")
+    add_arguments(parser)
+    try:
+        return run(parser.parse_args(argv))
+    except RobotError as error:
+        print(f"dashboard: {error}", file=sys.stderr)  # noqa: T201 - logs may not be set up yet
+        return EXIT_CODES.get(type(error), 1)
+
+
+def _host_class() -> "type[Host]":
+    try:
+        from services.dashboard.host import Host
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] in EXTRA:
+            raise RobotError(
+                f"the page needs {error.name}: install the extra `dashboard` "
+                "(pip install -e '.[dashboard]')"
+            ) from None
+        raise
+    return Host

@@ -1,0 +1,100 @@
+"""What the eight sonars mean to safety, and how the wheels stand: the vehicle as it is drawn.
+
+A sector's tone says what safety makes of its reading, by safety's own formula and settings: the
+speed allowed toward a reading d is the v for which v * react + v^2 / (2 a) = d - margin.
+
+====== ====================================================================================
+tone   when
+====== ====================================================================================
+dark   nothing was heard lately
+fault  the sonar is faulty, or safety does not trust it
+stop   within the margin, too near to measure, or safety names it as what blocks the way
+slow   nearer than full speed allows, or safety names it as what slows the vehicle
+clear  else
+====== ====================================================================================
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
+from common.settings import Vehicle
+
+Tone = Literal["dark", "clear", "slow", "stop", "fault"]
+Number = Annotated[float, Meta(gt=0)]
+
+WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
+OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
+OF_CAUSE: dict[str, Tone] = {"obstacle": "slow", "blocked": "stop", "sonar": "fault"}
+CREEPING_MPS = 0.02  # a wheel that is slower has no direction worth drawing
+
+
+class Protection(Struct, frozen=True, kw_only=True):
+    """What safety reckons with; as shipped until the running service has answered."""
+
+    margin: float = 0.20  # m
+    react: float = 0.25  # s
+    deceleration: Number = 0.6  # m/s^2
+    max_linear: float = 1.0  # m/s
+
+    @property
+    def full_speed_room(self) -> float:
+        """The reading at which full speed is allowed, in metres."""
+        speed = self.max_linear
+        return self.margin + speed * self.react + speed**2 / (2 * self.deceleration)
+
+
+def tones(
+    heard: Ultrasonic | None, causes: Sequence[Cause], protection: Protection
+) -> tuple[Tone, ...]:
+    """Return the tone of each sector, in the manual's order of sonars."""
+    if heard is None:
+        return tuple("dark" for _ in SONAR_NAMES)
+    own: list[Tone] = [
+        OF_STATUS.get(status) or _by_range(reading, protection)
+        for status, reading in zip(heard.status, heard.ranges, strict=True)
+    ]
+    for cause in causes:
+        for index in named(cause.text) if cause.name in OF_CAUSE else ():
+            own[index] = max(own[index], OF_CAUSE[cause.name], key=WORST.index)
+    return tuple(own)
+
+
+def named(text: str) -> list[int]:
+    """Return the sonars that a sentence of safety's names; "front left" is not "front"."""
+    found = []
+    for name in sorted(SONAR_NAMES, key=len, reverse=True):
+        words = name.replace("_", " ")
+        if words in text:
+            text = text.replace(words, "")
+            found.append(SONAR_NAMES.index(name))
+    return found
+
+
+def wheel_angles(linear: float, angular: float, vehicle: Vehicle) -> tuple[float, ...]:
+    """Return how the wheels stand in a motion (m/s, rad/s), in radians, counter-clockwise.
+
+    Front left, front right, rear left, rear right. The board tells no angles; these are the only
+    ones that let all four wheels roll.
+    """
+    front, left = vehicle.wheelbase / 2, vehicle.track / 2
+    places = ((front, left), (front, -left), (-front, left), (-front, -left))
+    return tuple(_angle(linear - angular * y, angular * x) for x, y in places)
+
+
+def _angle(ahead: float, aside: float) -> float:
+    if math.hypot(ahead, aside) < CREEPING_MPS:
+        return 0.0
+    # A wheel that rolls backward points forward all the same.
+    return math.atan2(aside, ahead) if ahead >= 0 else math.atan2(-aside, -ahead)
+
+
+def _by_range(reading: float | None, protection: Protection) -> Tone:
+    if reading is None or not math.isfinite(reading):
+        return "dark"
+    if reading <= protection.margin:
+        return "stop"
+    return "slow" if reading < protection.full_speed_room else "clear"

@@ -1,0 +1,70 @@
+// The vehicle from above: forward is up, metres, so that x is up and y is to the left.
+const NS = "http://www.w3.org/2000/svg";
+const REACH = 1.9; // m of a sector at most, so that all fit
+const HALF = 0.36; // rad, half of a sector as drawn
+const parts = { sectors: [], labels: [], wheels: [], body: null, mounts: [] };
+
+const at = (x, y) => `${(-y).toFixed(3)} ${(-x).toFixed(3)}`;
+
+function made(parent, tag, attributes) {
+  const it = document.createElementNS(NS, tag);
+  for (const [name, value] of Object.entries(attributes)) it.setAttribute(name, value);
+  parent.append(it);
+  return it;
+}
+
+// In the manual's order: counted clockwise from the left.
+function mounts({ length, width }) {
+  const [front, left] = [length / 2, width / 2];
+  const degrees = [90, 45, 0, -45, -90, -135, 180, 135];
+  const places = [[0, left], [front, left], [front, 0], [front, -left],
+    [0, -left], [-front, -left], [-front, 0], [-front, left]];
+  return places.map(([x, y], i) => ({ x, y, yaw: (degrees[i] * Math.PI) / 180 }));
+}
+
+export function build(vehicle) {
+  const svg = document.getElementById("around");
+  svg.replaceChildren();
+  parts.mounts = mounts(vehicle);
+  parts.sectors = parts.mounts.map(() => made(svg, "path", { class: "sector" }));
+  const { length, width, wheelbase, track } = vehicle;
+  parts.wheels = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => {
+    const place = made(svg, "g", { transform: `translate(${at((x * wheelbase) / 2, (y * track) / 2)})` });
+    return made(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });
+  });
+  parts.body = made(svg, "rect", {
+    class: "body", x: -width / 2, y: -length / 2, width, height: length, rx: 0.1, "fill-opacity": 0.55,
+  });
+  const tip = length / 2 - 0.08;
+  made(svg, "path", { class: "nose", d: `M${at(tip, 0)}L${at(tip - 0.2, 0.13)}L${at(tip - 0.2, -0.13)}Z` });
+  parts.labels = parts.mounts.map(() => made(svg, "text", {}));
+}
+
+function sector({ x, y, yaw }, reach) {
+  const end = (angle) => at(x + reach * Math.cos(angle), y + reach * Math.sin(angle));
+  // Counter-clockwise as seen from above, y to the left: the flag is 0 on the screen.
+  return `M${at(x, y)}L${end(yaw - HALF)}A${reach} ${reach} 0 0 0 ${end(yaw + HALF)}Z`;
+}
+
+function label(range, tone, t) {
+  if (range != null) return range.toFixed(2);
+  return { fault: t("fault"), stop: t("near"), clear: "" }[tone] ?? "?";
+}
+
+export function draw(now, t) {
+  now.tones.forEach((tone, i) => {
+    const range = now.ranges[i];
+    const reach = Math.max(0.25, Math.min(range ?? (tone === "stop" ? 0.25 : REACH), REACH));
+    const mount = parts.mounts[i];
+    parts.sectors[i].setAttribute("d", sector(mount, reach));
+    parts.sectors[i].dataset.tone = tone;
+    const far = Math.max(0.5, reach * 0.72);
+    parts.labels[i].setAttribute("x", (-mount.y - far * Math.sin(mount.yaw)).toFixed(3));
+    parts.labels[i].setAttribute("y", (-mount.x - far * Math.cos(mount.yaw)).toFixed(3));
+    parts.labels[i].textContent = label(range, tone, t);
+  });
+  now.wheels.forEach((angle, i) => {
+    parts.wheels[i].setAttribute("transform", `rotate(${((-angle * 180) / Math.PI).toFixed(1)})`);
+  });
+  parts.body.dataset.pressed = now.bumper === true;
+}

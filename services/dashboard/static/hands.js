@@ -1,0 +1,206 @@
+// What the driver's hands do. Nothing drives but what is held this moment, and every way of losing
+// sight of the hand lets go: blur, another tab, a lost socket, a lost finger, a lost gamepad.
+// A hold is sent only as the answer to a picture, so that the server can tell how old it is.
+const DEADZONE = 0.12; // of the stick's way
+const DEADMAN = 4; // left shoulder, in the browser's standard mapping
+const STICKS = { linear: 1, angular: 2 }; // left stick up and down, right stick left and right
+const KEYS = {
+  KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
+  KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
+};
+const $ = (id) => document.getElementById(id);
+const down = new Set();
+const seenUp = new Set(); // pads whose shoulder was seen up
+let page = null;
+let stick = null; // { pointer, push }
+let creeping = false;
+let driving = false; // whether the wheel is ours
+let sent = false; // whether the server believes that something is held
+
+const shaped = (way) => {
+  if (Math.abs(way) <= DEADZONE) return 0;
+  return Math.sign(way) * Math.min(1, (Math.abs(way) - DEADZONE) / (1 - DEADZONE));
+};
+const clamped = (value) => Math.max(-1, Math.min(1, value));
+
+function held() {
+  if (creeping) return { x: 0, y: 0, creep: true };
+  if (stick) return { x: stick.push[0], y: stick.push[1] };
+  if (down.size) {
+    const pushes = [...down].map((code) => KEYS[code]);
+    return { x: clamped(pushes.reduce((sum, it) => sum + it[0], 0)), y: clamped(pushes.reduce((sum, it) => sum + it[1], 0)) };
+  }
+  return gamepad();
+}
+
+// Only the browser's standard mapping says which axis is which: on another pad a trigger at rest
+// may be a full turn. The pad whose shoulder is pressed counts, whatever else is plugged in.
+function gamepad() {
+  const pads = [...(navigator.getGamepads?.() ?? [])].filter((it) => it?.connected);
+  const usable = pads.filter((it) => it.mapping === "standard");
+  const pressed = usable.filter((it) => it.buttons[DEADMAN]?.pressed);
+  // A shoulder that is down when it is found, or after a release, must be let go first.
+  for (const it of usable) if (!pressed.includes(it)) seenUp.add(it.index);
+  for (const index of seenUp) if (!usable.some((it) => it.index === index)) seenUp.delete(index);
+  const pad = pressed.find((it) => seenUp.has(it.index));
+  const named = pad ?? usable[0] ?? pads[0];
+  const what = usable.length ? "gamepad" : "gamepad_unusable";
+  $("gamepad").textContent = named ? `${page.t(what)}: ${named.id}` : "";
+  if (!pad) return null;
+  return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
+}
+
+export function answer(n, isMine, grip) {
+  if (driving && !isMine) letGo();
+  driving = isMine;
+  if (!driving) return;
+  const now = held();
+  if (now) sent = page.send({ k: "hold", n, ...now });
+  // After a lapse the server waits to hear that the hand was off.
+  else if (sent || grip !== "free") free();
+}
+
+function free() {
+  sent = false;
+  page.send({ k: "free" });
+}
+
+export function letGo() {
+  down.clear();
+  stick = null;
+  creeping = false;
+  seenUp.clear();
+  if (driving) free();
+  knob(0, 0);
+}
+
+function knob(x, y) {
+  const it = $("knob");
+  if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
+}
+
+export function show(isMine, grip) {
+  const panel = document.querySelector(".driving");
+  panel.classList.toggle("mine", isMine);
+  panel.dataset.grip = grip;
+  $("hold").textContent = isMine ? page.t(`hold.${grip}`) : "";
+  for (const name of ["leave", "reset", "release", "lamp"]) off($(name), !isMine);
+  for (const name of ["ultrasonic_brake", "bumper_brake"]) off($(name), !isMine);
+  off($("take"), isMine);
+}
+
+function off(button, disabled) {
+  if (button.disabled !== disabled) button.disabled = disabled;
+  button.classList.toggle("disabled", disabled);
+}
+
+export function showGear(gear, isMine) {
+  for (const it of document.querySelectorAll("[data-gear]")) {
+    it.classList.toggle("lit", isMine && Number(it.dataset.gear) === gear);
+    it.disabled = !isMine;
+  }
+  const top = page.gears()[gear - 1];
+  $("top").textContent = top && isMine ? `${top.toFixed(2)} m/s` : "";
+}
+
+// --- listening ------------------------------------------------------------------------------------
+
+const ready = () => {
+  if (!driving) page.toast("take_first");
+  return driving;
+};
+
+function listenToStick() {
+  const it = $("stick");
+  const pushed = (event) => {
+    const box = it.getBoundingClientRect();
+    const way = box.width / 2;
+    let x = (box.top + way - event.clientY) / way;
+    let y = (box.left + way - event.clientX) / way;
+    const length = Math.hypot(x, y);
+    if (length > 1) [x, y] = [x / length, y / length];
+    knob(x, y);
+    return [shaped(x), shaped(y)];
+  };
+  it.addEventListener("pointerdown", (event) => {
+    event.preventDefault();
+    if (stick || event.button > 0 || !ready()) return;
+    it.setPointerCapture(event.pointerId);
+    stick = { pointer: event.pointerId, push: pushed(event) };
+  });
+  it.addEventListener("pointermove", (event) => {
+    if (stick?.pointer === event.pointerId) stick.push = pushed(event);
+  });
+  for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    it.addEventListener(end, (event) => { if (stick?.pointer === event.pointerId) letGo(); });
+  }
+  it.addEventListener("contextmenu", (event) => event.preventDefault());
+}
+
+function listenToRelease() {
+  const it = $("release");
+  it.addEventListener("pointerdown", (event) => {
+    if (event.button > 0 || !ready()) return;
+    it.setPointerCapture(event.pointerId);
+    creeping = true;
+  });
+  for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    it.addEventListener(end, () => { if (creeping) letGo(); });
+  }
+  it.addEventListener("contextmenu", (event) => event.preventDefault());
+}
+
+// With one of these held, systems and browsers keep the other keys' way up to themselves.
+const MODIFIERS = ["Meta", "Control", "Alt"];
+const modified = (event) =>
+  event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
+const typing = (event) => event.target.matches?.("input, select");
+// In every field, too; but where Chinese is composed, the space bar takes a word.
+const spacing = (event) => event.code === "Space" && !event.isComposing;
+
+function keyDown(event) {
+  if (spacing(event)) {
+    event.preventDefault(); // or it would press the button that has the focus as well
+    event.stopPropagation();
+    if (!event.repeat) page.estop();
+  }
+  if (modified(event)) letGo();
+  if (typing(event) || modified(event)) return;
+  if (KEYS[event.code]) {
+    event.preventDefault();
+    // A repeat is no press: after a release the key has to come up first.
+    if (!event.repeat && ready()) down.add(event.code);
+  } else if (event.code === "KeyF" && !event.repeat && ready()) creeping = true;
+  else if (/^Digit[1-5]$/.test(event.code)) page.send({ k: "gear", gear: Number(event.code.at(-1)) });
+}
+
+function keyUp(event) {
+  if (spacing(event)) {
+    event.preventDefault();
+    event.stopPropagation();
+  }
+  if (modified(event)) letGo();
+  if (event.code === "KeyF" && creeping) letGo();
+  if (down.delete(event.code) && !down.size) letGo();
+}
+
+// At the first touch: with a finger on the stick, the tap of another one makes no click.
+function listenToStop() {
+  addEventListener("pointerdown", (event) => { if (event.target.closest?.("#estop")) page.estop(); }, true);
+}
+
+export function begin(given) {
+  page = given;
+  listenToStop();
+  listenToStick();
+  listenToRelease();
+  addEventListener("keydown", keyDown, true);
+  addEventListener("keyup", keyUp, true);
+  for (const name of ["blur", "pagehide", "gamepaddisconnected", "dragstart"]) addEventListener(name, letGo);
+  // An open menu swallows the key's way up; the stick opens none.
+  addEventListener("contextmenu", (event) => { if (!event.defaultPrevented) letGo(); });
+  document.addEventListener("visibilitychange", () => { if (document.hidden) letGo(); });
+  for (const it of document.querySelectorAll("[data-gear]")) {
+    it.onclick = () => page.send({ k: "gear", gear: Number(it.dataset.gear) });
+  }
+}

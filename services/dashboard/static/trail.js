@@ -1,0 +1,142 @@
+// The way on a grid, in odom: x to the right, y up, metres.
+import { fitted } from "./charts.js";
+
+const SPACING = 0.05; // m between two points that are kept
+const KEPT = 20000;
+const [NEAR, FAR] = [300, 4]; // pixels for a metre
+let points = [];
+let vehicle = { length: 1.1, width: 0.7 };
+let scale = 40;
+let center = [0, 0];
+let follow = true;
+let epoch = null;
+let pose = null;
+const fingers = new Map();
+
+export const size = (given) => { vehicle = given; };
+export const begin = (given) => {
+  points = given.slice();
+  epoch = null; // it may be another robot's
+};
+
+export function add(now) {
+  if (!now.pose) return;
+  if (epoch !== null && now.epoch !== epoch) points = [];
+  epoch = now.epoch;
+  const last = points.at(-1);
+  if (last && Math.hypot(now.pose[0] - last[0], now.pose[1] - last[1]) < SPACING) return;
+  points.push([now.pose[0], now.pose[1]]);
+  if (points.length > KEPT) points.shift();
+}
+
+export function draw(given) {
+  pose = given;
+  if (follow && pose) center = [pose[0], pose[1]];
+  const canvas = document.getElementById("trail");
+  const [pen, width, height] = fitted(canvas);
+  const css = getComputedStyle(document.documentElement);
+  const color = (name) => css.getPropertyValue(`--${name}`);
+  const screen = ([x, y]) => [width / 2 + (x - center[0]) * scale, height / 2 - (y - center[1]) * scale];
+  grid(pen, width, height, screen, color);
+  pen.strokeStyle = color("measured");
+  pen.lineWidth = 3;
+  pen.lineJoin = "round";
+  pen.beginPath();
+  points.forEach((point, i) => pen[i ? "lineTo" : "moveTo"](...screen(point)));
+  if (pose && points.length) pen.lineTo(...screen(pose));
+  pen.stroke();
+  if (pose) body(pen, screen(pose), pose[2], color);
+}
+
+function step() {
+  const least = 50 / scale; // m that are 50 pixels at least
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((n) => n * power).find((it) => it >= least);
+}
+
+function grid(pen, width, height, screen, color) {
+  const every = step();
+  const text = (value) => (every < 1 ? value.toFixed(1) : value.toFixed(0));
+  pen.font = "12px system-ui, sans-serif";
+  pen.lineWidth = 1;
+  pen.strokeStyle = color("line");
+  pen.fillStyle = color("quiet");
+  const [left, low] = [center[0] - width / 2 / scale, center[1] - height / 2 / scale];
+  for (let x = Math.ceil(left / every) * every; x < left + width / scale; x += every) {
+    line(pen, screen([x, 0])[0], 0, screen([x, 0])[0], height);
+    pen.fillText(text(x), screen([x, 0])[0] + 3, height - 4);
+  }
+  for (let y = Math.ceil(low / every) * every; y < low + height / scale; y += every) {
+    line(pen, 0, screen([0, y])[1], width, screen([0, y])[1]);
+    pen.fillText(`${text(y)} m`, 3, screen([0, y])[1] - 3);
+  }
+}
+
+function line(pen, ...[x0, y0, x1, y1]) {
+  pen.beginPath();
+  pen.moveTo(x0, y0);
+  pen.lineTo(x1, y1);
+  pen.stroke();
+}
+
+function body(pen, [x, y], heading, color) {
+  const [long, wide] = [Math.max(vehicle.length * scale, 18), Math.max(vehicle.width * scale, 11)];
+  pen.save();
+  pen.translate(x, y);
+  pen.rotate(-heading);
+  pen.fillStyle = color("body");
+  pen.fillRect(-long / 2, -wide / 2, long, wide);
+  pen.fillStyle = color("measured");
+  pen.beginPath();
+  pen.moveTo(long / 2 - 2, 0);
+  pen.lineTo(long / 6, wide / 3);
+  pen.lineTo(long / 6, -wide / 3);
+  pen.fill();
+  pen.restore();
+}
+
+// --- zoom, follow, clear ------------------------------------------------------------------------
+
+const zoom = (factor) => { scale = Math.max(FAR, Math.min(NEAR, scale * factor)); draw(pose); };
+
+function setFollow(on) {
+  follow = on;
+  document.getElementById("follow").classList.toggle("lit", on);
+}
+
+export function listen() {
+  const canvas = document.getElementById("trail");
+  const on = (id, call) => { document.getElementById(id).onclick = call; };
+  on("zoom-in", () => zoom(1.4));
+  on("zoom-out", () => zoom(1 / 1.4));
+  on("follow", () => { setFollow(!follow); draw(pose); });
+  on("clear", () => { points = []; draw(pose); });
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
+  }, { passive: false });
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  canvas.addEventListener("pointermove", move);
+  for (const end of ["pointerup", "pointercancel"]) {
+    canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  }
+}
+
+function move(event) {
+  if (!fingers.has(event.pointerId)) return;
+  const spread = () => {
+    const [one, other] = [...fingers.values()];
+    return other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0;
+  };
+  const [before, [x, y]] = [spread(), fingers.get(event.pointerId)];
+  fingers.set(event.pointerId, [event.clientX, event.clientY]);
+  if (before) zoom(spread() / before);
+  else {
+    setFollow(false);
+    center = [center[0] - (event.clientX - x) / scale, center[1] + (event.clientY - y) / scale];
+    draw(pose);
+  }
+}

@@ -1,0 +1,73 @@
+"""The dashboard's settings, and what stands in the way of its start."""
+
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigError
+from common.options import EXIT_CONFIG, EXIT_LINK
+from services.dashboard import host, life
+from services.dashboard.config import Dashboard
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--port", "0"], "dashboard.port = 0"),
+        (["--host", "robot"], "host is 'robot'"),
+        (["--set", "dashboard.gears_linear=0.1,0.2"], "should be 5 rising speeds"),
+        (["--set", "dashboard.gears_angular=0.5,0.4,0.3,0.2,0.1"], "should be 5 rising speeds"),
+        (["--set", "dashboard.round_trip=0"], "dashboard.round_trip"),
+        (["--set", "dashboard.certificate=a.pem"], "belong together"),
+        (["--set", "dashboard.source=No"], "dashboard.source"),
+        (["--set", "dashboard.token_file=/no/such"], "/no/such"),
+        (["--robot", "a/b"], "robot.id"),
+        (
+            ["--set", "dashboard.certificate=/no/c", "--set", "dashboard.private_key=/no/k"],
+            "/no/c",
+        ),
+    ],
+)
+def test_a_bad_setting_ends_it_before_anything_opens(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert life.main(words) == EXIT_CONFIG
+    assert named in capsys.readouterr().err
+
+
+def test_a_taken_port_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert life.main(["--port", port]) == EXIT_LINK
+    said = capsys.readouterr().err
+    assert port in said
+    assert "name another port" in said
+
+
+def test_a_missing_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "services.dashboard.host", raising=False)
+    monkeypatch.delitem(sys.modules, "services.dashboard.server", raising=False)
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    assert life.main([]) == 1
+    assert "install the extra `dashboard`" in capsys.readouterr().err
+
+
+def test_this_machine_needs_no_token_and_others_get_a_new_one() -> None:
+    assert host.token(Dashboard()) == ""
+    assert host.token(Dashboard(host="::1")) == ""
+    assert len(host.token(Dashboard(host="0.0.0.0"))) >= 16
+
+
+def test_the_token_of_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text("long enough\n", encoding="utf-8")
+    assert host.token(Dashboard(token_file=str(file))) == "long enough"
+    file.write_text("short", encoding="utf-8")
+    with pytest.raises(ConfigError, match="5 characters"):
+        host.token(Dashboard(token_file=str(file)))

@@ -1,0 +1,70 @@
+"""Which robots are looked at: with buses that carry nothing, as time here is not the clock's."""
+
+import time
+from unittest.mock import Mock
+
+import pytest
+
+from common.freshness import S
+from services.dashboard import fleet as module
+from services.dashboard import words as w
+from services.dashboard.config import DashboardConfig
+from services.dashboard.fleet import UNWANTED_S, Fleet
+from tests.support import wait_until
+
+
+@pytest.fixture
+def buses(monkeypatch: pytest.MonkeyPatch) -> dict[str, Mock]:
+    """Return the buses that are opened, by robot."""
+    opened: dict[str, Mock] = {}
+
+    def bus(_endpoints: object, robot: str, *_: object) -> Mock:
+        opened[robot] = Mock(robot=robot, connected=True)
+        return opened[robot]
+
+    monkeypatch.setattr(module, "Bus", bus)
+    return opened
+
+
+@pytest.fixture
+def fleet() -> Fleet:
+    return Fleet(Mock(config=DashboardConfig()), Mock())
+
+
+def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, Mock]) -> None:
+    fleet.join("1")
+    fleet.take_in("1", w.Look("002"))
+    fleet.estop("003", "somebody")
+    now_ns = time.monotonic_ns()
+    fleet.tick(now_ns)
+    fleet.take_in("1", w.Look("001"))
+    late_ns = now_ns + round((UNWANTED_S + 1) * S)
+    buses["003"].connected = False  # it is still being looked for
+    fleet.tick(late_ns)
+    wait_until(lambda: buses["002"].close.called, "the end of its session")
+    assert not buses["001"].close.called
+    assert not buses["003"].close.called
+    first = buses["002"]
+    fleet.take_in("1", w.Look("002"))
+    assert buses["002"] is not first
+    assert not buses["002"].close.called
+
+
+def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:
+    shown: list[bytes] = []
+    fleet = Fleet(
+        Mock(config=DashboardConfig()), lambda _viewers, text, _newer_wins: shown.append(text)
+    )
+
+    def paths() -> int:
+        return sum(b'"path"' in text for text in shown)
+
+    fleet.join("1")
+    fleet.take_in("1", w.Look("001"))
+    assert paths() == 1
+    fleet.take_in("1", w.Look("001", "Ada"))
+    assert paths() == 1
+    assert b'"Ada"' in shown[-1]
+    fleet.take_in("1", w.Look("002", "Ada"))
+    assert paths() == 2
+    assert set(buses) == {"001", "002"}
