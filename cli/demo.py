@@ -1,6 +1,7 @@
 """``t2 demo``: a simulated T2 drives a lap through the real services."""
 
 import argparse
+import contextlib
 import socket
 import time
 from collections.abc import Callable
@@ -139,8 +140,7 @@ def log_file(options: argparse.Namespace) -> Path:
 
 def own_ports() -> list[str]:
     """Return settings with ports of the demo's own, so that it runs beside ``t2 up``."""
-    board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
-    router = free_port(socket.SOCK_STREAM)
+    board, first, second, router = free_ports(*[socket.SOCK_DGRAM] * 3, socket.SOCK_STREAM)
     return [
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
@@ -151,9 +151,10 @@ def own_ports() -> list[str]:
     ]
 
 
-def free_port(kind: socket.SocketKind) -> int:
-    """Return a port of 127.0.0.1 that was free a moment ago."""
-    with socket.socket(socket.AF_INET, kind) as sock:
-        sock.bind(("127.0.0.1", 0))
-        port: int = sock.getsockname()[1]
-        return port
+def free_ports(*kinds: socket.SocketKind) -> list[int]:
+    """Return ports of 127.0.0.1 that were free a moment ago, no two the same."""
+    with contextlib.ExitStack() as stack:
+        socks = [stack.enter_context(socket.socket(socket.AF_INET, kind)) for kind in kinds]
+        for sock in socks:
+            sock.bind(("127.0.0.1", 0))
+        return [sock.getsockname()[1] for sock in socks]

@@ -104,17 +104,23 @@ def classes() -> str:
 
 def fields(kind: type[Struct]) -> str:
     """Return a struct's own fields with their units, as its source tells them."""
-    lines = inspect.getsource(kind).splitlines()
-    rows = [
-        (f"`{found['name']}`", f"`{spelt(found['type'])}`".replace("|", "\\|"),
-         f"`{found['default']}`" if found["default"] else "", found["why"] or "")
-        for found in map(FIELD.match, lines)
-        if found
-    ]  # fmt: skip
+    cells = [
+        (f"`{name}`", f"`{type_}`".replace("|", "\\|"), f"`{default}`" if default else "", why)
+        for name, type_, default, why in rows(kind)
+    ]
     summary = (kind.__doc__ or "").splitlines()[0]
     carried = f" Encoding `{codec.encoding(kind)}`." if kind is not m.Message else ""
     head = f"### {kind.__name__}\n\n{summary}{carried}\n"
-    return head + (f"\n{table(('field', 'type', 'default', ''), rows)}\n" if rows else "")
+    return head + (f"\n{table(('field', 'type', 'default', ''), cells)}\n" if cells else "")
+
+
+def rows(kind: type[Struct]) -> list[tuple[str, str, str, str]]:
+    """Return name, type, default and meaning of a struct's own fields, as its source tells them."""
+    found = filter(None, map(FIELD.match, inspect.getsource(kind).splitlines()))
+    return [
+        (each["name"], spelt(each["type"]), each["default"] or "", each["why"] or "")
+        for each in found
+    ]
 
 
 def causes() -> str:

@@ -1,9 +1,10 @@
-"""``t2 up``: router, simulated vehicle, bridge, safety and odometry, until ctrl-c."""
+"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c."""
 
 import argparse
 import signal
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 
 import structlog
 
@@ -25,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
     config = load(Everything, sources(options)).config
     log.configure(config.log, "up")
-    supervisor = Supervisor(commands(options))
+    supervisor = Supervisor([*commands(options), *recorder(options)])
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
     structlog.get_logger().info(
@@ -46,6 +47,13 @@ def commands(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
         modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
     modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}
     return [(name, [sys.executable, "-m", *words, *passed]) for name, words in modules.items()]
+
+
+def recorder(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
+    """Return the black box, where its library is installed: nobody waits for it."""
+    if find_spec("mcap") is None:
+        return []
+    return [("recorder", [sys.executable, "-m", "services.recorder", *passed_on(options)])]
 
 
 def passed_on(options: argparse.Namespace) -> list[str]:

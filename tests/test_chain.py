@@ -10,11 +10,13 @@ import pytest
 
 from common.bus.bus import Bus
 from common.loop import Loop
-from services.teleop.source import DriveSource
+from common.source import DriveSource
 from sim.requests import Bumper
 from tests.chain import Chain, Witness, chain, until_still_s
 from tests.support import bus_on, running, wait_until
 from tests.teleop.terminal import Terminal, terminal
+
+pytestmark = pytest.mark.alone
 
 # Beside the bridge's lease of 0.2 s as shipped: 0.5 s from the death of a part to the last
 # command to move.

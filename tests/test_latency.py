@@ -18,6 +18,8 @@ from tests.test_chain import Stick, push, stack, stick
 
 __all__ = ["stack", "stick"]  # fixtures
 
+pytestmark = pytest.mark.alone
+
 WAYS = {
     "contact_to_break": ["board_to_bridge", "bridge_to_break"],
     "judged_stop": [

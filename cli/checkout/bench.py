@@ -21,8 +21,8 @@ from common.freshness import S
 from common.keys import Call
 from common.loop import Loop
 from common.settings import Shared
+from common.source import DriveSource
 from services.safety.twist import STILL, Twist
-from services.teleop.source import DriveSource
 
 SOURCE = "checkout"  # as safety's settings name it
 ASK_S, LOOK_S = 0.05, 0.02

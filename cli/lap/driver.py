@@ -8,7 +8,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.freshness import S
-from services.teleop.source import DriveSource
+from common.source import DriveSource
 
 PERIOD_S = 0.05
 PRESS_NS = round(0.15 * S)  # between two presses of a button; a held release wants 0.3 s

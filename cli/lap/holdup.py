@@ -35,6 +35,7 @@ def settings(holdup_s: float) -> list[str]:
     accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
                 "sources.teleop.lease", "sources.checkout.lease"]  # fmt: skip
     return [
+        "bus.i_accept=lease",
         "bus.lease=10",
         "bridge.i_accept=lease,silence,heartbeat",
         f"bridge.lease={longer}",

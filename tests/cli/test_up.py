@@ -15,7 +15,7 @@ from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
 from tests.support import free_port, wait_until
 
-STACK = {"router", "sim", "bridge", "safety", "odom"}
+STACK = {"router", "sim", "bridge", "safety", "odom", "recorder"}
 
 
 def ports() -> list[str]:
@@ -33,15 +33,17 @@ def ports() -> list[str]:
 
 def starts(log: Path, name: str) -> int:
     """Return how often a service has said that it has started."""
-    # Up to the last whole line; five processes write here, and none into the other's line.
+    # Up to the last whole line; six processes write here, and none into the other's line.
     lines = [json.loads(line) for line in log.read_text(encoding="utf-8").split("\n")[:-1]]
     return sum(line["service"] == name and line["event"] == "started" for line in lines)
 
 
 def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with running(t2("up", *sets(*ports(), "log.format=json")), log) as up:
-        wait_until(lambda: all(starts(log, name) for name in STACK), "all five", PATIENCE_S)
+    with running(
+        t2("up", *sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")), log
+    ) as up:
+        wait_until(lambda: all(starts(log, name) for name in STACK), "all six", PATIENCE_S)
         first = children(up.pid)
         assert set(first) == STACK
 
@@ -71,7 +73,7 @@ def test_a_taken_port_ends_it_all_with_a_sentence(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        words = sets(*ports(), f"board.listen_ports={port}")
+        words = sets(*ports(), f"board.listen_ports={port}", f"recorder.folder={tmp_path}")
         with running(t2("up", "--no-sim", *words), log) as up:
             assert up.wait(PATIENCE_S) == EXIT_LINK
     said = log.read_text()
