@@ -51,8 +51,8 @@ def test_nothing_is_published_twice_although_it_comes_to_both_ports(rig: Rig) ->
 
 def test_begins_with_stop_even_without_a_router() -> None:
     with board() as made, bridge_process(made, "tcp/127.0.0.1:1"):
-        # BREAK is the guard's, until the bridge has said its first STOP, and the bridge's own while it
-        # hears no velocity: the test's board may be held up.
+        # BREAK is the guard's, until the bridge has said its first STOP; and the bridge's own while
+        # it hears no velocity, for the test's board may be held up.
         wait_until(lambda: [motion.kind for motion in made.motions[-10:]] == STOPS, "STOP at 20 Hz")
         assert {motion.kind for motion in made.motions} <= {MotionKind.BREAK, MotionKind.STOP}
 
