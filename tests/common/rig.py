@@ -24,9 +24,10 @@ class Rig:
         self.robot = f"r{next(_robots)}"
         self.loop = Loop()
         self._stack = contextlib.ExitStack()
+        self._running = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
-        self._stack.enter_context(running(self.loop))
+        self._running.enter_context(running(self.loop))
         return self
 
     def __exit__(
@@ -35,6 +36,7 @@ class Rig:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._running.close()  # first, for its timers put on the sessions
         self._stack.close()
 
     def bus(self, declare: Callable[[Bus], object] = lambda _: None) -> Bus:
