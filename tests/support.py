@@ -82,7 +82,10 @@ def running(loop: Loop) -> Iterator[Loop]:
 
 @contextlib.contextmanager
 def bus_on(endpoint: str, loop: Loop, declare: Callable[[Bus], None]) -> Iterator[Bus]:
-    """Open a bus with these declarations, connected when the context begins."""
+    """Open a bus with these declarations, connected when the context begins.
+
+    The loop runs. It is the loop's thread that closes the bus: its timers may be putting.
+    """
     bus = Bus([endpoint], "001", loop.post)
     declare(bus)
     bus.open()
@@ -90,4 +93,7 @@ def bus_on(endpoint: str, loop: Loop, declare: Callable[[Bus], None]) -> Iterato
         wait_until(lambda: bus.connected, "a session with the router")
         yield bus
     finally:
-        bus.close()
+        closed = threading.Event()
+        loop.post(bus.close)
+        loop.post(closed.set)
+        assert closed.wait(PATIENCE_S), "the loop does not run"

@@ -151,12 +151,14 @@ def with_a_child(folder: Path, seed: int) -> Iterator[Scene]:
     scene = Scene(folder, PARENT, seed)
     wait_until(lambda: len(list(tree("safety", scene.pid()))) == 2, "the child")
     pids = [pid for _, pid in tree("safety", scene.pid())]
-    yield scene
-    scene.supervisor.end()
-    for pid in filter(alive, pids):
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-    wait_gone(pids)
+    try:
+        yield scene
+    finally:
+        scene.supervisor.end()
+        for pid in filter(alive, pids):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        wait_gone(pids)
 
 
 @pytest.mark.parametrize("fault", [DRIVER_FAULT, KILL])
@@ -217,7 +219,7 @@ def test_a_child_that_is_lost_while_the_machine_hangs_is_no_crash(
         scene.yard.watch()
         (_, (_, child)) = tree("safety", scene.pid())
         os.kill(child, signal.SIGKILL)
-        wait_gone([child])
+        wait_until(lambda: ("safety/1", child) not in tree("safety", scene.pid()), "it is reaped")
         scene.late_s = late_s
         scene.yard.watch()
         assert scene.record.crashes == crashes

@@ -67,6 +67,8 @@ def read(folder: Path) -> list[Recorded]:
     """Return what is in all files, in order."""
     found: list[Recorded] = []
     for path in sorted(folder.glob("*.mcap")):
+        if not path.stat().st_size:
+            continue  # begun this moment
         with Reader(path) as reader:
             found += reader
     return found
