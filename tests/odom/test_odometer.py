@@ -143,6 +143,7 @@ def test_silence_is_told_and_nothing_old_is_published_again(world: World) -> Non
 
 
 def test_restart_slip_and_refusal_are_told(world: World) -> None:
+    wait_until(lambda: len(world.heard) > 25, "odometry that has heard the counters, too")
     world.epoch, world.origin = 1, -50.0
     wait_until(lambda: "reanchored" in world.events, "word of the restart")
     assert abs(world.heard[-1].x) < 30
