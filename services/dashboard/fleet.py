@@ -242,7 +242,7 @@ class Fleet:
         if not self._alive[name] and name != self._node.config.robot.id:
             del self._alive[name]
         # Aside: to end a session takes its time, and others are being driven.
-        threading.Thread(target=robot.bus.close, name=f"close {name}", daemon=True).start()
+        threading.Thread(target=robot.bus.close, name=f"close {name}").start()
 
     def _note_alive(self, key: str, alive: bool) -> None:
         robot = key.split("/")[2]

@@ -41,7 +41,7 @@ class Host:
             lambda robot, who: node.loop.post(lambda: self._fleet.estop(robot, who)),
         )
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._serve, name="fleet", daemon=True)
+        self._thread = threading.Thread(target=self._serve, name="fleet")
 
     def lead(self) -> int:
         """Run the server in front of the loop, and return the exit code."""
