@@ -29,9 +29,7 @@ class Opener:
         self._lease_s = lease_s
         self._adopt = adopt
         self._closing = threading.Event()
-        # No daemon: Zenoh's callback threads take after it, and one that is still about when Python
-        # leaves would abort the process.
-        self._thread = threading.Thread(target=self._run, name="bus-open")
+        self._thread = threading.Thread(target=self._run, name="bus-open", daemon=True)
         self._session: zenoh.Session | None = None
         self._log = structlog.get_logger()
 

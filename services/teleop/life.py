@@ -69,7 +69,7 @@ class Life:
         node.loop.post(lambda: desk.plug(find(self._settings.teleop)))
         self._lost = False
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._serve, name="desk", daemon=True)
+        self._thread = threading.Thread(target=self._serve, name="desk")
 
     def lead(self) -> int:
         """Run the screen in front of the loop, and return the exit code."""

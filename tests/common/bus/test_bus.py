@@ -42,14 +42,6 @@ def test_a_message_arrives_with_header_key_time_and_raw_frame(rig: Rig) -> None:
     assert before_ns < arrival.message.mono_ns < arrival.received_ns < time.monotonic_ns()
 
 
-def test_python_waits_for_zenohs_threads_when_it_leaves(rig: Rig) -> None:
-    before = set(threading.enumerate())
-    rig.bus(lambda bus: bus.subscribe(keys.BUMPER, print))
-    made = set(threading.enumerate()) - before
-    assert made
-    assert not [thread.name for thread in made if thread.daemon]
-
-
 def test_messages_keep_their_order_and_are_counted_at_both_ends(rig: Rig) -> None:
     heard: list[Arrival[Bumper]] = []
     hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=100))
