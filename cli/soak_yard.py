@@ -58,6 +58,7 @@ class Yard:
         self._late_s = 0.0  # at worst since the fault began
         self._runs: list[t.Command] = []  # that move the vehicle, since the fault began
         self._seen: dict[str, int] = {}  # pids by name
+        self._doomed: set[int] = set()  # pids of what was killed on purpose, gone by now or not
 
     def listen(self, bus: Bus) -> None:
         """Hear how the services fare."""
@@ -131,9 +132,8 @@ class Yard:
         processes = list(tree(service, child.process.pid))
         name, pid = processes[self._faults.one_of(len(processes))]
         os.kill(pid, signal.SIGKILL)
-        for gone, _ in processes:  # who is orphaned ends as well
-            if gone.startswith(name):
-                self._seen.pop(gone, None)
+        # Who is orphaned ends as well.
+        self._doomed |= {one for gone, one in processes if gone.startswith(name)}
         if pid != child.process.pid:
             return f"kill {name}", False  # whoever started it starts it again
         child.process.wait()
@@ -196,7 +196,9 @@ class Yard:
         """
         hung = self._late_s > HANG_S
         for name, pid in self._seen.items():
-            if now.get(name) != pid and not (hung and "/" in name):
+            if now.get(name) == pid or pid in self._doomed:
+                continue
+            if not (hung and "/" in name):
                 self._record.crashes.append(name)
                 self._tell(f"{name} has crashed")
         self._seen = now

@@ -146,6 +146,21 @@ def test_of_a_service_with_a_child_either_is_killed(tmp_path: Path) -> None:
     assert killed == {"kill safety", "kill safety/1"}
 
 
+def test_a_child_that_is_killed_is_no_crash_however_long_it_takes_to_end(tmp_path: Path) -> None:
+    with with_a_child(tmp_path, 1) as scene:
+        scene.yard.watch()
+        scene.yard._faults.one_of = lambda count: count - 1  # type: ignore[method-assign]
+        (_, (_, child)) = tree("safety", scene.pid())
+        os.kill(scene.pid(), signal.SIGSTOP)  # who is stopped does not reap its child
+        scene.begin(KILL)
+        scene.yard.watch()
+        assert ("safety/1", child) in tree("safety", scene.pid())
+        os.kill(scene.pid(), signal.SIGCONT)
+        wait_until(lambda: ("safety/1", child) not in tree("safety", scene.pid()), "it is reaped")
+        scene.yard.watch()
+        assert scene.record.crashes == []
+
+
 @contextlib.contextmanager
 def with_a_child(folder: Path, seed: int) -> Iterator[Scene]:
     scene = Scene(folder, PARENT, seed)
