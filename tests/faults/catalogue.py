@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from zenoh import CongestionControl
+
 from cli.settings import Everything
 from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar, SonarName, Wire
 from tests.faults import deeds
@@ -130,8 +132,11 @@ PROCESSES = [
     # Safety that loses its bus can hear no emergency stop: that is latched.
     *signals("router", (*NEUTRAL, *RESET), MOTION_LEASE),
     Fault("router gone for 5 s", kill("router", signal.SIGKILL), RESET, MOTION_LEASE, hold_s=5.0),
+    # A put that may be dropped, Zenoh's default, is dropped at its sender when it is so large.
     Fault("estop with 1 MB in it", deeds.estop_by(
-        lambda session, key: session.put(key, b"x" * 1_000_000)), RESET, within(0.1)),
+        lambda session, key: session.put(
+            key, b"x" * 1_000_000, congestion_control=CongestionControl.BLOCK)),
+          RESET, within(0.1)),
     # A driver that goes on has a stick that is still held: its next request counts.
     *signals("driver", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
     # The real one in a terminal, a finger on W; whoever only asks, as it does, is the driver.
