@@ -74,7 +74,7 @@ def campaign(faults: Sequence[Fault], repeat: int, folder: Path, holdups: HoldUp
     def work(queues: Queues, needs: Sequence[Need], name: str) -> None:
         for need in needs:
             if queues[need]:
-                _drive(folder / f"{name} {need}", queues[need], need)
+                _drive(folder / f"{name} {need}".replace(" ", "-"), queues[need], need)
 
     def _drive(room: Path, queue: deque[Fault], need: Need) -> None:
         room.mkdir()

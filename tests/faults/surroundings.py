@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sim.requests import Wire
 from tests.faults.deeds import hit, pid_of
-from tests.faults.enclosure import MEMORY
+from tests.faults.enclosure import MEMORY, step_clock
 from tests.faults.lane import Lane, until
 
 LET_GO_S = 0.4
@@ -51,12 +51,12 @@ def mend_cable(lane: Lane) -> None:
     lane.mend()
 
 
-def step_clock(whose: str, seconds: int) -> Callable[[Lane], int]:
+def step(whose: str, seconds: int) -> Callable[[Lane], int]:
     """Step the time of day of the ``robot`` or of the ``driver``."""
 
     def inject(lane: Lane) -> int:
         at_ns = time.monotonic_ns()
-        _set_clock(lane.folder / whose, seconds)
+        step_clock(lane.folder / whose, seconds)
         return at_ns
 
     return inject
@@ -65,14 +65,8 @@ def step_clock(whose: str, seconds: int) -> Callable[[Lane], int]:
 def set_clocks_right(lane: Lane) -> None:
     """Step all clocks back."""
     for whose in ("robot", "driver"):
-        _set_clock(lane.folder / whose, 0)
+        step_clock(lane.folder / whose, 0)
     lane.mend()
-
-
-def _set_clock(file: Path, seconds: int) -> None:
-    new = file.with_suffix(".new")
-    new.write_text(f"{seconds:+d}")
-    new.replace(file)
 
 
 def fill_disk(lane: Lane) -> int:
