@@ -58,11 +58,10 @@ def run(options: argparse.Namespace) -> int:
     log.configure(replace(config.log, level="error"), "demo")
     pace = PATIENT if holdup_s > holdup.LIMIT_S else QUICK
     driven, plan = Lap(lap(options.fast, pace)), load_plan(WORLD, config.vehicle)
-    where = config.bus.endpoints, config.robot.id
     with (
         Show(plan, config.vehicle, options.out) as show,
         closing(Loop()) as loop,
-        closing(Bus(*where, loop.post, config.bus.lease)) as bus,
+        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
     ):
         if holdup_s > holdup.LIMIT_S:
             show.say(holdup.sentence(holdup_s))

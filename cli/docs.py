@@ -1,4 +1,4 @@
-"""Writes what is made from the code: tables of ``docs/bus.md`` and ``docs/safety.md``, schemas.
+"""Writes what is made from the code: tables of the documents, and schemas.
 
 ``make docs`` runs it; a test runs it against what is committed. The prose around the tables is
 written by hand, the tables stand between ``<!-- name -->`` and ``<!-- end -->``.
@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 from msgspec import Struct
 
-from cli import states
+from cli import rights, states
 from common import codec, keys
 from common import messages as m
 
@@ -41,7 +41,12 @@ def generated() -> dict[Path, str]:
         "fields": "\n".join(fields(kind) for kind in kinds()),
     }
     safety = {"states": states.diagram(), "causes": causes()}
-    pages = {DOCS / "bus.md": bus, DOCS / "safety.md": safety}
+    security = {"rights": rights.table()}
+    pages = {
+        DOCS / "bus.md": bus,
+        DOCS / "safety.md": safety,
+        DOCS / "security.md": security,
+    }
     return {
         page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()
     } | schemas

@@ -58,10 +58,9 @@ def run(options: argparse.Namespace) -> int:
     """Show it until SIGINT or SIGTERM; raise ``LinkError`` when there is nothing to show once."""
     config = load(Shared, sources(options)).config
     log.configure(config.log, "latency")
-    bus_of = config.bus.endpoints, config.robot.id
     with (
         closing(Loop()) as loop,
-        closing(Bus(*bus_of, loop.post, config.bus.lease)) as bus,
+        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
         shown(options.once) as show,
     ):
         watch = Watch(loop, show, options.once)

@@ -1,28 +1,74 @@
-"""``t2 router``: the embedded Zenoh router alone."""
+"""``t2 router``: the embedded Zenoh router alone, or its configuration for ``zenohd``."""
 
 import argparse
+import json
 import signal
 import threading
+from pathlib import Path
 
 import structlog
 
+from cli import members
+from cli.access import access_control
 from common import log
-from common.bus.session import router
+from common.bus.session import router, router_config
 from common.config import load
 from common.options import add_sources, sources
-from common.settings import Shared
+from common.settings import Bus, Shared, is_encrypted
 
-add_arguments = add_sources
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument(
+        "--print", action="store_true", help="print the configuration for `zenohd -c`, and end"
+    )
+    add_insecure(parser)
+    add_sources(parser)
+
+
+def add_insecure(parser: argparse.ArgumentParser) -> None:
+    """Add the option that opens a robot to its network."""
+    parser.add_argument(
+        "--insecure", action="append_const", dest="sets", const="bus.insecure=true",
+        help="let everybody on the network in, to drive as well: no TLS, no certificates",
+    )  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:
     """Route until SIGINT or SIGTERM."""
     config = load(Shared, sources(options)).config
+    access = access_of(config.bus)
+    if options.print:
+        print(json.dumps(router_config(config.bus, access), indent=2))
+        return 0
     log.configure(config.log, "router")
     ended = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: ended.set())
-    with router(config.bus.listen, config.bus.lease):
-        structlog.get_logger().info("started", listen=list(config.bus.listen))
+    with router(config.bus, access):
+        listen = list(config.bus.listen)
+        structlog.get_logger().info("started", listen=listen, open_to=open_to(config.bus))
         ended.wait()
     return 0
+
+
+def access_of(bus: Bus) -> dict[str, object] | None:
+    """Return who may do what; None where everybody who gets in may do everything.
+
+    Raise ``ConfigError`` when the list of members cannot be read.
+    """
+    if not bus.members:
+        return None
+    protocols = {
+        endpoint.partition("/")[0] for endpoint in bus.listen if not is_encrypted(endpoint)
+    }
+    return access_control(members.read(Path(bus.members)).welcome, sorted(protocols))
+
+
+def open_to(bus: Bus) -> str:
+    """Say in words who is let in."""
+    if bus.insecure:
+        return "everybody on the network, without a certificate"
+    if any(map(is_encrypted, bus.listen)):
+        return "this machine, and members with a certificate"
+    return "every program on this machine"

@@ -97,7 +97,7 @@ def soak(
     commands = [*traced(options), ("driver", driver_command(options, patient))]
     with (
         closing(Loop()) as loop,
-        closing(Bus(config.bus.endpoints, config.robot.id, loop.post, config.bus.lease)) as bus,
+        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
         log_file(options).open("wb") as output,
         interruptible(loop) as signals,
     ):

@@ -124,7 +124,7 @@ def main() -> int:
     log.configure(config.log, "driver")
     with (
         closing(Loop()) as loop,
-        closing(Bus(config.bus.endpoints, config.robot.id, loop.post, config.bus.lease)) as bus,
+        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
     ):
         control = Control(config.sim.control_port, timeout_s=1.0)
         operator = Operator(bus, control, PATIENT if options.patient else QUICK)

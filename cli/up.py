@@ -8,6 +8,7 @@ from importlib.util import find_spec
 
 import structlog
 
+from cli.router import add_insecure
 from cli.settings import Everything
 from cli.supervisor import Supervisor
 from common import log
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
     parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
+    add_insecure(parser)
     add_sources(parser)
 
 

@@ -58,8 +58,7 @@ class Node(Generic[C]):
 
     def open_bus(self) -> Bus:
         """Return a bus of its own session, not yet open; the first one is ``bus``."""
-        bus = self.config.bus
-        return Bus(bus.endpoints, self.config.robot.id, self.loop.post, bus.lease)
+        return Bus(self.config.bus, self.config.robot.id, self.loop.post)
 
     def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
         """Publish and log a transition."""
@@ -120,11 +119,11 @@ def run(
     """Live a service's life and return its exit code."""
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
+        log.configure(loaded.config.log, name)
+        node = Node(name, loaded)
     except ConfigError as error:
-        print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
+        print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - whatever the log's format
         return EXIT_CONFIG
-    log.configure(loaded.config.log, name)
-    node = Node(name, loaded)
     try:
         build(node)
     except LinkError as error:

@@ -22,6 +22,7 @@ Port = Annotated[int, Meta(ge=1, le=65535)]
 
 # What the wheel of eclipse-zenoh can carry; a client would look for anything else forever.
 ENDPOINT = re.compile(r"((tcp|udp|tls|quic|ws)/.+:\d+|unixsock-stream/.+)([?#].*)?")
+ENCRYPTED = ("tls/", "quic/")
 
 
 class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -58,23 +59,67 @@ class Bus(Section, frozen=True, kw_only=True):
     i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
+    uplink: tuple[str, ...] = ()  # the site's router, dialled by the robot's own
     lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is noticed
+    ca: str = ""  # PEM files of `t2 keys`, for tls/ endpoints
+    certificate: str = ""
+    private_key: str = ""
+    members: str = ""  # the list of `t2 keys`: whom the router lets in, and as what
+    insecure: bool = False  # let a router listen to the network without TLS
 
     def __post_init__(self) -> None:
         check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.i_accept)
-        for endpoint in (*self.listen, *self.connect):
+        for endpoint in (*self.listen, *self.connect, *self.uplink):
             if not ENDPOINT.fullmatch(endpoint):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
         if not (self.listen or self.connect):
             raise ValueError("one of listen and connect needs an endpoint")
+        self._check_open()
+        self._check_encrypted()
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where a client dials: ``connect``, or else the embedded router."""
+        """Where a client dials: ``connect``, or else the embedded router, if it can without TLS."""
+        plain = tuple(endpoint for endpoint in self.listen if not is_encrypted(endpoint))
         return self.connect or tuple(
             endpoint.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
-            for endpoint in self.listen
+            for endpoint in plain or self.listen
         )
+
+    def _check_open(self) -> None:
+        """Refuse to open the robot to everybody on the network, unless that is spelled out."""
+        for endpoint in self.listen:
+            if not (self.insecure or is_encrypted(endpoint) or is_local(endpoint)):
+                raise ValueError(
+                    f"listen {endpoint} lets everybody on the network drive; "
+                    "`t2 keys` and tls/... let in whom you name, --insecure lets in all"
+                )
+
+    def _check_encrypted(self) -> None:
+        """Refuse TLS without the files that it takes."""
+        dialled = [e for e in (*self.listen, *self.connect, *self.uplink) if is_encrypted(e)]
+        for name in ("ca", "certificate", "private_key"):
+            if dialled and not getattr(self, name):
+                raise ValueError(f"{dialled[0]} wants {name}: a PEM file of `t2 keys issue`")
+        if any(map(is_encrypted, self.listen)) and not self.members:
+            raise ValueError("a router that listens on TLS wants members: the list of `t2 keys`")
+
+
+def is_encrypted(endpoint: str) -> bool:
+    """Tell whether an endpoint asks for certificates."""
+    return endpoint.startswith(ENCRYPTED)
+
+
+def is_local(endpoint: str) -> bool:
+    """Tell whether only this host can reach an endpoint."""
+    protocol, _, address = endpoint.partition("/")
+    if protocol == "unixsock-stream":
+        return True
+    host = address.partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class Board(Section, frozen=True, kw_only=True):

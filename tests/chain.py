@@ -95,6 +95,7 @@ def chain(
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
         f"bus.listen=tcp/{listen}:{port}",
+        "bus.insecure=true",
         f"sim.control_port={control}",
         *holdup.settings(holdup_s),
     ]

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
+from common import settings
 from common.bus.bus import Bus
 from common.loop import Loop
 
@@ -53,6 +54,16 @@ def wait_until(true: Callable[[], T], what: str, patience_s: float = PATIENCE_S)
     return found
 
 
+def at(*endpoints: str, lease: float = 1.0) -> settings.Bus:
+    """Return the settings of who dials these."""
+    return settings.Bus(connect=endpoints, lease=lease)
+
+
+def listening(endpoint: str) -> settings.Bus:
+    """Return the settings of a router there."""
+    return settings.Bus(listen=(endpoint,))
+
+
 @contextlib.contextmanager
 def router_process(endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run ``t2 router`` as a process of its own, listening when the context begins."""
@@ -82,11 +93,20 @@ def running(loop: Loop) -> Iterator[Loop]:
 
 @contextlib.contextmanager
 def bus_on(endpoint: str, loop: Loop, declare: Callable[[Bus], None]) -> Iterator[Bus]:
+    """Open a bus of robot 001 with these declarations, see ``joined``."""
+    with joined(at(endpoint), "001", loop, declare) as bus:
+        yield bus
+
+
+@contextlib.contextmanager
+def joined(
+    where: settings.Bus, robot: str, loop: Loop, declare: Callable[[Bus], object]
+) -> Iterator[Bus]:
     """Open a bus with these declarations, connected when the context begins.
 
     The loop runs. It is the loop's thread that closes the bus: its timers may be putting.
     """
-    bus = Bus([endpoint], "001", loop.post)
+    bus = Bus(where, robot, loop.post)
     declare(bus)
     bus.open()
     try:

@@ -39,7 +39,7 @@ class Bench:
 
     def __init__(self, config: Shared) -> None:
         self.loop = Loop()
-        self.bus = Bus(config.bus.endpoints, config.robot.id, self.loop.post, config.bus.lease)
+        self.bus = Bus(config.bus, config.robot.id, self.loop.post)
         self.tape = Tape(self.bus)
         self._endpoints = ", ".join(config.bus.endpoints)
         self._source = DriveSource(self.bus, SOURCE)

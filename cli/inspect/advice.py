@@ -1,14 +1,13 @@
 """What to do about what is wrong, in the operator's words. Pure."""
 
-DOCTOR_LISTENS_ON = "tcp/0.0.0.0:7447"
-
 REFUSED = (
     "on the robot: is `t2 up` on? The router listens on its own host alone as shipped; "
-    f"--set bus.listen={DOCTOR_LISTENS_ON} there lets laptops in"
+    "docs/security.md says how to let laptops in"
 )
 NO_WAY = "join the robot's Wi-Fi; then --set bus.connect=tcp/ROBOT:7447 with the robot's address"
 NO_NAME = "write the address in numbers, or correct bus.connect"
 NO_SOCKET = "the router makes this file: start it, or correct bus.connect"
+KEYS = "`t2 keys list` says what is valid until when; renew it, and copy its folder here anew"
 NOT_A_ROUTER = "it hangs, wants TLS, or is no router: restart it, or correct bus.connect"
 START = "on the robot: `t2 up`, or start it alone; when its process is there, it hangs: end that"
 HANGS = "end its process; what supervises it starts it anew"

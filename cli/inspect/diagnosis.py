@@ -133,7 +133,9 @@ def versions(seen: Seen) -> Iterator[Finding]:
 def rights(seen: Seen) -> Iterator[Finding]:
     """Tell what the router lets this laptop do."""
     if not seen.instances:
-        yield Finding("rights", "unknown", "nobody is there to be reached")
+        yield Finding(
+            "rights", "unknown", "nobody is there, or the router's list lacks this certificate"
+        )
         return
     if not seen.rates:
         yield Finding("rights", "wrong", "services are there and nothing is heard", advice.BLIND)

@@ -48,13 +48,13 @@ def run(options: argparse.Namespace) -> int:
 
 def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     """Yield what is found, as it is found; the rest is unknown without a router."""
-    dials: list[Dial] = [dial(endpoint) for endpoint in config.bus.endpoints]
+    dials: list[Dial] = [dial(endpoint, config.bus) for endpoint in config.bus.endpoints]
     yield from network(dials)
     if all(each.trouble for each in dials):
         yield Finding("router", "unknown", "and all behind it: the router cannot be reached")
         return
     try:
-        with probe(config.bus.endpoints, config.bus.lease) as opened:
+        with probe(config.bus) as opened:
             seen = look(opened, config.robot.id, seconds)
     except LinkError:
         yield Finding("router", "wrong", "what answers there is no router", advice.NOT_A_ROUTER)

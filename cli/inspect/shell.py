@@ -83,7 +83,7 @@ def seated(options: argparse.Namespace) -> Iterator[Seat]:
     """Join the bus while the context lasts; raise ``LinkError`` without a router."""
     config = settings(options)
     robot = EVERY_ROBOT if options.robot == EVERY_ROBOT else config.robot.id
-    with probe(config.bus.endpoints, config.bus.lease) as opened:
+    with probe(config.bus) as opened:
         yield Seat(opened, robot)
 
 

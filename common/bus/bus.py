@@ -4,7 +4,7 @@ import contextlib
 import secrets
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -12,13 +12,13 @@ import zenoh
 import zenoh.ext
 from msgspec import Struct
 
-from common import codec
+from common import codec, settings
 from common.bus.calls import Answers, Caller
 from common.bus.host import host_id
 from common.bus.publisher import Publisher, qos
 from common.bus.ring import Ring
 from common.bus.sample import copied
-from common.bus.session import LEASE_S, Opener
+from common.bus.session import Opener
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.messages import Message
@@ -49,9 +49,7 @@ class Bus:
     router's restart.
     """
 
-    def __init__(
-        self, endpoints: Sequence[str], robot: str, post: Post, lease_s: float = LEASE_S
-    ) -> None:
+    def __init__(self, where: settings.Bus, robot: str, post: Post) -> None:
         self.robot = robot
         self.boot = secrets.randbits(63)
         self.host = host_id()
@@ -65,9 +63,7 @@ class Bus:
         self._declared: list[Any] = []  # references keep them alive
         self._session: zenoh.Session | None = None
         self._closed = False
-        self._opener = Opener(
-            endpoints, lease_s, lambda session: post(lambda: self._adopt(session))
-        )
+        self._opener = Opener(where, lambda session: post(lambda: self._adopt(session)))
 
     # --- declarations ---------------------------------------------------------------------
 

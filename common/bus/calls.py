@@ -67,7 +67,7 @@ class Answers(Generic[A]):
     def end(self) -> None:
         """Take the end of the answers, on a thread of Zenoh's."""
         if not self._answered:
-            self.fail(f"{self._server} does not answer")
+            self.fail(f"{self._server} does not answer; `t2 doctor` tells why")
 
     def fail(self, reason: str) -> None:
         """Let the refusal follow, from any thread."""

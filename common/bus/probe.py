@@ -6,7 +6,7 @@ there. Zenoh's threads only note when a sample came and queue it.
 
 import queue
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -17,10 +17,11 @@ import zenoh.ext
 from common.bus.calls import is_timeout
 from common.bus.publisher import qos
 from common.bus.sample import copied
-from common.bus.session import LEASE_S, client_config
+from common.bus.session import check_files, client_config
 from common.errors import LinkError
 from common.keys import ClassOfService
 from common.sample import Sample
+from common.settings import Bus
 
 MATCH_S = 1.0  # until the router has told who is there for what was declared
 MOST = 20_000  # samples that may wait for a slow reader; the newest of more are left out
@@ -125,13 +126,14 @@ class Probe:
 
 
 @contextmanager
-def probe(endpoints: Sequence[str], lease_s: float = LEASE_S) -> Iterator[Probe]:
+def probe(where: Bus) -> Iterator[Probe]:
     """Join the bus while the context lasts; raise ``LinkError`` when no router answers."""
+    check_files(where, where.endpoints)
     try:
-        session = zenoh.open(client_config(endpoints, lease_s))
+        session = zenoh.open(client_config(where))
     except zenoh.ZError:
         raise LinkError(
-            f"no router answers at {', '.join(endpoints)}: is `t2 up` on there? "
+            f"no router answers at {', '.join(where.endpoints)}: is `t2 up` on there? "
             "`t2 doctor` looks further; --set bus.connect=tcp/HOST:7447 looks elsewhere"
         ) from None
     with session:
@@ -150,6 +152,11 @@ def valid(expression: str) -> bool:
 def intersects(one: str, other: str) -> bool:
     """Tell whether some key is in both expressions."""
     return bool(zenoh.KeyExpr(one).intersects(zenoh.KeyExpr(other)))
+
+
+def includes(wide: str, narrow: str) -> bool:
+    """Tell whether every key of the second expression is in the first."""
+    return bool(zenoh.KeyExpr(wide).includes(zenoh.KeyExpr(narrow)))
 
 
 def _answer(reply: zenoh.Reply) -> Answer:

@@ -39,6 +39,13 @@ class Publisher(Generic[M]):
         """The ``seq`` that the next message will carry."""
         return self._seq + 1
 
+    @property
+    def passed_on(self) -> bool | None:
+        """Whether the router has anybody to pass messages to; None while there is no bus."""
+        if self._declared is None:
+            return None
+        return bool(self._declared.matching_status.matching)
+
     def put(self, message: M, raw: bytes | None = None) -> M:
         """Send the message with a header of its own, ``raw`` beside it; return what was sent."""
         self._seq += 1

@@ -4,16 +4,18 @@ import contextlib
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 
 import structlog
 import zenoh
 
-from common.errors import LinkError
+from common.errors import ConfigError, LinkError
+from common.settings import Bus, is_encrypted
 
 RETRY_S = 0.5  # between two tries to find a router
 COMPLAIN_S = 5.0  # between two lines that say so
-LEASE_S = 1.0  # a silent partition is noticed after this long; Zenoh's default is 10 s
+RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
 class Opener:
@@ -22,11 +24,9 @@ class Opener:
     ``zenoh.open`` must not wait by itself (it ignores SIGINT then), so the waiting is done here.
     """
 
-    def __init__(
-        self, endpoints: Sequence[str], lease_s: float, adopt: Callable[[zenoh.Session], None]
-    ) -> None:
-        self._endpoints = list(endpoints)
-        self._lease_s = lease_s
+    def __init__(self, where: Bus, adopt: Callable[[zenoh.Session], None]) -> None:
+        check_files(where, where.endpoints)
+        self._where = where
         self._adopt = adopt
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bus-open", daemon=True)
@@ -49,53 +49,89 @@ class Opener:
         complained_s = -COMPLAIN_S
         while not self._closing.is_set():
             try:
-                self._session = zenoh.open(client_config(self._endpoints, self._lease_s))
+                self._session = zenoh.open(client_config(self._where))
             except zenoh.ZError:
                 if time.monotonic() - complained_s >= COMPLAIN_S:
                     complained_s = time.monotonic()
-                    self._log.warning("waiting for a router", endpoints=self._endpoints)
+                    self._complain()
                 self._closing.wait(RETRY_S)
                 continue
             self._adopt(self._session)
             return
 
+    def _complain(self) -> None:
+        endpoints = list(self._where.endpoints)
+        self._log.warning("waiting for a router; `t2 doctor` looks further", endpoints=endpoints)
 
-def client_config(endpoints: Sequence[str], lease_s: float = LEASE_S) -> zenoh.Config:
+
+def client_config(where: Bus) -> zenoh.Config:
     """Return how a service joins: a client of one of these routers, never by scouting."""
-    connect = {
-        "endpoints": list(endpoints),
-        "timeout_ms": 1500,
-        "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+    connect = {"endpoints": list(where.endpoints), "timeout_ms": 1500, "retry": RETRY}
+    return zenoh.Config.from_json5(
+        json.dumps(_common(where) | {"mode": "client", "connect": connect})
+    )
+
+
+def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dict[str, object]:
+    """Return a router's whole configuration, as JSON; ``access`` is its ``access_control``."""
+    parts: dict[str, object] = {
+        "mode": "router",
+        "listen": {"endpoints": list(where.listen)},
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
     }
-    return _config(lease_s, mode="client", connect=connect)
+    if where.uplink:
+        parts["connect"] = {"endpoints": list(where.uplink), "retry": RETRY}
+    if access is not None:
+        parts["access_control"] = access
+    return _common(where) | parts
 
 
 @contextlib.contextmanager
-def router(listen: Sequence[str], lease_s: float = LEASE_S) -> Iterator[None]:
+def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[None]:
     """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen."""
-    config = _config(
-        lease_s,
-        mode="router",
-        listen={"endpoints": list(listen)},
-        adminspace={"enabled": True, "permissions": {"read": True, "write": False}},
-    )
+    check_files(where, (*where.listen, *where.uplink))
     try:
-        session = zenoh.open(config)
+        session = zenoh.open(zenoh.Config.from_json5(json.dumps(router_config(where, access))))
     except zenoh.ZError as error:
         reason = str(error).split(" at /")[0]
-        raise LinkError(f"the router cannot listen on {', '.join(listen)}: {reason}") from None
+        listen = ", ".join(where.listen)
+        raise LinkError(f"the router cannot listen on {listen}: {reason}") from None
     with session:
         yield
 
 
-def _config(lease_s: float, **part: object) -> zenoh.Config:
-    whole = part | {
+def check_files(where: Bus, endpoints: Iterable[str]) -> None:
+    """Raise ``ConfigError`` for a file that these endpoints want and that cannot be read."""
+    if not any(map(is_encrypted, endpoints)):
+        return
+    for name in ("ca", "certificate", "private_key"):
+        file = Path(getattr(where, name))
+        try:
+            file.read_bytes()
+        except OSError as error:
+            raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
+
+
+def _common(where: Bus) -> dict[str, object]:
+    link: dict[str, object] = {"tx": {"lease": round(where.lease * 1000), "keep_alive": 4}}
+    if where.ca:
+        link["tls"] = _tls(where)
+    return {
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         # The advanced publishers behind evt/** want timestamps.
         "timestamping": {"enabled": True},
-        "transport": {
-            "link": {"tx": {"lease": round(lease_s * 1000), "keep_alive": 4}},
-            "shared_memory": {"enabled": False},  # our frames are tiny
-        },
+        "transport": {"link": link, "shared_memory": {"enabled": False}},  # our frames are tiny
     }
-    return zenoh.Config.from_json5(json.dumps(whole))
+
+
+def _tls(where: Bus) -> dict[str, object]:
+    """Both ends show a certificate of the site's own CA, whoever dials."""
+    return {
+        "root_ca_certificate": where.ca,
+        "listen_certificate": where.certificate,
+        "listen_private_key": where.private_key,
+        "connect_certificate": where.certificate,
+        "connect_private_key": where.private_key,
+        "enable_mtls": True,
+        "close_link_on_expiration": True,
+    }

@@ -226,8 +226,7 @@ class Fleet:
     def _open(self, name: str) -> Robot:
         if name not in self._robots:
             node = self._node
-            one = node.config.bus
-            bus = Bus(one.endpoints, name, node.loop.post, one.lease)
+            bus = Bus(node.config.bus, name, node.loop.post)
             broadcast = partial(self._broadcast, name)
             self._robots[name] = Robot(bus, self._settings, broadcast, self._tell)
             self._alive.setdefault(name, set())

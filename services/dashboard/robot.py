@@ -84,7 +84,7 @@ class Robot:
         push = self.wheel.held(now_ns)
         request = self._requests.tick(None if push is None or push.creep else self._twist())
         if request is not None:
-            self._source.ask(request.linear, request.angular)
+            self._ask(request)
         self._creep(push is not None and push.creep)
         self._follow(now_ns)
 
@@ -116,6 +116,12 @@ class Robot:
         )
 
     # --- inside -------------------------------------------------------------------------------
+
+    def _ask(self, request: Twist) -> None:
+        was_barred = self._source.barred
+        self._source.ask(request.linear, request.angular)
+        if self._source.barred and not was_barred:
+            self._broadcast("error", "barred")
 
     def _twist(self) -> Twist:
         push, gear = self.wheel.push, self.wheel.gear - 1

@@ -100,6 +100,10 @@ TEXTS: dict[str, tuple[str, str]] = {
         "This gamepad cannot drive: the browser does not know its buttons",
         "此手柄无法驾驶：浏览器不识别其按键",
     ),
+    "barred": (
+        "NOT ALLOWED: the router drops this dashboard's requests; its certificate may only watch.",
+        "未获许可：路由器丢弃了本仪表板的请求，其证书只能观看。",
+    ),
     "estop_unconfirmed": (
         "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch!",
         "急停未被确认：请使用车身上的急停开关！",

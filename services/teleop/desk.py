@@ -102,9 +102,16 @@ class Desk:
         self._repeat_estop(now_ns)
         self._asked = self._controls.tick(self._read_stick(now_ns), now_ns)
         if self._asked is not None:
-            self._source.ask(self._asked.linear, self._asked.angular)
+            self._ask(self._asked)
         self._creep(self._controls.creeping(now_ns))
         self.view = self._picture(now_ns)
+
+    def _ask(self, request: Twist) -> None:
+        was_barred = self._source.barred
+        self._source.ask(request.linear, request.angular)
+        if self._source.barred and not was_barred:
+            text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"
+            self._node.event("barred", "error", text)
 
     def _read_stick(self, now_ns: int) -> Stick | None:
         before = self._gamepad.words

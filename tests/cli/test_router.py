@@ -1,11 +1,16 @@
 """``t2 router``: it listens or says why not, and leaves when told."""
 
+import json
 import signal
+from pathlib import Path
 
 import pytest
+import zenoh
 
 from cli.__main__ import main
+from cli.router import open_to
 from common.options import EXIT_CONFIG, EXIT_LINK
+from common.settings import Bus
 from tests.cli.processes import PATIENCE_S, ran, sets
 from tests.support import free_port, router_process
 
@@ -23,10 +28,57 @@ def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
 
 
 def test_an_address_of_another_host_is_a_sentence() -> None:
-    result = ran("router", *sets("bus.listen=tcp/192.0.2.1:7447"))
+    result = ran("router", "--insecure", *sets("bus.listen=tcp/192.0.2.1:7447"))
     assert result.returncode == EXIT_LINK
     assert result.stderr.startswith("t2 router: the router cannot listen on tcp/192.0.2.1:7447: ")
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_it_does_not_open_a_robot_to_its_network_by_itself(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["router", *sets("bus.listen=tcp/0.0.0.0:7447")]) == EXIT_CONFIG
+    said = capsys.readouterr().err
+    assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in said
+    assert "--insecure lets in all" in said
+
+
+def test_it_prints_its_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["router", "--print", "--insecure", *sets("bus.listen=tcp/0.0.0.0:7447")]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["mode"], printed["listen"]) == ("router", {"endpoints": ["tcp/0.0.0.0:7447"]})
+    zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
+
+
+@pytest.mark.parametrize(
+    ("bus", "words"),
+    [
+        (Bus(), "every program on this machine"),
+        (Bus(insecure=True), "everybody on the network, without a certificate"),
+        (
+            Bus(listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"),
+            "this machine, and members with a certificate",
+        ),
+    ],
+)
+def test_it_says_whom_it_lets_in(bus: Bus, words: str) -> None:
+    assert open_to(bus) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [(None, "cannot be read: No such file or directory; `t2 keys` makes it"),
+     ("{}", "is no list of members: Object missing required field `site`"),
+     ("[", "is no list of members: ")],
+)  # fmt: skip
+def test_a_list_of_members_that_is_none(
+    text: str | None, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    listed = tmp_path / "members.json"
+    if text is not None:
+        listed.write_text(text)
+    assert main(["router", *sets(f"bus.members={listed}")]) == EXIT_CONFIG
+    assert f"t2 router: {listed}: {words}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("endpoint", ["router", "tcp/", "/127.0.0.1:7447"])

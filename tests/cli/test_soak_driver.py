@@ -17,6 +17,7 @@ from sim.control import Control
 from sim.requests import Asked, Place
 from sim.trace import Truth
 from tests.cli.lap.scene import odometry, safety, truth
+from tests.support import at
 
 BEAT_NS = S // 20
 
@@ -25,7 +26,7 @@ class Desk(Bus):
     """A bus without a router, whose calls are answered by hand."""
 
     def __init__(self) -> None:
-        super().__init__(["tcp/127.0.0.1:1"], "001", lambda call: call())
+        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
         self.asked: list[Any] = []
         self.reply: Callable[[Any], None] = lambda _: None
         self.refuse: Callable[[str], None] = lambda _: None

@@ -11,7 +11,7 @@ import zenoh
 from common.bus.bus import Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from tests.support import running, wait_until
+from tests.support import at, running, wait_until
 
 _robots = count(1)
 
@@ -41,7 +41,7 @@ class Rig:
 
     def bus(self, declare: Callable[[Bus], object] = lambda _: None) -> Bus:
         """Open a bus with these declarations; it is connected on return."""
-        bus = Bus([self.endpoint], self.robot, self.loop.post)
+        bus = Bus(at(self.endpoint), self.robot, self.loop.post)
         declare(bus)
         return self.opened(bus)
 
@@ -55,7 +55,7 @@ class Rig:
     def session(self) -> zenoh.Session:
         """Open a bare session, as a stranger would."""
         session: zenoh.Session = self._stack.enter_context(
-            zenoh.open(client_config([self.endpoint]))
+            zenoh.open(client_config(at(self.endpoint)))
         )
         return session
 

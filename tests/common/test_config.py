@@ -121,7 +121,7 @@ def test_a_service_leaves_the_sections_of_others_alone(desk: Desk) -> None:
         ("robot.id = a ", "robot.id", "a"),
         ("board.listen_ports=4002, 4001", "board.listen_ports", (4002, 4001)),
         ("board.listen_ports=[4002]", "board.listen_ports", (4002,)),
-        ("bus.listen=tcp/a:1,tcp/[::1]:2", "bus.listen", ("tcp/a:1", "tcp/[::1]:2")),
+        ("bus.listen=tcp/[::1]:1,ws/[::1]:2", "bus.listen", ("tcp/[::1]:1", "ws/[::1]:2")),
         ("bus.connect=", "bus.connect", ()),
         ("teleop.gamepad=false", "teleop.gamepad", False),
         ("odom.hold=5e-2", "odom.hold", 0.05),

@@ -18,7 +18,7 @@ from common.service import Node, package_version, resident_bytes, run
 from common.settings import Shared
 from tests.common.program import Program, program
 from tests.common.rig import Rig
-from tests.support import free_port, wait_until
+from tests.support import free_port, listening, wait_until
 
 SPECIMEN = "tests.common.specimen"
 
@@ -196,12 +196,12 @@ def test_it_waits_for_a_router_and_outlives_its_restart(rig: Rig) -> None:
     witness = Witness(rig.robot)
     with program(SPECIMEN, "plain", *on(rig.endpoint, rig.robot)) as it:
         it.wait_for("waiting for a router")
-        with router([rig.endpoint]):
+        with router(listening(rig.endpoint)):
             rig.bus(witness.declare)
             wait_until(lambda: witness.health, "health")
             assert {event.name for event in witness.events} <= {"built"}
         witness.health.clear()
-        with router([rig.endpoint]):
+        with router(listening(rig.endpoint)):
             wait_until(lambda: witness.health, "health after the restart")
             assert info(rig, "last")
         it.process.send_signal(signal.SIGINT)

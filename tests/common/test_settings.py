@@ -1,5 +1,7 @@
 """Sections that two services share: what they refuse."""
 
+from typing import Any
+
 import msgspec
 import pytest
 
@@ -40,13 +42,16 @@ def test_protections_are_not_taken_away_by_accident(
         check_protections({"margin": margin, "lease": lease}, LIMITS, i_accept)
 
 
+CERTIFIED: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_key": "c.key"}
+
+
 @pytest.mark.parametrize(
     "endpoint",
     ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tls/robot.local:7447", "unixsock-stream//run/t2.sock",
      "tcp/127.0.0.1:7447?rel=1", "tcp/127.0.0.1:7447#iface=lo"],
 )  # fmt: skip
 def test_endpoints_that_zenoh_can_carry(endpoint: str) -> None:
-    assert Bus(connect=(endpoint,)).endpoints == (endpoint,)
+    assert Bus(connect=(endpoint,), **CERTIFIED).endpoints == (endpoint,)
 
 
 @pytest.mark.parametrize(
@@ -66,8 +71,53 @@ def test_a_bus_needs_an_endpoint() -> None:
 
 
 def test_services_dial_the_embedded_router_where_they_can_reach_it() -> None:
-    listening = Bus(listen=("tcp/0.0.0.0:7447", "tcp/[::]:7448", "tcp/10.0.0.1:7449"))
+    addresses = ("tcp/0.0.0.0:7447", "tcp/[::]:7448", "tcp/10.0.0.1:7449")
+    listening = Bus(listen=addresses, insecure=True)
     assert listening.endpoints == ("tcp/127.0.0.1:7447", "tcp/[::1]:7448", "tcp/10.0.0.1:7449")
+
+
+def test_services_on_board_need_no_certificate() -> None:
+    socket = "unixsock-stream//run/t2/bus.sock"
+    both = Bus(listen=("tls/0.0.0.0:7447", socket), members="members.json", **CERTIFIED)
+    assert both.endpoints == (socket,)
+    alone = Bus(listen=("tls/0.0.0.0:7447",), members="members.json", **CERTIFIED)
+    assert alone.endpoints == ("tls/127.0.0.1:7447",)
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["tcp/0.0.0.0:1", "tcp/[::]:1", "udp/10.7.5.220:1", "ws/robot.local:1"]
+)
+def test_a_robot_is_not_opened_to_its_network_by_accident(endpoint: str) -> None:
+    with pytest.raises(ValueError, match=r"lets everybody on the network drive; .*--insecure"):
+        Bus(listen=("tcp/127.0.0.1:7447", endpoint))
+    assert Bus(listen=(endpoint,), insecure=True).listen == (endpoint,)
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["tcp/127.0.0.1:1", "tcp/127.8.8.8:1", "udp/[::1]:1#iface=lo", "ws/localhost:1",
+                 "unixsock-stream//run/t2/bus.sock"],
+)  # fmt: skip
+def test_what_only_this_machine_reaches_may_be_open(endpoint: str) -> None:
+    assert Bus(listen=(endpoint,)).listen == (endpoint,)
+
+
+@pytest.mark.parametrize("name", sorted(CERTIFIED))
+@pytest.mark.parametrize("way", ["listen", "connect", "uplink"])
+def test_tls_wants_its_files(way: str, name: str) -> None:
+    given: dict[str, Any] = {
+        way: ("tls/10.7.5.220:7447",),
+        "members": "members.json",
+        **CERTIFIED,
+        name: "",
+    }
+    with pytest.raises(ValueError, match=rf"^tls/10\.7\.5\.220:7447 wants {name}: a PEM file"):
+        Bus(**given)
+
+
+def test_a_router_on_tls_wants_to_know_its_members() -> None:
+    with pytest.raises(ValueError, match="wants members: the list of `t2 keys`"):
+        Bus(listen=("quic/0.0.0.0:7447",), **CERTIFIED)
+    Bus(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # who dials lets nobody in
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "$*", "a b", "001\n", "@x", "a?b", "a#b"])

@@ -6,16 +6,17 @@ import pytest
 
 from common import keys
 from common.bus.bus import Arrival
+from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.messages import Drive
-from common.source import DriveSource
-from tests.support import bus_on, running, wait_until
+from common.source import BARRED_AFTER, DriveSource
+from tests.support import at, bus_on, running, wait_until
 from tests.teleop.support import FakeBus, safety_state
 
 
 @pytest.fixture
 def bus() -> FakeBus:
-    return FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    return FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
 
 
 def test_before_safety_was_heard_the_echo_is_zero(bus: FakeBus) -> None:
@@ -60,3 +61,25 @@ def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
         wait_until(echoed, "an echo of the heartbeat")
     assert heard[-1].key.endswith("@cmd/drive/demo")
     assert heard[-1].message.linear == 0.3
+
+
+@pytest.mark.parametrize(
+    ("passed_on", "is_heard", "barred"),
+    [(False, True, True), (False, False, False), (True, True, False), (None, True, False)],
+)
+def test_who_may_only_watch_is_barred(
+    bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
+    passed_on: bool | None, is_heard: bool, barred: bool,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(Publisher, "passed_on", passed_on)
+    source = DriveSource(bus, "demo")
+    if is_heard:
+        bus.tell(keys.SAFETY, safety_state(heartbeat=7))
+    for _ in range(BARRED_AFTER - 1):
+        source.ask(0.1, 0.0)
+    assert not source.barred
+    source.ask(0.1, 0.0)
+    assert source.barred is barred
+    monkeypatch.setattr(Publisher, "passed_on", True)
+    source.ask(0.1, 0.0)
+    assert not source.barred

@@ -16,7 +16,7 @@ from common import keys
 from common.bus.session import client_config
 from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
 from tests.faults.lane import Lane, until
-from tests.support import wait_until
+from tests.support import at, wait_until
 
 
 def child(pid: int) -> int:
@@ -101,7 +101,7 @@ def estop_by(put: Callable[[zenoh.Session, str], None]) -> Callable[[Lane], int]
     """Stop it as any program can that knows the key and nothing else."""
 
     def inject(lane: Lane) -> int:
-        with zenoh.open(client_config([lane.stack.endpoint])) as session:
+        with zenoh.open(client_config(at(lane.stack.endpoint))) as session:
             time.sleep(0.1)  # the router knows the session
             at_ns = time.monotonic_ns()
             put(session, keys.estop_key("001"))
@@ -179,7 +179,7 @@ def say(payload: bytes, encoding: str = "application/msgpack") -> Callable[[Lane
     ]
 
     def inject(lane: Lane) -> int:
-        with zenoh.open(client_config([lane.stack.endpoint])) as session:
+        with zenoh.open(client_config(at(lane.stack.endpoint))) as session:
             at_ns = time.monotonic_ns()
             for key in whole:
                 session.put(key, payload, encoding=encoding,

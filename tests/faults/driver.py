@@ -9,11 +9,12 @@ import threading
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
+from tests.support import at
 
 
 def main() -> None:
     loop = Loop()
-    bus = Bus([sys.argv[1]], "001", loop.post)
+    bus = Bus(at(sys.argv[1]), "001", loop.post)
     source = DriveSource(bus, "teleop")
     asked = [0.0]
 

@@ -17,7 +17,7 @@ from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from tests.support import PATIENCE_S, bus_on, running, wait_until
+from tests.support import PATIENCE_S, at, bus_on, running, wait_until
 
 SPEED, TURNING = 0.5, 0.25
 PERIOD_S = 0.02
@@ -100,7 +100,7 @@ def world(endpoint: str, service: subprocess.Popen[bytes]) -> Iterator[World]:
 
 def trajectory(endpoint: str) -> Any:
     """Return what ``info/odom/path`` answers."""
-    with zenoh.open(client_config([endpoint])) as session:
+    with zenoh.open(client_config(at(endpoint))) as session:
         (reply,) = session.get(keys.info_key("001", "odom", "path"))
         assert reply.ok is not None
         assert str(reply.ok.encoding) == "application/json"

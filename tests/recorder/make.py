@@ -22,7 +22,7 @@ from services.recorder.recording import Recording
 from services.recorder.translation import Translator
 from sim.requests import Bumper
 from tests.chain import Chain, chain
-from tests.support import PATIENCE_S, running, wait_until
+from tests.support import PATIENCE_S, at, running, wait_until
 
 KEPT = Path(__file__).with_name("lap.mcap")
 PATHS = ("tel/bridge/", "tel/odom/odometry", "tel/safety/state", "evt/", "@cmd/")
@@ -60,7 +60,7 @@ def drive(stack: Chain) -> None:
     twist = [0.0, 0.0]
     with ExitStack() as closing_all:
         loop = Loop()
-        bus = closing_all.enter_context(closing(Bus([stack.endpoint], "001", loop.post)))
+        bus = closing_all.enter_context(closing(Bus(at(stack.endpoint), "001", loop.post)))
         source = DriveSource(bus, "demo")
 
         def ask() -> None:

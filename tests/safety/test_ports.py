@@ -26,7 +26,7 @@ from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.ports import Ports, source_of
-from tests.support import bus_on, running, wait_until
+from tests.support import at, bus_on, running, wait_until
 
 
 def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
@@ -138,7 +138,7 @@ def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
         running(loop),
         safety_on(endpoint) as node,
         bus_on(endpoint, loop, seen.watch) as bus,
-        zenoh.open(client_config([endpoint])) as session,
+        zenoh.open(client_config(at(endpoint))) as session,
     ):
         drive, other = (bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
         key = keys.DRIVE.on("001", source="demo")
@@ -161,7 +161,7 @@ def test_an_estop_by_delete_latches(endpoint: str) -> None:
         running(loop),
         safety_on(endpoint),
         bus_on(endpoint, loop, seen.watch),
-        zenoh.open(client_config([endpoint])) as session,
+        zenoh.open(client_config(at(endpoint))) as session,
     ):
         repeat_until(
             lambda: session.delete("t2/v1/001/estop"),

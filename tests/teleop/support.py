@@ -16,6 +16,7 @@ from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.logbook import Logbook
 from services.teleop.view import View
+from tests.support import at
 
 
 class FakeBus(Bus):
@@ -71,7 +72,7 @@ class FakeNode(Node[TeleopConfig]):
 
     def open_bus(self) -> FakeBus:
         """Return the fake."""
-        self.fake = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+        self.fake = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
         return self.fake
 
     @property

@@ -7,6 +7,7 @@ import pytest
 import structlog
 
 from common import keys
+from common.bus.publisher import Publisher
 from common.freshness import S
 from common.messages import (
     Bumper,
@@ -250,3 +251,15 @@ def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) ->
     fake.tell(keys.EVENTS, mine, declared=everyone, service="teleop")
     (line,) = operator.node.logbook.last(9)
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
+
+
+def test_an_operator_who_may_not_drive_is_told_once(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Publisher, "passed_on", False)
+    operator.tell_safety()
+    operator.press("w")
+    operator.ticks(15)
+    assert [line for line in operator.lines if "NOT ALLOWED" in line] == [
+        "NOT ALLOWED: the router drops our requests; this certificate may only watch"
+    ]

@@ -4,11 +4,12 @@ from common import keys
 from common.freshness import S
 from common.messages import Bumper
 from services.teleop.view import Ear
+from tests.support import at
 from tests.teleop.support import FakeBus
 
 
 def test_a_value_is_shown_while_it_is_worth_it() -> None:
-    bus = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     ear = Ear(bus, keys.BUMPER, 0.5)
     assert ear.at(0) is None
     bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * S)
@@ -17,7 +18,7 @@ def test_a_value_is_shown_while_it_is_worth_it() -> None:
 
 
 def test_each_side_has_its_own_ear() -> None:
-    bus = FakeBus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     Ear(bus, keys.DRIVER, 2.0, side="left")
     Ear(bus, keys.DRIVER, 2.0, side="right")
     assert sorted(bus.handlers) == [

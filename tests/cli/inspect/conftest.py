@@ -1,27 +1,12 @@
-"""One router for all these tests; each has a robot of its own on it, and ``t2`` to look at it."""
-
-from collections.abc import Iterator
+"""The rig of ``tests/common``, and ``t2`` to look at its robot."""
 
 import pytest
 
 from tests.cli.inspect.tool import Tool
+from tests.common.conftest import rig, shared_router
 from tests.common.rig import Rig
-from tests.support import free_port, router_process
 
-
-@pytest.fixture(scope="package")
-def shared_router() -> Iterator[str]:
-    """Run a real router, and name its endpoint."""
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with router_process(where):
-        yield where
-
-
-@pytest.fixture
-def rig(shared_router: str) -> Iterator[Rig]:
-    """Give a robot, and buses of it."""
-    with Rig(shared_router) as made:
-        yield made
+__all__ = ["rig", "shared_router", "tool"]
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from common.messages import Drive
 from sim.requests import Bumper, Freeze, Sonar
 from tests.chain import Chain, chain
 from tests.cli.inspect.tool import Tool
-from tests.support import bus_on, free_port, router_process, running, wait_until
+from tests.support import at, bus_on, free_port, router_process, running, wait_until
 
 TRIES_S = 30.0
 
@@ -163,11 +163,11 @@ def test_what_answers_is_no_router(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not dial("udp/127.0.0.1:7447").tried
-    assert dial(f"unixsock-stream/{tmp_path}/no.sock").todo == advice.NO_SOCKET
-    assert dial(f"unixsock-stream/{tmp_path}").trouble == ""
+    assert not dial("udp/127.0.0.1:7447", at()).tried
+    assert dial(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == advice.NO_SOCKET
+    assert dial(f"unixsock-stream/{tmp_path}", at()).trouble == ""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        reached = dial(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1")
+        reached = dial(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at())
     assert (reached.trouble, reached.tried) == ("", True)
     for error, todo in (
         (socket.gaierror(), advice.NO_NAME),
@@ -179,6 +179,6 @@ def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             raise error
 
         monkeypatch.setattr(socket, "create_connection", fail)
-        told = dial("tcp/robot:7447")
+        told = dial("tcp/robot:7447", at())
         assert told.trouble
         assert told.todo == todo

@@ -8,27 +8,17 @@ from functools import partial
 
 import pytest
 
-from cli.inspect import estop, info, measure
+from cli.inspect import info, measure
 from common import codec, keys
 from common.bus.bus import Bus
-from common.bus.calls import Caller
-from common.messages import Bumper, Cause, Done, Event, Limits, ReleaseRequest, SafetyState
+from common.messages import Bumper, Event
 from tests.cli.inspect.tool import Tool, health, pretend
 from tests.cli.processes import PATIENCE_S, t2
 from tests.common.rig import Rig
-from tests.support import wait_until
 
 
 def bumper() -> Bumper:
     return Bumper(pressed=True)
-
-
-def state(*latched: str) -> SafetyState:
-    causes = tuple(Cause(name=n, action="brake", age=0.0, text=n) for n in latched)
-    return SafetyState(
-        verdict="brake", latched=latched, causes=causes, source=None, heartbeat=1, text="",
-        limits=Limits(forward=0, backward=0, angular=0),
-    )  # fmt: skip
 
 
 @pytest.fixture
@@ -176,114 +166,6 @@ def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(info, "LISTEN_S", 0.1)
     result = tool("topic", "info", "tel/none")
     assert (result.code, result.lines[0]["publishers"]) == (1, [])
-
-
-# --- pub, call, estop -------------------------------------------------------------------------
-
-
-def test_pub_fills_in_the_header(rig: Rig, tool: Tool) -> None:
-    watched: list[tuple[bytes, str]] = []
-    session = rig.session()
-    subscriber = session.declare_subscriber(
-        f"t2/v1/{rig.robot}/tel/mine/t",
-        lambda sample: watched.append((sample.payload.to_bytes(), str(sample.encoding))),
-    )
-    result = tool("pub", "tel/mine/t", '{"celsius": 21.5}', "--rate", "50", "--times", "2")
-    assert (result.code, result.err) == (0, "")
-    assert [line["published"] for line in result.lines] == [1, 2]
-    wait_until(lambda: len(watched) == 2, "both messages")
-    from cli.inspect.reading import read
-
-    values = [read(*each).value for each in watched]
-    assert [(each["celsius"], each["seq"] > 0) for each in values] == [(21.5, True)] * 2
-    assert values[1]["seq"] == values[0]["seq"] + 1
-    subscriber.undeclare()
-
-
-def test_pub_says_when_nobody_reads(tool: Tool) -> None:
-    result = tool("pub", "tel/mine/t", "--once", "--text")
-    assert (result.code, result.out) == (0, "published 1 on tel/mine/t\n")
-    assert "nobody reads tel/mine/t" in result.err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("pub", "tel/*", "{}"), "means many keys"),
-        (("pub", "tel/mine", "{"), "is no JSON"),
-        (("pub", "tel/mine", "[1]"), "is no object"),
-        (("pub", "tel/mine/health", '{"service": 1}'), "not a Health"),
-        (("pub", "tel/mine", "--rate", "0"), "--rate"),
-        (("echo", "tel//x"), "is no key"),
-        (("echo", "tel/x", "--count", "0"), "--count"),
-        (("hz", "tel/x", "--duration", "nan"), "--duration"),
-        (("call", "bridge/led", '{"chanel": 1}'), "not a LedRequest"),
-    ],
-)
-def test_what_is_no_good_is_said(words: tuple[str, ...], said: str, tool: Tool) -> None:
-    result = tool(*words)
-    assert (result.code, result.out) == (2, "")
-    assert said in result.err
-
-
-@pytest.mark.parametrize("words", [("call", "safety/reset"), ("pub", "tel/mine"), ("doctor",)])
-def test_what_is_for_one_robot_at_a_time(words: tuple[str, ...], tool: Tool) -> None:
-    result = tool(*words, robot="*")
-    assert (result.code, result.out) == (2, "")
-    assert "one robot at a time" in result.err
-
-
-def test_call(rig: Rig, tool: Tool) -> None:
-    def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
-        if request.held:
-            caller.refuse("the bumper is free")
-        else:
-            caller.reply(Done(text="ended"))
-
-    rig.bus(lambda bus: bus.serve(keys.RELEASE, release))
-    for key in ("safety/release", "/srv/safety/release"):
-        result = tool("call", key, '{"held": false}')
-        assert (result.code, result.lines) == (0, [{"text": "ended"}])
-    assert tool("call", "safety/release", '{"held": false}', "--text").out == "text: ended\n"
-    result = tool("call", "safety/release")
-    assert (result.code, result.out) == (1, "")
-    assert result.err == "t2 call: refused: the bumper is free\n"
-
-
-def test_a_call_that_nobody_answers(tool: Tool) -> None:
-    result = tool("call", "safety/reset", "--timeout", "0.3")
-    assert (result.code, result.out) == (1, "")
-    assert "safety does not answer" in result.err
-    assert "nobody answers" in tool("call", "mine/x", "--timeout", "0.3").err
-
-
-def test_what_there_is_to_call(tool: Tool) -> None:
-    assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
-    assert "clear the latches" in tool("call", "--text").out
-
-
-@pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
-def test_estop_is_sent_until_safety_confirms(words: tuple[str, ...], rig: Rig, tool: Tool) -> None:
-    stopped: list[int] = []
-
-    def latch(bus: Bus) -> None:
-        bus.on_any(keys.estop_key(rig.robot), stopped.append)
-
-    pretend(rig, "safety", {keys.SAFETY: lambda: state(*["estop"] * bool(stopped))}, latch)
-    result = tool(*words)
-    assert (result.code, result.err) == (0, "")
-    assert f"Robot {rig.robot} is stopped." in result.out
-    assert stopped
-
-
-def test_an_estop_that_nobody_confirms(
-    rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(estop, "PATIENCE_S", 0.3)
-    pretend(rig, "safety", {keys.SAFETY: state})
-    result = tool("estop")
-    assert (result.code, result.out) == (1, "")
-    assert "USE THE VEHICLE'S OWN SWITCH" in result.err
 
 
 # --- services, health, schema -----------------------------------------------------------------

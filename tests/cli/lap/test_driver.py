@@ -12,13 +12,14 @@ from common import messages as m
 from common.bus.bus import Bus
 from common.freshness import S
 from tests.cli.lap.scene import odometry, safety
+from tests.support import at
 
 
 class Desk(Bus):
     """A bus without a router, whose calls are answered by hand."""
 
     def __init__(self) -> None:
-        super().__init__(["tcp/127.0.0.1:1"], "001", lambda call: call())
+        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
         self.asked: list[tuple[str, Callable[[Any], None], Callable[[str], None]]] = []
 
     def ask(

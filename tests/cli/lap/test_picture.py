@@ -19,6 +19,7 @@ from common.settings import Vehicle
 from sim.files import load_plan
 from sim.geometry import Pose, Rectangle
 from tests.cli.lap.scene import hit_lap, odometry, safety
+from tests.support import at
 
 PLAN = load_plan("office", Vehicle())
 BODY = Rectangle(0.55, 0.35)
@@ -34,7 +35,7 @@ def text(what: RenderableType, columns: int = COLUMNS) -> str:
 @pytest.fixture
 def driver() -> Driver:
     """Return a driver without a bus, who has seen nothing yet."""
-    bus = Bus(["tcp/127.0.0.1:1"], "001", lambda call: call())
+    bus = Bus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     return Driver(bus, Lap(lap(fast=True)), lambda _: None)
 
 

@@ -13,7 +13,7 @@ from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
 from tests.common.rig import Rig, rising, until_heard
-from tests.support import wait_until
+from tests.support import at, wait_until
 
 
 def bumper(rig: Rig) -> str:
@@ -158,7 +158,7 @@ def test_a_handler_that_is_behind_gets_the_newest(rig: Rig, depth: int) -> None:
 
 def test_late_joiners_get_the_events_that_were(rig: Rig) -> None:
     names = [f"event_{number}" for number in range(20)]
-    bus = Bus([rig.endpoint], rig.robot, rig.loop.post)
+    bus = Bus(at(rig.endpoint), rig.robot, rig.loop.post)
     tell = events(bus)
     for name in names[:10]:
         tell(name)  # before there is a session
@@ -272,7 +272,7 @@ def test_a_closed_bus_calls_nobody_and_hurts_nobody(rig: Rig) -> None:
 
 def test_a_session_that_is_found_but_not_taken_over_is_closed(rig: Rig) -> None:
     posted: list[Callable[[], None]] = []
-    bus = Bus([rig.endpoint], rig.robot, posted.append)
+    bus = Bus(at(rig.endpoint), rig.robot, posted.append)
     bus.live(keys.live_key(rig.robot, "bridge", "1"))
     bus.open()
     wait_until(lambda: posted, "a session")

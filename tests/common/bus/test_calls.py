@@ -10,7 +10,7 @@ from common.bus.calls import Caller
 from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
 from tests.common.rig import Rig, until_heard
-from tests.support import wait_until
+from tests.support import at, wait_until
 
 
 class Server:
@@ -109,7 +109,7 @@ def test_a_refusal_brings_its_reason(asker: Asker, server: Server) -> None:
 def test_who_does_not_answer_in_time_is_named(asker: Asker, server: Server) -> None:
     asker.ask(held=False, timeout_s=0.3)
     wait_until(lambda: asker.answers, "the timeout")
-    assert asker.refusals == ["safety does not answer"]
+    assert asker.refusals == ["safety does not answer; `t2 doctor` tells why"]
     wait_until(lambda: server.waiting, "the question, however late")
     server.waiting.pop().reply(Done(text="too late"))  # harmless, and nobody hears it
     asker.ask(timeout_s=20.0)
@@ -122,7 +122,7 @@ def test_the_router_s_own_timeout_is_no_refusal(asker: Asker) -> None:
     for count in range(1, 31):
         asker.ask(held=False, timeout_s=0.02)
         wait_until(lambda: asker.answers == count, "the timeout")  # noqa: B023
-    assert set(asker.refusals) == {"safety does not answer"}
+    assert set(asker.refusals) == {"safety does not answer; `t2 doctor` tells why"}
 
 
 def test_a_refusal_needs_no_encoding(rig: Rig) -> None:
@@ -144,11 +144,11 @@ def test_nobody_there_is_said_at_once(rig: Rig) -> None:
     asker = Asker(rig.bus())
     asker.ask(timeout_s=600.0)
     wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["safety does not answer"]
+    assert asker.refusals == ["safety does not answer; `t2 doctor` tells why"]
 
 
 def test_no_router_is_said_at_once(rig: Rig) -> None:
-    asker = Asker(Bus([rig.endpoint], rig.robot, rig.loop.post))  # never opened
+    asker = Asker(Bus(at(rig.endpoint), rig.robot, rig.loop.post))  # never opened
     asker.ask()
     wait_until(lambda: asker.answers, "an answer")
     assert asker.refusals == ["there is no router"]
@@ -253,4 +253,4 @@ def test_who_tells_nothing_is_named(rig: Rig) -> None:
     refusals: list[str] = []
     rig.bus().look_up("odom", "config", lambda _: None, refusals.append, timeout_s=0.3)
     wait_until(lambda: refusals, "the refusal")
-    assert refusals == ["odom does not answer"]
+    assert refusals == ["odom does not answer; `t2 doctor` tells why"]

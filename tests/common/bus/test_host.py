@@ -9,6 +9,7 @@ import pytest
 from common.bus.bus import Bus
 from common.bus.host import BOOT_ID, host_id
 from common.messages import Bumper
+from tests.support import at
 
 
 @pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")
@@ -35,7 +36,7 @@ def test_without_a_name_it_is_unknown(tmp_path: Path, text: str | None) -> None:
 
 
 def test_only_a_known_host_shares_its_clock() -> None:
-    bus = Bus([], "001", lambda _: None)
+    bus = Bus(at(), "001", lambda _: None)
     bus.host = 5
     assert bus.shares_clock(Bumper(pressed=True, host=5))
     assert not bus.shares_clock(Bumper(pressed=True, host=6))

@@ -2,7 +2,6 @@
 
 import json
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,14 +9,14 @@ import structlog
 import structlog.testing
 import zenoh
 
-from common import keys
+from common import keys, settings
 from common.bus import session as session_module
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Done, Event, ResetRequest
 from tests.common.rig import Rig, until_heard
-from tests.support import free_port, wait_until
+from tests.support import at, free_port, listening, wait_until
 
 
 def nowhere() -> str:
@@ -30,9 +29,9 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Let the tries follow each other quickly, and tell when each was."""
     made: list[float] = []
 
-    def config(endpoints: Sequence[str], lease_s: float) -> zenoh.Config:
+    def config(where: settings.Bus) -> zenoh.Config:
         made.append(time.monotonic())
-        quick = client_config(endpoints, lease_s)
+        quick = client_config(where)
         quick.insert_json5("connect/timeout_ms", "50")
         return quick
 
@@ -42,7 +41,7 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_a_client_never_scouts_and_notices_a_silent_partition() -> None:
-    config = client_config(["tcp/127.0.0.1:1"], lease_s=0.5)
+    config = client_config(at("tcp/127.0.0.1:1", lease=0.5))
     assert json.loads(config.get_json("mode")) == "client"
     assert json.loads(config.get_json("scouting/multicast/enabled")) is False
     assert json.loads(config.get_json("scouting/gossip/enabled")) is False
@@ -56,19 +55,19 @@ def test_without_a_router_it_says_so_again_and_again(
     monkeypatch.setattr(session_module, "COMPLAIN_S", 0.2)
     where = nowhere()
     with structlog.testing.capture_logs() as lines:
-        bus = Bus([where], "001", lambda call: call())
+        bus = Bus(at(where), "001", lambda call: call())
         bus.open()
         wait_until(lambda: len(lines) >= 3, "three lines")
         assert not bus.connected
         bus.close()
-    assert {line["event"] for line in lines} == {"waiting for a router"}
+    assert {line["event"] for line in lines} == {"waiting for a router; `t2 doctor` looks further"}
     assert lines[0]["endpoints"] == [where]
     assert lines[0]["log_level"] == "warning"
 
 
 def test_it_says_so_once_in_five_seconds(tries: list[float]) -> None:
     with structlog.testing.capture_logs() as lines:
-        bus = Bus([nowhere()], "001", lambda call: call())
+        bus = Bus(at(nowhere()), "001", lambda call: call())
         bus.open()
         wait_until(lambda: len(tries) >= 3, "three tries")
         bus.close()
@@ -80,11 +79,11 @@ def test_a_router_that_comes_later_is_found(rig: Rig) -> None:
     rig.endpoint = where
     heard: list[Arrival[Bumper]] = []
     with structlog.testing.capture_logs() as lines:
-        hearer = Bus([where], rig.robot, rig.loop.post)
+        hearer = Bus(at(where), rig.robot, rig.loop.post)
         hearer.subscribe(keys.BUMPER, heard.append)
         hearer.open()
         wait_until(lambda: lines, "the line that says so")
-        with router([where]):
+        with router(listening(where)):
             publisher = rig.bus().publisher(keys.BUMPER)
             until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
             hearer.close()
@@ -104,7 +103,7 @@ def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
         bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="done")))
         bus.watch_live(keys.live_key(rig.robot, "*", "*"), lambda key, _: seen.append(key))
 
-    with router([rig.endpoint]):
+    with router(listening(rig.endpoint)):
         hearer, sender = rig.bus(declare), rig.bus(lambda bus: bus.live(token))
         bumper = sender.publisher(keys.BUMPER)
         events = sender.publisher(keys.EVENTS, service="bridge")
@@ -114,7 +113,7 @@ def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
     bumper.put(Bumper(pressed=True))  # harmless
     heard.clear()
     seen.clear()
-    with router([rig.endpoint]):
+    with router(listening(rig.endpoint)):
         wait_until(lambda: hearer.connected and sender.connected, "both back")
         until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
         wait_until(lambda: seen, "the token")
@@ -129,22 +128,22 @@ def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
 
 
 def test_closing_while_it_looks_for_a_router_does_not_wait_for_one() -> None:
-    bus = Bus([nowhere()], "001", lambda call: call())
+    bus = Bus(at(nowhere()), "001", lambda call: call())
     bus.open()
     bus.close()
     assert not bus._opener._thread.is_alive()
 
 
 def test_a_bus_that_was_never_opened_can_be_closed() -> None:
-    Bus([nowhere()], "001", lambda call: call()).close()
+    Bus(at(nowhere()), "001", lambda call: call()).close()
 
 
 def test_a_taken_port_is_a_link_error() -> None:
     where = nowhere()
     with (
-        router([where]),
+        router(listening(where)),
         pytest.raises(LinkError, match=f"^the router cannot listen on {where}: ") as caught,
-        router([where]),
+        router(listening(where)),
     ):
         raise AssertionError("two routers on one port")
     assert "/root/" not in str(caught.value)
@@ -153,7 +152,7 @@ def test_a_taken_port_is_a_link_error() -> None:
 def test_a_router_on_a_unix_socket(rig: Rig, tmp_path: Path) -> None:
     rig.endpoint = f"unixsock-stream/{tmp_path}/bus.sock"
     heard: list[Arrival[Bumper]] = []
-    with router([rig.endpoint]):
+    with router(listening(rig.endpoint)):
         hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
         sender = rig.bus().publisher(keys.BUMPER)
         until_heard(lambda: sender.put(Bumper(pressed=True)), lambda: heard, "a bumper")

@@ -1,0 +1,31 @@
+"""A router, a world on it and a dashboard that shows it, for the tests of one file."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from common.loop import Loop
+from tests.dashboard.rig import Site, dashboard
+from tests.dashboard.world import World
+from tests.support import bus_on, free_port, router_process, running
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(where):
+        yield where
+
+
+@pytest.fixture(scope="module")
+def world(endpoint: str) -> Iterator[World]:
+    with running(Loop()) as loop:
+        world = World(loop)
+        with bus_on(endpoint, loop, world.declare):
+            yield world
+
+
+@pytest.fixture(scope="module")
+def site(endpoint: str, world: World, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    with dashboard(endpoint, tmp_path_factory.mktemp("site"), "dashboard.round_trip=0.5") as it:
+        yield it
