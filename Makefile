@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults check cover search mutants lint format types docs pictures lock clean help
+.PHONY: demo up test fuzz soak faults check cover search mutants lint format types docs pictures lock audit sbom clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -88,7 +88,7 @@ format: $(STAMP) ## let ruff write the format
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-LAPTOP = teleop dashboard record report foxglove
+LAPTOP = teleop dashboard record report foxglove keys
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
@@ -96,6 +96,18 @@ lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, 
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
+
+# Tools beside ours, each in an environment of its own: what they bring is not what T2 stands on.
+TOOL = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python
+
+audit: $(STAMP) ## ask a public database for known flaws in what LOCK=requirements.lock names
+	$(TOOL) --from pip-audit==2.9.0 pip-audit --disable-pip --require-hashes --progress-spinner off \
+	  --requirement $(or $(LOCK),requirements.lock)
+
+sbom: $(STAMP) ## write what is installed to out/sbom.json, in CycloneDX
+	mkdir -p out
+	$(TOOL) --from cyclonedx-bom==7.0.0 cyclonedx-py environment --pyproject pyproject.toml \
+	  --output-reproducible --output-file out/sbom.json $(BIN)/python
 
 clean: ## remove what was made
 	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist

@@ -25,6 +25,7 @@ COMMANDS = {
     "sim": "the simulated vehicle alone",
     "latency": "how fast the bridge reacts, hop by hop",
     "config": "what is in force and where each value came from",
+    "keys": "make, renew, revoke and list the certificates of a site",
     "wire": "read captured frames",
     "checkout": "check the real vehicle before its first drive, and write a report",
     "doctor": "find out what is wrong between this laptop and the wheels",
@@ -55,6 +56,7 @@ INSPECT = (
 # Where it is no module of its own name.
 PLACES = {
     "checkout": "checkout.command",
+    "keys": "keys.command",
     "replay": "replay.command",
     "report": "report.command",
     "list": "inspect.ls",

@@ -4,7 +4,7 @@ A setting is named by its path, ``board.port``. It is looked for in the files, t
 environment (``T2__BOARD__PORT``, in any case), then in ``--set board.port=4002``. A table adds to
 what was given before, whatever it came in. Sections of other services are left alone; unknown
 sections and unknown fields are refused, because a setting that is misspelt is a setting that is
-lost.
+lost. The name of a certificate's file is relative to the file that it stands in.
 """
 
 import difflib
@@ -25,6 +25,9 @@ C = TypeVar("C", bound=Struct)
 
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
+
+# Files that a file names lie beside it: the folder of a certificate works wherever it is put.
+BESIDE = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 
 # Whose sections may stand in a file; a service reads its own and the shared ones.
 SECTIONS = (
@@ -96,7 +99,14 @@ def _from_file(file: Path) -> dict[str, Setting]:
         raise ConfigError(f"{origin}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
         raise ConfigError(f"{origin}: is no TOML: {error}") from None
-    return _leaves("", table, origin)
+    return {at: _beside(file, at, leaf) for at, leaf in _leaves("", table, origin).items()}
+
+
+def _beside(file: Path, at: str, leaf: Setting) -> Setting:
+    """Return the name of a file as it is from here; none stays none."""
+    if at not in BESIDE or not isinstance(leaf.value, str) or not leaf.value:
+        return leaf
+    return Setting(str(file.absolute().parent / leaf.value), leaf.origin)
 
 
 def _nearby(file: Path) -> str:

@@ -43,7 +43,9 @@ FISH = """\
 # t2 for fish:  t2 completion fish | source
 complete -c t2 -f -n __fish_use_subcommand
 """
-FILES = ("--config", "--report", "--out", "--trace", "--folder")
+FILES = (
+    "--config", "--report", "--out", "--trace", "--folder", "--ca-key", "--passphrase-file",
+)  # fmt: skip
 PLACEHOLDERS = {
     "{service}": ("bridge", "safety", "odom"),
     "{side}": ("left", "right"),

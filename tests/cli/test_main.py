@@ -35,6 +35,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         ("sim", "--world"),
         ("latency", "--once"),
         ("config", "--json"),
+        ("keys", "revoke"),
         ("wire", "identify-crc"),
         ("checkout", "watchdog"),
         ("doctor", "--duration"),

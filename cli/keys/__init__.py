@@ -1,0 +1,1 @@
+"""``t2 keys``: a site's own certificate authority."""

@@ -1,0 +1,89 @@
+"""What ``t2 keys list`` shows: each certificate, how it stands, and what ought to be done. Pure."""
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from cli.inspect import output
+from cli.keys.profile import DAY_S, DAYS, EVERY_ROBOT
+from cli.members import Member, Members
+
+SOON_DAYS = 30
+HEAD = ("role", "name", "robots", "until", "state", "certificate")
+
+State = Literal["valid", "expires soon", "expired", "revoked"]
+
+
+def state(member: Member, now_s: float) -> State:
+    """Return how a certificate stands."""
+    if member.revoked:
+        return "revoked"
+    left_s = member.expires.timestamp() - now_s
+    if left_s <= 0:
+        return "expired"
+    return "expires soon" if left_s < SOON_DAYS * DAY_S else "valid"
+
+
+def as_table(members: Members, now_s: float) -> str:
+    """Return a line for each certificate."""
+    rows = [
+        (
+            member.role,
+            member.name,
+            robots(member),
+            f"{member.expires:%Y-%m-%d}",
+            state(member, now_s),
+            member.common_name,
+        )
+        for member in members.members
+    ]
+    return output.table(HEAD, rows)
+
+
+def as_json(members: Members, authority_ends_s: float, now_s: float) -> dict[str, object]:
+    """Return the same for programs."""
+    return {
+        "site": members.site,
+        "authority": {"days": days(authority_ends_s, now_s)},
+        "certificates": [
+            {
+                "common_name": member.common_name,
+                "role": member.role,
+                "name": member.name,
+                "robots": list(member.robots),
+                "expires": f"{member.expires:%Y-%m-%dT%H:%M:%SZ}",
+                "days": days(member.expires.timestamp(), now_s),
+                "state": state(member, now_s),
+            }
+            for member in members.members
+        ],
+    }
+
+
+def advice(members: Members, authority_ends_s: float, now_s: float) -> Iterator[str]:
+    """Yield what ends, and the command against it; what was renewed already may end."""
+    left = days(authority_ends_s, now_s)
+    if left < DAYS:
+        yield f"the CA {_ends(left)}: make another with `t2 keys init --folder NEW`"
+    for member in last_of_each(members.welcome):
+        if state(member, now_s) in ("expires soon", "expired"):
+            who = f"{member.role} {member.name}"
+            yield f"{who} {_ends(days(member.expires.timestamp(), now_s))}: `t2 keys renew {who}`"
+
+
+def last_of_each(members: Sequence[Member]) -> Sequence[Member]:
+    """Return each one's newest certificate."""
+    return list({(member.role, member.name): member for member in members}.values())
+
+
+def robots(member: Member) -> str:
+    """Return which robots somebody may move, in words."""
+    return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
+
+
+def days(ends_s: float, now_s: float) -> int:
+    """Return how many whole days are left; fewer than 0 once it is over."""
+    return int((ends_s - now_s) // DAY_S)
+
+
+def _ends(left: int) -> str:
+    return f"ends in {left} days" if left >= 0 else "has ended"

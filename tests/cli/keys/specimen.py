@@ -1,0 +1,24 @@
+"""Members of a small site, on a day of theirs."""
+
+from datetime import UTC, datetime, timedelta
+
+from cli.members import Member, Members, Role
+
+NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
+NOW_S = NOW.timestamp()
+
+
+def member(
+    role: Role, name: str, serial: str = "00000001", days: float = 300, *, revoked: bool = False
+) -> Member:
+    """Return one whose certificate is good for so many days."""
+    return Member(
+        common_name=f"{role}.{name}.{serial}", role=role, name=name,
+        robots=("001",) if role in ("driver", "robot") else (),
+        expires=NOW + timedelta(days=days), revoked=revoked,
+    )  # fmt: skip
+
+
+def members(*each: Member) -> Members:
+    """Return their list."""
+    return Members(site="berlin", members=each)

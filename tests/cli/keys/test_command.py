@@ -1,0 +1,251 @@
+"""``t2 keys`` from the command line: the whole life of a certificate, and what is refused."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from cli.keys import profile as profile_module
+from cli.keys import verbs
+from cli.members import read
+from common.config import Sources, load
+from common.options import EXIT_CONFIG
+from common.settings import Shared
+from tests.cli.processes import PATIENCE_S, t2
+
+
+class Desk:
+    """A folder, and what was said last."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.folder = folder
+        self._capsys = capsys
+
+    def keys(self, *words: str, code: int = 0) -> str:
+        assert main(["keys", *words, "--folder", str(self.folder)]) == code
+        said = self._capsys.readouterr()
+        return said.err if code else said.out
+
+    def states(self) -> dict[str, str]:
+        table = json.loads(self.keys("list", "--json"))
+        return {
+            each["common_name"].rpartition(".")[0] + f".{place}": each["state"]
+            for place, each in enumerate(table["certificates"])
+        }
+
+    def serials(self) -> list[str]:
+        members = read(self.folder / "members.json").members
+        return [member.common_name.rpartition(".")[2] for member in members]
+
+
+@pytest.fixture
+def desk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Desk:
+    made = Desk(tmp_path / "keys", capsys)
+    made.keys("init", "--site", "berlin")
+    return made
+
+
+def test_the_life_of_a_certificate(desk: Desk) -> None:
+    assert "driver.anna." in desk.keys("issue", "driver", "anna", "--robot", "001")
+    assert desk.states() == {"driver.anna.0": "valid"}
+    first = (desk.folder / "driver.anna" / "private.key").read_bytes()
+    said = desk.keys("renew", "driver", "anna", "--days", "20")
+    assert f"t2 keys revoke driver anna --serial {desk.serials()[0]}" in said
+    assert (desk.folder / "driver.anna" / "private.key").read_bytes() != first
+    assert desk.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
+    assert "driver anna ends in 19 days" in desk.keys("list")
+    desk.keys("revoke", "driver", "anna", "--serial", desk.serials()[0])
+    assert desk.states() == {"driver.anna.0": "revoked", "driver.anna.1": "expires soon"}
+    desk.keys("revoke", "driver", "anna")
+    assert set(desk.states().values()) == {"revoked"}
+    desk.keys("issue", "driver", "anna", "--robot", "002")
+    assert desk.states()["driver.anna.2"] == "valid"
+
+
+def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
+    desk.keys("issue", "site", "berlin", "--address", "site.example", "--address", "10.0.0.9")
+    desk.keys("issue", "robot", "001")
+    desk.keys("issue", "driver", "anna", "--robot", "001", "--robot", "002")
+    for who in (("site", "berlin"), ("robot", "001"), ("driver", "anna")):
+        desk.keys("renew", *who)
+    members = read(desk.folder / "members.json")
+    assert members.members[2].robots == members.members[5].robots == ("001", "002")
+    said = desk.keys("renew", "site", "berlin")
+    assert "found at site.example, 10.0.0.9, localhost, 127.0.0.1;" in said
+    assert "found at 10.1.1.1, localhost" in desk.keys(
+        "renew", "robot", "001", "--address", "10.1.1.1"
+    )
+
+
+def test_the_settings_are_valid_wherever_the_folder_is_put(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk.keys("issue", "robot", "007")
+    (desk.folder / "robot.007").rename(tmp_path / "elsewhere")
+    monkeypatch.chdir(tmp_path)
+    bus = load(Shared, Sources(files=(Path("elsewhere/bus.toml"),), environ={})).config
+    assert bus.robot.id == "007"
+    for file in (bus.bus.ca, bus.bus.certificate, bus.bus.private_key, bus.bus.members):
+        assert Path(file).is_absolute()
+        assert Path(file).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("init",), 1, "is there already: another CA would lock everybody out"),
+        (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is no name"),
+        (("issue", "driver", "anna"), EXIT_CONFIG, "a driver wants --robot ID"),
+        (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router wants --address"),
+        (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
+        (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such is not there, and only it"),
+        (("renew", "driver", "ben"), 1, "driver ben has no certificate, or a revoked one"),
+        (("revoke", "driver", "ben"), 1, "driver ben has no certificate that could be revoked"),
+    ],
+)
+def test_refusals(desk: Desk, words: tuple[str, ...], code: int, said: str) -> None:
+    before = (desk.folder / "members.json").read_bytes()
+    assert said in desk.keys(*words, code=code)
+    assert (desk.folder / "members.json").read_bytes() == before
+
+
+def test_nobody_gets_a_second_certificate_by_mistake(desk: Desk) -> None:
+    desk.keys("issue", "viewer", "guest")
+    assert "viewer guest has a certificate until" in desk.keys("issue", "viewer", "guest", code=1)
+
+
+def test_an_unknown_role_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["keys", "issue", "pilot", "anna"])
+    assert end.value.code == 2
+    assert "invalid choice: 'pilot'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("issue", "viewer", "v"), ("renew", "viewer", "v"), ("revoke", "viewer", "v"), ("list",)],
+)
+def test_without_an_authority(
+    words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = Desk(tmp_path / "none", capsys).keys(*words, code=1)
+    assert "none has no CA; `t2 keys init` makes one" in said
+    assert not (tmp_path / "none").exists()
+
+
+def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    later_s = verbs.time.time() + 3650 * profile_module.DAY_S
+
+    class Later:
+        @staticmethod
+        def time() -> float:
+            return later_s
+
+    monkeypatch.setattr(verbs, "time", Later)
+    assert "the CA has reached its end" in desk.keys("issue", "viewer", "v", code=1)
+    assert "the CA has ended: make another" in desk.keys("list")
+
+
+def test_a_list_that_is_none(desk: Desk) -> None:
+    (desk.folder / "members.json").write_text("[]", encoding="utf-8")
+    assert "is no list of members" in desk.keys("list", code=EXIT_CONFIG)
+
+
+# --- the passphrase -----------------------------------------------------------------------------
+
+
+def test_a_passphrase_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    desk = Desk(tmp_path / "keys", capsys)
+    secret, wrong, empty = (tmp_path / name for name in ("secret", "wrong", "empty"))
+    secret.write_text("correct horse\n", encoding="utf-8")
+    wrong.write_text("battery\n", encoding="utf-8")
+    empty.write_text("\n", encoding="utf-8")
+    assert "is empty" in desk.keys("init", "--passphrase-file", str(empty), code=EXIT_CONFIG)
+    assert not desk.folder.exists()
+    desk.keys("init", "--passphrase-file", str(secret))
+    assert b"ENCRYPTED" in (desk.folder / "ca.key").read_bytes()
+    issue = ("issue", "viewer", "v", "--passphrase-file")
+    assert "a wrong passphrase" in desk.keys(*issue, str(wrong), code=1)
+    assert "cannot be read" in desk.keys(*issue, str(tmp_path / "none"), code=EXIT_CONFIG)
+    assert "viewer.v." in desk.keys(*issue, str(secret))
+
+
+def test_without_a_terminal_nobody_is_asked(tmp_path: Path) -> None:
+    asked = subprocess.run(
+        t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys")),
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert asked.returncode == 1
+    assert "give --passphrase-file FILE" in asked.stderr
+    assert not (tmp_path / "keys").exists()
+
+
+@pytest.mark.parametrize(
+    ("typed", "code", "said"),
+    [
+        ("horse\nhorse\n", 0, "holds the certificate authority"),
+        ("horse\nhouse\n", EXIT_CONFIG, "two different ones; nothing was made"),
+        ("\n", EXIT_CONFIG, "an empty one protects nothing"),
+    ],
+)
+def test_a_passphrase_is_asked_twice_and_not_shown(
+    typed: str, code: int, said: str, tmp_path: Path
+) -> None:
+    command = t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys"))
+    got, shown = on_a_terminal(command, typed)
+    assert (got, said in shown) == (code, True), shown
+    assert "horse" not in shown
+    assert (tmp_path / "keys").exists() is (code == 0)
+
+
+def on_a_terminal(command: list[str], typed: str) -> tuple[int, str]:
+    """Run a command on a terminal of its own; a line is typed each time that it asks."""
+    terminal, theirs = pty.openpty()
+    shown, lines = "", typed.splitlines(keepends=True)
+    with subprocess.Popen(
+        command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True
+    ) as process:
+        os.close(theirs)
+        while chunk := _read(terminal):
+            shown += chunk
+            if lines and shown.endswith(": "):
+                os.write(terminal, lines.pop(0).encode())
+    os.close(terminal)
+    return process.returncode, shown
+
+
+def _read(terminal: int) -> str:
+    try:
+        return os.read(terminal, 4096).decode()
+    except OSError:  # Linux's way to say that the other end is closed
+        return ""
+
+
+# --- without the library ------------------------------------------------------------------------
+
+ABSENT = """
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] == "cryptography":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
+sys.meta_path.insert(0, Absent())
+from cli.__main__ import main
+sys.exit(main(["keys", "list"]))
+"""
+
+
+def test_without_the_extra(tmp_path: Path) -> None:
+    result = subprocess.run(
+        [sys.executable, "-c", ABSENT],
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert result.returncode == 1
+    assert result.stderr == (
+        "t2 keys: it needs cryptography: install the extra `keys` (pip install -e '.[keys]')\n"
+    )

@@ -1,0 +1,115 @@
+"""Whom a certificate can be for, and for how long."""
+
+from collections.abc import Sequence
+from typing import cast
+
+import pytest
+
+from cli.keys.profile import (
+    CA_DAYS,
+    DAY_S,
+    DAYS,
+    EARLY_S,
+    LISTENERS,
+    LOCAL,
+    VEHICLE,
+    Profile,
+    profile,
+    span,
+)
+from cli.members import ROLES, Role
+from common.errors import ConfigError, RobotError
+
+
+def test_a_robot_is_found_where_the_manual_says_unless_told() -> None:
+    assert profile("robot", "001", (), ()) == Profile("robot", "001", ("001",), VEHICLE + LOCAL)
+    told = profile("robot", "001", (), ("robot.example", "fd00::1", "robot.example"))
+    assert told.addresses == ("robot.example", "fd00::1", *LOCAL)
+
+
+def test_a_site_says_where_it_is() -> None:
+    assert profile("site", "berlin", (), ("10.0.0.1", "localhost")).addresses == (
+        "10.0.0.1", "localhost", "127.0.0.1",
+    )  # fmt: skip
+
+
+def test_a_driver_names_its_robots() -> None:
+    driver = profile("driver", "anna", ("001", "002", "001"), ())
+    assert driver == Profile("driver", "anna", ("001", "002"), ())
+    assert profile("driver", "anna", ("*",), ()).robots == ("*",)
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_who_listens(role: Role) -> None:
+    assert Profile(role, "x").listens is (role in LISTENERS)
+
+
+@pytest.mark.parametrize(
+    ("role", "name", "robots", "addresses", "said"),
+    [
+        ("driver", "anna", (), (), "a driver wants --robot ID"),
+        ("viewer", "guest", ("001",), (), "a viewer has no robots to name"),
+        ("robot", "001", ("002",), (), "a robot has no robots to name"),
+        ("fleet", "control", (), ("10.0.0.1",), "a fleet dials, and nobody dials it"),
+        ("site", "berlin", (), (), "a site's router wants --address"),
+        ("driver", "../anna", ("001",), (), "'../anna' is no name"),
+        ("driver", "", ("001",), (), "'' is no name"),
+        ("driver", "a" * 49, ("001",), (), "is no name"),
+        ("driver", "anna", ("0 1",), (), "'0 1' is no name"),
+        ("driver", "anna\n", ("001",), (), "'anna\\n' is no name"),
+    ],
+)
+def test_what_cannot_be(
+    role: str, name: str, robots: Sequence[str], addresses: Sequence[str], said: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        profile(cast(Role, role), name, robots, addresses)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "address", ["robot", "robot-1", "r1.lan", "xn--bcher-kva.example", "10.7.5.220", "fd00::1"]
+)
+def test_addresses(address: str) -> None:
+    assert profile("site", "x", (), (address,)).addresses[0] == address
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "300.1.1.1", "10.7.5", "a b", "-a.example", "a..b", "a.", "tls/a", "a:7447", "*.a.example",
+     "a" * 64, "a\n", ".".join(["a" * 63] * 4)],
+)  # fmt: skip
+def test_what_is_no_address(address: str) -> None:
+    with pytest.raises(ConfigError, match="is no IP address and no host name"):
+        profile("site", "x", (), (address,))
+
+
+def test_the_common_name_ends_with_the_beginning_of_the_serial() -> None:
+    who = Profile("driver", "anna")
+    assert who.common_name(0x3F2A91BC << 128) == "driver.anna.3f2a91bc"
+    assert who.common_name(1 << 128) == "driver.anna.00000001"
+
+
+def test_every_common_name_is_short_enough_for_a_certificate() -> None:
+    longest = max(len(Profile(role, "a" * 48).common_name(1)) for role in ROLES)
+    assert longest <= 64  # RFC 5280, ub-common-name
+
+
+def test_a_certificate_begins_early_and_ends_as_asked() -> None:
+    now_s = 1e9
+    valid = span(now_s, DAYS, now_s + CA_DAYS * DAY_S)
+    assert valid.begins_s == now_s - EARLY_S
+    assert valid.ends_s == now_s + 365 * DAY_S
+
+
+@pytest.mark.parametrize("days", [0, -1, 11])
+def test_a_certificate_never_outlives_the_authority(days: int) -> None:
+    assert span(0.0, 10, 10.5 * DAY_S).ends_s == 10 * DAY_S
+    with pytest.raises(ConfigError, match=rf"--days {days}: allowed is 1..10, the days"):
+        span(0.0, days, 10.5 * DAY_S)
+
+
+@pytest.mark.parametrize("left_s", [DAY_S - 1, 0, -1])
+def test_an_authority_at_its_end_signs_nothing(left_s: int) -> None:
+    with pytest.raises(RobotError, match="the CA has reached its end"):
+        span(1e9, 1, 1e9 + left_s)

@@ -1,0 +1,64 @@
+"""The list of members, as it is changed."""
+
+import pytest
+
+from cli.keys import roster
+from common.errors import RobotError
+from tests.cli.keys.specimen import NOW_S, member, members
+
+OLD = member("driver", "anna", "00000001", 10)
+NEW = member("driver", "anna", "00000002")
+GONE = member("driver", "anna", "00000003", revoked=True)
+OTHER = member("driver", "ann", "00000001")
+SAME_NAME = member("viewer", "anna")
+SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
+
+
+def test_the_newest_is_the_last_that_is_not_revoked() -> None:
+    assert roster.newest(SITE, "driver", "anna") is NEW
+
+
+@pytest.mark.parametrize("there", [members(), members(GONE, OTHER, SAME_NAME)])
+def test_nothing_to_renew(there: roster.Members) -> None:
+    with pytest.raises(RobotError, match="driver anna has no certificate, or a revoked one"):
+        roster.newest(there, "driver", "anna")
+
+
+def test_a_name_is_free_while_nobody_has_a_good_certificate_of_it() -> None:
+    ended = member("driver", "anna", days=-1)
+    roster.check_free(members(ended, GONE, OTHER, SAME_NAME), "driver", "anna", NOW_S)
+    with pytest.raises(RobotError, match=r"has a certificate until 2027-09-17; `t2 keys renew dri"):
+        roster.check_free(SITE, "driver", "anna", NOW_S)
+
+
+def test_one_more() -> None:
+    assert roster.added(members(OLD), NEW) == members(OLD, NEW)
+
+
+def test_all_of_somebodys_are_revoked() -> None:
+    left, struck = roster.revoked(SITE, "driver", "anna", None)
+    assert struck == [OLD, NEW]
+    assert [each.common_name for each in left.welcome] == [
+        "driver.ann.00000001",
+        "viewer.anna.00000001",
+    ]
+    assert len(left.members) == len(SITE.members)
+
+
+def test_one_of_somebodys_is_revoked() -> None:
+    left, struck = roster.revoked(SITE, "driver", "anna", "00000001")
+    assert struck == [OLD]
+    assert left.welcome == (NEW, OTHER, SAME_NAME)
+
+
+@pytest.mark.parametrize(
+    ("name", "serial", "said"),
+    [
+        ("ben", None, "driver ben has no certificate that could be revoked"),
+        ("anna", "00000003", "has no certificate with the serial 00000003 that could be"),
+        ("anna", "1", "has no certificate with the serial 1 that could be"),
+    ],
+)
+def test_nothing_to_revoke(name: str, serial: str | None, said: str) -> None:
+    with pytest.raises(RobotError, match=said):
+        roster.revoked(SITE, "driver", name, serial)

@@ -1,0 +1,196 @@
+"""``deploy/nftables/t2.nft`` on a vehicle's network made of namespaces: who gets through."""
+
+import contextlib
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.deploy.network import CABLE, PATIENCE_S, PC, WIFI, missing, python, vehicle, within
+
+RULES = Path(__file__).parents[2] / "deploy" / "nftables" / "t2.nft"
+WHY_NOT = missing()
+pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
+
+# Prints each datagram that comes, and ends with the one that says so.
+LISTEN = """
+import socket, sys
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.bind((sys.argv[1], int(sys.argv[2])))
+    sock.settimeout(20)
+    print("listening", flush=True)
+    said = ""
+    while said != "end":
+        said = sock.recv(100).decode()
+        print(said, flush=True)
+"""
+SEND = """
+import socket, sys
+source, to, port, said = sys.argv[1:]
+with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.bind((source, 0))
+    sock.sendto(said.encode(), (to, int(port)))
+"""
+SERVE = """
+import socket, sys
+with socket.create_server(("0.0.0.0", int(sys.argv[1]))) as sock:
+    print("listening", flush=True)
+    sock.accept()[0].sendall(b"welcome")
+    sys.stdin.read()
+"""
+DIAL = """
+import socket, sys
+try:
+    with socket.create_connection((sys.argv[1], int(sys.argv[2])), timeout=1.0) as sock:
+        print(sock.recv(100).decode())
+except TimeoutError:
+    print("no answer")
+"""
+
+
+@pytest.fixture(scope="module")
+def network() -> Iterator[None]:
+    with vehicle():
+        yield
+
+
+@contextlib.contextmanager
+def loaded(file: Path = RULES) -> Iterator[None]:
+    """Load the rules for a while."""
+    within(PC, "nft", "-f", str(file))
+    try:
+        yield
+    finally:
+        within(PC, "nft", "flush", "ruleset")
+
+
+@pytest.fixture
+def rules(network: None) -> Iterator[None]:
+    with loaded():
+        yield
+
+
+class Listener:
+    """Somebody who listens on UDP, until told to end."""
+
+    def __init__(self, name: str, address: str, port: int) -> None:
+        self._to = (address, str(port))
+        self._process = subprocess.Popen(
+            python(name, LISTEN, *self._to), stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == "listening\n"
+
+    def send(self, name: str, source: str, said: str) -> None:
+        subprocess.run(python(name, SEND, source, *self._to, said), timeout=PATIENCE_S, check=True)
+
+    def heard(self, name: str, source: str) -> list[str]:
+        """End it by a datagram that gets through, and return those that came before."""
+        self.send(name, source, "end")
+        out, _ = self._process.communicate(timeout=PATIENCE_S)
+        return out.split()[:-1]
+
+
+def board_and_others(port: int) -> list[str]:
+    listener = Listener(PC, "10.7.5.220", port)
+    listener.send(CABLE, "10.7.5.224", "board")
+    listener.send(CABLE, "10.7.5.99", "stranger")
+    listener.send(WIFI, "192.168.201.50", "laptop")
+    listener.send(WIFI, "10.7.5.224", "impostor")
+    return listener.heard(CABLE, "10.7.5.224")
+
+
+def passed(counter: str) -> int:
+    said = within(PC, "nft", "list", "counter", "inet", "t2", counter).stdout
+    return int(said.split("packets ")[1].split()[0])
+
+
+@pytest.mark.usefixtures("network")
+def test_without_rules_everybody_is_the_board() -> None:
+    assert sorted(board_and_others(4002)) == ["board", "impostor", "laptop", "stranger"]
+
+
+@pytest.mark.usefixtures("rules")
+@pytest.mark.parametrize("port", [4001, 4002])
+def test_only_the_board_reaches_the_bridge(port: int) -> None:
+    assert board_and_others(port) == ["board"]
+    assert passed("from_board") == 2  # and the end
+    assert passed("strangers") >= 2
+    assert passed("spoofed") >= 1
+
+
+@pytest.mark.usefixtures("rules")
+def test_the_board_itself_reaches_nothing_else() -> None:
+    listener = Listener(PC, "0.0.0.0", 5000)
+    listener.send(CABLE, "10.7.5.224", "board")
+    ending = Listener(PC, "10.7.5.220", 4002)
+    assert ending.heard(CABLE, "10.7.5.224") == []
+    listener._to = ("127.0.0.1", "5000")
+    assert listener.heard(PC, "127.0.0.1") == []
+
+
+@pytest.mark.usefixtures("network")
+def test_nobody_reaches_the_board_through_the_pc() -> None:
+    def through() -> list[str]:
+        listener = Listener(CABLE, "10.7.5.224", 4002)
+        listener.send(WIFI, "192.168.201.50", "laptop")
+        listener.send(PC, "10.7.5.220", "bridge")
+        return listener.heard(PC, "10.7.5.220")
+
+    assert through() == ["laptop", "bridge"]
+    with loaded():
+        assert through() == ["bridge"]
+
+
+@pytest.mark.usefixtures("rules")
+@pytest.mark.parametrize(
+    ("name", "address", "port", "answer"),
+    [
+        (WIFI, "192.168.201.1", 7447, "welcome"),
+        (WIFI, "192.168.201.1", 22, "welcome"),
+        (WIFI, "192.168.201.1", 8000, "no answer"),
+        (CABLE, "10.7.5.220", 7447, "no answer"),
+    ],
+)
+def test_operators_find_the_router_and_nothing_else(
+    name: str, address: str, port: int, answer: str
+) -> None:
+    with subprocess.Popen(
+        python(PC, SERVE, str(port)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as server:
+        try:
+            assert server.stdout is not None
+            assert server.stdout.readline() == "listening\n"
+            dialled = subprocess.run(
+                python(name, DIAL, address, str(port)),
+                capture_output=True, text=True, timeout=PATIENCE_S, check=True,
+            )  # fmt: skip
+            assert dialled.stdout.strip() == answer
+        finally:
+            server.kill()
+
+
+@pytest.mark.usefixtures("network")
+def test_it_can_be_loaded_again_and_beside_others() -> None:
+    within(PC, "nft", "add", "table", "inet", "other")
+    with loaded(), loaded():
+        tables = within(PC, "nft", "list", "tables").stdout.splitlines()
+        assert sorted(tables) == ["table inet other", "table inet t2"]
+
+
+@pytest.mark.usefixtures("network")
+def test_only_the_bridges_user_may_command_the_board(tmp_path: Path) -> None:
+    text = RULES.read_text(encoding="utf-8")
+    strict = tmp_path / "strict.nft"
+    asleep, awake = "# ip daddr $board meta skuid != t2", "ip daddr $board meta skuid != 65534"
+    assert asleep in text
+    strict.write_text(text.replace(asleep, awake), encoding="utf-8")
+    listener = Listener(CABLE, "10.7.5.224", 4002)
+    with loaded(strict):
+        sent = subprocess.run(
+            python(PC, SEND, "10.7.5.220", "10.7.5.224", "4002", "root"),
+            capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+        )  # fmt: skip
+        assert "PermissionError" in sent.stderr
+    assert listener.heard(PC, "10.7.5.220") == []
