@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_insecure(parser: argparse.ArgumentParser) -> None:
     """Add the option that opens a robot to its network."""
     parser.add_argument(
-        "--insecure", action="append_const", dest="sets", const="bus.insecure=true",
+        "--insecure", action="append_const", dest="sets", const="bus.insecure=true", default=[],
         help="let everybody on the network in, to drive as well: no TLS, no certificates",
     )  # fmt: skip
 

@@ -50,6 +50,13 @@ def test_it_prints_its_configuration_for_zenohd(capsys: pytest.CaptureFixture[st
     zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
 
 
+def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["router", "--print"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["listen"] == {"endpoints": ["tcp/127.0.0.1:7447"]}
+    assert "access_control" not in printed
+
+
 @pytest.mark.parametrize(
     ("bus", "words"),
     [
