@@ -90,6 +90,9 @@ def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dic
 def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[None]:
     """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen."""
     check_files(where, (*where.listen, *where.uplink))
+    for socket in (each for each in where.listen if each.startswith("unixsock-stream/")):
+        with contextlib.suppress(OSError):  # what is wrong with it, Zenoh says
+            Path(socket.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
     try:
         session = zenoh.open(zenoh.Config.from_json5(json.dumps(router_config(where, access))))
     except zenoh.ZError as error:

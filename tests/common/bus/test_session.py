@@ -150,7 +150,7 @@ def test_a_taken_port_is_a_link_error() -> None:
 
 
 def test_a_router_on_a_unix_socket(rig: Rig, tmp_path: Path) -> None:
-    rig.endpoint = f"unixsock-stream/{tmp_path}/bus.sock"
+    rig.endpoint = f"unixsock-stream/{tmp_path}/made/bus.sock"
     heard: list[Arrival[Bumper]] = []
     with router(listening(rig.endpoint)):
         hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
