@@ -39,8 +39,6 @@ def vehicle() -> Iterator[None]:
         link(CABLE, "cable0", "10.7.5.220/24", ("10.7.5.224/24", "10.7.5.99/24"))
         link(WIFI, "wifi0", "192.168.201.1/24", ("192.168.201.50/24",))
         within(PC, "sysctl", "-qw", "net.ipv4.ip_forward=1")
-        # Somebody on the Wi-Fi who says that he is the board.
-        within(WIFI, "ip", "address", "add", "10.7.5.224/32", "dev", "there")
         within(WIFI, "ip", "route", "add", "10.7.5.0/24", "via", "192.168.201.1")
         within(CABLE, "ip", "route", "add", "192.168.201.0/24", "via", "10.7.5.220")
         for at in ("all", "cable0", "wifi0"):  # the rules have to find it out, not the kernel

@@ -25,10 +25,13 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         said = sock.recv(100).decode()
         print(said, flush=True)
 """
+# From any address, whoever has it.
 SEND = """
 import socket, sys
 source, to, port, said = sys.argv[1:]
+IP_TRANSPARENT = 19
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    sock.setsockopt(socket.SOL_IP, IP_TRANSPARENT, 1)
     sock.bind((source, 0))
     sock.sendto(said.encode(), (to, int(port)))
 """
