@@ -23,11 +23,11 @@ def bus_toml(profile: Profile, routers: Sequence[Profile]) -> str:
         lines += ["[robot]", _line("id", profile.robots[0]), ""]
     lines += ["[bus]"]
     if not profile.listens:
-        lines += [_line("connect", endpoints(site or _driven(profile, routers)))]
+        lines += _dialled(endpoints(site or _driven(profile, routers)))
     else:
         lines += [_line("listen", [SOCKET, ANYWHERE]), _line("members", MEMBERS)]
     if profile.role == "robot" and site:
-        lines += [_line("uplink", endpoints(site))]
+        lines += [_line("uplink", endpoints(site)[:1])]
     lines += [_line("ca", CA), _line("certificate", CERTIFICATE), _line("private_key", PRIVATE_KEY)]
     return "\n".join(lines) + "\n"
 
@@ -41,6 +41,14 @@ def endpoints(routers: Sequence[Profile]) -> list[str]:
         if address not in LOCAL
     ]
     return found or [f"tls/{LOCAL[0]}:{PORT}"]
+
+
+def _dialled(found: Sequence[str]) -> list[str]:
+    """Return one endpoint to dial: Zenoh waits for the first, and never gets to a second."""
+    return [
+        *(f"# connect = {json.dumps([other])}" for other in found[1:]),
+        _line("connect", list(found[:1])),
+    ]
 
 
 def _driven(profile: Profile, routers: Sequence[Profile]) -> list[Profile]:

@@ -99,6 +99,23 @@ def test_a_file_below_the_working_directory_is_called_by_its_short_name(
     assert loaded.settings["robot.id"].origin == "config/t2.toml"
 
 
+def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(desk: Desk) -> None:
+    (desk.folder / "keys").mkdir()
+    desk.file("[bus]\nca = 'ca.pem'\nmembers = '/etc/t2/members.json'", "keys/bus.toml")
+    file = Path("keys/bus.toml")
+    loaded = load(Everything, Sources((file,), {}, ["bus.private_key=private.key"]))
+    assert loaded.config.bus.ca == str(desk.folder / "keys" / "ca.pem")
+    assert loaded.config.bus.members == "/etc/t2/members.json"
+    assert loaded.config.bus.private_key == "private.key"  # nobody put that beside anything
+    assert loaded.config.bus.certificate == ""
+    assert loaded.settings["bus.ca"].origin == "keys/bus.toml"
+
+
+def test_a_file_that_is_named_by_a_number_is_refused(desk: Desk) -> None:
+    said = "over0.toml: bus.ca = 1: Expected `str`, got `int`"
+    assert desk.refused("[bus]\nca = 1").startswith(said)
+
+
 @pytest.mark.parametrize("name", ["T2__BOARD__PORT", "t2__board__port", "T2__Board__Port"])
 def test_the_environment_is_read_in_any_case(desk: Desk, name: str) -> None:
     assert desk.load(environ={name: "77"}).config.board.port == 77

@@ -5,13 +5,13 @@ import os
 import pty
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from cli.__main__ import main
-from cli.keys import profile as profile_module
-from cli.keys import verbs
+from cli.keys.profile import CA_DAYS, DAY_S
 from cli.members import read
 from common.config import Sources, load
 from common.options import EXIT_CONFIG
@@ -139,14 +139,14 @@ def test_without_an_authority(
 
 
 def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    later_s = verbs.time.time() + 3650 * profile_module.DAY_S
+    later_s = time.time() + CA_DAYS * DAY_S
 
     class Later:
         @staticmethod
         def time() -> float:
             return later_s
 
-    monkeypatch.setattr(verbs, "time", Later)
+    monkeypatch.setattr("cli.keys.verbs.time", Later)
     assert "the CA has reached its end" in desk.keys("issue", "viewer", "v", code=1)
     assert "the CA has ended: make another" in desk.keys("list")
 

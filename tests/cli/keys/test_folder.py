@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from cli.keys import folder as folder_module
 from cli.keys.authority import Authority
 from cli.keys.folder import Folder, locked
 from cli.keys.profile import DAY_S, Profile, Span, profile
@@ -112,7 +111,10 @@ def test_what_is_missing_is_said(folder: Folder) -> None:
 
 def test_the_key_may_lie_elsewhere(folder: Folder, tmp_path: Path) -> None:
     away = folder.ca_key.rename(tmp_path / "stick.key")
-    assert folder.authority(away, no_passphrase).certificate
+    assert (
+        folder.authority(away, no_passphrase).certificate
+        == folder.authority(away, no_passphrase).certificate
+    )
 
 
 def test_no_folder_is_made_by_looking(tmp_path: Path) -> None:
@@ -128,7 +130,7 @@ def test_a_full_disk_leaves_the_old_list(folder: Folder, monkeypatch: pytest.Mon
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(folder_module.os, "fsync", full)
+    monkeypatch.setattr("cli.keys.folder.os.fsync", full)
     with pytest.raises(RobotError, match=r"members.json: No space left on device"):
         folder.write(Members(site="berlin"))
     assert folder.members.read_bytes() == kept

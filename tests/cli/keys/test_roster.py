@@ -3,6 +3,7 @@
 import pytest
 
 from cli.keys import roster
+from cli.members import Members
 from common.errors import RobotError
 from tests.cli.keys.specimen import NOW_S, member, members
 
@@ -19,7 +20,7 @@ def test_the_newest_is_the_last_that_is_not_revoked() -> None:
 
 
 @pytest.mark.parametrize("there", [members(), members(GONE, OTHER, SAME_NAME)])
-def test_nothing_to_renew(there: roster.Members) -> None:
+def test_nothing_to_renew(there: Members) -> None:
     with pytest.raises(RobotError, match="driver anna has no certificate, or a revoked one"):
         roster.newest(there, "driver", "anna")
 
