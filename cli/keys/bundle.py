@@ -45,10 +45,8 @@ def endpoints(routers: Sequence[Profile]) -> list[str]:
 
 def _dialled(found: Sequence[str]) -> list[str]:
     """Return one endpoint to dial: Zenoh waits for the first, and never gets to a second."""
-    return [
-        *(f"# connect = {json.dumps([other])}" for other in found[1:]),
-        _line("connect", list(found[:1])),
-    ]
+    line = _line("connect", list(found[:1]))
+    return [line, *(f"# or: {_line('connect', [other])}" for other in found[1:])]
 
 
 def _driven(profile: Profile, routers: Sequence[Profile]) -> list[Profile]:

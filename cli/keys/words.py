@@ -46,7 +46,9 @@ def issued(
         yield f"1. Copy the folder {target} to {profile.name}'s computer, and to no other."
         yield "2. There:"
         yield f"     t2 {USED_BY[profile.role]} --config {_last(target)}/{SETTINGS}"
-    yield from _spread("3. ", target, [each for each in routers if each.who != profile.who])
+    others = [each for each in routers if each.who != profile.who]
+    if others or not profile.listens:  # a router's own folder holds the list
+        yield from _spread("3. ", target, others)
 
 
 def renewed(role: Role, name: str, old: Member) -> Iterator[str]:

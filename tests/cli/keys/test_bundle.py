@@ -46,8 +46,8 @@ def test_a_site_is_no_robot() -> None:
 def test_the_others_dial(who: Profile, routers: list[Profile], dialled: list[str]) -> None:
     text = bus_toml(who, routers)
     assert tomllib.loads(text)["bus"] == {"connect": dialled[:1], **FILES}
-    assert [line for line in text.splitlines() if line.startswith("# connect")] == [
-        f'# connect = ["{other}"]' for other in dialled[1:]
+    assert [line for line in text.splitlines() if line.startswith("# or: ")] == [
+        f'# or: connect = ["{other}"]' for other in dialled[1:]
     ]
 
 

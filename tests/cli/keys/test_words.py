@@ -31,6 +31,11 @@ def test_a_robots_certificate() -> None:
     assert told[-1] == "     scp -p keys/members.json site.example:/etc/t2/keys/members.json"
 
 
+def test_the_first_routers_folder_holds_all_that_there_is_to_know() -> None:
+    told = list(words.issued(ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT]))
+    assert not [line for line in told if "members.json" in line]
+
+
 def test_a_drivers_certificate() -> None:
     told = list(words.issued(ANNA, member("driver", "anna"), "/tmp/k/driver.anna", [ROBOT]))
     assert "  may move robot 001, robot 002" in told
