@@ -97,17 +97,18 @@ lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, 
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 
-# Tools beside ours, each in an environment of its own: what they bring is not what T2 stands on.
-TOOL = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python
+audit: $(STAMP) ## known flaws of what LOCK=requirements.lock names, from a public database
+	$(BIN)/python -m tests.audit $(LOCK)
 
-audit: $(STAMP) ## ask a public database for known flaws in what LOCK=requirements.lock names
-	$(TOOL) --from pip-audit==2.9.0 pip-audit --disable-pip --require-hashes --progress-spinner off \
-	  --requirement $(or $(LOCK),requirements.lock)
+# A tool in an environment of its own, in uv's cache: what it brings is not what T2 stands on.
+SBOM = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python \
+  --from cyclonedx-bom==7.0.0 cyclonedx-py
+SBOM_OPTIONS = --pyproject pyproject.toml --output-reproducible
 
-sbom: $(STAMP) ## write what is installed to out/sbom.json, in CycloneDX
+sbom: $(STAMP) ## what is installed, and what a robot gets, as CycloneDX: out/sbom.json, out/sbom-robot.json
 	mkdir -p out
-	$(TOOL) --from cyclonedx-bom==7.0.0 cyclonedx-py environment --pyproject pyproject.toml \
-	  --output-reproducible --output-file out/sbom.json $(BIN)/python
+	$(SBOM) environment $(SBOM_OPTIONS) --output-file out/sbom.json $(BIN)/python
+	$(SBOM) requirements $(SBOM_OPTIONS) --output-file out/sbom-robot.json requirements-robot.lock
 
 clean: ## remove what was made
 	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
