@@ -1,6 +1,6 @@
 """Zenoh's own TLS against our certificates: whom it lets in, and whom it believes.
 
-What somebody may do once he is in is tested elsewhere (``tests/cli/test_access.py``).
+What somebody may do once he is in is tested elsewhere (``tests/cli/test_rights.py``).
 """
 
 import contextlib
