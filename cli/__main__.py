@@ -44,6 +44,7 @@ COMMANDS = {
     "topic": "list, echo, hz, delay, bw, info, pub: the words of ros2 topic",
     "record": "everything on the bus to files, until ctrl-c",
     "info": "what is in a recording",
+    "metrics": "health, link, safety and odometry for Prometheus",
     "report": "a recording as one page: path, speeds, stops, streams",
     "replay": "a recording onto the bus again, or its frames to a bridge",
     "foxglove": "the bus, live, to Foxglove or Lichtblick",

@@ -3,6 +3,7 @@
 from common import settings
 from services.bridge.config import Bridge
 from services.dashboard.config import Dashboard
+from services.metrics.config import Metrics
 from services.odom.config import Odom
 from services.recorder.config import Recorder
 from services.safety.config import Safety
@@ -22,4 +23,5 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     teleop: Teleop = Teleop()
     dashboard: Dashboard = Dashboard()
     recorder: Recorder = Recorder()
+    metrics: Metrics = Metrics()
     sim: Sim = Sim()

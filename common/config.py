@@ -32,7 +32,7 @@ BESIDE = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 # Whose sections may stand in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "bus", "board", "wire", "log", "vehicle",
-    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "sim",
+    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "sim",
 )  # fmt: skip
 
 

@@ -1,0 +1,205 @@
+"""The exporter on a real bus, scraped as Prometheus scrapes it."""
+
+import contextlib
+import subprocess
+import sys
+import threading
+import urllib.request
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from cli.members import Member, Members
+from common import codec, keys
+from common import messages as m
+from common.options import EXIT_CONFIG, EXIT_LINK
+from services.metrics import exporter, life
+from services.metrics.exporter import asked
+from services.metrics.samples import FAMILIES
+from tests.cli.inspect.tool import pretend
+from tests.common.rig import Rig, until_heard
+from tests.metrics.heard import event, health, link, odometry, safety
+from tests.metrics.test_samples import Values, flat, names
+from tests.support import PATIENCE_S, free_port, router_process, wait_until
+
+
+def scraped(port: int) -> Values:
+    """Scrape as Prometheus does, by its own client's parser."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+        text = answer.read().decode()
+    return flat(list(text_string_to_metric_families(text)))
+
+
+def value(port: int, name: str, /, **labels: str) -> float | None:
+    """Return a sample's value, None when there is no such sample."""
+    return scraped(port).get((name, frozenset(labels.items())))
+
+
+@contextlib.contextmanager
+def running(endpoint: str, folder: Path, *sets: str) -> Iterator[int]:
+    """Run the exporter as a process while the context lasts, and name its port."""
+    port = free_port()
+    given = (f"bus.connect={endpoint}", f"metrics.port={port}", *sets)
+    command = [sys.executable, "-m", "cli", "metrics"]
+    command += [word for text in given for word in ("--set", text)]
+    with (
+        (folder / "metrics.log").open("wb") as log,
+        subprocess.Popen(command, stdout=log, stderr=log) as process,
+    ):
+        try:
+            wait_until(lambda: answers(process, port, folder), "the page", 2 * PATIENCE_S)
+            yield port
+            process.terminate()
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+
+
+def answers(process: "subprocess.Popen[bytes]", port: int, folder: Path) -> bool:
+    assert process.poll() is None, (folder / "metrics.log").read_text()
+    with contextlib.suppress(OSError):
+        return value(port, "t2_bus_connected") == 1
+    return False
+
+
+def test_a_robot_is_scraped_as_it_fares(rig: Rig, tmp_path: Path) -> None:
+    robot = {"robot": rig.robot}
+    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
+        assert value(port, "t2_robot_up", **robot) == 0
+        pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
+        pretend(rig, "safety", {keys.SAFETY: lambda: safety("estop")})
+        pretend(rig, "odom", {keys.ODOMETRY: odometry})
+        wanted = {"t2_link_up", "t2_safety_latched", "t2_odometry_slip", "t2_service_info"}
+        wait_until(lambda: wanted <= names(scraped(port)), "every stream")
+        assert value(port, "t2_robot_up", **robot) == 1
+        assert value(port, "t2_service_up", service="bridge", **robot) == 1
+        assert value(port, "t2_safety_latched", **robot) == 1
+        assert value(port, "t2_link_rejected_total", reason="crc", **robot) == 3
+        found = scraped(port)
+    ends = ("", "_bucket", "_count", "_sum")
+    known = {family.name + end for family in FAMILIES for end in ends}
+    assert names(found) <= known
+
+
+def test_a_robot_that_is_gone_has_no_values_left(rig: Rig, tmp_path: Path) -> None:
+    robot = {"robot": rig.robot}
+    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
+        bus = pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
+        wait_until(
+            lambda: value(port, "t2_service_up", service="bridge", **robot) == 1, "the robot"
+        )
+        assert value(port, "t2_link_up", **robot) == 1
+        bus.close()
+        wait_until(
+            lambda: value(port, "t2_service_instances", service="bridge", **robot) == 0,
+            "the end of its token",
+        )
+        wait_until(lambda: value(port, "t2_robot_up", **robot) == 0, "the end of the robot")
+        assert value(port, "t2_link_up", **robot) is None
+        age = value(port, "t2_stream_age_seconds", stream="link", **robot)
+        assert age is not None
+        assert age > 3
+        wait_until(
+            lambda: (value(port, "t2_stream_age_seconds", stream="link", **robot) or 0) > age,
+            "its age to grow",
+        )
+
+
+def test_all_robots_of_a_site_are_told(rig: Rig, tmp_path: Path) -> None:
+    root = "t2/v1"
+    site, stranger = f"{rig.robot}s", rig.session()
+
+    def put() -> None:
+        for robot in (f"{site}-1", f"{site}-2", f"other-{rig.robot}"):
+            stranger.put(f"{root}/{robot}/tel/bridge/link", codec.encode(link()))
+
+    with running(rig.endpoint, tmp_path, f"metrics.robots={site}-$*") as port:
+        until_heard(
+            put,
+            lambda: {
+                dict(labels).get("robot")
+                for name, labels in scraped(port)
+                if name == "t2_link_up"
+            } == {f"{site}-1", f"{site}-2"},
+            "both robots of the site, and no other",
+        )  # fmt: skip
+        assert value(port, "t2_robot_up", robot="001") is None
+
+
+def test_events_are_counted_and_tell_of_a_full_disk(rig: Rig, tmp_path: Path) -> None:
+    robot = {"robot": rig.robot}
+    told = {"event": "disk_full", "level": "error", "service": "recorder"}
+    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
+        made: list[m.Health] = []
+
+        def healthy() -> m.Health:
+            made.append(health("recorder"))
+            return made[-1]
+
+        bus = pretend(rig, "recorder", {keys.HEALTH: healthy}, service="recorder")
+        events = bus.publisher(keys.EVENTS, service="recorder")
+        until_heard(
+            lambda: events.put(event("disk_full")),
+            lambda: value(port, "t2_events_total", **told, **robot),
+            "the event",
+        )
+        assert value(port, "t2_recorder_disk_full", **robot) == 1
+        events.put(event("disk_room"))
+        wait_until(lambda: value(port, "t2_recorder_disk_full", **robot) == 0, "room again")
+
+
+def test_a_router_that_goes_is_told(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with contextlib.ExitStack() as stack:
+        with router_process(endpoint):
+            port = stack.enter_context(running(endpoint, tmp_path))
+        wait_until(lambda: value(port, "t2_bus_connected") == 0, "the router's end")
+        with router_process(endpoint):
+            wait_until(lambda: value(port, "t2_bus_connected") == 1, "the next router")
+            stack.close()
+
+
+def test_certificates_are_read_from_the_list_of_members(rig: Rig, tmp_path: Path) -> None:
+    members = tmp_path / "members.json"
+    end = datetime(2030, 1, 1, tzinfo=UTC)
+    one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
+    members.write_bytes(msgspec.json.encode(Members(site="berlin", members=(one,))))
+    told = {"role": "driver", "name": "anna"}
+    name = "t2_certificate_expiry_timestamp_seconds"
+    with running(rig.endpoint, tmp_path, f"bus.members={members}") as port:
+        assert value(port, name, **told) == end.timestamp()
+    with running(rig.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
+        assert value(port, name, **told) is None
+    assert "no list of members" in (tmp_path / "metrics.log").read_text()
+
+
+def test_a_taken_port_ends_it_with_a_sentence(
+    rig: Rig, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with running(rig.endpoint, tmp_path) as port:
+        words = [f"bus.connect={rig.endpoint}", f"metrics.port={port}"]
+        done = subprocess.run(
+            [sys.executable, "-m", "services.metrics", *(w for t in words for w in ("--set", t))],
+            capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+    assert done.returncode == EXIT_LINK
+    assert f"metrics cannot listen on 127.0.0.1:{port}" in done.stderr
+
+
+def test_without_its_library_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "services.metrics.exporter", None)
+    assert life.main([]) == EXIT_CONFIG
+    assert "install the extra `metrics`" in capsys.readouterr().err
+
+
+def test_a_loop_that_hangs_gives_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exporter, "PATIENCE_S", 0.05)
+    with pytest.raises(TimeoutError):
+        asked(lambda _: None, lambda: 1)
+    assert asked(lambda call: threading.Thread(target=call).start(), lambda: 1) == 1
