@@ -18,6 +18,7 @@ from msgspec import Struct
 from cli import rights, states
 from common import codec, keys
 from common import messages as m
+from services.metrics.samples import FAMILIES
 
 DOCS = Path(__file__).parent.parent / "docs"
 FIELD = re.compile(r"    (?P<name>\w+): (?P<type>.+?)(?: = (?P<default>.+?))?(?:  # (?P<why>.+))?$")
@@ -46,6 +47,7 @@ def generated() -> dict[Path, str]:
         DOCS / "bus.md": bus,
         DOCS / "safety.md": safety,
         DOCS / "security.md": security,
+        DOCS / "operations.md": {"metrics": metrics()},
     }
     return {
         page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()
@@ -131,6 +133,15 @@ def rows(kind: type[Struct]) -> list[tuple[str, str, str, str]]:
 def causes() -> str:
     """Return the table of what holds the vehicle back."""
     return table(("cause", "action", "latched", "clears", "in words"), states.causes())
+
+
+def metrics() -> str:
+    """Return the table of what Prometheus is told."""
+    rows = [
+        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.what)
+        for one in FAMILIES
+    ]
+    return table(("metric", "kind", "labels", ""), rows)
 
 
 def spelt(kind: str) -> str:
