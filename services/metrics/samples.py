@@ -17,6 +17,7 @@ from prometheus_client.core import (
 )
 
 from common.freshness import Latest, fresh
+from common.keys import ROOT
 from common.messages import Health, Link, Odometry, SafetyState, Timing
 from common.messages import Verdict as VerdictName
 from services.metrics.robot import LATENESS_S, WORTH_S, Robot, Service
@@ -195,8 +196,8 @@ def _health(made: Sheet, labels: tuple[str, str], health: Health) -> None:
     made.put("t2_service_uptime_seconds", health.uptime, *labels)
     made.put("t2_service_resident_memory_bytes", health.rss, *labels)
     for key, rate in sorted(health.rates.items()):
-        # t2/v1/ROBOT/ stands in the labels already.
-        made.put("t2_service_message_rate_hertz", rate, *labels, key.split("/", 3)[-1])
+        short = key.removeprefix(f"{ROOT}/{labels[0]}/")  # stands in the labels already
+        made.put("t2_service_message_rate_hertz", rate, *labels, short)
     for counter, count in sorted(health.counters.items()):
         made.put("t2_service_counts_total", count, *labels, counter)
     if health.timing is not None:

@@ -117,11 +117,14 @@ def test_what_is_unknown_has_no_sample() -> None:
 
 def test_rates_and_counts_are_told_by_key_and_by_name() -> None:
     robot = whole()
-    told = health(rates={"t2/v1/007/tel/bridge/link": 5.0}, counters={"overrun": 2})
+    rates = {"t2/v1/007/tel/bridge/link": 5.0, "t2/v1/008/tel/bridge/link": 4.0}
+    told = health(rates=rates, counters={"overrun": 2})
     robot.on_health("bridge", told, NOW_NS)
     found = values(robot)
     rate = value(found, "t2_service_message_rate_hertz", service="bridge", key="tel/bridge/link")
     assert rate == 5
+    other = "t2/v1/008/tel/bridge/link"  # as who watches several robots has it
+    assert value(found, "t2_service_message_rate_hertz", service="bridge", key=other) == 4
     assert value(found, "t2_service_counts_total", service="bridge", counter="overrun") == 2
 
 
