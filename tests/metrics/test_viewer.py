@@ -1,0 +1,61 @@
+"""The exporter with a viewer's certificate: it needs no right to say anything."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common import keys
+from common.bus.bus import Bus
+from common.bus.publisher import Publisher
+from common.keys import Topic
+from common.loop import Loop
+from common.messages import Message
+from tests.cli.site import Site
+from tests.metrics.heard import health, link, odometry, safety
+from tests.metrics.test_exporter import running as exporting
+from tests.metrics.test_exporter import scraped, value
+from tests.metrics.test_samples import names
+from tests.support import at, joined, running, wait_until
+
+ROBOT = "001"
+
+
+@pytest.fixture
+def loop() -> Iterator[Loop]:
+    with running(Loop()) as it:
+        yield it
+
+
+def test_a_viewer_is_told_all_that_it_exports(loop: Loop, tmp_path: Path) -> None:
+    site = Site(tmp_path / "keys")
+    own = site.member("robot", ROBOT, "--address", "127.0.0.1")
+    viewer = site.member("viewer", "prometheus")
+    said: dict[Topic[Any], Message] = {
+        keys.SAFETY: safety(),
+        keys.LINK: link(),
+        keys.ODOMETRY: odometry(),
+        keys.HEALTH: health(),
+    }
+    puts: list[tuple[Publisher[Any], Message]] = []
+
+    def declare(bus: Bus) -> None:
+        bus.live(keys.live_key(ROBOT, "bridge", "1"))
+        puts.extend((bus.publisher(topic, service="bridge"), one) for topic, one in said.items())
+
+    def put(_: int) -> None:
+        for publisher, message in puts:
+            publisher.put(message)
+
+    with site.router(own) as (secured, onboard), joined(at(onboard), ROBOT, loop, declare):
+        loop.post(lambda: loop.every(0.1, put))
+        files = {name: getattr(viewer, name) for name in ("ca", "certificate", "private_key")}
+        sets = [f"bus.{name}={path}" for name, path in files.items()]
+        with exporting(secured, tmp_path, *sets, "metrics.robots=*") as port:
+            told = {"t2_safety_latched", "t2_link_up", "t2_odometry_slip"}
+            wait_until(lambda: told <= names(scraped(port)), "the streams")
+            wait_until(
+                lambda: value(port, "t2_service_up", robot=ROBOT, service="bridge") == 1,
+                "the token and the health",
+            )
