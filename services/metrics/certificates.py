@@ -1,4 +1,4 @@
-"""When whose certificate ends, from the list of members that `t2 keys` writes. Pure.
+"""When whose certificate ends, from the list of members that `t2 keys` writes.
 
 A renewed member stands on the list more than once until its old certificate has expired: the one
 that ends last counts.
