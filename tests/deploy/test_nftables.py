@@ -10,8 +10,6 @@ import pytest
 from tests.deploy.network import CABLE, PATIENCE_S, PC, WIFI, missing, python, vehicle, within
 
 RULES = Path(__file__).parents[2] / "deploy" / "nftables" / "t2.nft"
-WHY_NOT = missing()
-pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
 # Prints each datagram that comes, and ends with the one that says so.
 LISTEN = """
@@ -54,6 +52,8 @@ except TimeoutError:
 
 @pytest.fixture(scope="module")
 def network() -> Iterator[None]:
+    if why_not := missing():
+        pytest.skip(why_not)
     with vehicle():
         yield
 
