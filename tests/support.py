@@ -59,9 +59,9 @@ def at(*endpoints: str, lease: float = 1.0) -> settings.Bus:
     return settings.Bus(connect=endpoints, lease=lease)
 
 
-def listening(endpoint: str) -> settings.Bus:
-    """Return the settings of a router there."""
-    return settings.Bus(listen=(endpoint,))
+def listening(endpoint: str, *uplink: str) -> settings.Bus:
+    """Return the settings of a router there, which dials these."""
+    return settings.Bus(listen=(endpoint,), uplink=uplink)
 
 
 @contextlib.contextmanager

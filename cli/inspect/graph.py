@@ -126,7 +126,7 @@ def _named(tokens: Iterable[str]) -> dict[str, Member]:
 
 
 def _declaration(key: str, value: Any) -> tuple[str, str, list[str]]:
-    """Return role, key and ids of the sessions of one entry ``@/ZID/router/ROLE/KEY``."""
+    """Return role, key and ids of the sessions of one entry ``@/ZID/MODE/ROLE/KEY``."""
     parts = key.split("/", 4)
     if len(parts) < 5 or not isinstance(value, dict):
         return "", "", []

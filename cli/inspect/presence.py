@@ -12,8 +12,9 @@ from cli.inspect.reading import read
 from common import keys
 from common.bus.probe import Probe
 
-ADMIN = "@/*/router/*/t2/v1/{robot}/**"
-ROUTER = "@/*/router"
+# A robot's router that dials a site's is a peer.
+ADMIN = "@/*/*/*/t2/v1/{robot}/**"
+ROUTER = "@/*/*"
 OVERHEAR_S = 0.5
 SOMEBODY = "somebody"  # the router knows a reader, and does not tell which
 

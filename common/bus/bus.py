@@ -210,8 +210,9 @@ class Bus:
     @property
     def connected(self) -> bool:
         """Whether there is a router at the other end right now."""
-        session = self._session
-        return session is not None and bool(session.info.routers_zid())
+        # A robot's router that dials a site's is a peer.
+        info = self._session.info if self._session is not None else None
+        return info is not None and bool(info.routers_zid() or info.peers_zid())
 
     def close(self) -> None:
         """End the session; no handler is called any more."""

@@ -81,6 +81,9 @@ def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dic
     }
     if where.uplink:
         parts["connect"] = {"endpoints": list(where.uplink), "retry": RETRY}
+        # Routers among themselves learn every declaration of all; a peer tells one, and hears its
+        # own. A site's router that dials on knows robots by the name.
+        parts |= {"mode": "peer", "region_name": "robot"}
     if access is not None:
         parts["access_control"] = access
     return _common(where) | parts

@@ -88,9 +88,10 @@ def test_a_list_of_members_that_is_none(
     assert f"t2 router: {listed}: {words}" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("setting", ["listen", "uplink"])
 @pytest.mark.parametrize("endpoint", ["router", "tcp/", "/127.0.0.1:7447"])
 def test_what_is_no_endpoint_is_refused_before_anything_opens(
-    endpoint: str, capsys: pytest.CaptureFixture[str]
+    endpoint: str, setting: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["router", *sets(f"bus.listen={endpoint}")]) == EXIT_CONFIG
+    assert main(["router", *sets(f"bus.{setting}={endpoint}")]) == EXIT_CONFIG
     assert "should look like tcp/127.0.0.1:7447" in capsys.readouterr().err

@@ -205,6 +205,7 @@ def test_any_put_and_any_delete_is_an_emergency_stop(rig: Rig) -> None:
         lambda: stranger.put(one, b""),
         lambda: stranger.put(one, b"\xc1" * 1_000_000),
         lambda: stranger.put(fleet, "stop!"),
+        lambda: stranger.put(keys.estop_key(f"{rig.robot[0]}$*"), b""),
         lambda: stranger.put("t2/**", b""),
         lambda: stranger.delete(one),
         lambda: stranger.delete(fleet),

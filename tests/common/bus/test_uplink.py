@@ -1,0 +1,114 @@
+"""A robot's router that dials its site's: what the site sees, and what the robots do not."""
+
+from contextlib import ExitStack
+
+import zenoh
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.bus.session import client_config, router
+from common.messages import Bumper, Done, Event, ResetRequest
+from tests.common.rig import Rig, until_heard
+from tests.support import at, free_port, listening, wait_until
+
+
+def somewhere() -> str:
+    """Return an endpoint where nobody listens yet."""
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+class Onboard:
+    """What is on a robot."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.stops: list[int] = []
+        self.bus = rig.bus(self.declare)
+        self.bumper = self.bus.publisher(keys.BUMPER)
+        events = self.bus.publisher(keys.EVENTS, service="safety")
+        events.put(Event(name="old", level="info", text="before the site was there"))
+
+    def declare(self, bus: Bus) -> None:
+        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
+        bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="done")))
+        bus.live(keys.live_key(bus.robot, "safety", "1"))
+
+    def put(self) -> None:
+        self.bumper.put(Bumper(pressed=True))
+
+
+class Room:
+    """Somebody at the site."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.heard: list[Arrival[Bumper]] = []
+        self.late: list[str] = []
+        self.tokens: list[str] = []
+        self.replies: list[Done] = []
+        self.bus = rig.bus(self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        bus.subscribe(keys.BUMPER, self.heard.append)
+        bus.subscribe(
+            keys.EVENTS, lambda a: self.late.append(a.message.name), depth=99, service="*"
+        )
+        bus.watch_live(keys.live_key("berlin-$*", "*", "*"), lambda key, _: self.tokens.append(key))
+
+    def ask(self) -> None:
+        self.bus.ask(keys.RESET, ResetRequest(), self.replies.append, print)
+
+
+def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(rig: Rig) -> None:
+    site, own = somewhere(), somewhere()
+    rig.endpoint, rig.robot = own, "berlin-007"
+    with router(listening(own, site)):  # which does without the site's
+        onboard = Onboard(rig)
+        for _ in range(2):  # the site's is restarted in between
+            onboard.stops.clear()
+            with router(listening(site)), zenoh.open(client_config(at(site))) as session:
+                rig.endpoint = site
+                room = Room(rig)
+                until_heard(onboard.put, lambda r=room: r.heard, "a bumper")  # type: ignore[misc]
+                wait_until(lambda r=room: r.tokens, "the token")  # type: ignore[misc]
+                wait_until(lambda r=room: r.late, "the event")  # type: ignore[misc]
+                until_heard(room.ask, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
+                until_heard(
+                    lambda s=session: s.put(keys.estop_key("berlin-$*"), b""),  # type: ignore[misc]
+                    lambda: onboard.stops,
+                    "a stop",
+                )
+                room.bus.close()
+
+
+def test_without_its_site_a_robot_is_whole(rig: Rig) -> None:
+    rig.endpoint = somewhere()
+    with router(listening(rig.endpoint, somewhere())):
+        room, onboard = Room(rig), Onboard(rig)
+        until_heard(onboard.put, lambda: room.heard, "a bumper")
+        until_heard(onboard.bus.estop, lambda: onboard.stops, "a stop")
+        until_heard(room.ask, lambda: room.replies, "a reply")
+        for bus in (room.bus, onboard.bus):
+            bus.close()
+
+
+def test_robots_do_not_hear_each_other(rig: Rig) -> None:
+    """So the declarations of one cost the others nothing, and none can drive another."""
+    site, first, second = somewhere(), somewhere(), somewhere()
+    with ExitStack() as stack:
+        for where in (listening(site), listening(first, site), listening(second, site)):
+            stack.enter_context(router(where))
+        one, other, room = (
+            stack.enter_context(zenoh.open(client_config(at(e)))) for e in (first, second, site)
+        )
+        heard: list[str] = []
+        seen: list[str] = []
+        ears = [
+            other.declare_subscriber("t2/**", lambda sample: heard.append(str(sample.key_expr))),
+            room.declare_subscriber("t2/**", lambda sample: seen.append(str(sample.key_expr))),
+        ]
+        until_heard(lambda: one.put("t2/v1/a/tel/x", b""), lambda: seen, "what the site sees")
+        until_heard(
+            lambda: room.put("t2/v1/a/tel/end", b""), lambda: "t2/v1/a/tel/end" in heard, "the end"
+        )
+        assert set(heard) == {"t2/v1/a/tel/end"}
+        for ear in ears:
+            ear.undeclare()
