@@ -37,7 +37,8 @@ COMMANDS = {
     "bw": "how many bytes a key takes",
     "pub": "publish on a key of your own",
     "call": "make a call to a service, such as safety/reset",
-    "estop": "stop the robot now; it stays so until a reset",
+    "estop": "stop the robot now, a site's or all; they stay so until a reset",
+    "robots": "the robots that are there: verdict, speed, driver",
     "services": "who is there, who publishes and who reads",
     "health": "how the services fare",
     "schema": "the fields of a message type",
@@ -51,8 +52,8 @@ COMMANDS = {
     "completion": "what bash, zsh or fish want to complete t2",
 }
 INSPECT = (
-    "doctor", "ls", "echo", "hz", "delay", "bw", "pub", "call", "estop", "services", "health",
-    "schema", "topic", "completion",
+    "doctor", "ls", "echo", "hz", "delay", "bw", "pub", "call", "estop", "robots", "services",
+    "health", "schema", "topic", "completion",
 )  # fmt: skip
 # Where it is no module of its own name.
 PLACES = {

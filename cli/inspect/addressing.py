@@ -1,6 +1,7 @@
 """Which keys the operator means: short or whole, one robot or all."""
 
 import argparse
+import re
 
 from common import keys
 from common.bus.probe import valid
@@ -8,6 +9,10 @@ from common.messages import Message
 
 # An expression's `**` passes by what begins with "@", on purpose: both are needed for all.
 EVERYTHING = ("**", "@cmd/**")
+EVERY_ROBOT = "*"
+# Robots of a site are called SITE-NUMBER. With a dash in its name, "north" would have the robots
+# of "north-east", too.
+SITE = re.compile(r"[A-Za-z0-9_.]+")
 
 
 def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
@@ -30,6 +35,20 @@ def one_key(word: str) -> str:
     if "*" in keys_meant(word):
         raise argparse.ArgumentTypeError(f"{word!r} means many keys, name one")
     return word
+
+
+def robots_of(site: str) -> str:
+    """Read a site's name; return what stands for its robots in a key expression."""
+    if not SITE.fullmatch(site):
+        raise argparse.ArgumentTypeError(
+            f"{site!r} is no site: letters, digits, _ and . alone, as in berlin for berlin-007"
+        )
+    return f"{site}-$*"
+
+
+def is_many(robot: str) -> bool:
+    """Tell whether a robot's place in a key stands for more than one."""
+    return "*" in robot
 
 
 def expression(word: str, robot: str) -> str:

@@ -7,17 +7,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from cli.inspect.addressing import EVERY_ROBOT, is_many, robots_of
 from common.bus.probe import Probe, probe
 from common.config import load
 from common.options import add_sources, sources
 from common.settings import Shared
 
-EVERY_ROBOT = "*"
-
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """Where a tool sits: its session, and the robot that it looks at, ``*`` for all."""
+    """Where a tool sits: its session, and the robot that it looks at, or an expression for many."""
 
     probe: Probe
     robot: str
@@ -25,10 +24,15 @@ class Seat:
 
 def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
     """Add the options that every tool takes; ``every`` says whether all robots will do."""
-    all_of_them = ", '*' for all" if every else ""
-    parser.add_argument(
-        "--robot", type=str if every else one_robot, help=f"which robot, such as 001{all_of_them}"
-    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--robot", type=str if every else one_robot, help="which robot, such as 001")
+    if every:
+        which.add_argument(
+            "--site", dest="robot", type=robots_of, help="all robots of a site, such as berlin"
+        )
+        which.add_argument(
+            "--all", dest="robot", action="store_const", const=EVERY_ROBOT, help="all robots"
+        )
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--json", action="store_true", help="JSON lines, as in a pipe")
     shown.add_argument("--text", action="store_true", help="text, as on a terminal")
@@ -37,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
 
 def one_robot(text: str) -> str:
     """Read a robot's name where all of them will not do."""
-    if text == EVERY_ROBOT:
+    if is_many(text):
         raise argparse.ArgumentTypeError("this is for one robot at a time, name it")
     return text
 
@@ -73,7 +77,7 @@ def wants_json(options: argparse.Namespace) -> bool:
 
 def settings(options: argparse.Namespace) -> Shared:
     """Return the shared settings in force; ``--robot`` names one robot there, too."""
-    if options.robot and options.robot != EVERY_ROBOT:
+    if options.robot and not is_many(options.robot):
         options.sets = [*options.sets, f"robot.id={options.robot}"]
     return load(Shared, sources(options)).config
 
@@ -82,7 +86,8 @@ def settings(options: argparse.Namespace) -> Shared:
 def seated(options: argparse.Namespace) -> Iterator[Seat]:
     """Join the bus while the context lasts; raise ``LinkError`` without a router."""
     config = settings(options)
-    robot = EVERY_ROBOT if options.robot == EVERY_ROBOT else config.robot.id
+    named = options.robot and is_many(options.robot)
+    robot = options.robot if named else config.robot.id
     with probe(config.bus) as opened:
         yield Seat(opened, robot)
 

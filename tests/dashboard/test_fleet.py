@@ -1,15 +1,17 @@
 """Which robots are looked at: with buses that carry nothing, as time here is not the clock's."""
 
+import json
 import time
 from unittest.mock import Mock
 
 import pytest
 
+from common import keys
 from common.freshness import S
 from services.dashboard import fleet as module
 from services.dashboard import words as w
 from services.dashboard.config import DashboardConfig
-from services.dashboard.fleet import UNWANTED_S, Fleet
+from services.dashboard.fleet import REST_TICKS, ROBOTS_MAX, UNWANTED_S, Fleet
 from tests.support import wait_until
 
 
@@ -48,6 +50,29 @@ def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, M
     fleet.take_in("1", w.Look("002"))
     assert buses["002"] is not first
     assert not buses["002"].close.called
+
+
+def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock]) -> None:
+    shown: list[bytes] = []
+    node = Mock(config=DashboardConfig())
+    fleet = Fleet(node, lambda _viewers, text, _newer_wins: shown.append(text))
+    _, note_alive = node.bus.watch_live.call_args.args
+    names = [f"berlin-{number:03d}" for number in range(1, 51)]
+    for name in names:
+        note_alive(keys.live_key(name, "safety", "1"), True)
+    note_alive(keys.live_key(names[-1], "safety", "1"), False)
+    fleet.join("1")
+    for name in names[: ROBOTS_MAX + 1]:
+        fleet.take_in("1", w.Look(name))
+    assert set(buses) == {"001", *names[: ROBOTS_MAX - 1]}  # the settings' robot is one of them
+    assert b"too_many_robots" in b"".join(shown)
+    fleet.estop(names[-2], "somebody")
+    assert buses[names[-2]].estop.called
+    shown.clear()
+    for tick in range(REST_TICKS):
+        fleet.tick(time.monotonic_ns() + tick)
+    (rest,) = (json.loads(text) for text in shown if b'"k":"rest"' in text)
+    assert rest["robots"] == {"001": False} | dict.fromkeys(names, True) | {names[-1]: False}
 
 
 def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 import zenoh
 
-from common import keys
+from common import codec, keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.config import Sources, load
@@ -35,8 +35,8 @@ def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
 
 
 @contextlib.contextmanager
-def safety_on(endpoint: str) -> Iterator[Node[SafetyConfig]]:
-    node = make_node(endpoint)
+def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
+    node = make_node(endpoint, *sets)
     reader = node.open_bus()
     Ports(node, reader)
     with running(node.loop):
@@ -168,6 +168,27 @@ def test_an_estop_by_delete_latches(endpoint: str) -> None:
             lambda: seen.states and "estop" in seen.states[-1].latched,
             "a latched emergency stop",
         )
+
+
+@pytest.mark.parametrize("who", ["berlin-007", "berlin-$*", "*"])
+def test_an_estop_for_one_a_site_or_all_latches(endpoint: str, who: str) -> None:
+    latched: list[tuple[str, ...]] = []
+    with (
+        safety_on(endpoint, "robot.id=berlin-007"),
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        states = session.declare_subscriber(
+            keys.SAFETY.on("berlin-007"),
+            lambda sample: latched.append(
+                codec.decode(sample.payload.to_bytes(), SafetyState).latched
+            ),
+        )
+        repeat_until(
+            lambda: session.put(keys.estop_key(who), b""),
+            lambda: latched and "estop" in latched[-1],
+            "a latched emergency stop",
+        )
+        states.undeclare()
 
 
 def test_the_source_is_the_last_part_of_the_key() -> None:

@@ -31,7 +31,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Tool:
-    """Runs ``t2`` on one robot."""
+    """Runs ``t2`` on one robot; on those that the words name when it is called nothing."""
 
     endpoint: str
     robot: str
@@ -39,7 +39,8 @@ class Tool:
 
     def __call__(self, *words: str, robot: str | None = None) -> Result:
         """Run it to its end, as in a pipe."""
-        where = ("--set", f"bus.connect={self.endpoint}", "--robot", robot or self.robot)
+        named = robot or self.robot
+        where = ("--set", f"bus.connect={self.endpoint}", *(("--robot", named) if named else ()))
         self.capsys.readouterr()
         try:
             code = main([*words, *where])

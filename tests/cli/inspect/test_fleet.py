@@ -1,0 +1,184 @@
+"""Many robots: who is there, and an emergency stop for one, a site's, or all."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from cli.inspect import estop, robots
+from common import keys
+from common.bus.bus import Bus
+from common.messages import Limits, SafetyState, Velocity
+from tests.cli.inspect.tool import Tool, pretend
+from tests.common.rig import Rig
+
+Join = Callable[[str], Rig]
+LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
+
+
+class Robot:
+    """Safety of one robot, which latches when it is told to."""
+
+    def __init__(self, rig: Rig, obeys: bool = True) -> None:
+        self.stops: list[int] = []
+        self._obeys = obeys
+        pretend(rig, "safety", {keys.SAFETY: self.state}, self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
+
+    def state(self) -> SafetyState:
+        latched = bool(self.stops) and self._obeys
+        return SafetyState(
+            verdict="brake" if latched else "run", latched=("estop",) if latched else (),
+            causes=(), source=None if latched else "web", limits=LIMITS, heartbeat=1,
+            text="Emergency stop." if latched else "Drives.",
+        )  # fmt: skip
+
+
+@pytest.fixture
+def join(shared_router: str) -> Iterator[Join]:
+    """Give a robot of that name, on the router that all share."""
+    with contextlib.ExitStack() as stack:
+
+        def made(name: str) -> Rig:
+            rig = Rig(shared_router)
+            rig.robot = name
+            return stack.enter_context(rig)
+
+        yield made
+
+
+@pytest.fixture
+def t2(shared_router: str, capsys: pytest.CaptureFixture[str]) -> Tool:
+    """Run ``t2`` on no robot by name."""
+    return Tool(shared_router, "", capsys)
+
+
+# --- estop ------------------------------------------------------------------------------------
+
+
+def test_a_site_is_stopped_and_no_other(join: Join, t2: Tool) -> None:
+    berlin = [Robot(join(name)) for name in ("berlin-001", "berlin-002")]
+    others = [Robot(join(name)) for name in ("munich-001", "berlinale-001", "001")]
+    result = t2("estop", "--site", "berlin")
+    assert (result.code, result.err) == (0, "")
+    assert [line.split()[1] for line in result.out.splitlines()] == ["berlin-001", "berlin-002"]
+    assert all(robot.stops for robot in berlin)
+    assert not any(robot.stops for robot in others)
+
+
+def test_all_are_stopped(join: Join, t2: Tool) -> None:
+    for name in ("berlin-001", "munich-001", "001"):
+        Robot(join(name))
+    result = t2("estop", "--all")
+    assert (result.code, result.err) == (0, "")
+    assert [line.split()[1] for line in result.out.splitlines()] == [
+        "001", "berlin-001", "munich-001",
+    ]  # fmt: skip
+
+
+def test_who_does_not_confirm_is_named(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Robot(join("berlin-001"))
+    Robot(join("berlin-002"), obeys=False)
+    pretend(join("berlin-003"), "bridge", {})  # its safety has died
+    pretend(join("berlin-004"), "dashboard", {})  # a laptop
+    monkeypatch.setattr(estop, "PATIENCE_S", 1.0)
+    result = t2("estop", "--site", "berlin")
+    assert result.code == 1
+    assert "Robot berlin-001 is stopped." in result.out
+    assert "berlin-002 is stopped" not in result.out
+    for name in ("berlin-002", "berlin-003"):
+        assert f"robot {name} does not confirm. USE THE VEHICLE'S OWN SWITCH" in result.err
+    assert "2 of 3 robots DO NOT CONFIRM: berlin-002, berlin-003" in result.err
+    assert "berlin-004" not in result.err
+
+
+def test_a_driver_of_some_robots_stops_these_by_name(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Access rules let it put on the keys of its own robots, and not on one that means more."""
+    robot = Robot(join("berlin-001"))
+    order = estop._order
+    monkeypatch.setattr(estop, "_order", lambda probe, to: None if "*" in to else order(probe, to))
+    assert t2("estop", "--all").code == 0
+    assert robot.stops
+
+
+def test_nobody_to_stop(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estop, "PATIENCE_S", 0.2)
+    result = t2("estop", "--site", "nowhere")
+    assert (result.code, result.out) == (1, "")
+    assert result.err == "t2 estop: sent, but no robot is there\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("estop", "--site", "north-east"), "'north-east' is no site"),
+        (("estop", "--site", "berlin", "--all"), "not allowed with"),
+        (("call", "safety/reset", "--robot", "berlin-$*"), "one robot at a time"),
+    ],
+)
+def test_what_is_no_good_is_said(words: tuple[str, ...], said: str, t2: Tool) -> None:
+    result = t2(*words)
+    assert (result.code, result.out) == (2, "")
+    assert said in result.err
+
+
+# --- robots -----------------------------------------------------------------------------------
+
+
+def test_robots_are_listed_with_what_they_do(join: Join, t2: Tool) -> None:
+    one = join("berlin-001")
+    Robot(one)
+    pretend(one, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
+    Robot(join("munich-001"))
+    result = t2("robots")
+    assert (result.code, result.err) == (0, "")
+    first, second = result.lines
+    assert first == {
+        "robot": "berlin-001", "services": ["bridge", "safety"], "verdict": "run", "latched": [],
+        "source": "web", "linear": 0.5, "text": "Drives.",
+    }  # fmt: skip
+    assert (second["robot"], second["linear"]) == ("munich-001", None)
+    assert [line["robot"] for line in t2("robots", "--site", "munich").lines] == ["munich-001"]
+    assert [line["robot"] for line in t2("robots", robot="berlin-001").lines] == ["berlin-001"]
+    rows = [line.split() for line in t2("robots", "--text").out.splitlines()]
+    assert rows[0] == ["robot", "services", "verdict", "m/s", "driver"]
+    assert rows[1] == ["berlin-001", "bridge", "safety", "run", "0.50", "web", "Drives."]
+
+
+def test_a_robot_that_tells_nothing_is_told_of(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robots, "LISTEN_S", 0.3)
+    pretend(join("a"), "safety", {})
+    pretend(join("b"), "bridge", {})
+    pretend(join("c"), "dashboard", {})
+    result = t2("robots")
+    assert result.code == 1
+    assert {line["robot"]: line["verdict"] for line in result.lines} == {
+        "a": "silent", "b": "no safety", "c": "-",
+    }  # fmt: skip
+
+
+def test_what_is_no_word_of_safety_is_said(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robots, "LISTEN_S", 0.3)
+    rig = join("a")
+    pretend(rig, "bridge", {})
+    session, key = rig.session(), keys.SAFETY.on("a")
+    rig.loop.post(lambda: rig.loop.every(0.02, lambda _: session.put(key, b"\xc1")))
+    result = t2("robots")
+    assert (result.code, result.lines[0]["verdict"]) == (1, "no safety")
+    assert "t2 robots: t2/v1/a/tel/safety/state: not a SafetyState" in result.err
+
+
+def test_no_robots(t2: Tool) -> None:
+    result = t2("robots", "--site", "nowhere")
+    assert (result.code, result.out) == (1, "")
+    assert "nobody is there" in result.err
