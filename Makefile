@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults check cover search mutants lint format types docs pictures lock audit sbom clean help
+.PHONY: demo up test fuzz soak faults fleet check cover search mutants lint format types docs pictures lock audit sbom clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -47,6 +47,9 @@ soak: $(STAMP) ## laps with random faults and kill -9 for MINUTES=30, watching m
 
 faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faults.md
 	$(BIN)/python -m tests.faults --out docs/faults.md
+
+fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
+	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
 
 check: lint types cover search ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

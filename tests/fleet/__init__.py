@@ -1,0 +1,1 @@
+"""A fleet on one machine: real stacks, light robots, one site router, and what they cost it."""
