@@ -126,9 +126,11 @@ def _named(tokens: Iterable[str]) -> dict[str, Member]:
 
 
 def _declaration(key: str, value: Any) -> tuple[str, str, list[str]]:
-    """Return role, key and ids of the sessions of one entry ``@/ZID/MODE/ROLE/KEY``."""
+    """Return role, key and ids of the sessions of one entry ``@/ZID/MODE/ROLE/KEY``.
+
+    All sessions are clients; what else has declared it is a router, which stands for its own.
+    """
     parts = key.split("/", 4)
     if len(parts) < 5 or not isinstance(value, dict):
         return "", "", []
-    zids = [zid for kind in ("clients", "peers") for zid in value.get(kind) or ()]
-    return parts[3], parts[4], zids
+    return parts[3], parts[4], list(value.get("clients") or ())

@@ -2,15 +2,18 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
 from cli.inspect import estop, robots
 from common import keys
 from common.bus.bus import Bus
+from common.bus.session import router
 from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.rig import Rig
+from tests.support import free_port, listening, wait_until
 
 Join = Callable[[str], Rig]
 LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
@@ -182,3 +185,20 @@ def test_no_robots(t2: Tool) -> None:
     result = t2("robots", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
     assert "nobody is there" in result.err
+
+
+@pytest.mark.parametrize("seat", ["on board", "at the site"])
+def test_services_of_a_robot_that_dials_a_site(
+    seat: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its router is a peer, and no member by itself, neither on board nor at the site."""
+    own, site = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
+    tool = Tool({"on board": own, "at the site": site}[seat], "berlin-001", capsys)
+
+    def found() -> dict[str, Any]:
+        return {line["name"]: line["publishes"] for line in tool("services").lines}
+
+    with router(listening(site)), router(listening(own, site)), Rig(own) as rig:
+        rig.robot = "berlin-001"
+        pretend(rig, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
+        wait_until(lambda: found() == {"bridge": {"tel/bridge/velocity": []}}, "the bridge alone")

@@ -8,7 +8,7 @@ TOKENS = ["t2/v1/7/live/bridge/1a", "t2/v1/7/live/safety/2b", "t2/v1/7/live/odd"
 
 
 def entry(role: str, key: str, *zids: str) -> tuple[str, Any]:
-    return f"@/r0/router/{role}/{key}", {"routers": ["r0"], "peers": [], "clients": list(zids)}
+    return f"@/r0/router/{role}/{key}", {"routers": ["r0"], "peers": ["p0"], "clients": list(zids)}
 
 
 DECLARED = dict(
