@@ -7,7 +7,7 @@ there. Zenoh's threads only note when a sample came and queue it.
 import queue
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -129,15 +129,18 @@ class Probe:
 def probe(where: Bus) -> Iterator[Probe]:
     """Join the bus while the context lasts; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
-    try:
-        session = zenoh.open(client_config(where))
-    except zenoh.ZError:
-        raise LinkError(
-            f"no router answers at {', '.join(where.endpoints)}: is `t2 up` on there? "
-            "`t2 doctor` looks further; --set bus.connect=tcp/HOST:7447 looks elsewhere"
-        ) from None
-    with session:
+    with _opened(where) as session:
         yield Probe(session)
+
+
+def _opened(where: Bus) -> zenoh.Session:
+    for turn in range(len(where.endpoints)):
+        with suppress(zenoh.ZError):
+            return zenoh.open(client_config(where, turn))
+    raise LinkError(
+        f"no router answers at {', '.join(where.endpoints)}: is `t2 up` on there? "
+        "`t2 doctor` looks further; --set bus.connect=tcp/HOST:7447 looks elsewhere"
+    )
 
 
 def valid(expression: str) -> bool:

@@ -1,6 +1,7 @@
 """Sessions: how a client finds its router, and the embedded router itself."""
 
 import contextlib
+import itertools
 import json
 import threading
 import time
@@ -47,9 +48,11 @@ class Opener:
 
     def _run(self) -> None:
         complained_s = -COMPLAIN_S
-        while not self._closing.is_set():
+        for turn in itertools.count():
+            if self._closing.is_set():
+                return
             try:
-                self._session = zenoh.open(client_config(self._where))
+                self._session = zenoh.open(client_config(self._where, turn))
             except zenoh.ZError:
                 if time.monotonic() - complained_s >= COMPLAIN_S:
                     complained_s = time.monotonic()
@@ -64,9 +67,15 @@ class Opener:
         self._log.warning("waiting for a router; `t2 doctor` looks further", endpoints=endpoints)
 
 
-def client_config(where: Bus) -> zenoh.Config:
-    """Return how a service joins: a client of one of these routers, never by scouting."""
-    connect = {"endpoints": list(where.endpoints), "timeout_ms": 1500, "retry": RETRY}
+def client_config(where: Bus, turn: int = 0) -> zenoh.Config:
+    """Return how a service joins: a client of one of these routers, never by scouting.
+
+    Zenoh waits for the first endpoint, if it is silent, until there is no time left for the others:
+    each try begins with another one.
+    """
+    first = turn % len(where.endpoints)
+    endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
+    connect = {"endpoints": endpoints, "timeout_ms": 1500, "retry": RETRY}
     return zenoh.Config.from_json5(
         json.dumps(_common(where) | {"mode": "client", "connect": connect})
     )

@@ -1,6 +1,7 @@
 """How a client finds its router, early or late, and the router itself."""
 
 import json
+import socket
 import time
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import zenoh
 from common import keys, settings
 from common.bus import session as session_module
 from common.bus.bus import Arrival, Bus
+from common.bus.probe import probe
 from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Done, Event, ResetRequest
@@ -29,9 +31,9 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Let the tries follow each other quickly, and tell when each was."""
     made: list[float] = []
 
-    def config(where: settings.Bus) -> zenoh.Config:
+    def config(where: settings.Bus, turn: int) -> zenoh.Config:
         made.append(time.monotonic())
-        quick = client_config(where)
+        quick = client_config(where, turn)
         quick.insert_json5("connect/timeout_ms", "50")
         return quick
 
@@ -87,6 +89,18 @@ def test_a_router_that_comes_later_is_found(rig: Rig) -> None:
             publisher = rig.bus().publisher(keys.BUMPER)
             until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
             hearer.close()
+
+
+def test_a_router_behind_one_that_is_silent_is_found(rig: Rig) -> None:
+    where = nowhere()
+    with socket.create_server(("127.0.0.1", 0)) as silent, router(listening(where)):
+        dead = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
+        bus = Bus(at(dead, where), rig.robot, rig.loop.post)
+        bus.open()
+        wait_until(lambda: bus.connected, "the second one")
+        bus.close()
+        with probe(at(dead, where)) as opened:
+            assert opened.zid
 
 
 def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
