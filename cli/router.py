@@ -4,6 +4,7 @@ import argparse
 import json
 import signal
 import threading
+import time
 from pathlib import Path
 
 import structlog
@@ -15,6 +16,9 @@ from common.bus.session import router, router_config
 from common.config import load
 from common.options import add_sources, sources
 from common.settings import Bus, Shared, is_encrypted
+from common.systemd import Systemd
+
+LOOK_S = 0.25  # between two questions to the router, where systemd wants to know
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,10 +49,15 @@ def run(options: argparse.Namespace) -> int:
     ended = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: ended.set())
-    with router(config.bus, access):
+    systemd = Systemd()
+    with router(config.bus, access) as answers:
         listen = list(config.bus.listen)
         structlog.get_logger().info("started", listen=listen, open_to=open_to(config.bus))
-        ended.wait()
+        # Routing happens in Zenoh's own threads: that this one lives says nothing about them.
+        while not ended.wait(LOOK_S if systemd.listens else None):
+            if answers():
+                systemd.ready(time.monotonic_ns())
+        systemd.stopping()
     return 0
 
 

@@ -30,6 +30,7 @@ from common.messages import Event, Health, Level, Timing
 from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.schema import schemas
 from common.settings import Shared
+from common.systemd import OFTEN_S, Systemd
 
 REST_S = 2.0  # how long a service may take to come to rest
 
@@ -136,11 +137,15 @@ def run(
 def serve(node: Node[C]) -> int:
     """Run the loop until a signal, let the service come to rest, and leave."""
     _on_signal(node)
+    systemd = Systemd()
+    if systemd.listens:
+        node.loop.every(OFTEN_S, systemd.ready)
     try:
         node.bus.open()
         node.log.info("started", robot=node.config.robot.id)
         node.loop.run()
         node.log.info("stopping")
+        systemd.stopping()
         _come_to_rest(node)
     finally:
         node.last_words()

@@ -16,7 +16,10 @@ from common.settings import Bus, is_encrypted
 
 RETRY_S = 0.5  # between two tries to find a router
 COMPLAIN_S = 5.0  # between two lines that say so
+ANSWER_S = 1.0  # that a router has to answer
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
+
+Answers = Callable[[], bool]
 
 
 class Opener:
@@ -99,8 +102,11 @@ def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dic
 
 
 @contextlib.contextmanager
-def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[None]:
-    """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen."""
+def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[Answers]:
+    """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen.
+
+    It hands out a call that tells whether the router answers a question about itself.
+    """
     check_files(where, (*where.listen, *where.uplink))
     for socket in (each for each in where.listen if each.startswith("unixsock-stream/")):
         with contextlib.suppress(OSError):  # what is wrong with it, Zenoh says
@@ -111,8 +117,9 @@ def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[N
         reason = str(error).split(" at /")[0]
         listen = ", ".join(where.listen)
         raise LinkError(f"the router cannot listen on {listen}: {reason}") from None
+    me = f"@/{session.info.zid()}/router"
     with session:
-        yield
+        yield lambda: any(reply.ok for reply in session.get(me, timeout=ANSWER_S))
 
 
 def check_files(where: Bus, endpoints: Iterable[str]) -> None:

@@ -12,7 +12,7 @@ from common.errors import ConfigError, LinkError
 from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.settings import Board
 from services.bridge.config import BridgeConfig
-from services.bridge.guard import Guard, bridge_command
+from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
 
 # A bridge whose guard was killed keeps the ports until its vehicle stands.
@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except LinkError as error:
         structlog.get_logger().error(str(error))
         return EXIT_LINK
-    return Guard(config, sockets, bridge_command(given)).run()
+    return Guard(config, sockets, [sys.executable, "-m", "services.bridge.guarded", *given]).run()
 
 
 def bound(board: Board) -> Sockets:

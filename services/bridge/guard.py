@@ -13,14 +13,13 @@ alive          from 200 ms without one         five BREAKs without one: killed; 
 ending, killed until the child is gone         it is gone: started again, first at once
 ============== =============================== ==============================================
 
-SIGTERM and SIGINT are passed on. A bridge that comes to rest then says the last word itself.
+SIGTERM, SIGINT and SIGHUP are passed on; a bridge that comes to rest says the last word itself.
 """
 
 import os
 import select
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from types import FrameType
@@ -29,6 +28,7 @@ import structlog
 
 from common.backoff import Backoff
 from common.options import HOPELESS
+from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.config import BridgeConfig
@@ -56,10 +56,11 @@ class Guard:
         self._child: subprocess.Popen[bytes] | None = None  # the one that signals go to
         self._backoff = Backoff()
         self._log = structlog.get_logger()
+        self._systemd = Systemd()
 
     def run(self) -> int:
         """Keep a bridge running until a signal or a hopeless end; return the exit code."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._stop)
         code = 0
         while not self._stopping and code not in HOPELESS:
@@ -73,7 +74,8 @@ class Guard:
         return code
 
     def brake(self) -> None:
-        """Send BREAK as the bridge would."""
+        """Send BREAK as the bridge would; a guard that does so works."""
+        self._systemd.beat(time.monotonic_ns())
         self._sockets.send(self._brake, self._port)
 
     def _start(self) -> tuple["subprocess.Popen[bytes]", int]:
@@ -102,6 +104,7 @@ class Guard:
                 if not beats:
                     return
                 self._port = beats[-1]
+                self._systemd.ready(time.monotonic_ns())
                 timeout_ms, missed, hangs = self._missed_ms, 0, HANGS
             else:
                 self.brake()
@@ -140,10 +143,6 @@ class Guard:
 
     def _stop(self, number: int, _: FrameType | None) -> None:
         self._stopping = True
+        self._systemd.stopping()
         if self._child is not None:
             self._child.send_signal(signal.SIGTERM)
-
-
-def bridge_command(argv: Sequence[str]) -> list[str]:
-    """Return what the guard runs."""
-    return [sys.executable, "-m", "services.bridge.guarded", *argv]

@@ -1,6 +1,7 @@
 """``python -m services.bridge.guarded``: the bridge itself; ``services.bridge.guard`` starts it."""
 
 import os
+import signal
 import sys
 
 from common.service import run
@@ -14,6 +15,9 @@ def main() -> int:
     if NAME not in os.environ:
         print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
         return 2
+    # systemd sends these to guard and bridge alike; a bridge is told by its guard, or by its end.
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
     handover = received(os.environ)
     return run("bridge", BridgeConfig, lambda node: Bridge(node, handover))
 

@@ -7,12 +7,14 @@ then the loop comes to rest with zeros; an error of ours in the loop ends the se
 import signal
 import ssl
 import threading
+import time
 from pathlib import Path
 
 from common import log
 from common.config import Loaded
 from common.errors import ConfigError
 from common.service import REST_S, Node
+from common.systemd import Systemd
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.fleet import Fleet
 from services.dashboard.gate import TOKEN_MIN, Gate, new_token
@@ -33,12 +35,14 @@ class Host:
         viewers = Viewers(node.loop.post)
         self._fleet = viewers.fleet = Fleet(node, viewers.show)
         node.present()
+        self._systemd = Systemd()
         self._server = serving(
             settings,
             loaded.config.robot.id,
             self._gate,
             viewers,
             lambda robot, who: node.loop.post(lambda: self._fleet.estop(robot, who)),
+            alive=self._alive,
         )
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._serve, name="fleet")
@@ -54,11 +58,16 @@ class Host:
         try:
             self._server.run(sockets=[self._socket])
         finally:
+            self._systemd.stopping()
             self._node.loop.post(self._fleet.end)
             self._thread.join(REST_S)
         if self._error:
             raise self._error
         return 0
+
+    def _alive(self) -> None:
+        """Tell systemd by way of both loops, the server's and the node's: both must work."""
+        self._node.loop.post(lambda: self._systemd.ready(time.monotonic_ns()))
 
     def _serve(self) -> None:
         try:

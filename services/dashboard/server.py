@@ -33,8 +33,14 @@ def serving(
     gate: Gate,
     viewers: Viewers,
     estop: Callable[[str, str], None],
+    *,
+    alive: Callable[[], None],
 ) -> uvicorn.Server:
-    """Return the server, ready to run."""
+    """Return the server, ready to run; it calls ``alive`` from its own loop, once a second."""
+
+    async def tick() -> None:
+        alive()
+
     return uvicorn.Server(
         uvicorn.Config(
             Door(_site(robot, viewers, estop), gate, secure=bool(settings.certificate)),
@@ -47,6 +53,8 @@ def serving(
             ws_ping_interval=5.0,
             ws_ping_timeout=5.0,
             timeout_graceful_shutdown=END_S,
+            callback_notify=tick,
+            timeout_notify=0,
             ssl_certfile=settings.certificate or None,
             ssl_keyfile=settings.private_key or None,
         )

@@ -1,9 +1,12 @@
 """A small service to be run as a process: ``python -m tests.common.specimen KIND [options]``.
 
-KINDs are plain, restless (never at rest), failing (once it is connected) and refused (a port).
+KINDs are plain, restless (never at rest), failing (once it is connected), refused (a port) and
+hanging (its loop, from a SIGUSR1 to the next).
 """
 
+import signal
 import sys
+from collections.abc import Callable
 
 from common import keys
 from common.errors import LinkError
@@ -25,9 +28,25 @@ def build(node: Node[Shared]) -> None:
             raise RuntimeError("a bug of ours")
 
     node.loop.every(0.05, tick)
+    if kind == "hanging":
+        node.loop.every(0.01, hang(node))
     node.at_rest = lambda: kind != "restless"
     node.counters["resets"] += 1
     node.event("built", "info", "all is built", count=3)
+
+
+def hang(node: Node[Shared]) -> Callable[[int], None]:
+    """Return a timer that does not return while it is told to hang."""
+    told: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, _: told.append(number))
+
+    def tick(_: int) -> None:
+        if len(told) % 2:
+            node.log.info("hangs")
+        while len(told) % 2:
+            signal.pause()
+
+    return tick
 
 
 if __name__ == "__main__":

@@ -1,0 +1,78 @@
+"""The guard under a supervisor that watches it, and that speaks to guard and bridge alike."""
+
+import contextlib
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.wire.commands import MotionKind
+from tests.bridge.board import Board, board
+from tests.bridge.rig import Rig, bridge_process
+from tests.bridge.test_guard import breaks_since, bridge_pid
+from tests.common.manager import PATIENCE_US, Manager
+from tests.support import wait_until
+
+Watched = tuple[Board, "subprocess.Popen[bytes]", Manager]
+
+
+@pytest.fixture
+def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
+    """Run guard and bridge without a router, under a supervisor's eyes."""
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as manager, board() as made:
+        monkeypatch.setenv("NOTIFY_SOCKET", manager.environ["NOTIFY_SOCKET"])
+        monkeypatch.setenv("WATCHDOG_USEC", str(PATIENCE_US))
+        with bridge_process(made, "tcp/127.0.0.1:1", "bridge.heartbeat=0.5") as process:
+            made.wait_for(MotionKind.STOP)
+            yield made, process, manager
+
+
+def test_the_guard_is_ready_once_the_bridge_lives(watched: Watched) -> None:
+    _, process, manager = watched
+    wait_until(lambda: "READY=1" in manager.hear(), "that it is ready")
+    assert manager.told.count("READY=1") == 1
+    environ = Path(f"/proc/{bridge_pid(process)}/environ").read_bytes()
+    assert b"NOTIFY_SOCKET" not in environ, "the bridge does not speak for its guard"
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(20) == 0
+    assert "STOPPING=1" in manager.hear()
+
+
+def test_the_guard_beats_though_the_bridge_hangs_and_not_when_it_hangs(watched: Watched) -> None:
+    made, process, manager = watched
+    wait_until(lambda: "READY=1" in manager.hear(), "that it is ready")
+    first, count = bridge_pid(process), len(made.motions)
+    os.kill(first, signal.SIGSTOP)
+    wait_until(lambda: breaks_since(made, count), "BREAK")
+    heard = manager.beats()
+    wait_until(lambda: manager.beats() > heard, "a beat while it brakes")
+    wait_until(lambda: bridge_pid(process) != first, "the next bridge")
+    process.send_signal(signal.SIGSTOP)
+    heard = manager.beats()
+    with pytest.raises(AssertionError):
+        wait_until(lambda: manager.beats() > heard + 1, "a beat of nobody's", patience_s=0.6)
+    process.send_signal(signal.SIGCONT)
+    wait_until(lambda: manager.beats() > heard + 1, "beats again")
+
+
+def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(rig: Rig) -> None:
+    rig.drive()
+    count = len(rig.board.motions)
+    os.kill(bridge_pid(rig.process), signal.SIGHUP)
+    rig.process.send_signal(signal.SIGHUP)
+    assert rig.process.wait(20) == 0
+    assert breaks_since(rig.board, count) == 0
+    rig.board.wait_for(MotionKind.STOP)
+
+
+def test_a_guard_that_is_killed_for_its_hang_leaves_a_bridge_that_stops(rig: Rig) -> None:
+    rig.drive()
+    bridge = bridge_pid(rig.process)
+    os.kill(bridge, signal.SIGQUIT)
+    rig.process.send_signal(signal.SIGQUIT)
+    assert rig.process.wait(20) == -signal.SIGQUIT
+    rig.board.wait_for(MotionKind.STOP)
+    wait_until(lambda: not Path(f"/proc/{bridge}").exists(), "the end of the bridge")

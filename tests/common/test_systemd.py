@@ -1,0 +1,105 @@
+"""What systemd is told, on a real socket of the kind that it listens on."""
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.freshness import S
+from common.systemd import BEATS, Systemd
+from tests.common.manager import PATIENCE_US, Manager
+from tests.common.program import program
+from tests.common.test_service import SPECIMEN, on
+from tests.support import free_port, wait_until
+
+PERIOD_NS = PATIENCE_US * 1000 // BEATS
+
+
+@pytest.fixture
+def manager(tmp_path: Path) -> Iterator[Manager]:
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as made:
+        yield made
+
+
+def test_ready_is_said_once_and_beats_when_they_are_due(manager: Manager) -> None:
+    systemd = Systemd(manager.environ)
+    assert systemd.listens
+    for now_ns in (0, 1, PERIOD_NS - 1, PERIOD_NS, PERIOD_NS + 1, 5 * PERIOD_NS):
+        systemd.ready(now_ns)
+    systemd.stopping()
+    beat = "WATCHDOG=1"
+    assert manager.hear() == ["READY=1", beat, beat, beat, "STOPPING=1"]
+
+
+def test_a_beat_alone_does_not_say_that_it_is_ready(manager: Manager) -> None:
+    Systemd(manager.environ).beat(S)
+    assert manager.hear() == ["WATCHDOG=1"]
+
+
+def test_its_children_do_not_find_it(manager: Manager) -> None:
+    environ = manager.environ | {"PATH": "/bin"}
+    Systemd(environ)
+    assert environ == {"PATH": "/bin"}
+
+
+def test_an_abstract_socket_is_found_by_its_name() -> None:
+    name = f"@t2-test-{os.getpid()}"
+    with contextlib.closing(Manager(name)) as manager:
+        Systemd(manager.environ).ready(0)
+        assert manager.hear()[0] == "READY=1"
+
+
+@pytest.mark.parametrize(
+    "watchdog",
+    [{}, {"WATCHDOG_USEC": "soon"}, {"WATCHDOG_USEC": "200000", "WATCHDOG_PID": "1"}],
+)
+def test_no_beat_where_nobody_waits_for_ours(manager: Manager, watchdog: dict[str, str]) -> None:
+    systemd = Systemd({"NOTIFY_SOCKET": manager.environ["NOTIFY_SOCKET"]} | watchdog)
+    systemd.ready(0)
+    systemd.ready(100 * S)
+    assert manager.hear() == ["READY=1"]
+
+
+def test_without_systemd_nothing_is_said() -> None:
+    systemd = Systemd({})
+    assert not systemd.listens
+    systemd.ready(0)
+    systemd.stopping()
+
+
+def test_a_socket_that_is_gone_or_full_holds_nobody_up(manager: Manager) -> None:
+    systemd = Systemd(dict(manager.environ))
+    for n in range(2000):  # more than a queue takes
+        systemd.ready(n * S)
+    manager.close()
+    systemd.ready(3000 * S)
+    Path(manager.environ["NOTIFY_SOCKET"]).unlink()
+    systemd.stopping()
+    assert manager.told == []
+
+
+# --- a service ----------------------------------------------------------------------------------
+
+
+def test_a_service_is_ready_when_its_loop_runs_and_beats_until_it_hangs(
+    manager: Manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", manager.environ["NOTIFY_SOCKET"])
+    monkeypatch.setenv("WATCHDOG_USEC", str(PATIENCE_US))
+    where = f"tcp/127.0.0.1:{free_port()}"  # there is no router, and it is there all the same
+    with program(SPECIMEN, "hanging", *on(where, "001")) as it:
+        wait_until(lambda: manager.beats() > 3, "beats")
+        assert manager.told[0] == "READY=1"
+        it.process.send_signal(signal.SIGUSR1)  # its loop hangs from here on
+        it.wait_for("hangs")
+        heard = manager.beats()
+        with pytest.raises(AssertionError):
+            wait_until(lambda: manager.beats() > heard, "a beat of nobody's", patience_s=0.6)
+        it.process.send_signal(signal.SIGUSR1)
+        wait_until(lambda: manager.beats() > heard, "beats again")
+        it.process.send_signal(signal.SIGTERM)
+        assert it.code() == 0
+    assert "STOPPING=1" in manager.hear()

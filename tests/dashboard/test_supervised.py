@@ -1,0 +1,43 @@
+"""The dashboard under systemd: it is there when it serves, and both of its loops must work."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from common.loop import Loop
+from common.systemd import Systemd
+from services.dashboard.host import Host
+from tests.common.manager import Manager
+from tests.dashboard.rig import dashboard
+from tests.support import PATIENCE_S, wait_until
+
+
+@pytest.fixture
+def manager(tmp_path: Path) -> Iterator[Manager]:
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as made:
+        yield made
+
+
+def test_it_is_ready_when_it_serves(
+    manager: Manager, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC"):
+        monkeypatch.setenv(name, manager.environ[name])
+    with dashboard("tcp/127.0.0.1:1", tmp_path):
+        wait_until(lambda: manager.beats() > 1, "beats", 2 * PATIENCE_S)
+        assert manager.told[0] == "READY=1"
+    assert manager.hear()[-1] == "STOPPING=1"
+
+
+def test_a_word_of_the_servers_loop_waits_for_the_nodes(manager: Manager) -> None:
+    host = Host.__new__(Host)
+    with contextlib.closing(Loop()) as loop:
+        host.__dict__.update(_node=SimpleNamespace(loop=loop), _systemd=Systemd(manager.environ))
+        host._alive()
+        assert manager.hear() == []
+        loop.post(loop.stop)
+        loop.run()
+        assert manager.hear() == ["READY=1", "WATCHDOG=1"]
