@@ -49,6 +49,7 @@ COMMANDS = {
     "report": "a recording as one page: path, speeds, stops, streams",
     "replay": "a recording onto the bus again, or its frames to a bridge",
     "foxglove": "the bus, live, to Foxglove or Lichtblick",
+    "install": "have systemd run the services on this computer",
     "completion": "what bash, zsh or fish want to complete t2",
 }
 INSPECT = (
