@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults fleet check cover search mutants lint format types docs pictures lock audit sbom clean help
+.PHONY: demo up test fuzz soak faults fleet check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -99,6 +99,34 @@ lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, 
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
+	echo pip | $(subst pyproject.toml,,$(LOCK)) --upgrade - -o deploy/pip.lock
+
+# For a robot without internet: which set, and what its computer is.
+SET ?= robot
+WHEEL_PYTHON ?= 3.11
+WHEEL_ARCH ?= x86_64
+HOUSE = build/wheelhouse
+DOWNLOAD = $(BIN)/pip download --quiet --disable-pip-version-check --no-deps --require-hashes --only-binary :all: \
+  --implementation cp --python-version $(WHEEL_PYTHON) \
+  $(foreach glibc,2_28 2_17,--platform manylinux_$(glibc)_$(WHEEL_ARCH)) --platform manylinux2014_$(WHEEL_ARCH) \
+  --dest $(HOUSE)
+
+wheelhouse: $(STAMP) ## all for a robot without internet; SET=laptop WHEEL_PYTHON=3.13 WHEEL_ARCH=aarch64
+	rm -rf $(HOUSE)
+	mkdir -p $(HOUSE)
+	$(DOWNLOAD) -r deploy/pip.lock
+	$(DOWNLOAD) -r requirements-$(SET).lock
+	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w $(HOUSE) .
+	cp requirements-$(SET).lock $(HOUSE)/requirements.txt
+	cp deploy/t2-install.sh $(HOUSE)
+	cd $(HOUSE) && set -- t2-*-py3-none-any.whl && version=$${1#t2-} && version=$${version%%-*} && \
+	  echo $$version > VERSION && echo "Python $(WHEEL_PYTHON) on $(WHEEL_ARCH)" > PLATFORM && \
+	  echo "t2==$$version --hash=sha256:$$(sha256sum $$1 | cut -d ' ' -f 1)" >> requirements.txt && \
+	  sha256sum -- * > SHA256SUMS
+	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
+
+systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; wants root, Docker and debootstrap
+	$(BIN)/python -m tests.systemd
 
 audit: $(STAMP) ## known flaws of what LOCK=requirements.lock names, from a public database
 	$(BIN)/python -m tests.audit $(LOCK)
