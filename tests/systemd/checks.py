@@ -95,7 +95,7 @@ def watched(m: Machine) -> str:
         drives(m)
         before = m.unit(name)
         started_s = time.monotonic()
-        m.said("kill", "-STOP", before["MainPID"])
+        signal_main(m, name, "STOP")
         wait_until(lambda n=name, b=before: renewed(m, n, b), f"a new {name}", PATIENCE_S)  # type: ignore[misc]
         took.append(f"{name[3:-8]} {time.monotonic() - started_s:.1f} s")
         assert "watchdog" in m.said("journalctl", "-u", name, "-o", "cat").lower()
@@ -109,7 +109,7 @@ def killed(m: Machine) -> str:
     for name in UNITS:
         before = m.unit(name)
         started_s = time.monotonic()
-        m.said("kill", "-KILL", before["MainPID"])
+        signal_main(m, name, "KILL")
         wait_until(lambda n=name, b=before: renewed(m, n, b), f"a new {name}", PATIENCE_S)  # type: ignore[misc]
         took.append(f"{name[3:-8]} {time.monotonic() - started_s:.1f} s")
     drives(m)
@@ -198,6 +198,11 @@ def renewed(m: Machine, name: str, before: dict[str, str]) -> bool:
     """Tell whether a service is there again, by another process."""
     now = m.unit(name)
     return now["ActiveState"] == "active" and now["MainPID"] not in ("0", before["MainPID"])
+
+
+def signal_main(m: Machine, name: str, number: str) -> None:
+    """Send a signal to a service's main process, and to no other."""
+    m.said("systemctl", "kill", "--kill-whom=main", f"--signal={number}", name)
 
 
 def drives(m: Machine) -> float:
