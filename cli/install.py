@@ -21,6 +21,7 @@ TEMPLATES = Path(__file__).parent.parent / "deploy" / "systemd"
 UNITS = Path("/usr/local/lib/systemd/system")
 USER = Path("/etc/sysusers.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
+KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; the way in for laptops
 ENABLED = Path("/etc/systemd/system/multi-user.target.wants/t2.target")
 SIM = "t2-sim.service"
 BACKOFF = "t2-.service.d/20-backoff.conf"
@@ -69,7 +70,7 @@ class Host:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "--prefix", type=Path, default=Path(sys.prefix), metavar="DIR",
+        "--prefix", type=Path, default=here(), metavar="DIR",
         help="the Python environment that has T2; this one by default",
     )  # fmt: skip
     parser.add_argument(
@@ -79,6 +80,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sim", action="store_true", help="a simulated vehicle, not a real one")
     parser.add_argument("--dry-run", action="store_true", help="say what it would do, do nothing")
     parser.add_argument("--uninstall", action="store_true", help="remove units and user again")
+
+
+def here() -> Path:
+    """Return this environment, by the link that t2-install.sh keeps on it, if there is one."""
+    prefix = Path(sys.prefix)
+    current = prefix.parent / "current"
+    return current if current.is_symlink() and current.resolve() == prefix.resolve() else prefix
 
 
 def run(options: argparse.Namespace) -> int:
@@ -95,12 +103,17 @@ def run(options: argparse.Namespace) -> int:
 
 def install(host: Host, prefix: Path, sim: bool) -> None:
     """Write what is wanted, and remove what an earlier installation had more than that."""
-    if host.has(SETTINGS):  # they must do for this version
-        load(Everything, Sources(files=(DEFAULT_FILE, host.at(SETTINGS)), environ={}))
+    given = [path for path in (SETTINGS, KEYS) if host.has(path)]
+    # They must do for this version.
+    load(Everything, Sources(files=(DEFAULT_FILE, *map(host.at, given)), environ={}))
     start = "enable --now t2.target"
     if host.has(UNITS / "t2.target"):
         start = "restart t2.target  # while the vehicle stands"
-    wanted = units(prefix, sim or host.has(UNITS / SIM)) | {USER: template("t2.sysusers")}
+    wanted = {USER: template("t2.sysusers")}
+    options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
+    for name in names_here(sim or host.has(UNITS / SIM)):
+        text = template(name).replace("@PREFIX@", str(prefix))
+        wanted[UNITS / name] = text.replace("@SETTINGS@", options)
     for path in sorted(ours() - wanted.keys()):
         host.remove(path)
     for path, text in sorted(wanted.items()):
@@ -138,8 +151,8 @@ def ours() -> set[Path]:
     return {UNITS / name for name in names()} | {USER}
 
 
-def units(prefix: Path, sim: bool) -> dict[Path, str]:
-    """Return the text of each unit and drop-in that this computer is to have."""
+def names_here(sim: bool) -> list[str]:
+    """Return those that this computer is to have, and say which it cannot."""
     left_out = {name for name, library in EXTRAS.items() if find_spec(library) is None}
     for name in sorted(left_out):
         print(f"without {name}: {EXTRAS[name]} is not installed")
@@ -147,8 +160,7 @@ def units(prefix: Path, sim: bool) -> dict[Path, str]:
         left_out.add(SIM)
     if systemd_version() < BACKOFF_SINCE:
         left_out.add(BACKOFF)
-    kept = (name for name in names() if name not in left_out)
-    return {UNITS / name: template(name).replace("@PREFIX@", str(prefix)) for name in kept}
+    return [name for name in names() if name not in left_out]
 
 
 def template(name: str) -> str:

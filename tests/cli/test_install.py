@@ -61,6 +61,29 @@ def test_the_settings_are_the_vehicles_and_valid(tmp_path: Path) -> None:
     assert config.recorder.folder == "/var/lib/t2/recordings"
 
 
+def test_keys_that_are_there_are_used(tmp_path: Path) -> None:
+    keys = tmp_path / "etc/t2/keys/bus.toml"
+    keys.parent.mkdir(parents=True)
+    keys.write_text('[bus]\nlisten = ["unixsock-stream//run/t2/bus.sock", "tcp/127.0.0.1:7447"]\n')
+    t2_install(tmp_path)
+    command = unit(files(tmp_path)[f"{UNITS}/t2-router.service"])["Service"]["ExecStart"]
+    assert command.endswith(" --config /etc/t2/t2.toml --config /etc/t2/keys/bus.toml")
+
+
+def test_a_link_to_this_environment_is_named_instead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    version = tmp_path / "1.0"
+    version.mkdir()
+    monkeypatch.setattr("sys.prefix", str(version))
+    assert install.here() == version
+    (tmp_path / "current").symlink_to("2.0")
+    assert install.here() == version
+    (tmp_path / "current").unlink()
+    (tmp_path / "current").symlink_to("1.0")
+    assert install.here() == tmp_path / "current"
+
+
 def test_a_simulated_vehicle_stays_one_until_it_is_uninstalled(tmp_path: Path) -> None:
     t2_install(tmp_path, "--sim")
     assert f"{UNITS}/t2-sim.service" in files(tmp_path)

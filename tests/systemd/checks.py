@@ -173,6 +173,7 @@ def upgrades(m: Machine) -> str:
     assert m.said("readlink", "/opt/t2/current") == first
     m.said("systemctl", "restart", "t2.target")
     wait_until(lambda: all(active(m, name) for name in UNITS), "the version before", PATIENCE_S)
+    assert "replace" not in m.said(T2, "install"), "its own prefix is the link"
     assert "disable --now" in m.tried(T2, "install", "--uninstall").stdout
     m.said("systemctl", "disable", "--now", "t2.target")
     m.said(T2, "install", "--uninstall")

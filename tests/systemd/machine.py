@@ -1,4 +1,4 @@
-"""A computer with a systemd of its own: a privileged container without a network.
+"""A computer with a systemd of its own: a container with rights and without a network.
 
 Its image is made of Debian's packages, once, and stays: ``docker rmi t2-systemd-test:SUITE``.
 """
@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 IMAGE = "t2-systemd-test"
@@ -127,3 +127,13 @@ def booted(suite: str, wheelhouse: Path) -> Iterator[Machine]:
         yield machine
     finally:
         subprocess.run(["docker", "rm", "--force", name], check=False, stdout=subprocess.DEVNULL)
+        forget(name)
+
+
+def forget(name: str) -> None:
+    """Remove the control groups that a machine has left; the innermost go first."""
+    for root in Path("/sys/fs/cgroup").rglob(name):
+        for folder in (*sorted(root.rglob("*"), reverse=True), root):
+            if folder.is_dir():
+                with suppress(OSError):  # its last process is still on its way
+                    folder.rmdir()
