@@ -37,7 +37,7 @@ def checked(machine: Machine, stay: bool) -> int:
         started_s = time.monotonic()
         try:
             seen, code = check(machine), 0
-        except AssertionError as error:
+        except (AssertionError, subprocess.SubprocessError) as error:
             seen, code = f"FAILED: {error}", 1
         took_s = time.monotonic() - started_s
         print(f"{check.__name__:16} {took_s:6.1f} s  {seen}", flush=True)

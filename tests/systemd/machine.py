@@ -88,6 +88,10 @@ class Machine:
             ["docker", "exec", "-i", self.name, *into], input=text, text=True, check=True
         )
 
+    def carry(self, folder: Path, to: str) -> None:
+        """Copy a folder to a place that does not exist yet."""
+        subprocess.run(["docker", "cp", "--quiet", folder, f"{self.name}:{to}"], check=True)
+
     def unit(self, name: str) -> dict[str, str]:
         """Return the properties of a unit."""
         lines = self.said("systemctl", "show", name).splitlines()
