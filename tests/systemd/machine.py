@@ -124,8 +124,8 @@ def booted(suite: str, wheelhouse: Path) -> Iterator[Machine]:
         "--volume", f"{wheelhouse}:/wheelhouse:ro",
         image(suite), "/bin/sh", "-c", BOOT.replace("NAME", name),
     ]  # fmt: skip
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     try:
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         machine = Machine(name)
         machine.tried("systemctl", "is-system-running", "--wait")
         yield machine
