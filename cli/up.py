@@ -13,12 +13,16 @@ from cli.settings import Everything
 from cli.supervisor import Supervisor
 from common import log
 from common.config import load
+from common.errors import ConfigError
 from common.options import add_sources, sources
+
+Commands = list[tuple[str, Sequence[str]]]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
+    parser.add_argument("--only", metavar="NAME", help="this one alone, such as bridge")
     parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
     add_insecure(parser)
     add_sources(parser)
@@ -28,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
     config = load(Everything, sources(options)).config
     log.configure(config.log, "up")
-    supervisor = Supervisor([*commands(options), *recorder(options)])
+    supervisor = Supervisor(chosen([*commands(options), *recorder(options)], options.only))
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
     structlog.get_logger().info(
@@ -41,7 +45,15 @@ def run(options: argparse.Namespace) -> int:
     return supervisor.run()
 
 
-def commands(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
+def chosen(all_of_them: Commands, only: str | None) -> Commands:
+    """Return the one that is wanted, or all; raise ``ConfigError`` for one that there is not."""
+    names = [name for name, _ in all_of_them]
+    if only is not None and only not in names:
+        raise ConfigError(f"--only {only}: no such process; there are {', '.join(names)}")
+    return [each for each in all_of_them if only in (None, each[0])]
+
+
+def commands(options: argparse.Namespace) -> Commands:
     """Return what is run, by name: the later ones stand on the earlier ones."""
     passed = passed_on(options)
     modules = {"router": ["cli", "router"]}
@@ -51,7 +63,7 @@ def commands(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
     return [(name, [sys.executable, "-m", *words, *passed]) for name, words in modules.items()]
 
 
-def recorder(options: argparse.Namespace) -> list[tuple[str, Sequence[str]]]:
+def recorder(options: argparse.Namespace) -> Commands:
     """Return the black box, where its library is installed: nobody waits for it."""
     if find_spec("mcap") is None:
         return []

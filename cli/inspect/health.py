@@ -1,49 +1,103 @@
-"""``t2 health``: how the services fare, by what they tell once a second."""
+"""``t2 health``: how the services fare, by what they tell once a second.
+
+``t2 health safety`` asks one of them itself: the answer is made in its own loop. It takes no longer
+than the answer does, so that a container's health check can ask often.
+"""
 
 import argparse
 import sys
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.inspect.presence import present
-from cli.inspect.shell import add_options, quietly, seated, wants_json
+from cli.inspect.shell import Seat, add_options, quietly, seated, wants_json
 from common import codec, keys
-from common.bus.probe import Probe
+from common.bus.probe import Answer, Probe
 from common.errors import MessageError
 from common.messages import Health
 
 NEEDED = ("bridge", "safety", "odom")
+ROUTER = "router"  # is no service of ours: that it lets a session in is its answer
 LISTEN_S = 2.5  # twice what a service takes between two messages, and some
+ANSWER_S = 2.0  # a loop that is held up for longer does not fare well
 LATE_S = 0.1  # later than that a loop is held up
+WHY = {
+    "hangs": "is there and tells nothing: it hangs",
+    "missing": "is not there",
+    "silent": "does not answer",
+    "unreadable": "answers what is no health",
+}
+
+
+class Row(NamedTuple):
+    """What is known of one service."""
+
+    robot: str
+    name: str
+    state: str  # ok, or why it is not
+    health: Health | None  # what it told last
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
+    parser.add_argument(
+        "service", nargs="?", help="ask this one alone, such as safety, or the router"
+    )
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show it once; 1 when one of the robot's own services is missing or hangs."""
+    """Show it once; 1 when one of the robot's own services, or the one asked, does not fare."""
     with seated(options) as seat:
-        told = listen(seat.probe, seat.robot)
-        there = {(each.robot, each.name)
-                 for each in present(seat.probe, seat.robot) if each.instance}  # fmt: skip
-    robots = {robot for robot, _ in told.keys() | there} or {seat.robot}
-    missing = [(r, name) for r in sorted(robots) for name in NEEDED if (r, name) not in told]
-    silent = sorted((there - told.keys()) | set(missing))
-    rows = [(where, told.get(where)) for where in sorted(told.keys() | set(silent))]
+        rows = one(seat, options.service) if options.service else every(seat)
     if wants_json(options):
-        for (robot, name), health in rows:
-            output.line(as_json(robot, name, health, (robot, name) in there))
+        for row in rows:
+            output.line(as_json(row))
     else:
-        print(as_table(rows, there))
-    for robot, name in silent:
-        why = "is there and tells nothing: it hangs" if (robot, name) in there else "is not there"
-        print(f"t2 health: {name} of robot {robot} {why}", file=sys.stderr)
+        print(as_table(rows))
+    silent = [row for row in rows if row.state != "ok"]
+    for row in silent:
+        print(f"t2 health: {row.name} of robot {row.robot} {WHY[row.state]}", file=sys.stderr)
     return 1 if silent else 0
+
+
+def one(seat: Seat, name: str) -> list[Row]:
+    """Ask one service for the last that it told of itself."""
+    if name == ROUTER:
+        return [Row(seat.robot, name, "ok", None)]
+    answers = seat.probe.ask(keys.info_key(seat.robot, name, "last"), timeout_s=ANSWER_S)
+    rows = [told_last(each, name) for each in answers if not each.refusal]
+    return rows or [Row(seat.robot, name, "silent", None)]
+
+
+def told_last(answer: Answer, name: str) -> Row:
+    """Return what a service's own answer tells; in its first second it has no health yet."""
+    robot = chunks(answer.key)[0]
+    try:
+        told = msgspec.json.decode(answer.payload, type=dict[str, msgspec.Raw])
+        health = told.get(keys.HEALTH.on(robot, service=name))
+        said = None if health is None else msgspec.json.decode(health, type=Health)
+    except msgspec.DecodeError:
+        return Row(robot, name, "unreadable", None)
+    return Row(robot, name, "ok", said)
+
+
+def every(seat: Seat) -> list[Row]:
+    """Listen to all of them, and look who is there besides."""
+    told = listen(seat.probe, seat.robot)
+    there = {(each.robot, each.name)
+             for each in present(seat.probe, seat.robot) if each.instance}  # fmt: skip
+    robots = {robot for robot, _ in told.keys() | there} or {seat.robot}
+    needed = {(robot, name) for robot in robots for name in NEEDED}
+    return [
+        Row(*where, "ok" if where in told else "hangs" if where in there else "missing",
+            told.get(where))
+        for where in sorted(told.keys() | there | needed)
+    ]  # fmt: skip
 
 
 def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
@@ -61,29 +115,28 @@ def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
     return told
 
 
-def as_json(robot: str, name: str, health: Health | None, alive: bool) -> Mapping[str, object]:
+def as_json(row: Row) -> Mapping[str, object]:
     """Return one service for programs."""
-    fields = msgspec.structs.asdict(health) if health else {}
+    fields = msgspec.structs.asdict(row.health) if row.health else {}
     fields.pop("timing", None)  # `t2 latency` shows it
-    return {"robot": robot, "service": name, "alive": alive, "told": bool(health)} | fields
+    alive, told = row.state in ("ok", "hangs"), row.health is not None
+    return {"robot": row.robot, "service": row.name, "alive": alive, "told": told} | fields
 
 
-def as_table(rows: list[tuple[tuple[str, str], Health | None]], there: set[tuple[str, str]]) -> str:
+def as_table(rows: list[Row]) -> str:
     """Return a row for each service."""
-    cells = []
-    for where, health in rows:
-        state = "ok" if health else ("hangs" if where in there else "missing")
-        cells.append([where[0], where[1], *_cells(health, state)])
+    cells = [[row.robot, row.name, *_cells(row)] for row in rows]
     head = ["robot", "service", "", "version", "up", "late ms", "MB", "messages/s", "counters"]
     return output.table(head, cells)
 
 
-def _cells(health: Health | None, state: str) -> list[str]:
+def _cells(row: Row) -> list[str]:
+    health = row.health
     if not health:
-        return [state, *[""] * 6]
+        return [row.state, *[""] * 6]
     counters = " ".join(f"{name}={count}" for name, count in sorted(health.counters.items()))
     return [
-        "held up" if health.lateness > LATE_S else state,
+        "held up" if health.lateness > LATE_S else row.state,
         health.version,
         up(health.uptime),
         f"{health.lateness * 1000:.1f}",

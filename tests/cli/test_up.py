@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from cli.up import commands
+from cli.up import chosen, commands
+from common.errors import ConfigError
 from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
 from tests.support import free_port, wait_until
@@ -138,3 +139,11 @@ def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
         assert command[-len(passed) :] == passed, name
     assert " ".join(made["sim"][1:5]) == "-m sim --world x"
     assert " ".join(made["router"][1:4]) == "-m cli router"
+
+
+def test_one_of_them_alone() -> None:
+    everything = commands(options())
+    assert chosen(everything, None) == everything
+    assert [name for name, _ in chosen(everything, "bridge")] == ["bridge"]
+    with pytest.raises(ConfigError, match="--only brigde: no such process; there are router, sim"):
+        chosen(everything, "brigde")

@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-from functools import partial
 
 import pytest
 
@@ -12,7 +11,7 @@ from cli.inspect import info, measure
 from common import codec, keys
 from common.bus.bus import Bus
 from common.messages import Bumper, Event
-from tests.cli.inspect.tool import Tool, health, pretend
+from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
 from tests.common.rig import Rig
 
@@ -168,7 +167,7 @@ def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> N
     assert (result.code, result.lines[0]["publishers"]) == (1, [])
 
 
-# --- services, health, schema -----------------------------------------------------------------
+# --- services, schema -------------------------------------------------------------------------
 
 
 def test_services(rig: Rig, bridge: Bus, tool: Tool) -> None:
@@ -189,19 +188,6 @@ def test_nobody_is_there(tool: Tool) -> None:
     result = tool("services")
     assert (result.code, result.out) == (1, "")
     assert "nobody is there" in result.err
-
-
-def test_health(rig: Rig, tool: Tool) -> None:
-    for name in ("bridge", "safety"):
-        pretend(rig, name, {keys.HEALTH: partial(health, name)}, service=name)
-    pretend(rig, "odom", {})
-    result = tool("health", "--text")
-    assert result.code == 1
-    rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
-    assert rows["bridge"] == ["ok", "1", "0m03s", "0.0", "5", "0", "overrun=2"]
-    assert rows["odom"] == ["hangs"]
-    assert "odom of robot" in result.err
-    assert "it hangs" in result.err
 
 
 def test_schema_by_type_and_by_key(tool: Tool) -> None:

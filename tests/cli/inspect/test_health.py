@@ -1,0 +1,115 @@
+"""``t2 health``: all of them by what they tell, one of them by its own answer."""
+
+import threading
+from collections.abc import Iterator
+from functools import partial
+
+import msgspec
+import pytest
+
+from cli.inspect import health as command
+from common import keys
+from common.bus.bus import Bus
+from tests.cli.inspect.tool import Tool, health, pretend
+from tests.common.rig import Rig
+
+
+def test_health(rig: Rig, tool: Tool) -> None:
+    for name in ("bridge", "safety"):
+        pretend(rig, name, {keys.HEALTH: partial(health, name)}, service=name)
+    pretend(rig, "odom", {})
+    result = tool("health", "--text")
+    assert result.code == 1
+    rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
+    assert rows["bridge"] == ["ok", "1", "0m03s", "0.0", "5", "0", "overrun=2"]
+    assert rows["odom"] == ["hangs"]
+    assert "odom of robot" in result.err
+    assert "it hangs" in result.err
+
+
+@pytest.fixture
+def answers() -> dict[str, bytes]:
+    """What safety of that robot answers when it is asked for its last values, by robot."""
+    return {}
+
+
+@pytest.fixture
+def safety(rig: Rig, answers: dict[str, bytes]) -> Bus:
+    last = {keys.HEALTH.on(rig.robot, service="safety"): health("safety"), "another": None}
+    answers[rig.robot] = msgspec.json.encode(last)
+
+    def answer(bus: Bus) -> None:
+        key = keys.info_key(rig.robot, "safety", "last")
+        bus.answer(key, lambda: answers[rig.robot], "application/json")
+
+    return pretend(rig, "safety", {}, answer)
+
+
+def test_one_is_asked_itself(safety: Bus, tool: Tool) -> None:
+    result = tool("health", "safety")
+    assert (result.code, result.err) == (0, "")
+    (line,) = result.lines
+    assert (line["service"], line["alive"], line["told"], line["rss"]) == (
+        "safety", True, True, 5_000_000,
+    )  # fmt: skip
+    shown = tool("health", "safety", "--text").out.splitlines()[1]
+    assert shown.split()[1:4] == ["safety", "ok", "1"]
+
+
+def test_one_of_every_robot(rig: Rig, safety: Bus, tool: Tool) -> None:
+    assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [rig.robot]
+
+
+def test_one_that_has_only_just_begun_fares_well(
+    rig: Rig, safety: Bus, tool: Tool, answers: dict[str, bytes]
+) -> None:
+    answers[rig.robot] = b"{}"
+    result = tool("health", "safety")
+    assert (result.code, result.lines[0]["alive"], result.lines[0]["told"]) == (0, True, False)
+
+
+@pytest.mark.parametrize("nonsense", [b"\xff", b"[]", b'{"KEY": {"service": 1}}'])
+def test_an_answer_that_is_no_health(
+    rig: Rig, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
+) -> None:
+    key = keys.HEALTH.on(rig.robot, service="safety")
+    answers[rig.robot] = nonsense.replace(b"KEY", key.encode())
+    result = tool("health", "safety")
+    assert (result.code, result.lines[0]["alive"]) == (1, False)
+    assert f"safety of robot {rig.robot} answers what is no health" in result.err
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "ANSWER_S", 0.3)
+
+
+def test_one_that_is_not_there(tool: Tool, impatient: None) -> None:
+    result = tool("health", "odom")
+    assert (result.code, result.lines[0]["alive"]) == (1, False)
+    assert f"odom of robot {tool.robot} does not answer" in result.err
+
+
+@pytest.fixture
+def held_up(rig: Rig, safety: Bus) -> Iterator[None]:
+    """Hold the loop of all services up while the test runs."""
+    end = threading.Event()
+
+    def hang() -> None:
+        end.wait(20.0)
+
+    rig.loop.post(hang)
+    yield
+    end.set()
+
+
+def test_one_whose_loop_hangs_does_not_answer(held_up: None, tool: Tool, impatient: None) -> None:
+    result = tool("health", "safety")
+    assert result.code == 1
+    assert "does not answer" in result.err
+
+
+def test_the_router_answers_by_letting_us_in(tool: Tool) -> None:
+    result = tool("health", "router", "--text")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.splitlines()[1].split() == [tool.robot, "router", "ok"]
