@@ -14,6 +14,7 @@ from cli.access import access_control
 from common import log
 from common.bus.session import router, router_config
 from common.config import load
+from common.errors import ConfigError
 from common.options import add_sources, sources
 from common.settings import Bus, Shared, is_encrypted
 from common.systemd import Systemd
@@ -24,8 +25,9 @@ LOOK_S = 0.25  # between two questions to the router, where systemd wants to kno
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "--print", action="store_true", help="print the configuration for `zenohd -c`, and end"
-    )
+        "--print", nargs="?", const="-", metavar="FILE",
+        help="print the configuration for `zenohd -c`, or write it to FILE, and end",
+    )  # fmt: skip
     add_insecure(parser)
     add_sources(parser)
 
@@ -43,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     config = load(Shared, sources(options)).config
     access = access_of(config.bus)
     if options.print:
-        print(json.dumps(router_config(config.bus, access), indent=2))
+        tell(json.dumps(router_config(config.bus, access), indent=2), options.print)
         return 0
     log.configure(config.log, "router")
     ended = threading.Event()
@@ -59,6 +61,17 @@ def run(options: argparse.Namespace) -> int:
                 systemd.ready(time.monotonic_ns())
         systemd.stopping()
     return 0
+
+
+def tell(text: str, file: str) -> None:
+    """Print a text, or write it to a file; raise ``ConfigError`` when that cannot be written."""
+    if file == "-":
+        print(text)
+        return
+    try:
+        Path(file).write_text(f"{text}\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"--print {file}: cannot be written: {error.strerror}") from None
 
 
 def access_of(bus: Bus) -> dict[str, object] | None:

@@ -50,6 +50,16 @@ def test_it_prints_its_configuration_for_zenohd(capsys: pytest.CaptureFixture[st
     zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
 
 
+def test_it_writes_its_configuration_where_there_is_no_shell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["router", "--print", str(tmp_path / "router.json5")]) == 0
+    assert json.loads((tmp_path / "router.json5").read_text())["mode"] == "router"
+    assert capsys.readouterr().out == ""
+    assert main(["router", "--print", str(tmp_path / "none" / "x")]) == EXIT_CONFIG
+    assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
+
+
 def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["router", "--print"]) == 0
     printed = json.loads(capsys.readouterr().out)
