@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults fleet check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults fleet compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -50,6 +50,8 @@ faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faul
 
 fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
 	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
+compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
+	$(BIN)/python -m tests.compose
 
 check: lint types cover search ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1
@@ -95,9 +97,10 @@ LAPTOP = teleop dashboard record report foxglove keys
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
-lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, laptop
+lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, dashboard, laptop
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
+	$(LOCK) --constraint requirements.lock --extra record --extra dashboard -o requirements-dashboard.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 	echo pip | $(subst pyproject.toml,,$(LOCK)) --upgrade - -o deploy/pip.lock
 

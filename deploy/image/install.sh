@@ -1,0 +1,20 @@
+#!/bin/sh
+# install.sh LOCK | t2: have pip install a lock, or T2 itself, into /opt/venv.
+set -eu
+source=/opt/src
+wheels=$source/build/wheelhouse
+if [ ! -d /opt/venv ]; then
+  python3 -m venv /opt/pip
+  python3 -m venv --without-pip /opt/venv
+  mkdir /opt/empty
+fi
+if ls $wheels/*.whl >/dev/null 2>&1; then
+  export PIP_NO_INDEX=1 PIP_FIND_LINKS=$wheels
+fi
+if [ "$1" = t2 ]; then
+  own=$(ls $wheels/t2-*.whl 2>/dev/null || echo $source)
+  set -- --no-deps "$own"
+else
+  set -- --require-hashes -r "$source/$1"
+fi
+exec /opt/pip/bin/pip --python /opt/venv/bin/python install --quiet --no-compile "$@"
