@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from tests.compose import crashes, drives, rights, upgrade
-from tests.compose.base import base
+from tests.compose.base import base, wheelhouse
 from tests.compose.engine import docker, missing
 from tests.compose.stage import Stage, say, staged
 from tests.compose.table import Row, markdown
@@ -48,12 +48,17 @@ LOOKS: Sequence[tuple[str, Look]] = (
     ("odom upgraded, and back", upgrade.one_service_is_upgraded),
     ("logs", drives.logs_are_in_order),
 )
+KEPT = "test-kept"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Look at everything; return 1 when something is not as it should be."""
     parser = argparse.ArgumentParser(prog="python -m tests.compose", description=__doc__)
     parser.add_argument("only", nargs="*", help="only what has these words in its name")
+    parser.add_argument(
+        "--keep-wheelhouse", action="store_true", help="take build/wheelhouse as it is"
+    )
+    parser.add_argument("--keep", action="store_true", help="leave the images for the next run")
     options = parser.parse_args(argv)
     looks = [each for each in LOOKS if not options.only or any(o in each[0] for o in options.only)]
     lacks = missing()
@@ -61,11 +66,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"compose-test: NOT RUN: {lacks}")
         return 0
     rows: list[Row] = []
-    tag = f"test{secrets.token_hex(3)}"
+    tag = KEPT if options.keep else f"test{secrets.token_hex(3)}"
     with tempfile.TemporaryDirectory() as folder:
-        with staged(Path(folder), base(), tag) as stage:
+        image = base()
+        if not options.keep_wheelhouse:
+            wheelhouse(image)
+        with staged(Path(folder), image, tag, keep=options.keep) as stage:
             rows += [looked(stage, *each) for each in looks]
-        rows.append(nothing_is_left(tag))
+        if not options.keep:
+            rows.append(nothing_is_left(tag))
     print(markdown(rows))
     return int(not all(row.fine for row in rows))
 

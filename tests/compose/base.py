@@ -3,12 +3,21 @@
 import os
 import shutil
 
-from tests.compose.engine import docker, pulled, ran
+from tests.compose.engine import EngineError, docker, pulled, ran
 from tests.compose.stage import ROOT, say
 
 OFFICIAL = "python:3.13-slim"
 OWN = "t2-base:bookworm"  # stays on the machine: it takes minutes to make
 MAKING_S = 1800.0
+
+
+def wheelhouse(image: str) -> None:
+    """Make the wheelhouse anew, for the Python of an image: T2 itself is in it."""
+    say("making the wheelhouse")
+    version = "import sys; print('{}.{}'.format(*sys.version_info))"
+    python = docker("run", "--rm", "--entrypoint", "python3", image, "-c", version)
+    make = ["make", "-C", str(ROOT), "wheelhouse", "SET=laptop", f"WHEEL_PYTHON={python}"]
+    ran(make, None, MAKING_S)
 
 
 def base() -> str:
@@ -21,9 +30,7 @@ def base() -> str:
     if pulled(OFFICIAL):
         return OFFICIAL
     if shutil.which("debootstrap") is None or os.geteuid() != 0:
-        raise AssertionError(
-            "no registry gives an image to build on, and without root and debootstrap none is made"
-        )
+        raise EngineError("no registry gives a base image; to make one takes root and debootstrap")
     say("making a base image of Debian's packages")
     ran(["sh", str(ROOT / "deploy/image/base.sh"), OWN], None, MAKING_S)
     return OWN

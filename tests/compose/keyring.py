@@ -1,6 +1,8 @@
 """Certificates as ``t2 keys`` makes them: of the robot, and of one who drives it."""
 
+import io
 import shutil
+from contextlib import redirect_stdout
 from pathlib import Path
 
 from cli.__main__ import main
@@ -19,7 +21,8 @@ class Keyring:
             ["issue", "driver", "anna", "--robot", "001"],
             ["issue", "robot", "001", "--address", "127.0.0.1", "--address", "router"],
         ):
-            code = main(["keys", *words, *at])
+            with redirect_stdout(io.StringIO()):
+                code = main(["keys", *words, *at])
             assert code == 0, words
         for file in (self.robot, *self.robot.iterdir()):
             shutil.chown(file, USER, USER)

@@ -99,8 +99,8 @@ def override(sets: list[str], trace: Path) -> dict[str, object]:
 
 
 @contextmanager
-def staged(folder: Path, base: str, tag: str) -> Iterator[Stage]:
-    """Build, bring up and sit at the wheel while the context lasts."""
+def staged(folder: Path, base: str, tag: str, *, keep: bool = False) -> Iterator[Stage]:
+    """Build, bring up and sit at the wheel while the context lasts; ``keep`` leaves the images."""
     ports, keyring, holdup_s = Ports.free(), Keyring(folder / "keys"), holdup.measured()
     sets = [*ports.settings(), *holdup.settings(holdup_s)]
     trace = folder / "trace"
@@ -115,7 +115,9 @@ def staged(folder: Path, base: str, tag: str) -> Iterator[Stage]:
         ["sim"],
     )
     with ExitStack() as stack:
-        stack.callback(leave, project, tag)
+        if not keep:
+            stack.callback(remove_images, tag)
+        stack.callback(leave, project)
         say("building the images")
         project("build", patience_s=BUILD_S)
         say("bringing all up")
@@ -141,10 +143,14 @@ def dialled(ports: Ports, folder: Path) -> settings.Bus:
     )
 
 
-def leave(project: Project, tag: str) -> None:
-    """Take all down that was put up, images too, but for the base."""
+def leave(project: Project) -> None:
+    """Take all down that was put up."""
     say("taking all down")
     project("down", "--volumes", "--remove-orphans", "--timeout", "10", check=False)
+
+
+def remove_images(tag: str) -> None:
+    """Remove the images of a run, and what they were built from, but for the base."""
     for image in docker("image", "ls", "--quiet", "--filter", f"reference=t2-*:{tag}*").split():
         docker("image", "rm", "--force", image, check=False)
     docker("image", "prune", "--force", "--filter", "label=t2.stage=build", check=False)
