@@ -50,6 +50,7 @@ faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faul
 
 fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
 	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
+
 compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
 	$(BIN)/python -m tests.compose
 
