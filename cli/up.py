@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
     parser.add_argument("--only", metavar="NAME", help="this one alone, such as bridge")
     parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
+    parser.add_argument("--no-router", action="store_true", help="one is running, such as zenohd")
     add_insecure(parser)
     add_sources(parser)
 
@@ -56,7 +57,8 @@ def chosen(all_of_them: Commands, only: str | None) -> Commands:
 def commands(options: argparse.Namespace) -> Commands:
     """Return what is run, by name: the later ones stand on the earlier ones."""
     passed = passed_on(options)
-    modules = {"router": ["cli", "router"]}
+    # Demo, soak and tests make options of their own, and always want a router.
+    modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
     if not options.no_sim:
         modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
     modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}

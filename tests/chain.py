@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -80,11 +80,13 @@ def chain(
     listen: str = "127.0.0.1",
     log: str = "log.jsonl",
     env: Mapping[str, str] | None = None,
+    route: Callable[[Sequence[str]], list[str]] | None = None,
 ) -> Iterator[Chain]:
     """Run the stack while the context lasts, as shipped unless this machine cannot bear it.
 
     ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides. The router
-    listens on the address ``listen``; ``log`` is a file in the folder.
+    listens on the address ``listen``; ``log`` is a file in the folder. ``route`` returns the
+    command of a router that is none of ours, for these settings.
     """
     holdup_s = 0.0 if shipped else holdup.measured()
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
@@ -103,6 +105,8 @@ def chain(
     files = [file for file in (folder / "lane.toml",) if file.exists()]
     options = Namespace(no_sim=False, world=world, config=files, sets=sets)
     made = {name: list(command) for name, command in commands(options)}
+    if route:
+        made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file)]
     it = Chain(endpoint, trace_file, Control(control), made, folder / log, config, env)
@@ -118,7 +122,8 @@ def chain(
 def _is_up(it: Chain) -> bool:
     ended = [name for name, process in it.processes.items() if process.poll() is not None]
     assert not ended, f"{ended} ended: {it.log.read_text()}"
-    return it.log.read_text().count('"event": "started"') >= len(it.commands)
+    ours = [command for command in it.commands.values() if command[0] == sys.executable]
+    return it.log.read_text().count('"event": "started"') >= len(ours)
 
 
 class Witness:

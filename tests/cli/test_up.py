@@ -122,6 +122,11 @@ def test_without_the_simulated_vehicle() -> None:
     assert names == ["router", "bridge", "safety", "odom"]
 
 
+def test_on_a_router_that_is_running() -> None:
+    names = [name for name, _ in commands(options(no_router=True))]
+    assert names == ["sim", "bridge", "safety", "odom"]
+
+
 def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
     files = [Path("a.toml"), Path("b.toml")]
     made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))

@@ -1,0 +1,31 @@
+"""One stack on one zenohd for a module's tests: they look at it, and leave it standing."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from common.loop import Loop
+from tests.chain import Chain, chain
+from tests.support import bus_on, running
+from tests.test_chain import Stick
+from tests.zenohd.router import command, found
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
+    """Run the stack on zenohd."""
+    zenohd = found()
+    folder: Path = tmp_path_factory.mktemp("stack")
+    with chain(folder, route=partial(command, zenohd, folder)) as it:
+        yield it
+
+
+@pytest.fixture
+def stick(stack: Chain) -> Iterator[Stick]:
+    """Be a source that asks without a pause."""
+    with running(Loop()) as loop:
+        it = Stick(loop)
+        with bus_on(stack.endpoint, loop, it.declare):
+            yield it

@@ -1,0 +1,97 @@
+"""A real ``zenohd`` as the stack's router, and a second one that speaks HTTP."""
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import urllib.request
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.processes import ran, sets
+from tests.support import free_port, wait_until
+
+REST = Path(__file__).parent.parent.parent / "deploy" / "zenohd" / "rest.json5"
+ABSENT = "no zenohd: ZENOHD names none and there is none on PATH; README.md says where it is had"
+
+
+def found() -> str:
+    """Return where zenohd is; skip the test that asks where there is none."""
+    path = os.environ.get("ZENOHD") or shutil.which("zenohd")
+    if not path:
+        pytest.skip(ABSENT)
+    return path
+
+
+def command(zenohd: str, folder: Path, given: Sequence[str]) -> list[str]:
+    """Return how zenohd is started with the configuration that ``t2 router`` prints for it."""
+    printed = ran("router", "--print", *sets(*given))
+    assert printed.returncode == 0, printed.stderr
+    file = folder / "zenohd.json5"
+    file.write_text(printed.stdout, encoding="utf-8")
+    return [zenohd, "-c", str(file)]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What speaks HTTP for the bus."""
+
+    port: int
+
+    def get(self, path: str, accept: str = "application/json") -> bytes:
+        """Ask for a key; 200 is wanted."""
+        return self._ask(path, "GET", accept=accept)
+
+    def rows(self, path: str) -> list[dict[str, Any]]:
+        """Ask for a key, and return what each one answers."""
+        rows: list[dict[str, Any]] = json.loads(self.get(path))
+        return rows
+
+    def put(self, path: str, body: bytes) -> None:
+        """Publish, as `curl -X PUT` does."""
+        self._ask(path, "PUT", body)
+
+    def _ask(self, path: str, method: str, body: bytes | None = None, accept: str = "") -> bytes:
+        url = f"http://127.0.0.1:{self.port}/{path}"
+        request = urllib.request.Request(url, body, {"Accept": accept}, method=method)
+        with urllib.request.urlopen(request, timeout=15) as answer:
+            return bytes(answer.read())
+
+    def answers(self) -> bool:
+        """Tell whether it listens."""
+        with contextlib.suppress(OSError):
+            self.get("t2/nothing")
+            return True
+        return False
+
+
+@contextlib.contextmanager
+def rest(
+    zenohd: str, log: Path, endpoint: str, tls: dict[str, object] | None = None
+) -> Iterator[Rest]:
+    """Run the second one while the context lasts; skip where its plugins are not installed."""
+    port = free_port()
+    changes = {"plugins/rest/http_port": f"127.0.0.1:{port}", "connect/endpoints": [endpoint]}
+    if tls is not None:
+        changes["transport/link/tls"] = tls  # type: ignore[assignment]
+    words = [f"--cfg={path}:{json.dumps(value)}" for path, value in changes.items()]
+    started = [zenohd, "-c", str(REST), *words]
+    with (
+        log.open("ab") as output,
+        subprocess.Popen(started, stdout=output, stderr=output) as process,
+    ):
+        try:
+            it = Rest(port)
+            wait_until(lambda: process.poll() is not None or it.answers(), f"REST; {log}")
+            said = log.read_text(encoding="utf-8", errors="replace")
+            if process.poll() is not None and "library not found" in said.lower():
+                pytest.skip("this zenohd has no plugins for REST and storages beside it")
+            assert process.poll() is None, said
+            yield it
+        finally:
+            process.kill()
