@@ -34,10 +34,9 @@ class Systemd:
         return bool(self._address)
 
     def ready(self, now_ns: int) -> None:
-        """Say that the service is there, the first time; and beat. For the loop that works."""
+        """Say that the service is there, until that was taken once; and beat."""
         if not self._ready:
-            self._ready = True
-            self._say("READY=1")
+            self._ready = self._say("READY=1")
         self.beat(now_ns)
 
     def beat(self, now_ns: int) -> None:
@@ -50,13 +49,14 @@ class Systemd:
         """Say that the end has begun."""
         self._say("STOPPING=1")
 
-    def _say(self, text: str) -> None:
+    def _say(self, text: str) -> bool:
         if not self._address:
-            return
+            return False
         # A full queue or a socket that is gone must not hold up what drives.
         with (
             contextlib.suppress(OSError),
             socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock,
         ):
             sock.setblocking(False)
-            sock.sendto(text.encode(), self._address)
+            return bool(sock.sendto(text.encode(), self._address))
+        return False

@@ -81,6 +81,17 @@ def test_a_socket_that_is_gone_or_full_holds_nobody_up(manager: Manager) -> None
     assert manager.told == []
 
 
+def test_ready_is_said_again_until_a_full_queue_takes_it(manager: Manager) -> None:
+    systemd = Systemd(manager.environ)
+    for n in range(2000):
+        systemd.beat(n * S)
+    systemd.ready(3000 * S)
+    assert "READY=1" not in manager.hear()
+    systemd.ready(3001 * S)
+    systemd.ready(3002 * S)
+    assert manager.hear().count("READY=1") == 1
+
+
 # --- a service ----------------------------------------------------------------------------------
 
 
