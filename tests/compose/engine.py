@@ -89,10 +89,14 @@ class Project:
 
     def container(self, service: str) -> "Container":
         """Return the container of a service, running or not."""
-        ids = self("ps", "--all", "--quiet", service, check=False) or self("ps", "-q", service)
+        label = "label=com.docker.compose"
+        ids = docker(
+            "ps", "--all", "--quiet", "--no-trunc", "--filter", f"{label}.project={self.name}",
+            "--filter", f"{label}.service={service}",
+        ).split()  # fmt: skip
         if not ids:
             raise EngineError(f"{service} has no container")
-        return Container(ids.splitlines()[0])
+        return Container(ids[0])
 
 
 @dataclass(frozen=True, slots=True)
