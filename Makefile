@@ -132,8 +132,8 @@ wheelhouse: $(STAMP) ## all for a robot without internet; SET=laptop WHEEL_PYTHO
 systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; wants root, Docker and debootstrap
 	$(BIN)/python -m tests.systemd
 
-audit: $(STAMP) ## known flaws of what LOCK=requirements.lock names, from a public database
-	$(BIN)/python -m tests.audit $(LOCK)
+audit: $(STAMP) ## known flaws of what FILE=requirements.lock names, from a public database
+	$(BIN)/python -m tests.audit $(FILE)
 
 # A tool in an environment of its own, in uv's cache: what it brings is not what T2 stands on.
 SBOM = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python \
