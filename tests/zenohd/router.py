@@ -52,6 +52,15 @@ class Rest:
         rows: list[dict[str, Any]] = json.loads(self.get(path))
         return rows
 
+    def follow(self, path: str) -> Iterator[bytes]:
+        """Yield each sample from now on, as JSON."""
+        url = f"http://127.0.0.1:{self.port}/{path}"
+        request = urllib.request.Request(url, headers={"Accept": "text/event-stream"})
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            for line in answer:
+                if line.startswith(b"data:"):
+                    yield line.removeprefix(b"data:")
+
     def put(self, path: str, body: bytes) -> None:
         """Publish, as `curl -X PUT` does."""
         self._ask(path, "PUT", body)

@@ -5,6 +5,7 @@ import contextlib
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import msgspec
@@ -17,6 +18,7 @@ from common.loop import Loop
 from common.messages import Odometry
 from tests.chain import Chain
 from tests.cli.site import Site
+from tests.common.rig import rising
 from tests.support import at, free_port, joined, running, wait_until
 from tests.zenohd.router import Rest, command, found, rest
 
@@ -60,15 +62,9 @@ def test_a_wild_card_asks_for_all_streams(http: Rest) -> None:
 
 
 def test_a_stream_is_followed(http: Rest) -> None:
-    curl = ["curl", "-sN", "-m", "5", "-H", "Accept: text/event-stream"]
-    done = subprocess.run(
-        [*curl, f"http://127.0.0.1:{http.port}/{ODOMETRY}"],
-        capture_output=True, timeout=30, check=False,
-    )  # fmt: skip
-    events = [line for line in done.stdout.splitlines() if line.startswith(b"data:")]
-    assert len(events) > 5
-    row = msgspec.json.decode(events[-1].removeprefix(b"data:"))
-    assert codec.decode(base64.b64decode(row["value"]), Odometry).frame_id == "odom"
+    rows = [msgspec.json.decode(data) for data in islice(http.follow(ODOMETRY), 3)]
+    came = [codec.decode(base64.b64decode(row["value"]), Odometry).seq for row in rows]
+    assert rising(came)
 
 
 @contextlib.contextmanager
