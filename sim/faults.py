@@ -1,8 +1,8 @@
 """The cable between board and PC, one way of it, with all that can happen to a datagram.
 
 Each datagram meets the faults in this order: dropped, corrupted, sent from a foreign address, held
-to be joined with the next one, delayed, duplicated. What is not delayed comes out at once and in
-order.
+to be joined with the next one, duplicated, queued for a cable that carries so much and no more,
+delayed. What is not delayed comes out at once and in order.
 """
 
 import heapq
@@ -33,6 +33,7 @@ class Cable:
         self._under_way: list[tuple[int, int, Datagram]] = []  # due, order, datagram
         self._held: dict[int, bytes] = {}
         self._order = 0
+        self._free_ns = 0  # when all that was put in has left
 
     def put(self, datagram: Datagram, now_ns: int) -> None:
         """Send one."""
@@ -47,11 +48,13 @@ class Cable:
             self._held[datagram.port] = payload
             return
         for _ in range(2 if self._happens(self.faults.duplicate) else 1):
-            due_ns = now_ns + round(self._delay_s() * S)
-            heapq.heappush(
-                self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
-            )
-            self._order += 1
+            left_ns = self._leaves_ns(len(payload), now_ns)
+            if left_ns is not None:
+                due_ns = left_ns + round(self._delay_s() * S)
+                heapq.heappush(
+                    self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
+                )
+                self._order += 1
 
     def take(self, now_ns: int) -> list[Datagram]:
         """Return what has arrived by now, in the order of arrival."""
@@ -64,6 +67,17 @@ class Cable:
     def due_ns(self) -> int | None:
         """Return when the next one arrives; None when nothing is under way."""
         return self._under_way[0][0] if self._under_way else None
+
+    def _leaves_ns(self, size: int, now_ns: int) -> int | None:
+        """Return when so many bytes have left, after all before them; None if none may wait."""
+        if self.faults.rate is None:
+            return now_ns
+        a_byte_ns = 8 * S / self.faults.rate
+        begins_ns = max(now_ns, self._free_ns)
+        if (begins_ns - now_ns) / a_byte_ns + size > self.faults.queue:
+            return None
+        self._free_ns = begins_ns + round(size * a_byte_ns)
+        return self._free_ns
 
     def _happens(self, chance: float) -> bool:
         # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.

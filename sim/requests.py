@@ -87,6 +87,8 @@ class Wire(Request, frozen=True, kw_only=True, tag="wire"):
     foreign: Chance = 0.0  # sent from an address that is not the sender's own
     delay: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0  # s
     jitter: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0  # s, at most that much more
+    rate: Annotated[float, Meta(ge=1e3)] | None = None  # bit/s; as fast as it comes without any
+    queue: Annotated[float, Meta(ge=2048)] = 65536  # bytes that may wait for it; more are dropped
 
 
 class Place(Request, frozen=True, kw_only=True, tag="place"):

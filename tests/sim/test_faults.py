@@ -90,6 +90,28 @@ def test_jitter_is_at_most_that_much_more() -> None:
     assert len(early) + len(cable.take(S // 5)) == len(MANY)
 
 
+def test_a_thin_cable_lets_one_after_the_other_through() -> None:
+    cable = Cable(1)
+    cable.faults = Wire(rate=8e3, delay=1.0)  # a byte in a millisecond
+    for datagram in MANY[:2]:
+        cable.put(datagram, 0)
+    assert cable.take(1_003_000_000 - 1) == []
+    assert cable.take(1_003_000_000) == [MANY[0]]
+    assert cable.take(1_006_000_000) == [MANY[1]]
+    cable.put(MANY[2], 2 * S)  # it has been free meanwhile
+    assert cable.due_ns == 3_003_000_000
+
+
+def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
+    cable = Cable(1)
+    cable.faults = Wire(rate=8e6, queue=2048)
+    big = [Datagram(bytes([k]) * 1000, 4002) for k in range(4)]
+    for datagram in big[:3]:
+        cable.put(datagram, 0)
+    cable.put(big[3], 1_000_000)  # a microsecond for a byte: one has left
+    assert cable.take(S) == [big[0], big[1], big[3]]
+
+
 def test_the_same_seed_does_the_same() -> None:
     faults: dict[str, Any] = {
         "drop": 0.1, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "join": 0.1, "jitter": 0.05,
