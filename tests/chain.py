@@ -20,6 +20,8 @@ from common.freshness import S
 from sim.control import Control
 from tests.support import free_port, wait_until
 
+UP_S = 60.0  # on a machine that others use, too
+
 
 @dataclass
 class Chain:
@@ -77,27 +79,25 @@ def chain(
     *,
     sets: Sequence[str] = (),
     shipped: bool = False,
-    listen: str = "127.0.0.1",
+    listen: str = "tcp/127.0.0.1:{port}",
     log: str = "log.jsonl",
     env: Mapping[str, str] | None = None,
     route: Callable[[Sequence[str]], list[str]] | None = None,
 ) -> Iterator[Chain]:
     """Run the stack while the context lasts, as shipped unless this machine cannot bear it.
 
-    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides. The router
-    listens on the address ``listen``; ``log`` is a file in the folder. ``route`` returns the
-    command of a router that is none of ours, for these settings.
+    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides. ``listen``
+    is where the router listens, the way of those on board first; ``log`` is a file in the folder.
+    ``route`` returns the command of a router that is none of ours, for these settings.
     """
     holdup_s = 0.0 if shipped else holdup.measured()
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
     port = free_port()
-    endpoint = f"tcp/127.0.0.1:{port}"
     sets = [
         *sets,
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
-        f"bus.listen=tcp/{listen}:{port}",
-        "bus.insecure=true",
+        f"bus.listen={listen.format(port=port)}",
         f"sim.control_port={control}",
         *holdup.settings(holdup_s),
     ]
@@ -109,11 +109,12 @@ def chain(
         made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file)]
+    endpoint = config.bus.endpoints[0]
     it = Chain(endpoint, trace_file, Control(control), made, folder / log, config, env)
     for name in made:
         it.start(name)
     try:
-        wait_until(lambda: _is_up(it), "all processes up")
+        wait_until(lambda: _is_up(it), f"all processes up: {it.log}", UP_S)
         yield it
     finally:
         it.end()

@@ -12,7 +12,7 @@ from typing import Self
 import msgspec
 
 from common import keys
-from common.bus.bus import Bus
+from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Done, ResetRequest, SafetyState
 from sim.requests import Bumper, Driver, Mute, Place, Wire
@@ -27,9 +27,10 @@ QUICK = [
     "safety.linear_acceleration=5",
     "sim.drive.acceleration=10",
 ]
+OPEN = ["bus.insecure=true"]  # for a driver on another host, without certificates
 ROOM_M = 900.0  # the vehicle is put back to the origin from there
 READY_S = 30.0
-DRIVERS: dict[Need, str] = {"a far driver": "tests.faults.far", "a teleop": "tests.faults.keyboard"}
+DRIVER = "tests.faults.driver"
 
 
 class Lane:
@@ -59,13 +60,14 @@ class Lane:
     def ask(self, speed: float) -> None:
         """Push the stick."""
         self.asked = speed
-        self._tell_driver(b"%f" % speed)
+        self.tell(b"%f" % speed)
 
     def cable(self, faults: Wire) -> None:
         """Let this happen to the packets between a far driver and the robot from now on."""
-        self._tell_driver(msgspec.json.encode(faults))
+        self.tell(msgspec.json.encode(faults))
 
-    def _tell_driver(self, line: bytes) -> None:
+    def tell(self, line: bytes) -> None:
+        """Say a line to whoever drives."""
         pipe = self.stack.processes["driver"].stdin
         assert pipe is not None
         with contextlib.suppress(OSError):  # the driver may be dead
@@ -173,25 +175,32 @@ def lane(folder: Path, *, shipped: bool = True, need: Need = "nothing") -> Itera
             stack.enter_context(small_disk(folder / "disk"))
         made = stack.enter_context(
             chain(
-                folder, sets=QUICK, shipped=shipped, log="disk/log.jsonl" if disk else "log.jsonl",
-                listen="0.0.0.0" if far else "127.0.0.1",
+                folder, sets=[*QUICK, *OPEN] if far else QUICK, shipped=shipped,
+                log="disk/log.jsonl" if disk else "log.jsonl",
+                listen=f"tcp/{'0.0.0.0' if far else '127.0.0.1'}:{{port}}",
                 env=clock(folder / "robot") if clocks else None,
             )
         )  # fmt: skip
-        loop = stack.enter_context(running(Loop()))
-        states: list[SafetyState] = []
-
-        def declare(bus: Bus) -> None:
-            bus.subscribe(keys.SAFETY, lambda arrival: take(arrival.message))
-
-        def take(state: SafetyState) -> None:
-            states[:] = [state]
-            if it:
-                it[0].state = state
-
-        it: list[Lane] = []
-        bus = stack.enter_context(bus_on(made.endpoint, loop, declare))
-        driver = [DRIVERS.get(need, "tests.faults.driver"), made.endpoint]
+        driver = {
+            "a far driver": ["tests.faults.far", made.endpoint, DRIVER],
+            "a teleop": ["tests.faults.keyboard", made.endpoint],
+        }.get(need, [DRIVER, made.endpoint])
         env = clock(folder / "driver") if clocks else os.environ
-        it.append(Lane(made, bus, folder, driver, env))
-        yield it[0]
+        yield stack.enter_context(driven(made, folder, driver, env))
+
+
+@contextlib.contextmanager
+def driven(
+    stack: Chain, folder: Path, driver: Sequence[str], env: Mapping[str, str]
+) -> Iterator[Lane]:
+    """Put a driver and an operator before a stack while the context lasts."""
+    with running(Loop()) as loop:
+        it: list[Lane] = []
+
+        def take(arrival: Arrival[SafetyState]) -> None:
+            if it:
+                it[0].state = arrival.message
+
+        with bus_on(stack.endpoint, loop, lambda bus: bus.subscribe(keys.SAFETY, take)) as bus:
+            it.append(Lane(stack, bus, folder, driver, env))
+            yield it[0]
