@@ -45,14 +45,15 @@ def run(options: argparse.Namespace) -> int:
     config = load(Shared, sources(options)).config
     access = access_of(config.bus)
     if options.print:
-        tell(json.dumps(router_config(config.bus, access), indent=2), options.print)
+        printed = json.dumps(router_config(config.bus, access, config.robot.id), indent=2)
+        tell(printed, options.print)
         return 0
     log.configure(config.log, "router")
     ended = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: ended.set())
     systemd = Systemd()
-    with router(config.bus, access) as answers:
+    with router(config.bus, access, config.robot.id) as answers:
         listen = list(config.bus.listen)
         structlog.get_logger().info("started", listen=listen, open_to=open_to(config.bus))
         # Routing happens in Zenoh's own threads: that this one lives says nothing about them.

@@ -18,7 +18,7 @@ MessageT = TypeVar("MessageT", bound=m.Message)
 RequestT = TypeVar("RequestT", bound=Struct)
 ReplyT = TypeVar("ReplyT", bound=Struct)
 
-Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_HIGH", "DATA"]
+Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,9 @@ class ClassOfService:
 
 ESTOP_CLASS = ClassOfService("estop", "REAL_TIME", "nothing may be ahead of it", express=True)
 COMMAND = ClassOfService("command", "INTERACTIVE_HIGH", "moves or stops the wheels", express=True)
+STATE = ClassOfService(
+    "state", "INTERACTIVE_LOW", "who drives echoes it: late, it stops the vehicle", express=True
+)
 FAST = ClassOfService("fast", "DATA_HIGH", "safety and odometry decide on it")
 SLOW = ClassOfService("slow", "DATA", "people and records read it")
 EVENT = ClassOfService("event", "DATA", "rare, and worth having late", history=100)
@@ -92,7 +95,7 @@ SWITCHES = Topic(
 LINK = Topic("tel/bridge/link", m.Link, 5, FAST, "bridge", "the way to the board")
 ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 50, FAST, "odom", "pose and twist")
 SAFETY = Topic(
-    "tel/safety/state", m.SafetyState, 20, FAST, "safety", "verdict, causes, and who drives"
+    "tel/safety/state", m.SafetyState, 20, STATE, "safety", "verdict, causes, and who drives"
 )
 HEALTH = Topic("tel/{service}/health", m.Health, 1, SLOW, "every service", "how a service fares")
 EVENTS = Topic("evt/{service}", m.Event, 0, EVENT, "every service", "transitions")

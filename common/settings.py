@@ -66,6 +66,7 @@ class Bus(Section, frozen=True, kw_only=True):
     private_key: str = ""
     members: str = ""  # the list of `t2 keys`: whom the router lets in, and as what
     insecure: bool = False  # let a router listen to the network without TLS
+    laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
 
     def __post_init__(self) -> None:
         check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.i_accept)

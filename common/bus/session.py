@@ -11,6 +11,7 @@ from pathlib import Path
 import structlog
 import zenoh
 
+from common.bus.thinning import thinned
 from common.errors import ConfigError, LinkError
 from common.settings import Bus, is_encrypted
 
@@ -84,8 +85,13 @@ def client_config(where: Bus, turn: int = 0) -> zenoh.Config:
     )
 
 
-def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dict[str, object]:
-    """Return a router's whole configuration, as JSON; ``access`` is its ``access_control``."""
+def router_config(
+    where: Bus, access: Mapping[str, object] | None = None, robot: str = ""
+) -> dict[str, object]:
+    """Return a router's whole configuration, as JSON.
+
+    ``access`` is its ``access_control``; ``robot`` is whose streams it thins towards laptops.
+    """
     parts: dict[str, object] = {
         "mode": "router",
         "listen": {"endpoints": list(where.listen)},
@@ -98,11 +104,15 @@ def router_config(where: Bus, access: Mapping[str, object] | None = None) -> dic
         parts |= {"mode": "peer", "region_name": "robot"}
     if access is not None:
         parts["access_control"] = access
+    if robot:
+        parts |= thinned(robot, where.laptop_rate)
     return _common(where) | parts
 
 
 @contextlib.contextmanager
-def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[Answers]:
+def router(
+    where: Bus, access: Mapping[str, object] | None = None, robot: str = ""
+) -> Iterator[Answers]:
     """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen.
 
     It hands out a call that tells whether the router answers a question about itself.
@@ -112,7 +122,8 @@ def router(where: Bus, access: Mapping[str, object] | None = None) -> Iterator[A
         with contextlib.suppress(OSError):  # what is wrong with it, Zenoh says
             Path(socket.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
     try:
-        session = zenoh.open(zenoh.Config.from_json5(json.dumps(router_config(where, access))))
+        config = json.dumps(router_config(where, access, robot))
+        session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:
         reason = str(error).split(" at /")[0]
         listen = ", ".join(where.listen)
