@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults fleet compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -53,6 +53,10 @@ fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/f
 
 compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
 	$(BIN)/python -m tests.compose
+
+roaming: $(STAMP) ## drive over a bad link between two hosts, and lose it; renews docs/roaming.md
+	$(BIN)/python -m tests.roaming --out docs/roaming.md
+
 
 check: lint types cover search ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

@@ -1,0 +1,1 @@
+"""Two hosts and the air between them: what the operator has of it, and what the robot."""
