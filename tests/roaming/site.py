@@ -59,9 +59,11 @@ class Site:
         return [note for note in heard if note.key == path]
 
     def press_again(self, speed: float) -> None:
-        """Lift the finger and put it back."""
+        """Lift the finger and put it back, after a reset where one is due."""
         self.lane.ask(0.0)
         time.sleep(LIFT_S)
+        if self.lane.latched():
+            self.lane.reset()
         self.lane.ask(speed)
 
 
