@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
-import structlog
 import zenoh
 
 from common.bus.thinning import thinned
@@ -36,6 +35,8 @@ class Opener:
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bus-open", daemon=True)
         self._session: zenoh.Session | None = None
+        import structlog  # here, for it takes as long as all the rest: tools do without
+
         self._log = structlog.get_logger()
 
     def start(self) -> None:

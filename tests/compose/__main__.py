@@ -59,6 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--keep-wheelhouse", action="store_true", help="take build/wheelhouse as it is"
     )
     parser.add_argument("--keep", action="store_true", help="leave the images for the next run")
+    parser.add_argument("--built", action="store_true", help="with --keep: take what was left")
     options = parser.parse_args(argv)
     looks = [each for each in LOOKS if not options.only or any(o in each[0] for o in options.only)]
     lacks = missing()
@@ -69,9 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     tag = KEPT if options.keep else f"test{secrets.token_hex(3)}"
     with tempfile.TemporaryDirectory() as folder:
         image = base()
-        if not options.keep_wheelhouse:
+        if not (options.keep_wheelhouse or options.built):
             wheelhouse(image)
-        with staged(Path(folder), image, tag, keep=options.keep) as stage:
+        with staged(Path(folder), image, tag, keep=options.keep, built=options.built) as stage:
             rows += [looked(stage, *each) for each in looks]
         if not options.keep:
             rows.append(nothing_is_left(tag))

@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[2]
 OVER = ("deploy/compose/own-router.yaml", "deploy/compose/tls.yaml")
 ASKED = ("router", "bridge", "safety", "odom", "recorder", "dashboard")  # have a health check
 SERVICES = (*ASKED, "sim")
+MEASURE_S = 10.0  # some minutes follow: what holds up now and then has to be seen
 UP_S, HEALTHY_S, BUILD_S = 300.0, 180.0, 3600.0
 
 
@@ -99,9 +100,11 @@ def override(sets: list[str], trace: Path) -> dict[str, object]:
 
 
 @contextmanager
-def staged(folder: Path, base: str, tag: str, *, keep: bool = False) -> Iterator[Stage]:
-    """Build, bring up and sit at the wheel while the context lasts; ``keep`` leaves the images."""
-    ports, keyring, holdup_s = Ports.free(), Keyring(folder / "keys"), holdup.measured()
+def staged(
+    folder: Path, base: str, tag: str, *, keep: bool = False, built: bool = False
+) -> Iterator[Stage]:
+    """Build, bring up and sit at the wheel; ``keep`` leaves the images, ``built`` takes them."""
+    ports, keyring, holdup_s = Ports.free(), Keyring(folder / "keys"), holdup.measured(MEASURE_S)
     sets = [*ports.settings(), *holdup.settings(holdup_s)]
     trace = folder / "trace"
     trace.mkdir()
@@ -118,8 +121,9 @@ def staged(folder: Path, base: str, tag: str, *, keep: bool = False) -> Iterator
         if not keep:
             stack.callback(remove_images, tag)
         stack.callback(leave, project)
-        say("building the images")
-        project("build", patience_s=BUILD_S)
+        if not built:
+            say("building the images")
+            project("build", patience_s=BUILD_S)
         say("bringing all up")
         project("up", "-d", patience_s=UP_S)
         yield Stage(
