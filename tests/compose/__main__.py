@@ -88,7 +88,7 @@ def looked(stage: Stage, what: str, look: Look) -> Row:
         seen, fine = look(stage), True
     except Exception as error:  # whatever it is, the next look is worth having
         seen, fine = f"{type(error).__name__}: {error}", False
-        print(f"{what}: {seen}", file=sys.stderr, flush=True)
+    say(f"{'ok' if fine else 'WRONG'}: {seen}")
     stage.wheel.linear = 0.0
     return Row(what, seen, fine, time.monotonic() - began_s)
 
