@@ -35,9 +35,8 @@ EVERY_KEY = f"{keys.ROOT}/**"
 EVERY_COMMAND = f"{keys.ROOT}/*/@cmd/**"
 KEPT = f"{keys.ROOT}/**/@adv/**"
 EVERYTHING = (EVERY_KEY, EVERY_COMMAND, KEPT)
-# The admin space of routers: version, sessions, who declared what. One with an uplink is a peer.
-ROUTERS = ("@/*/router/**", "@/*/peer/**")
-ASKED = (f"{keys.ROOT}/*/info/**", KEPT, *ROUTERS)
+ROUTERS = "@/*/*/**"  # their admin space: version, sessions, who declared what
+ASKED = (f"{keys.ROOT}/*/info/**", KEPT, ROUTERS)
 
 # The services that a laptop runs: a member may speak for these, and never for those on board.
 SEATS = ("dashboard", "recorder", "metrics")

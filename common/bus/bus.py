@@ -15,7 +15,7 @@ from msgspec import Struct
 from common import codec, settings
 from common.bus.calls import Answers, Caller
 from common.bus.host import host_id
-from common.bus.publisher import Publisher, qos
+from common.bus.publisher import QUERY_CONGESTION, Publisher, qos
 from common.bus.ring import Ring
 from common.bus.sample import copied
 from common.bus.session import Opener
@@ -273,7 +273,9 @@ class Bus:
             answers.fail("there is no router")
             return
         callback = zenoh.handlers.Callback(answers.queue, answers.end)
-        self._session.get(key, callback, payload=payload, timeout=timeout_s)
+        self._session.get(
+            key, callback, payload=payload, timeout=timeout_s, congestion_control=QUERY_CONGESTION
+        )
 
     def _queryable(self, key: str, take: Callable[[zenoh.Query], None]) -> None:
         def queue(query: zenoh.Query) -> None:

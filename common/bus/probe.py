@@ -15,7 +15,7 @@ import zenoh
 import zenoh.ext
 
 from common.bus.calls import is_timeout
-from common.bus.publisher import qos
+from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.sample import copied
 from common.bus.session import check_files, client_config
 from common.errors import LinkError
@@ -89,7 +89,9 @@ class Probe:
         self, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
     ) -> list[Answer]:
         """Return every answer to a query; none when nobody answers in time."""
-        replies = self._session.get(selector, payload=payload, timeout=timeout_s)
+        replies = self._session.get(
+            selector, payload=payload, timeout=timeout_s, congestion_control=QUERY_CONGESTION
+        )
         return [_answer(reply) for reply in replies if not is_timeout(reply)]
 
     def alive(self, expression: str, timeout_s: float = 2.0) -> list[str]:

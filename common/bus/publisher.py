@@ -14,6 +14,9 @@ from common.messages import Message
 
 M = TypeVar("M", bound=Message)
 
+# Of a query, and so of its answers: Zenoh's default makes the router wait up to 5 s for a full link.
+QUERY_CONGESTION = zenoh.CongestionControl.DROP
+
 
 class Publisher(Generic[M]):
     """Puts the header on a topic's messages and sends them.

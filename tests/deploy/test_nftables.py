@@ -155,6 +155,7 @@ def test_nobody_reaches_the_board_through_the_pc() -> None:
         (WIFI, "192.168.201.1", 8000, "no answer"),
         (CABLE, "10.7.5.220", 7447, "no answer"),
     ],
+    ids=["router", "ssh", "REST", "cable"],  # the names hold a process' number
 )
 def test_operators_find_the_router_and_nothing_else(
     name: str, address: str, port: int, answer: str
