@@ -31,7 +31,7 @@ from tests.fleet.paper import scale, units
 from tests.fleet.plot import save
 from tests.support import at
 
-SIZES = (1, 2, 5, 10, 20, 50)
+SIZES = "1,2,5,10,20,50"
 LOOKS = ("nobody", "overview", "everything")
 THIN_HZ = 10.0
 RAW = Path("out/fleet")
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = arguments().parse_args(argv)
     RAW.mkdir(parents=True, exist_ok=True)
     if not options.again:
-        KEPT.write_bytes(msgspec.json.encode(measure(options.robots, options.seconds)))
+        KEPT.write_bytes(msgspec.json.encode(measure(sizes(options), options.seconds)))
     blocks, windows = told(msgspec.json.decode(KEPT.read_bytes()))
     for name, block in blocks.items():
         print(f"{name}\n{block}\n")
@@ -56,15 +56,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def measure(robots: int, seconds: float) -> dict[str, object]:
+def sizes(options: argparse.Namespace) -> list[int]:
+    """Return how many robots, one number after the other."""
+    smaller = {int(text) for text in options.sizes.split(",") if int(text) < options.robots}
+    return sorted(smaller | {options.robots})
+
+
+def measure(sizes: Sequence[int], seconds: float) -> dict[str, object]:
     """Return all that was measured."""
-    sizes = sorted({size for size in SIZES if size < robots} | {robots})
     windows: list[Window] = []
     with tempfile.TemporaryDirectory() as folder, site() as ground:
         for made in measured(ground, Path(folder), sizes, seconds):
             windows.append(made)
             print(markdown([made]).splitlines()[-1], file=sys.stderr, flush=True)
-        return {"machine": machine(seconds), "windows": windows, "estop": stopped(ground, robots)}
+        return {
+            "machine": machine(seconds),
+            "windows": windows,
+            "estop": stopped(ground, sizes[-1]),
+        }
 
 
 def told(kept: dict[str, Any]) -> tuple[dict[str, str], list[Window]]:
@@ -147,6 +156,7 @@ def arguments() -> argparse.ArgumentParser:
     """Return what the command line may say."""
     parser = argparse.ArgumentParser(prog="fleet", description=__doc__)
     parser.add_argument("--robots", type=int, default=50, metavar="N", help="at most, 50")
+    parser.add_argument("--sizes", default=SIZES, metavar="N,N", help=f"smaller ones, {SIZES}")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="of each row")
     parser.add_argument("--again", action="store_true", help="tell what was measured last")
     parser.add_argument("--out", type=Path, metavar="FILE", help="the document to renew")

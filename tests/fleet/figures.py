@@ -86,7 +86,7 @@ def markdown(windows: Sequence[Window]) -> str:
     """Return a row for each window."""
     head = (
         "robots", "looked at", "put /s", "arrived /s", "age p50 ms", "p99 ms", "site CPU %",
-        "site MB", "machine %", "request p50 ms", "p99 ms", "unanswered", "saturated",
+        "site MB", "machine %", "others %", "request p50 ms", "p99 ms", "unanswered", "saturated",
     )  # fmt: skip
     lines = [head, ("---",) * len(head), *map(_cells, windows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
@@ -145,6 +145,7 @@ def _cells(window: Window) -> tuple[str, ...]:
         f"{100 * site['cpu']:.0f}",
         f"{site['rss'] / 1e6:.0f}",
         f"{100 * window['machine']['busy']:.0f}",
+        f"{100 * window['machine']['others']:.0f}",
         ms(took, 0.5),
         ms(took, 0.99),
         f"{len(window['answers_s']) - len(took)} of {len(window['answers_s'])}",

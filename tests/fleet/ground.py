@@ -145,6 +145,7 @@ def gauged(ground: Ground, before: Reading, after: Reading) -> Window:
         who: {"cpu": (now.cpu_s - before.used[who].cpu_s) / past_s, "rss": now.rss}
         for who, now in after.used.items()
     }
+    mine_s = past_s * sum(part["cpu"] for part in parts.values())
     whole = [getattr(after.machine, f) - getattr(before.machine, f) for f in FIELDS]
     rates = {pid: since(now, before.links.get(pid, {}), past_s) for pid, now in after.links.items()}
     light = rates.get(ground.light.pid) if ground.light else None
@@ -153,7 +154,11 @@ def gauged(ground: Ground, before: Reading, after: Reading) -> Window:
     return {
         "site": parts["site"],
         "parts": parts,
-        "machine": {"busy": whole[0] / sum(whole), "stolen": whole[2] / sum(whole)},
+        "machine": {
+            "busy": whole[0] / sum(whole),
+            "stolen": whole[2] / sum(whole),
+            "others": (whole[0] - mine_s) / sum(whole),
+        },
         "real_link": rates[router],
         "real_total": after.links[router],
         "light_total": _each(after.links.get(ground.light.pid), count) if ground.light else None,

@@ -16,7 +16,7 @@ from tests.fleet.figures import (
     uplinks,
 )
 from tests.fleet.gauges import parsed, since
-from tests.fleet.paper import cost, scale, units
+from tests.fleet.paper import scale, units
 from tests.fleet.plot import save
 
 MS = 1_000_000
@@ -50,7 +50,8 @@ def made(**other: Any) -> Any:
     return {
         "robots": 5, "what": "everything", "shape": "peer", "thin": 0.0, "light": light,
         "ear": {"hz": 2000.0, "ages_s": [0.001, 0.002]}, "answers_s": [0.001, None],
-        "site": {"cpu": 0.25, "rss": 40_000_000}, "machine": {"busy": 0.5, "stolen": 0.0},
+        "site": {"cpu": 0.25, "rss": 40_000_000},
+        "machine": {"busy": 0.5, "stolen": 0.0, "others": 0.1},
         "real_link": link, "light_link": link, "light_total": link,
         "parts": {"site": {"cpu": 0.25}, "router 0": {"cpu": 0.021}},
     } | other  # fmt: skip
@@ -60,7 +61,7 @@ def made(**other: Any) -> Any:
     ("other", "said"),
     [
         ({}, ""),
-        ({"machine": {"busy": 0.97, "stolen": 0.0}}, "machine"),
+        ({"machine": {"busy": 0.97, "stolen": 0.0, "others": 0.1}}, "machine"),
         ({"light": {"hz": 1100.0, "wanted_hz": 1200.0, "robots": 3}}, "generator"),
         ({"ear": {"hz": 1900.0, "ages_s": []}}, "arrival"),
         ({"ear": {"hz": 0.0, "ages_s": []}, "what": "nobody"}, ""),
@@ -76,9 +77,8 @@ def test_what_was_saturated_is_said(other: dict[str, Any], said: str) -> None:
 
 def test_a_row_holds_what_was_measured() -> None:
     row = markdown([made(thin=10.0)]).splitlines()[-1]
-    assert row == (
-        "| 5 | everything, 10 Hz | 1200 | 2000 | 1.0 | 2.0 | 25 | 40 | 50 | 1.0 | 1.0 | 1 of 2 |  |"
-    )
+    assert row.startswith("| 5 | everything, 10 Hz | 1200 | 2000 | 1.0 | 2.0 | 25 | 40 | 50 | 10 |")
+    assert row.endswith("| 1.0 | 1.0 | 1 of 2 |  |")
     assert uplinks([made()]).splitlines()[-1] == "| 5 | everything | 12 | 1 | 2.1 | 12 | 1 | 0 |"
     assert "| - | - |" in uplinks([made(light_link=None)])
     assert shares([made(), made(what="nobody")]).splitlines()[2:] == ["| 5 | everything | 2 | 25 |"]
@@ -126,12 +126,10 @@ def fleet() -> list[Any]:
 
 
 def test_what_a_robot_and_a_message_cost() -> None:
-    found = cost(fleet())
-    assert found.robot_cpu == pytest.approx(0.01)
-    assert found.message_s == pytest.approx(50e-6)
-    assert found.robot_bytes == pytest.approx(100_000)
-    assert "50 us of a core" in units(fleet())
-    assert "1.000 % of it and 100 kB" in units(fleet())
+    assert units(fleet()) == (
+        "A message that comes in and goes out once takes this much of a core: "
+        "100 us with 11 robots. A robot takes 100 kB of the router's memory."
+    )
 
 
 def test_it_is_carried_on_to_more() -> None:
