@@ -14,7 +14,7 @@ from common.messages import Message
 
 M = TypeVar("M", bound=Message)
 
-# Of a query, and so of its answers: Zenoh's default makes the router wait up to 5 s for a full link.
+# Of a query, and so of its answers: by Zenoh's default the router waits up to 5 s for a full link.
 QUERY_CONGESTION = zenoh.CongestionControl.DROP
 
 
