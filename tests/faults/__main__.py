@@ -144,7 +144,8 @@ Real processes, real UDP, the simulated board, 0.8 m/s on an empty plain with th
 - *p50, p99, worst*: from the fault to the last command to move that the board received, or to the
   first STOP or BREAK if that came later.
 - *held up*: how long the machine kept a process that only sleeps from running, at worst, while a
-  sample lasted. A sample may take so much longer than its budget.
+  sample lasted, and with SIGKILL how long the kernel took to end the process: others notice its
+  end by its pipes, which are closed last. A sample may take so much longer than its budget.
 - Network, disk and mounts are the campaign's own. It wants root for that; what it cannot have here
   is said below the table.
 - *then*: what it took to drive again once the fault was gone. Faults that come again and again trip

@@ -1,6 +1,7 @@
 """How faults are made: to processes, to the simulated board, on the bus, to the machine."""
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -14,9 +15,12 @@ import zenoh
 
 from common import keys
 from common.bus.session import client_config
+from common.freshness import S
 from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
 from tests.faults.lane import Lane, until
 from tests.support import at, wait_until
+
+DEATH_S = 1.0  # longer than a kernel needs to end a process
 
 
 def child(pid: int) -> int:
@@ -36,12 +40,19 @@ def pid_of(lane: Lane, name: str) -> int:
 
 
 def kill(name: str, number: signal.Signals) -> Callable[[Lane], int]:
-    """Send a signal to a part of the stack."""
+    """Send a signal to a part of the stack; note how long the kernel takes to end what is killed.
+
+    It gives back the memory before it closes the pipes, and others notice by these.
+    """
 
     def inject(lane: Lane) -> int:
-        pid = pid_of(lane, name)
+        process = os.pidfd_open(pid_of(lane, name))
         at_ns = time.monotonic_ns()
-        os.kill(pid, number)
+        signal.pidfd_send_signal(process, number)
+        if number == signal.SIGKILL:
+            select.select([process], [], [], DEATH_S)
+            lane.death_s = (time.monotonic_ns() - at_ns) / S
+        os.close(process)
         return at_ns
 
     return inject

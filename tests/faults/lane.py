@@ -46,6 +46,7 @@ class Lane:
         self.frames = Frames(stack.trace_file)
         self.state: SafetyState | None = None
         self.asked = 0.0
+        self.death_s = 0.0  # that the kernel took to end what was killed last
         self.start_driver()
 
     def start_driver(self) -> None:

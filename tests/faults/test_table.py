@@ -68,6 +68,8 @@ def test_ranks_are_values_that_were_measured(share: float, value: float) -> None
         (row(sample(0.010, 0.5)), ["500.0 ms, 20.0 are allowed"]),
         (row(sample(None)), ["inf ms, 20.0 are allowed"]),
         (row(sample(0.025), held_up_s=0.006), []),
+        (row(sample(0.025, death_s=0.006)), []),
+        (row(sample(0.025, death_s=0.004)), ["25.0 ms, 24.0 are allowed"]),
         (row(sample(None), budget_s=None), []),
         (row(sample(outcome="by itself")), ["by itself, not after a neutral"]),
         (row(sample(outcome=None)), ["would not drive again, not after a neutral"]),

@@ -23,12 +23,14 @@ class Sample:
     fault_ns: int
     strayed: bool = False  # a command to move otherwise than anybody asked
     died: tuple[str, ...] = ()  # that should have lived
+    death_s: float = 0.0  # that the kernel took to end what was killed
 
 
 def tried(lane: Lane, fault: Fault) -> Sample:
     """Bring the vehicle to speed, let the fault happen, mend it, and see what it takes."""
     lane.ready()
     time.sleep(random.random() * 0.06)  # anywhere between two requests
+    lane.death_s = 0.0
     fault_ns = fault.inject(lane)
     end_s = fault_ns / 1e9 + fault.hold_s
     time.sleep(max(0.0, end_s - time.monotonic()))
@@ -40,7 +42,9 @@ def tried(lane: Lane, fault: Fault) -> Sample:
     stopped = first_stop_s(commands, fault_ns)
     outcome = "drives on" if moving and stopped is None else _outcome(lane)
     moved_s = last_move_s(commands, fault_ns)
-    return Sample(stopped, moved_s, outcome, fault_ns, strayed(lane.frames.commands), died)
+    return Sample(
+        stopped, moved_s, outcome, fault_ns, strayed(lane.frames.commands), died, lane.death_s
+    )
 
 
 def _outcome(lane: Lane) -> Outcome | None:
