@@ -17,6 +17,10 @@ from common.settings import Bus, is_encrypted
 RETRY_S = 0.5  # between two tries to find a router
 COMPLAIN_S = 5.0  # between two lines that say so
 ANSWER_S = 1.0  # that a router has to answer
+# What may not be dropped (declarations, their history) makes a router wait for a link that is full,
+# with all others waiting behind. Zenoh's default is 5 s, then the link is closed: a laptop that was
+# cut off would stop the robot's own streams for as long.
+FULL_US = 100_000
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 Answers = Callable[[], bool]
@@ -107,7 +111,8 @@ def router_config(
         parts["access_control"] = access
     if robot:
         parts |= thinned(robot, where.laptop_rate)
-    return _common(where) | parts
+    full = {"congestion_control": {"block": {"wait_before_close": FULL_US}}}
+    return _common(where, queue=full) | parts
 
 
 @contextlib.contextmanager
@@ -146,8 +151,14 @@ def check_files(where: Bus, endpoints: Iterable[str]) -> None:
             raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
 
 
-def _common(where: Bus) -> dict[str, object]:
-    link: dict[str, object] = {"tx": {"lease": round(where.lease * 1000), "keep_alive": 4}}
+def _common(where: Bus, **queue: object) -> dict[str, object]:
+    link: dict[str, object] = {
+        "tx": {
+            "lease": round(where.lease * 1000),
+            "keep_alive": 4,
+            **queue,
+        }
+    }
     if where.ca:
         link["tls"] = _tls(where)
     return {
