@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import signal
 import threading
 import time
@@ -12,7 +13,7 @@ import structlog
 from cli import members
 from cli.access import access_control
 from common import log
-from common.bus.session import router, router_config
+from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.config import load
 from common.errors import ConfigError
 from common.options import add_sources, sources
@@ -48,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
         printed = json.dumps(router_config(config.bus, access, config.robot.id), indent=2)
         tell(printed, options.print)
         return 0
+    os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, when it is first used
     log.configure(config.log, "router")
     ended = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):

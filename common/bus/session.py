@@ -21,6 +21,11 @@ ANSWER_S = 1.0  # that a router has to answer
 # with all others waiting behind. Zenoh's default is 5 s, then the link is closed: a laptop that was
 # cut off would stop the robot's own streams for as long.
 FULL_US = 100_000
+# Zenoh ends a dead TCP link in a thread that reads from the others, and waits up to 10 s there for
+# what was not sent (SO_LINGER; no setting). It has two, as many as a laptop has sessions. Each link
+# that dies within 10 s takes one; idle ones cost 20 kB. For the process of a router: `READERS_ENV`.
+READERS = "(rx:(worker_threads:32))"
+READERS_ENV = "ZENOH_RUNTIME"
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 Answers = Callable[[], bool]

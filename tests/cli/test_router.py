@@ -9,10 +9,11 @@ import zenoh
 
 from cli.__main__ import main
 from cli.router import open_to
+from common.bus.session import client_config
 from common.options import EXIT_CONFIG, EXIT_LINK
 from common.settings import Bus
 from tests.cli.processes import PATIENCE_S, ran, sets
-from tests.support import free_port, router_process
+from tests.support import at, free_port, router_process
 
 
 def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
@@ -25,6 +26,14 @@ def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
         assert "Traceback" not in second.stderr
         first.send_signal(signal.SIGINT)
         assert first.wait(PATIENCE_S) == 0
+
+
+def test_dead_links_leave_it_threads_to_read_the_others() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(endpoint) as router, zenoh.open(client_config(at(endpoint))):
+        threads = Path(f"/proc/{router.pid}/task").glob("*/comm")
+        names = [comm.read_text(encoding="ascii") for comm in threads]
+    assert sum(name.startswith("rx-") for name in names) >= 32
 
 
 def test_an_address_of_another_host_is_a_sentence() -> None:
