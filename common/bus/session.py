@@ -26,6 +26,9 @@ FULL_US = 100_000
 # that dies within 10 s takes one; idle ones cost 20 kB. For the process of a router: `READERS_ENV`.
 READERS = "(rx:(worker_threads:32))"
 READERS_ENV = "ZENOH_RUNTIME"
+# For one try to dial. Who has just got another address may have dialled from the old one, and waits
+# this long for nothing; five ways there and back of a bad link fit in it.
+OPEN_MS = 4_000
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 Answers = Callable[[], bool]
@@ -170,7 +173,11 @@ def _common(where: Bus, **queue: object) -> dict[str, object]:
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         # The advanced publishers behind evt/** want timestamps.
         "timestamping": {"enabled": True},
-        "transport": {"link": link, "shared_memory": {"enabled": False}},  # our frames are tiny
+        "transport": {
+            "link": link,
+            "shared_memory": {"enabled": False},  # our frames are tiny
+            "unicast": {"open_timeout": OPEN_MS},
+        },
     }
 
 
