@@ -20,7 +20,8 @@ from services.teleop.logbook import Logbook
 from sim.requests import Place
 from tests.chain import Chain, chain
 from tests.dashboard.rig import dashboard
-from tests.dashboard.test_browser import CHROMIUM, opened, takes
+from tests.dashboard.test_browser import CHROMIUM
+from tests.dashboard.window import opened, takes
 from tests.support import running, wait_until
 
 IMAGES = Path("docs/images")

@@ -1,9 +1,11 @@
 """One router for all these tests; each test has a robot of its own on it."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from tests.common.desk import Desk
 from tests.common.rig import Rig
 from tests.support import free_port, router_process
 
@@ -21,3 +23,10 @@ def rig(shared_router: str) -> Iterator[Rig]:
     """Give a robot, and buses of it."""
     with Rig(shared_router) as made:
         yield made
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
+    """Give a directory to write settings in, and work in it."""
+    monkeypatch.chdir(tmp_path)
+    return Desk(tmp_path)
