@@ -158,7 +158,7 @@ def test_uninstalled_it_leaves_settings_alone(
     assert list(files(tmp_path)) == ["etc/t2/t2.toml"]
 
 
-@pytest.mark.parametrize("prefix", ["/home/anna/t2/.venv", "/tmp/t2", "/root/.venv"])
+@pytest.mark.parametrize("prefix", [f"{place}/t2" for place in install.HIDDEN])
 def test_a_place_that_services_do_not_see_is_refused(
     tmp_path: Path, prefix: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,7 +16,7 @@ lines = dict(l.split(":", 1) for l in open("/proc/self/status") if ":" in l)
 print(json.dumps({n: lines[n].strip() for n in ("Uid", "CapEff", "CapBnd", "NoNewPrivs")}))
 """
 WRITES = """
-import pathlib
+import pathlib, tempfile
 for place in ("/opt/t2", "/etc/t2", "/opt/venv/bin/python", "/run/x"):
     try:
         pathlib.Path(place + ".new").write_bytes(b"")
@@ -24,7 +24,7 @@ for place in ("/opt/t2", "/etc/t2", "/opt/venv/bin/python", "/run/x"):
         print(error.errno)
     else:
         print(place, "was written")
-pathlib.Path("/tmp/x").write_bytes(b"")
+pathlib.Path(tempfile.gettempdir(), "x").write_bytes(b"")
 """
 LINKS = "import os; print(*sorted(os.listdir('/sys/class/net')))"
 

@@ -30,8 +30,8 @@ sock.bind(("127.0.0.1", 4002))
 time.sleep(900)
 """
 REBUILD = (
-    "echo '# next' >> requirements.txt; rm SHA256SUMS; sha256sum -- * > /tmp/sums; "
-    "mv /tmp/sums SHA256SUMS"
+    "echo '# next' >> requirements.txt; rm SHA256SUMS; sha256sum -- * > ../sums; "
+    "mv ../sums SHA256SUMS"
 )
 
 
@@ -188,10 +188,10 @@ def refuses(m: Machine) -> str:
 
 def upgrades(m: Machine) -> str:
     """Install another build beside it, go back, and take everything away again."""
-    m.said("cp", "-r", "/wheelhouse", "/tmp/next")
-    m.said("sh", "-c", f"cd /tmp/next; {REBUILD}")
+    m.said("cp", "-r", "/wheelhouse", "/srv/next")
+    m.said("sh", "-c", f"cd /srv/next; {REBUILD}")
     first = m.said("readlink", "/opt/t2/current")
-    m.said("sh", "/tmp/next/t2-install.sh")
+    m.said("sh", "/srv/next/t2-install.sh")
     assert m.said("readlink", "/opt/t2/current") != first
     m.said("systemctl", "restart", "t2.target")
     wait_until(lambda: all(active(m, name) for name in UNITS), "the next version", PATIENCE_S)

@@ -37,10 +37,10 @@ def test_the_first_routers_folder_holds_all_that_there_is_to_know() -> None:
 
 
 def test_a_drivers_certificate() -> None:
-    told = list(words.issued(ANNA, member("driver", "anna"), "/tmp/k/driver.anna", [ROBOT]))
+    told = list(words.issued(ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]))
     assert "  may move robot 001, robot 002" in told
     assert "     t2 drive --config driver.anna/bus.toml" in told
-    assert told[-1] == "     scp -p /tmp/k/members.json 192.168.201.1:/etc/t2/keys/members.json"
+    assert told[-1] == "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json"
 
 
 def test_a_driver_of_every_robot() -> None:
