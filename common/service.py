@@ -33,6 +33,7 @@ from common.settings import Shared
 from common.systemd import OFTEN_S, Systemd
 
 REST_S = 2.0  # how long a service may take to come to rest
+BEHIND = 10  # how nice a service is that does not drive
 
 
 C = TypeVar("C", bound=Shared)
@@ -132,6 +133,30 @@ def run(
         return EXIT_LINK
     node.present()
     return serve(node)
+
+
+def run_behind(
+    name: str,
+    root: type[C],
+    found: Callable[[], Callable[[Node[C]], object]],
+    argv: Sequence[str] | None = None,
+    *,
+    extra: str,
+) -> int:
+    """Live the life of a service that needs an extra and stands behind all that drives.
+
+    ``found`` imports what builds the service.
+    """
+    try:
+        build = found()
+    except ModuleNotFoundError as error:
+        print(  # noqa: T201 - logs are not set up yet
+            f"{name} needs {error.name}: install the extra `{extra}` (pip install -e '.[{extra}]')",
+            file=sys.stderr,
+        )
+        return EXIT_CONFIG
+    os.nice(BEHIND)
+    return run(name, root, build, argv)
 
 
 def serve(node: Node[C]) -> int:
