@@ -26,7 +26,8 @@ SECONDS = 5.0
 PAGE = Path(__file__).with_name("page.md")
 CANNOT = 3  # exit code where two hosts cannot be made here
 # What a source's request holds, as shipped, and what it takes to notice.
-BUDGET_S = SafetyConfig().safety.sources["teleop"].lease + NOTICE_S
+SHIPPED = SafetyConfig().safety
+BUDGET_S = SHIPPED.sources["teleop"].lease + NOTICE_S
 NEEDS: tuple[Need, ...] = ("a far driver", "other clocks")
 
 
@@ -51,7 +52,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(text)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
-    return int(bool(page.wrong(backs, BUDGET_S)))
+    return int(bool(wrong(backs)))
+
+
+def wrong(backs: Backs) -> list[str]:
+    """Return what is not as it should be, by the shipped limits."""
+    return page.wrong(backs, BUDGET_S, SHIPPED.bumper_age)
 
 
 def _wanted(name: str, only: Sequence[str]) -> bool:
@@ -105,7 +111,7 @@ def report(wents: Wents, backs: Backs, took_s: float) -> str:
         "seen": page.seen(wents),
         "returning": page.returning(backs),
         "own": page.own(wents, backs),
-        "verdict": page.verdict(page.wrong(backs, BUDGET_S)),
+        "verdict": page.verdict(wrong(backs)),
     }
     return PAGE.read_text(encoding="utf-8").format(**parts)
 

@@ -1,6 +1,6 @@
 """What the campaign found, as a document. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import inf, isfinite
 
 from tests.faults.table import rank
@@ -88,19 +88,33 @@ def returning(backs: Backs) -> str:
     return table(head, rows)
 
 
-def wrong(backs: Backs, budget_s: float) -> list[str]:
-    """Return what is not as it should be, in words; ``budget_s`` is what a STOP may take."""
+def wrong(backs: Backs, budget_s: float, fresh_s: float) -> list[str]:
+    """Return what is not as it should be, in words.
+
+    ``budget_s`` is what a STOP may take, ``fresh_s`` how long safety lives with the last bumper.
+    """
     found = []
     for what, some, held_s in backs:
         for back in some:
-            found += [f"{what.name}: {fault}" for fault in _faults(what, back, budget_s + held_s)]
+            faults = [
+                *_gaps(back.chain, fresh_s + held_s),
+                *_faults(what, back, budget_s + held_s),
+            ]
+            found += [f"{what.name}: {fault}" for fault in faults]
     return found
+
+
+def _gaps(chain: Chain, fresh_s: float) -> Iterator[str]:
+    lost = chain.bumper.lost + chain.odometry.lost
+    if lost:
+        yield f"{lost} messages lost on board"
+    if chain.bumper.gap_s > fresh_s:
+        yield f"no bumper on board for {_ms(chain.bumper.gap_s)}, {_ms(fresh_s)} are allowed"
 
 
 def _faults(what: Outage, back: Back, budget_s: float) -> list[str]:
     took_s = max(back.told_s or 0.0, back.moved_s)
-    lost = back.chain.bumper.lost + back.chain.odometry.lost
-    faults = [f"{lost} messages lost on board"] if lost else []
+    faults = []
     if what.seconds > budget_s and back.told_s is None:
         faults.append("it did not stop")
     elif back.told_s is not None and what.seconds > budget_s and took_s > budget_s:

@@ -82,15 +82,16 @@ def test_a_verdict_and_its_input_have_an_age() -> None:
 )
 def test_what_is_not_as_it_should_be(one: Back, found: list[str]) -> None:
     lost = [(Outage("down for 1 s", 1.0, 1), [one], 0.1)]
-    assert page.wrong(lost, 0.35) == [f"down for 1 s: {what}" for what in found]
+    assert page.wrong(lost, 0.35, 0.15) == [f"down for 1 s: {what}" for what in found]
 
 
 def test_a_short_loss_may_be_driven_over_and_the_robots_own_messages_may_not_be_lost() -> None:
     short = Outage("down for 0.2 s", 0.2, 1)
-    assert page.wrong([(short, [back(told_s=None)], 0.0)], 0.35) == []
-    chain = replace(back().chain, bumper=replace(GOOD, lost=3))
-    assert page.wrong([(short, [back(chain=chain)], 0.0)], 0.35) == [
-        "down for 0.2 s: 3 messages lost on board"
+    assert page.wrong([(short, [back(told_s=None)], 0.0)], 0.35, 0.15) == []
+    chain = replace(back().chain, bumper=replace(GOOD, lost=3, gap_s=0.3))
+    assert page.wrong([(short, [back(chain=chain)], 0.1)], 0.35, 0.15) == [
+        "down for 0.2 s: 3 messages lost on board",
+        "down for 0.2 s: no bumper on board for 0.30 s, 0.25 s are allowed",
     ]
 
 
