@@ -1,14 +1,15 @@
 """What the containers do when nothing fails: they come up, drive a lap, tell and record."""
 
 import json
+import os
 import re
 import time
 
 from cli.lap import holdup
 from cli.lap.score import good, results
 from cli.lap.script import PATIENT, QUICK
-from tests.compose.engine import docker
-from tests.compose.stage import ASKED, SERVICES, Stage
+from tests.compose.engine import Project, size_mb
+from tests.compose.stage import ASKED, BUILD_S, SERVICES, Stage
 
 OURS = (*SERVICES, "router-settings")
 ROUNDS = 5
@@ -67,19 +68,24 @@ def settings_of_the_router_are_made(stage: Stage) -> str:
 
 
 def laptop_comes_in(stage: Stage) -> str:
-    """A container on the laptops' network, with a driver's certificate, asks over TLS."""
-    router = stage["router"].about
-    network = next(iter(router["NetworkSettings"]["Networks"]))
-    folder = stage.project.files[-1].parent / "keys" / "driver.anna"
-    settings = {"CONNECT": "tls/router:7447", "CA": "/k/ca.pem",
-                "CERTIFICATE": "/k/certificate.pem", "PRIVATE_KEY": "/k/private.key"}  # fmt: skip
-    given = [word for n, v in settings.items() for word in ("-e", f"T2__BUS__{n}={v}")]
-    said = docker(
-        "run", "--rm", "--network", network, "--user", "0:0", "-v", f"{folder}:/k:ro", *given,
-        "--entrypoint", "t2", router["Image"], "health", "safety", "--json",
-    )  # fmt: skip
+    """The laptop's own image, with a driver's certificate, asks over TLS."""
+    project = laptop(stage)
+    project("build", "laptop", patience_s=BUILD_S)
+    said = project("run", "--rm", "-T", "laptop", "health", "safety", "--json")
     assert json.loads(said)["told"], said
-    return "tls/router:7447 with driver.anna: safety answers"
+    size = size_mb(f"t2-laptop:{stage.project.variables['T2_TAG']}")
+    return f"t2-laptop, {size:.1f} MB, with driver.anna: safety answers through tls/router:7447"
+
+
+def laptop(stage: Stage) -> Project:
+    """Return the same project as a laptop runs it; its keys belong to who runs this."""
+    project = stage.project
+    own = {
+        "T2_KEYS": str(project.files[-1].parent / "keys" / "driver.anna"),
+        "T2_ROUTER": "tls/router:7447",
+        "T2_USER": f"{os.getuid()}:{os.getgid()}",
+    }
+    return Project(project.name, project.files, {**project.variables, **own}, ["laptop"])
 
 
 def logs_are_in_order(stage: Stage) -> str:

@@ -71,6 +71,11 @@ def pulled(image: str) -> bool:
     return True
 
 
+def size_mb(image: str) -> float:
+    """Return the size of an image, in MB of its files."""
+    return float(json.loads(docker("image", "inspect", image))[0]["Size"]) / 1e6
+
+
 @dataclass(frozen=True, slots=True)
 class Project:
     """One compose project: its files, what its variables are, and a name of its own."""

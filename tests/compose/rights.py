@@ -4,7 +4,7 @@ import json
 import urllib.error
 import urllib.request
 
-from tests.compose.engine import Container, docker
+from tests.compose.engine import size_mb
 from tests.compose.stage import SERVICES, Stage
 
 ROBOT_MB = 120.0
@@ -31,7 +31,7 @@ LINKS = "import os; print(*sorted(os.listdir('/sys/class/net')))"
 
 def image_is_small(stage: Stage) -> str:
     """The robot's own image."""
-    sizes = {name: size_mb(stage[name]) for name in ("safety", "dashboard")}
+    sizes = {name: size_mb(stage[name].about["Image"]) for name in ("safety", "dashboard")}
     assert sizes["safety"] < ROBOT_MB, sizes
     return f"robot {sizes['safety']:.1f} MB, with the dashboard {sizes['dashboard']:.1f} MB"
 
@@ -105,9 +105,3 @@ def status(browser: urllib.request.OpenerDirector, address: str) -> int:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
-
-
-def size_mb(container: Container) -> float:
-    """Return the size of a container's image, in MB of its files."""
-    image = json.loads(docker("image", "inspect", container.about["Image"]))[0]
-    return float(image["Size"]) / 1e6

@@ -96,6 +96,7 @@ def override(sets: list[str], trace: Path) -> dict[str, object]:
         "command": ["sim", "--config", "/etc/t2/robot.toml", "--trace", "/trace/trace.jsonl"],
         "volumes": [{"type": "bind", "source": str(trace), "target": "/trace"}],
     }
+    services["laptop"] = {"networks": ["site"]}  # there is no other host here to come in from
     return {"services": services}
 
 
