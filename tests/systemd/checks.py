@@ -178,6 +178,7 @@ def refuses(m: Machine) -> str:
     said = m.said("journalctl", "-u", "t2-odom.service", "-o", "cat", "-n", "20")
     assert "odom.hold = 99.0" in said, said
     m.write(SETTINGS, good)
+    m.said("systemctl", "stop", "t2-bridge.service")
     m.said("systemd-run", "--unit=taker", "/opt/t2/current/bin/python", "-c", TAKER)
     m.said("systemctl", "start", "--no-block", "t2.target")
     wait_until(lambda: int(m.unit("t2-bridge.service")["NRestarts"]) >= 1, "a retry", PATIENCE_S)
