@@ -74,6 +74,18 @@ def chunks(key: str) -> tuple[str, str]:
     return (parts[2], parts[3]) if len(parts) == 4 and key.startswith(f"{keys.ROOT}/") else ("", "")
 
 
+PRETENDS = "the health of another service than the key's"
+
+
+def speaker(key: str) -> str:
+    """Return the service that a whole key of ``tel/{service}/...`` belongs to.
+
+    Access rules go by keys, so only the key proves who speaks; what a message says of itself is
+    anybody's.
+    """
+    return chunks(key)[1].split("/")[1]
+
+
 def topic_of(key: str) -> keys.Topic[Message] | None:
     """Return the row of the table that a whole key belongs to."""
     path = chunks(key)[1].split("/")

@@ -81,5 +81,5 @@ def look(opened: Probe, robot: str, seconds: float) -> Seen:
 def as_text(finding: Finding) -> str:
     """Return a finding for people: what to do stands below it."""
     mark = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}[finding.level]
-    text = f"{finding.where:9} {mark:6} {finding.text}"
+    text = f"{finding.where:9} {mark:6} {output.printable(finding.text)}"
     return f"{text}\n{'':17}-> {finding.todo}" if finding.todo else text

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import msgspec
 
 from cli.inspect import output
-from cli.inspect.addressing import chunks
+from cli.inspect.addressing import PRETENDS, chunks, speaker
 from cli.inspect.presence import present
 from cli.inspect.shell import Seat, add_options, quietly, seated, wants_json
 from common import codec, keys
@@ -107,11 +107,14 @@ def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
     with quietly():
         for heard in probe.samples(LISTEN_S):
             try:
-                health = codec.decode(heard.payload, Health)
+                health, name = codec.decode(heard.payload, Health), speaker(heard.key)
             except MessageError as error:
                 print(f"t2 health: {heard.key}: {error}", file=sys.stderr)
+                continue
+            if health.service == name:
+                told[chunks(heard.key)[0], name] = health
             else:
-                told[chunks(heard.key)[0], health.service] = health
+                print(f"t2 health: {heard.key}: {PRETENDS}", file=sys.stderr)
     return told
 
 

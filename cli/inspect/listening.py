@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from cli.inspect.addressing import EVERYTHING, chunks, expression, topic_of
+from cli.inspect.addressing import EVERYTHING, PRETENDS, chunks, expression, speaker, topic_of
 from cli.inspect.diagnosis import Seen
 from cli.inspect.shell import quietly
 from common import codec
@@ -36,6 +36,9 @@ def note(heard: Sample, seen: Seen, host: int) -> None:
         message = codec.decode(heard.payload, topic.message)
     except MessageError as error:
         seen.undecodable[path] = str(error)
+        return
+    if isinstance(message, m.Health) and message.service != speaker(heard.key):
+        seen.undecodable[path] = PRETENDS
         return
     if path.startswith("tel/"):
         seen.delays_s.append((heard.wall_ns - message.t_ns) / S)

@@ -28,8 +28,16 @@ def plain(thing: Any) -> Any:
             return str(thing)
 
 
+def printable(text: str) -> str:
+    """Return a text from the bus without what a terminal would obey."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return aligned columns; those that hold numbers alone stand to the right."""
+    rows = [[printable(cell) for cell in row] for row in rows]
     columns = list(zip(head, *rows, strict=True))
     wide = [max(map(len, column)) for column in columns]
     right = [bool(rows) and all(map(_is_number, column[1:])) for column in columns]
@@ -58,7 +66,7 @@ def scalar(value: Any) -> str:
     if isinstance(value, bytes):
         return value.hex()
     if isinstance(value, str) and value:
-        return value
+        return printable(value)
     return msgspec.json.encode(plain(value)).decode()
 
 

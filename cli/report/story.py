@@ -179,6 +179,6 @@ class Story:
 
     @_tell.register
     def _(self, message: Health, key: str, at_s: float) -> None:
-        life = message.service, message.boot
+        life = key.split("/")[-2], message.boot
         first, _ = self.healths.get(life, (message, message))
         self.healths[life] = first, message

@@ -76,7 +76,7 @@ class Summary:
                 text = f"{message.name}: {message.text}"
                 self.events.append(Note(at_s, key.rpartition("/")[2], message.level, text))
             case Health():
-                self.versions[message.service] = message.version
+                self.versions[key.split("/")[-2]] = message.version
             case SafetyState():
                 for name in self._latches.take(message):
                     self.latched.append(Note(at_s, "safety", "error", name))

@@ -13,7 +13,7 @@ from common.bus.session import client_config
 from common.options import EXIT_CONFIG, EXIT_LINK
 from common.settings import Bus
 from tests.cli.processes import PATIENCE_S, ran, sets
-from tests.support import at, free_port, router_process
+from tests.support import at, free_port, router_process, wait_until
 
 
 def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
@@ -31,9 +31,13 @@ def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
 def test_dead_links_leave_it_threads_to_read_the_others() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with router_process(endpoint) as router, zenoh.open(client_config(at(endpoint))):
-        threads = Path(f"/proc/{router.pid}/task").glob("*/comm")
-        names = [comm.read_text(encoding="ascii") for comm in threads]
-    assert sum(name.startswith("rx-") for name in names) >= 32
+        tasks = Path(f"/proc/{router.pid}/task")
+
+        def readers() -> int:
+            names = [comm.read_text(encoding="ascii") for comm in tasks.glob("*/comm")]
+            return sum(name.startswith("rx-") for name in names)
+
+        wait_until(lambda: readers() >= 32, "threads that read")
 
 
 def test_an_address_of_another_host_is_a_sentence() -> None:

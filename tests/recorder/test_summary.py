@@ -49,6 +49,7 @@ def test_events_latches_and_versions_are_told() -> None:
     summary.take(state, "SafetyState", specimen.state(), BEGIN_NS, raw=False)
     summary.take(f"{ROOT}/evt/bridge", "Event", event, at_ns, raw=False)
     summary.take(state, "SafetyState", specimen.state("contact"), at_ns, raw=False)
-    assert summary.versions == {"odom": "1.2"}
+    summary.take(f"{ROOT}/tel/dashboard/health", "Health", health, at_ns, raw=False)
+    assert summary.versions == {"odom": "1.2", "dashboard": "1.2"}  # by the key: rules go by it
     assert summary.events == [Note(1.0, "bridge", "error", "contact: the bumper is hit")]
     assert summary.latched == [Note(1.0, "safety", "error", "contact")]

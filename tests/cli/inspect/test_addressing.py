@@ -1,8 +1,11 @@
 """Short keys, whole keys, and what is none."""
 
 import argparse
+import re
+from pathlib import Path
 
 import pytest
+import zenoh
 
 from cli.inspect.addressing import chunks, expression, keys_meant, one_key, short, topic_of
 from common import keys
@@ -53,3 +56,22 @@ def test_the_row_of_the_table() -> None:
     assert topic_of("t2/v1/7/tel/mine/x/y") is None
     assert topic_of("t2/v1/7/tel/mine/temperature") is None
     assert topic_of("elsewhere") is None
+
+
+ROOT = Path(__file__).parents[3]
+NAMED = re.compile(r"t2 (?:echo|hz|delay|bw) +'?([a-z@][\w/*@]*)")
+
+
+def test_every_key_that_a_document_names_is_one_of_the_table() -> None:
+    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("services/*/*.md"),
+             *ROOT.glob("deploy/**/*.md"), *ROOT.glob("deploy/**/*.yml")]  # fmt: skip
+    rows = [
+        zenoh.KeyExpr(re.sub(r"\{\w+\}", "*", f"{keys.ROOT}/7/{row.path}")) for row in keys.TOPICS
+    ]
+    named = {word for text in texts for word in NAMED.findall(text.read_text(encoding="utf-8"))}
+    deaf = [
+        word
+        for word in named
+        if not any(zenoh.KeyExpr(expression(word, "7")).intersects(row) for row in rows)
+    ]
+    assert (deaf, len(named) > 3) == ([], True)

@@ -27,6 +27,15 @@ def test_health(rig: Rig, tool: Tool) -> None:
     assert "it hangs" in result.err
 
 
+def test_nobody_tells_how_another_fares(rig: Rig, tool: Tool) -> None:
+    pretend(rig, "dashboard", {keys.HEALTH: partial(health, "safety")}, service="dashboard")
+    result = tool("health")
+    assert {line["service"]: line["alive"] for line in result.lines} == {
+        "bridge": False, "safety": False, "odom": False, "dashboard": True,
+    }  # fmt: skip
+    assert "tel/dashboard/health: the health of another service than the key's" in result.err
+
+
 @pytest.fixture
 def answers() -> dict[str, bytes]:
     """What safety of that robot answers when it is asked for its last values, by robot."""

@@ -12,6 +12,11 @@ def test_a_table_is_aligned_and_numbers_stand_to_the_right() -> None:
     assert shown.splitlines() == ["key       Hz", "tel/a    5.0", "b      120.5", "c          -"]
 
 
+def test_nothing_from_the_bus_steers_the_terminal() -> None:
+    assert output.table(["a"], [["\x1b[2Jgone\n"]]) == "a\n\\x1b[2Jgone\\n"
+    assert output.fields({"text": "急停\x07"}) == "text: 急停\\x07"
+
+
 def test_a_table_without_rows_is_its_head() -> None:
     assert output.table(("a", "b"), []) == "a  b"
 
