@@ -88,7 +88,7 @@ class Exporter(Collector):
 
     def _forget(self, now_ns: int) -> None:
         for name, robot in list(self._robots.items()):
-            if robot.forget(now_ns) and name != self._own:
+            if name != self._own and (robot.forget(now_ns) or not robot.is_robot):
                 del self._robots[name]
 
     def _read(self, members: Path) -> None:
@@ -102,7 +102,7 @@ class Exporter(Collector):
 
     def _sheet(self) -> list[Metric]:
         return sheet(
-            self._robots,
+            {n: robot for n, robot in self._robots.items() if n == self._own or robot.is_robot},
             time.monotonic_ns(),
             connected=self._bus.connected,
             certificates=self._certificates,

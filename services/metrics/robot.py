@@ -15,6 +15,7 @@ from common.messages import Event, Health, Link, Odometry, SafetyState
 WORTH_S = 3.0  # how long a value is told: the slowest streams come once a second
 KEPT_S = 24 * 3600.0  # after which what is gone is forgotten: fleets change
 EXPECTED = ("bridge", "safety", "odom")  # it does not drive without: told though never heard
+NAMES = 500  # events of so many names are told apart: nobody fills the memory with invented ones
 ROOM = ("disk_full", "disk_room")  # the recorder's events that tell whether it can write
 LATENESS_S = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
@@ -73,10 +74,19 @@ class Robot:
 
     def on_event(self, name: str, event: Event) -> None:
         """Count an event; late ones come in any order."""
-        self.events[name, event.name, event.level] += 1
+        key = name, event.name, event.level
+        if key not in self.events and len(self.events) >= NAMES:
+            key = name, "other", event.level
+        self.events[key] += 1
         newer = self.room is None or event.t_ns > self.room.t_ns
         if name == "recorder" and event.name in ROOM and newer:
             self.room = event
+
+    @property
+    def is_robot(self) -> bool:
+        """Whether anything that runs on a robot was ever heard: others only bear its id."""
+        streams = self.safety, self.link, self.odometry
+        return any(streams) or any(self.services[name].seen_ns for name in EXPECTED)
 
     def is_up(self, now_ns: int) -> bool:
         """Tell whether what runs on the robot itself is heard: others bear its id on laptops."""

@@ -116,6 +116,8 @@ def test_all_robots_of_a_site_are_told(rig: Rig, tmp_path: Path) -> None:
     def put() -> None:
         for robot in (f"{site}-1", f"{site}-2", f"other-{rig.robot}"):
             stranger.put(f"{root}/{robot}/tel/bridge/link", codec.encode(link()))
+        only_named = f"{root}/{site}-3/tel/dashboard/health"
+        stranger.put(only_named, codec.encode(health("dashboard")))
 
     with running(rig.endpoint, tmp_path, f"metrics.robots={site}-$*") as port:
         until_heard(
@@ -128,6 +130,7 @@ def test_all_robots_of_a_site_are_told(rig: Rig, tmp_path: Path) -> None:
             "both robots of the site, and no other",
         )  # fmt: skip
         assert value(port, "t2_robot_up", robot="001") is None
+        assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # a laptop bears its id
 
 
 def test_events_are_counted_and_tell_of_a_full_disk(rig: Rig, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from common.freshness import Latest, S
-from services.metrics.robot import EXPECTED, KEPT_S, WORTH_S, Robot, Tally
+from services.metrics.robot import EXPECTED, KEPT_S, NAMES, WORTH_S, Robot, Tally
 from tests.metrics.heard import NOW_NS, event, health, link, whole
 
 LATE_NS = NOW_NS + round(WORTH_S * S) + 1
@@ -92,6 +92,21 @@ def test_events_are_counted_by_name() -> None:
         ("bridge", "contact", "error"): 2,
         ("safety", "contact", "error"): 1,
     }
+
+
+def test_invented_events_do_not_fill_the_memory() -> None:
+    robot = Robot()
+    for number in range(NAMES + 7):
+        robot.on_event("dashboard", event(f"e{number}"))
+    assert robot.events["dashboard", "other", "error"] == 7
+    assert len(robot.events) == NAMES + 1
+
+
+def test_it_is_a_robot_once_what_runs_on_one_was_heard() -> None:
+    robot = Robot()
+    robot.on_health("dashboard", health("dashboard"), NOW_NS)
+    assert not robot.is_robot
+    assert Robot(link=Latest(link(), NOW_NS)).is_robot
 
 
 def test_a_service_that_is_long_gone_is_forgotten_and_an_expected_one_is_not() -> None:
