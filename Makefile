@@ -33,7 +33,7 @@ up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder
 	$(BIN)/t2 up
 
 # Most tests wait for other processes most of the time; some measure, and no other may run then.
-TOGETHER = -n 3 --dist worksteal -m "not alone"
+TOGETHER = -n 4 --dist worksteal -m "not alone"
 
 test: $(STAMP) ## all tests
 	$(BIN)/pytest $(TOGETHER)
@@ -72,10 +72,10 @@ SEARCH = tests/invariants tests/safety/test_walk.py
 search: $(STAMP) ## the search for holes in the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
-cover: $(STAMP) ## all tests but the search, with what they cover
+cover: $(STAMP) ## all tests but the search, with what those cover that do not measure
 	$(BIN)/coverage erase
 	$(BIN)/pytest --cov --cov-report= $(addprefix --ignore=,$(SEARCH)) $(TOGETHER)
-	$(BIN)/pytest --cov --cov-report= --cov-append $(addprefix --ignore=,$(SEARCH)) -m alone
+	$(BIN)/pytest $(addprefix --ignore=,$(SEARCH)) -m alone
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 
