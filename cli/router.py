@@ -84,16 +84,15 @@ def access_of(bus: Bus) -> dict[str, object] | None:
     """
     if not bus.members:
         return None
-    protocols = {
-        endpoint.partition("/")[0] for endpoint in bus.listen if not is_encrypted(endpoint)
-    }
-    return access_control(members.read(Path(bus.members)).welcome, sorted(protocols))
+    return access_control(members.read(Path(bus.members)).welcome, bus.onboard)
 
 
 def open_to(bus: Bus) -> str:
     """Say in words who is let in."""
     if bus.insecure:
-        return "everybody on the network, without a certificate"
-    if any(map(is_encrypted, bus.listen)):
-        return "this machine, and members with a certificate"
-    return "every program on this machine"
+        who = "everybody on the network, without a certificate"
+    elif any(map(is_encrypted, bus.listen)):
+        who = "this machine, and members with a certificate"
+    else:
+        who = "every program on this machine"
+    return ", and ".join((who, *(f"whom the router {each} lets in" for each in bus.uplink)))

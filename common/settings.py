@@ -65,7 +65,7 @@ class Bus(Section, frozen=True, kw_only=True):
     certificate: str = ""
     private_key: str = ""
     members: str = ""  # the list of `t2 keys`: whom the router lets in, and as what
-    insecure: bool = False  # let a router listen to the network without TLS
+    insecure: bool = False  # let a router listen to the network, or dial it, without TLS
     laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
 
     def __post_init__(self) -> None:
@@ -87,13 +87,28 @@ class Bus(Section, frozen=True, kw_only=True):
             for endpoint in plain or self.listen
         )
 
+    @property
+    def onboard(self) -> tuple[str, ...]:
+        """The protocols whose links a router trusts, members or not: it listens there in plain."""
+        plain = (each for each in self.listen if not is_encrypted(each))
+        return tuple(sorted({protocol(each) for each in plain}))
+
     def _check_open(self) -> None:
         """Refuse to open the robot to everybody on the network, unless that is spelled out."""
-        for endpoint in self.listen:
-            if not (self.insecure or is_encrypted(endpoint) or is_local(endpoint)):
+        if self.insecure:
+            return
+        for way, endpoints in (("listen", self.listen), ("uplink", self.uplink)):
+            for endpoint in endpoints:
+                if not (is_encrypted(endpoint) or is_local(endpoint)):
+                    raise ValueError(
+                        f"{way} {endpoint} lets everybody on the network drive; "
+                        "`t2 keys` and tls/... let in whom you name, --insecure lets in all"
+                    )
+        for endpoint in self.uplink if self.members else ():
+            if protocol(endpoint) in self.onboard:  # rules know a link by its protocol alone
                 raise ValueError(
-                    f"listen {endpoint} lets everybody on the network drive; "
-                    "`t2 keys` and tls/... let in whom you name, --insecure lets in all"
+                    f"uplink {endpoint} would pass for a service on board, as listen has "
+                    f"{protocol(endpoint)}/, too; dial tls/..., or listen on unixsock-stream/..."
                 )
 
     def _check_encrypted(self) -> None:
@@ -102,8 +117,17 @@ class Bus(Section, frozen=True, kw_only=True):
         for name in ("ca", "certificate", "private_key"):
             if dialled and not getattr(self, name):
                 raise ValueError(f"{dialled[0]} wants {name}: a PEM file of `t2 keys issue`")
-        if any(map(is_encrypted, self.listen)) and not self.members:
-            raise ValueError("a router that listens on TLS wants members: the list of `t2 keys`")
+        for endpoint in (*self.listen, *self.uplink):
+            if is_encrypted(endpoint) and not self.members:
+                raise ValueError(
+                    f"{endpoint} wants members: the list of `t2 keys`, or whoever comes that way "
+                    "may do everything"
+                )
+
+
+def protocol(endpoint: str) -> str:
+    """Return what an endpoint is spoken to in, such as tcp."""
+    return endpoint.partition("/")[0]
 
 
 def is_encrypted(endpoint: str) -> bool:
@@ -113,9 +137,9 @@ def is_encrypted(endpoint: str) -> bool:
 
 def is_local(endpoint: str) -> bool:
     """Tell whether only this host can reach an endpoint."""
-    protocol, _, address = endpoint.partition("/")
-    if protocol == "unixsock-stream":
+    if protocol(endpoint) == "unixsock-stream":
         return True
+    address = endpoint.partition("/")[2]
     host = address.partition("?")[0].partition("#")[0].rpartition(":")[0].strip("[]")
     try:
         return ip_address(host).is_loopback

@@ -5,9 +5,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from common import keys
 from common.bus.bus import Arrival, Bus
+from common.bus.session import client_config
 from common.loop import Loop
 from common.messages import Done, Drive, ResetRequest
 from common.settings import Bus as Where
@@ -138,6 +140,29 @@ def test_through_the_sites_router_each_reaches_its_own(
             return bool(first.estops and second.estops)
 
         wait_until(stopped, "all robots stopped")
+
+
+def test_what_is_safetys_alone_does_not_come_down_the_uplink(site: Site) -> None:
+    motion, stop = keys.MOTION.on("001"), keys.estop_key("001")
+    heard: list[str] = []
+    with (
+        site.router(site.settings("site", "berlin")) as (center, room),
+        site.router(site.settings("robot", "001"), center) as (_, onboard),
+        zenoh.open(client_config(at(onboard))) as safety,
+        zenoh.open(client_config(at(room))) as somebody,
+    ):
+        ears = [safety.declare_subscriber(key, lambda s: heard.append(str(s.key_expr)))
+                for key in (motion, stop)]  # fmt: skip
+
+        def passed() -> bool:
+            for key in (motion, stop):
+                somebody.put(key, b"", congestion_control=zenoh.CongestionControl.BLOCK)
+            return bool(heard)
+
+        wait_until(passed, "a stop from the site")
+        assert set(heard) == {stop}
+        for ear in ears:
+            ear.undeclare()
 
 
 @contextmanager

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from cli.docs import DOCS, generated, kinds
 from cli.states import transitions
+from common.config import Sources, load
+from common.settings import Shared
 from services.safety.causes import RULES
 
 TREE = DOCS.parent
@@ -76,3 +78,11 @@ def test_the_diagram_shows_what_the_policy_does() -> None:
     assert of_brake == {"reset", "release held"}
     assert not [one for one in found if one[1] == "time" and one[2] in ("run", "slow", "creeping")]
     assert {after for before, _, after in found if before == "[*]"} == {"inhibited"}
+
+
+def test_the_settings_of_a_fleets_robot_are_good(tmp_path: Path) -> None:
+    page = (DOCS / "fleet.md").read_text(encoding="utf-8")
+    file = tmp_path / "robot.toml"
+    file.write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    bus = load(Shared, Sources(files=(file,), environ={})).config.bus
+    assert bus.uplink == ("tls/site.example:7447",)

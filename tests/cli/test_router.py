@@ -89,6 +89,10 @@ def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
             Bus(listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"),
             "this machine, and members with a certificate",
         ),
+        (
+            Bus(uplink=("tcp/127.0.0.1:1",)),
+            "every program on this machine, and whom the router tcp/127.0.0.1:1 lets in",
+        ),
     ],
 )
 def test_it_says_whom_it_lets_in(bus: Bus, words: str) -> None:

@@ -1,5 +1,6 @@
 """Sections that two services share: what they refuse."""
 
+import re
 from typing import Any
 
 import msgspec
@@ -117,7 +118,31 @@ def test_tls_wants_its_files(way: str, name: str) -> None:
 def test_a_router_on_tls_wants_to_know_its_members() -> None:
     with pytest.raises(ValueError, match="wants members: the list of `t2 keys`"):
         Bus(listen=("quic/0.0.0.0:7447",), **CERTIFIED)
-    Bus(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # who dials lets nobody in
+    Bus(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # a client lets nobody in
+
+
+@pytest.mark.parametrize("endpoint", ["tcp/192.0.2.1:7447", "udp/[2001:db8::1]:1", "ws/site:1"])
+def test_a_robot_is_not_opened_by_what_it_dials(endpoint: str) -> None:
+    with pytest.raises(ValueError, match=rf"^uplink {re.escape(endpoint)} lets everybody .*--inse"):
+        Bus(uplink=(endpoint,))
+    with pytest.raises(ValueError, match="lets everybody on the network drive"):
+        Bus(uplink=(endpoint,), members="members.json")
+    assert Bus(uplink=(endpoint,), insecure=True).uplink == (endpoint,)
+    assert Bus(uplink=("tcp/127.0.0.1:7448",)).uplink == ("tcp/127.0.0.1:7448",)
+
+
+def test_an_uplink_by_tls_wants_to_know_its_members() -> None:
+    uplink = ("tls/site.example:7447",)
+    with pytest.raises(ValueError, match=r"^tls/site.example:7447 wants members: the list of"):
+        Bus(uplink=uplink, **CERTIFIED)
+    assert Bus(uplink=uplink, members="members.json", **CERTIFIED).onboard == ("tcp",)
+
+
+def test_what_is_dialled_never_passes_for_a_service_on_board() -> None:
+    for endpoint in ("tcp/127.0.0.1:7448", "tcp/localhost:7448"):
+        with pytest.raises(ValueError, match=r"would pass for a service on board, as .* tcp/, too"):
+            Bus(uplink=(endpoint,), members="members.json")
+    Bus(uplink=(endpoint,), members="members.json", listen=("unixsock-stream//run/t2/bus.sock",))
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "$*", "a b", "001\n", "@x", "a?b", "a#b"])
