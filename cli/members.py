@@ -27,6 +27,7 @@ class Member(Struct, frozen=True, kw_only=True):
     role: Role
     name: Name
     robots: tuple[str, ...] = ()  # that a driver may move, or that a robot is
+    addresses: tuple[str, ...] = ()  # where a router is dialled; lists of before have none
     expires: datetime  # UTC
     revoked: bool = False
 

@@ -94,7 +94,7 @@ class Authority:
         )  # fmt: skip
         member = Member(
             common_name=name, role=profile.role, name=profile.name, robots=profile.robots,
-            expires=signed.not_valid_after_utc,
+            addresses=profile.addresses, expires=signed.not_valid_after_utc,
         )  # fmt: skip
         return Issued(certificate_pem(signed), key_pem(key), member)
 
@@ -116,15 +116,6 @@ def key_pem(key: ec.EllipticCurvePrivateKey, passphrase: bytes = b"") -> bytes:
     """Return a private key as its file holds it, encrypted if there is a passphrase."""
     protection = BestAvailableEncryption(passphrase) if passphrase else NoEncryption()
     return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, protection)
-
-
-def addresses(certificate: x509.Certificate) -> tuple[str, ...]:
-    """Return where a certificate's holder listens."""
-    try:
-        found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except x509.ExtensionNotFound:
-        return ()
-    return tuple(str(name.value) for name in found)
 
 
 def _signed(

@@ -14,16 +14,15 @@ from pathlib import Path
 import msgspec
 
 from cli import members as lists
+from cli.keys import roster
 from cli.keys.authority import (
     Authority,
     Issued,
-    addresses,
-    certificate_from,
     certificate_pem,
     key_pem,
 )
 from cli.keys.bundle import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
-from cli.keys.profile import LISTENERS, Profile
+from cli.keys.profile import Profile
 from cli.members import Members
 from common.errors import RobotError
 
@@ -73,17 +72,20 @@ class Folder:
         return lists.read(self.members)
 
     def write(self, members: Members) -> None:
-        """Write the list, here and for each router that is let in."""
+        """Write the list, here and into each folder of a router that is let in."""
         _write(self.members, _as_file(members), PUBLIC)
-        for router in self.routers(members):
-            _write(self.path / router.who / MEMBERS, _as_file(members), PUBLIC)
+        for router in roster.routers(members):
+            if (self.path / router.who / CERTIFICATE).exists():
+                _write(self.path / router.who / MEMBERS, _as_file(members), PUBLIC)
 
     def hand_out(
         self, profile: Profile, issued: Issued, members: Members, *, settings: bool
     ) -> Path:
         """Write the folder that goes to a machine and return it; ``settings``: ``bus.toml`` too."""
         target = self.path / profile.who
-        others = [each for each in self.routers(members) if each.who != profile.who]
+        others = [
+            each for each in roster.routers(members) if each.addresses and each.who != profile.who
+        ]
         with _told(target):
             target.mkdir(mode=0o700, exist_ok=True)
         _write(target / PRIVATE_KEY, issued.private_key, SECRET)
@@ -92,20 +94,6 @@ class Folder:
         if settings or not (target / SETTINGS).exists():
             _write(target / SETTINGS, bus_toml(profile, others).encode(), PUBLIC)
         return target
-
-    def routers(self, members: Members) -> list[Profile]:
-        """Return the routers that are let in and whose folders are here."""
-        there = {(each.role, each.name) for each in members.welcome if each.role in LISTENERS}
-        return [
-            Profile(role, name, addresses=found)
-            for role, name in sorted(there)
-            if (found := self.addresses(f"{role}.{name}"))
-        ]
-
-    def addresses(self, who: str) -> tuple[str, ...]:
-        """Return where somebody's certificate says that it listens; nothing if there is none."""
-        file = self.path / who / CERTIFICATE
-        return addresses(certificate_from(_read(file))) if file.exists() else ()
 
 
 @contextlib.contextmanager

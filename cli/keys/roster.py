@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
+from cli.keys.profile import LISTENERS, Profile
 from cli.members import Member, Members, Role
 from common.errors import RobotError
 
@@ -22,6 +23,23 @@ def newest(members: Members, role: Role, name: str) -> Member:
             f"`t2 keys issue {role} {name}` makes one"
         )
     return found[-1]
+
+
+def found_at(member: Member) -> tuple[str, ...]:
+    """Return where somebody is dialled; raise ``RobotError`` for a router of whom no list says."""
+    if member.role in LISTENERS and not member.addresses:
+        who = f"{member.role} {member.name}"
+        raise RobotError(
+            f"the list does not say where {who} is found, and its certificate has to; "
+            f"`t2 keys renew {who} --address HOST` says so"
+        )
+    return member.addresses
+
+
+def routers(members: Members) -> list[Profile]:
+    """Return the routers that are let in, each where its newest certificate says that it is."""
+    last = {(each.role, each.name): each for each in members.welcome if each.role in LISTENERS}
+    return [Profile(*who, addresses=last[who].addresses) for who in sorted(last)]
 
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:

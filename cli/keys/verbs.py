@@ -50,7 +50,7 @@ def renew(options: argparse.Namespace) -> int:
     with locked(options.folder) as folder:
         old = roster.newest(folder.read(), options.role, options.name)
         robots = old.robots if old.role == "driver" else ()
-        addresses = options.address or folder.addresses(f"{old.role}.{old.name}")
+        addresses = options.address or roster.found_at(old)
         asked = profile(old.role, old.name, robots, addresses)
         _hand_out(folder, asked, options, settings=False)
     _say(words.renewed(old.role, old.name, old))
@@ -63,7 +63,7 @@ def revoke(options: argparse.Namespace) -> int:
         left, struck = roster.revoked(folder.read(), options.role, options.name, options.serial)
         folder.write(left)
         target = folder.path / f"{options.role}.{options.name}"
-        _say(words.struck(struck, str(target), folder.routers(left)))
+        _say(words.struck(struck, str(target), roster.routers(left)))
     return 0
 
 
@@ -92,7 +92,7 @@ def _hand_out(
     members = roster.added(folder.read(), issued.member)
     target = folder.hand_out(asked, issued, members, settings=settings)
     folder.write(members)
-    _say(words.issued(asked, issued.member, str(target), folder.routers(members)))
+    _say(words.issued(asked, issued.member, str(target), roster.routers(members)))
 
 
 def _say(lines: Iterable[str]) -> None:

@@ -7,6 +7,7 @@ from cli.keys.profile import EVERY_ROBOT, Profile
 from cli.members import Member, Role
 
 PLACE = "/etc/t2/keys"  # on a machine that runs a router; the units and compose.yaml look there
+UNKNOWN = "; where it is, the list does not say"
 USED_BY: dict[Role, str] = {
     "robot": "router",
     "site": "router",
@@ -76,7 +77,9 @@ def _spread(number: str, target: str, routers: Sequence[Profile]) -> Iterator[st
         return
     yield f"{number}Each router learns of it by {MEMBERS} and a restart:"
     for router in routers:
-        yield f"     scp -p {folder}/{MEMBERS} {_host(router)}:{PLACE}/{MEMBERS}"
+        host, unknown = (_host(router), "") if router.addresses else ("HOST", UNKNOWN)
+        copy = f"scp -p {folder}/{MEMBERS} {host}:{PLACE}/{MEMBERS}"
+        yield f"     {copy}  # {router.role} {router.name}{unknown}"
 
 
 def _robots(profile: Profile) -> str:

@@ -9,12 +9,18 @@ NOW_S = NOW.timestamp()
 
 
 def member(
-    role: Role, name: str, serial: str = "00000001", days: float = 300, *, revoked: bool = False
+    role: Role,
+    name: str,
+    serial: str = "00000001",
+    days: float = 300,
+    *,
+    revoked: bool = False,
+    addresses: tuple[str, ...] = (),
 ) -> Member:
     """Return one whose certificate is good for so many days."""
     return Member(
         common_name=f"{role}.{name}.{serial}", role=role, name=name,
-        robots=("001",) if role in ("driver", "robot") else (),
+        robots=("001",) if role in ("driver", "robot") else (), addresses=addresses,
         expires=NOW + timedelta(days=days), revoked=revoked,
     )  # fmt: skip
 

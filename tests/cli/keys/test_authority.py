@@ -17,7 +17,6 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from cli.keys.authority import (
     Authority,
-    addresses,
     certificate_from,
     certificate_pem,
     key_pem,
@@ -105,8 +104,13 @@ def test_a_routers_addresses_are_in_its_certificate(authority: Authority) -> Non
         ip_address("10.7.5.220"), ip_address("127.0.0.1"),
     ]  # fmt: skip
     assert names.get_values_for_type(x509.DNSName) == ["robot.lan", "localhost"]
-    assert addresses(found) == ROBOT.addresses
-    assert addresses(issued(authority, DRIVER)) == ()
+    with pytest.raises(x509.ExtensionNotFound):
+        issued(authority, DRIVER).extensions.get_extension_for_class(x509.SubjectAlternativeName)
+
+
+def test_a_routers_addresses_are_on_the_list(authority: Authority) -> None:
+    assert authority.issue(ROBOT, SPAN).member.addresses == ROBOT.addresses
+    assert authority.issue(DRIVER, SPAN).member.addresses == ()
 
 
 def test_it_is_read_back(authority: Authority) -> None:

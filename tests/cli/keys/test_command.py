@@ -82,6 +82,27 @@ def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
     )
 
 
+def test_a_router_is_known_when_its_folder_is_with_it(desk: Desk, tmp_path: Path) -> None:
+    desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
+    desk.keys("issue", "driver", "anna", "--robot", "002")
+    (desk.folder / "robot.002").rename(tmp_path / "away")
+    target = "192.168.1.2:/etc/t2/keys"
+    assert f"{target}/members.json  # robot 002\n" in desk.keys("revoke", "driver", "anna")
+    assert f"/robot.002/. {target}\n" in desk.keys("renew", "robot", "002")
+
+
+def test_of_a_list_without_addresses_they_are_asked(desk: Desk) -> None:
+    desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
+    listed = desk.folder / "members.json"
+    table = json.loads(listed.read_bytes())
+    del table["members"][0]["addresses"]
+    listed.write_text(json.dumps(table), encoding="utf-8")
+    said = desk.keys("renew", "robot", "002", code=1)
+    assert "`t2 keys renew robot 002 --address HOST` says so" in said
+    desk.keys("renew", "robot", "002", "--address", "192.168.1.3")
+    assert "found at 192.168.1.3, localhost" in desk.keys("renew", "robot", "002")
+
+
 def test_the_settings_are_valid_wherever_the_folder_is_put(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

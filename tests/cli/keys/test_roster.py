@@ -32,6 +32,24 @@ def test_a_name_is_free_while_nobody_has_a_good_certificate_of_it() -> None:
         roster.check_free(SITE, "driver", "anna", NOW_S)
 
 
+def test_each_router_is_where_its_newest_certificate_says() -> None:
+    old, new = (member("robot", "002", serial, addresses=(where,))
+                for serial, where in (("1", "10.0.0.1"), ("2", "10.0.0.2")))  # fmt: skip
+    gone, of_before = member("robot", "003", revoked=True), member("robot", "001")
+    site = member("site", "berlin", addresses=("site.example",))
+    found = roster.routers(members(site, old, new, gone, of_before, OLD))
+    assert [(each.who, each.addresses) for each in found] == [
+        ("robot.001", ()), ("robot.002", ("10.0.0.2",)), ("site.berlin", ("site.example",)),
+    ]  # fmt: skip
+
+
+def test_no_router_is_renewed_for_an_address_that_nobody_named() -> None:
+    assert roster.found_at(member("robot", "002", addresses=("10.0.0.1",))) == ("10.0.0.1",)
+    assert roster.found_at(NEW) == ()
+    with pytest.raises(RobotError, match=r"not say where robot 002 is .*`t2 keys renew robot 002 "):
+        roster.found_at(member("robot", "002"))
+
+
 def test_one_more() -> None:
     assert roster.added(members(OLD), NEW) == members(OLD, NEW)
 

@@ -28,7 +28,10 @@ def test_a_robots_certificate() -> None:
     assert "found at 192.168.201.1, 10.7.5.220, localhost, 127.0.0.1" in told[1]
     assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in told
     assert "     t2 router --config /etc/t2/keys/bus.toml" in told
-    assert told[-1] == "     scp -p keys/members.json site.example:/etc/t2/keys/members.json"
+    assert (
+        told[-1]
+        == "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin"
+    )
 
 
 def test_the_first_routers_folder_holds_all_that_there_is_to_know() -> None:
@@ -40,7 +43,10 @@ def test_a_drivers_certificate() -> None:
     told = list(words.issued(ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]))
     assert "  may move robot 001, robot 002" in told
     assert "     t2 drive --config driver.anna/bus.toml" in told
-    assert told[-1] == "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json"
+    assert (
+        told[-1]
+        == "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001"
+    )
 
 
 def test_a_driver_of_every_robot() -> None:
@@ -66,6 +72,15 @@ def test_a_revocation_takes_hold_with_the_routers() -> None:
     assert told[0] == "driver.anna.00000001 is revoked"
     assert "nothing has changed" in told[1]
     assert told[-1].startswith("     scp -p keys/members.json ")
+
+
+def test_a_router_that_is_nobody_knows_where_is_named() -> None:
+    lost = Profile("robot", "002")
+    told = list(words.struck([member("driver", "anna")], "keys/driver.anna", [ROBOT, lost]))
+    assert told[-1] == (
+        "     scp -p keys/members.json HOST:/etc/t2/keys/members.json"
+        "  # robot 002; where it is, the list does not say"
+    )
 
 
 def test_a_stolen_router_is_worse() -> None:
