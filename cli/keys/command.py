@@ -71,7 +71,17 @@ def _add_renew(parser: argparse.ArgumentParser) -> None:
 
 def _add_revoke(parser: argparse.ArgumentParser) -> None:
     _add_who(parser)
-    parser.add_argument("--serial", help="the certificate whose name ends so, and no other")
+    parser.add_argument(
+        "--serial", type=_serial, help="the certificate whose name ends so, and no other"
+    )
+
+
+def _serial(text: str) -> str:
+    if not text:  # a shell's variable that was not set, and all would be revoked
+        raise argparse.ArgumentTypeError(
+            "it is empty; `t2 keys list` shows serials, and without --serial all are revoked"
+        )
+    return text
 
 
 def _add_who(parser: argparse.ArgumentParser) -> None:

@@ -61,10 +61,10 @@ def revoked(
     members: Members, role: Role, name: str, serial: str | None
 ) -> tuple[Members, Sequence[Member]]:
     """Return the list without somebody's certificates, or that one alone, and what was struck."""
-    ends = f".{serial}" if serial else ""
+    ends = "" if serial is None else f".{serial}"
     struck = [each for each in of(members, role, name) if each.common_name.endswith(ends)]
     if not struck:
-        with_serial = f" with the serial {serial}" if serial else ""
+        with_serial = "" if serial is None else f" with the serial {serial!r}"
         raise RobotError(f"{role} {name} has no certificate{with_serial} that could be revoked")
     left = tuple(
         replace(each, revoked=True) if each in struck else each for each in members.members

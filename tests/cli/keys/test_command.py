@@ -147,6 +147,15 @@ def test_an_unknown_role_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert "invalid choice: 'pilot'" in capsys.readouterr().err
 
 
+def test_an_empty_serial_revokes_nothing(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
+    desk.keys("issue", "viewer", "guest")
+    with pytest.raises(SystemExit) as end:
+        desk.keys("revoke", "viewer", "guest", "--serial", "")
+    assert end.value.code == 2
+    assert "--serial: it is empty; `t2 keys list` shows serials" in capsys.readouterr().err
+    assert desk.states() == {"viewer.guest.0": "valid"}
+
+
 @pytest.mark.parametrize(
     "words",
     [("issue", "viewer", "v"), ("renew", "viewer", "v"), ("revoke", "viewer", "v"), ("list",)],

@@ -74,8 +74,9 @@ def test_one_of_somebodys_is_revoked() -> None:
     ("name", "serial", "said"),
     [
         ("ben", None, "driver ben has no certificate that could be revoked"),
-        ("anna", "00000003", "has no certificate with the serial 00000003 that could be"),
-        ("anna", "1", "has no certificate with the serial 1 that could be"),
+        ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
+        ("anna", "1", "has no certificate with the serial '1' that could be"),
+        ("anna", "", "has no certificate with the serial '' that could be"),
     ],
 )
 def test_nothing_to_revoke(name: str, serial: str | None, said: str) -> None:
