@@ -132,7 +132,7 @@ def _write(file: Path, content: bytes, mode: int) -> None:
                 os.fchmod(descriptor, mode)
                 os.fsync(descriptor)
             Path(made).rename(file)
-        except OSError:
+        except BaseException:  # ctrl-c, too: it may be a private key, in a folder that is copied
             Path(made).unlink(missing_ok=True)
             raise
 

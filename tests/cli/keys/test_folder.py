@@ -123,15 +123,28 @@ def test_no_folder_is_made_by_looking(tmp_path: Path) -> None:
     assert not (tmp_path / "keys").exists()
 
 
-def test_a_full_disk_leaves_the_old_list(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("trouble", "raised", "said"),
+    [
+        (OSError(28, "No space left"), RobotError, "members.json: No space left"),
+        (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
+    ],
+)
+def test_a_full_disk_or_ctrl_c_leaves_the_old_list_and_nothing_else(
+    trouble: BaseException,
+    raised: type[BaseException],
+    said: str,
+    folder: Folder,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     hand_out(folder, ROBOT)
     kept = folder.members.read_bytes()
 
-    def full(_: int) -> None:
-        raise OSError(28, "No space left on device")
+    def stopped(_: int) -> None:
+        raise trouble
 
-    monkeypatch.setattr("cli.keys.folder.os.fsync", full)
-    with pytest.raises(RobotError, match=r"members.json: No space left on device"):
+    monkeypatch.setattr("cli.keys.folder.os.fsync", stopped)
+    with pytest.raises(raised, match=said):
         folder.write(Members(site="berlin"))
     assert folder.members.read_bytes() == kept
     assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]
