@@ -38,8 +38,9 @@ EVERYTHING = (EVERY_KEY, EVERY_COMMAND, KEPT)
 ROUTERS = "@/*/*/**"  # their admin space: version, sessions, who declared what
 ASKED = (f"{keys.ROOT}/*/info/**", KEPT, ROUTERS)
 
-# The services that a laptop runs: a member may speak for these, and never for those on board.
-SEATS = ("dashboard", "recorder", "metrics")
+# The services that a laptop runs: a member may speak for these, and for no others. A dead recorder
+# on board must be missed, so that one on a laptop is not heard, and does without.
+SEATS = ("dashboard", "metrics")
 DRIVERS_SEATS = (*SEATS, "teleop")
 
 

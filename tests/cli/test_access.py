@@ -11,7 +11,7 @@ from cli.rights import CLASSES, MINE, OTHER, ROLES, may
 from common import keys
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
-ON_BOARD = ("bridge", "safety", "odom")
+ON_BOARD = ("bridge", "safety", "odom", "recorder")
 
 
 def member(role: Role, name: str = "anna", robots: tuple[str, ...] = ()) -> Member:
