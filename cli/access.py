@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from cli.members import Member
 from common import keys
+from common.members import Member
 
 Verb = Literal["read", "know", "write", "ask", "serve", "live"]
 Rights = Mapping[Verb, Sequence[str]]

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import structlog
 
-from cli import members
 from cli.access import access_control
-from common import log
+from common import log, members
 from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.config import load
 from common.errors import ConfigError

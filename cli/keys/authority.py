@@ -22,8 +22,8 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from cli.keys.profile import Profile, Span, is_ip
-from cli.members import Member
 from common.errors import RobotError
+from common.members import Member
 
 Extensions = Sequence[tuple[x509.ExtensionType, bool]]  # each with whether it is critical
 

@@ -8,8 +8,8 @@ import argparse
 from pathlib import Path
 
 from cli.keys.profile import DAYS
-from cli.members import ROLES
 from common.errors import RobotError
+from common.members import ROLES
 
 FOLDER = Path("keys")
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import msgspec
 
-from cli import members as lists
 from cli.keys import roster
 from cli.keys.authority import (
     Authority,
@@ -23,8 +22,9 @@ from cli.keys.authority import (
 )
 from cli.keys.bundle import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
 from cli.keys.profile import Profile
-from cli.members import Members
+from common import members as lists
 from common.errors import RobotError
+from common.members import Members
 
 SECRET, PUBLIC = 0o600, 0o644
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from cli.inspect import output
 from cli.keys.profile import DAY_S, DAYS, EVERY_ROBOT
-from cli.members import Member, Members
+from common.members import Member, Members
 
 SOON_DAYS = 30
 HEAD = ("role", "name", "robots", "until", "state", "certificate")

@@ -13,8 +13,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from cli.members import Name, Role
 from common.errors import ConfigError, RobotError
+from common.members import Name, Role
 
 DAY_S = 86_400
 CA_DAYS = 3650

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from cli.keys.profile import LISTENERS, Profile
-from cli.members import Member, Members, Role
 from common.errors import RobotError
+from common.members import Member, Members, Role
 
 
 def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:

@@ -19,7 +19,7 @@ from cli.keys.profile import (
     profile,
     span,
 )
-from cli.members import Members
+from common.members import Members
 
 
 def init(options: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from cli.keys.bundle import MEMBERS, SETTINGS, endpoints
 from cli.keys.profile import EVERY_ROBOT, Profile
-from cli.members import Member, Role
+from common.members import Member, Role
 
 PLACE = "/etc/t2/keys"  # on a machine that runs a router; the units and compose.yaml look there
 UNKNOWN = "; where it is, the list does not say"

@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import TypeVar
 from wsgiref.simple_server import WSGIServer
 
-import msgspec
 from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from common import keys
+from common import keys, members
 from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.errors import LinkError
+from common.errors import ConfigError, LinkError
 from common.freshness import Latest
 from common.service import Node
 from services.metrics.certificates import ends
@@ -91,14 +90,14 @@ class Exporter(Collector):
             if name != self._own and (robot.forget(now_ns) or not robot.is_robot):
                 del self._robots[name]
 
-    def _read(self, members: Path) -> None:
+    def _read(self, file: Path) -> None:
         """Look when certificates end; a list that cannot be read tells nothing of them."""
         try:
-            self._certificates = ends(members.read_bytes())
-        except (OSError, msgspec.DecodeError) as error:
+            self._certificates = ends(members.read(file))
+        except ConfigError as error:
             self._certificates = {}
             self._node.counters["members_unreadable"] += 1
-            self._node.log.warning("no list of members", file=str(members), reason=str(error))
+            self._node.log.warning("no list of members", reason=str(error))
 
     def _sheet(self) -> list[Metric]:
         return sheet(

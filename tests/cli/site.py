@@ -6,9 +6,9 @@ from pathlib import Path
 
 import msgspec
 
-from cli import members
 from cli.__main__ import main
 from cli.access import access_control
+from common import members
 from common.bus.session import router
 from common.settings import Bus
 from tests.support import free_port

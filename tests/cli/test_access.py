@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from cli.access import VERBS, access_control, driver, rights
-from cli.members import Member, Role
 from cli.rights import CLASSES, MINE, OTHER, ROLES, may
 from common import keys
+from common.members import Member, Role
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
 ON_BOARD = ("bridge", "safety", "odom", "recorder")

@@ -13,9 +13,9 @@ import msgspec
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from cli.members import Member, Members
 from common import codec, keys
 from common import messages as m
+from common.members import Member, Members
 from common.options import EXIT_CONFIG, EXIT_LINK
 from services.metrics import exporter, life
 from services.metrics.exporter import asked

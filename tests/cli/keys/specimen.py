@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
-from cli.members import Member, Members, Role
+from common.members import Member, Members, Role
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 NOW_S = NOW.timestamp()

@@ -6,7 +6,7 @@ import pytest
 
 from cli.keys.bundle import SOCKET, bus_toml, endpoints
 from cli.keys.profile import Profile, profile
-from cli.members import ROLES
+from common.members import ROLES
 
 ROBOT = profile("robot", "001", (), ())
 OTHER = profile("robot", "002", (), ("robot-2.lan", "fd00::2"))

@@ -12,8 +12,8 @@ import pytest
 
 from cli.__main__ import main
 from cli.keys.profile import CA_DAYS, DAY_S
-from cli.members import read
 from common.config import Sources, load
+from common.members import read
 from common.options import EXIT_CONFIG
 from common.settings import Shared
 from tests.cli.processes import PATIENCE_S, t2

@@ -11,8 +11,8 @@ import pytest
 from cli.keys.authority import Authority
 from cli.keys.folder import Folder, locked
 from cli.keys.profile import DAY_S, Profile, Span, profile
-from cli.members import Members
 from common.errors import RobotError
+from common.members import Members
 from tests.cli.keys.specimen import member, members
 from tests.support import wait_until
 

@@ -5,7 +5,7 @@ import pytest
 
 from cli.keys import listing
 from cli.keys.profile import DAY_S
-from cli.members import Member
+from common.members import Member
 from tests.cli.keys.specimen import NOW_S, member, members
 
 LONG_S = NOW_S + 3000 * DAY_S

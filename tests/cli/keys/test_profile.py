@@ -17,8 +17,8 @@ from cli.keys.profile import (
     profile,
     span,
 )
-from cli.members import ROLES, Role
 from common.errors import ConfigError, RobotError
+from common.members import ROLES, Role
 
 
 def test_a_robot_is_found_where_the_manual_says_unless_told() -> None:

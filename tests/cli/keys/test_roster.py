@@ -3,8 +3,8 @@
 import pytest
 
 from cli.keys import roster
-from cli.members import Members
 from common.errors import RobotError
+from common.members import Members
 from tests.cli.keys.specimen import NOW_S, member, members
 
 OLD = member("driver", "anna", "00000001", 10)

@@ -17,10 +17,10 @@ import zenoh
 from cli.keys.authority import Authority
 from cli.keys.folder import locked
 from cli.keys.profile import DAY_S, Profile, Span, profile
-from cli.members import Members
 from common.bus.session import client_config, router
 from common.config import Sources, load
 from common.errors import LinkError
+from common.members import Members
 from common.settings import Bus, Shared
 from tests.support import free_port, wait_until
 
