@@ -8,6 +8,8 @@ from common.members import Member, Role
 
 PLACE = "/etc/t2/keys"  # on a machine that runs a router; the units and compose.yaml look there
 UNKNOWN = "; where it is, the list does not say"
+# A container's router starts with the rules that were made for it, so these are made anew first.
+IN_CONTAINERS = "docker compose up -d --force-recreate router-settings router"
 USED_BY: dict[Role, str] = {
     "robot": "router",
     "site": "router",
@@ -74,12 +76,14 @@ def _spread(number: str, target: str, routers: Sequence[Profile]) -> Iterator[st
     folder = target.rpartition("/")[0] or "."
     if not routers:
         yield f"{number}Each router wants {folder}/{MEMBERS} anew, and a restart."
-        return
-    yield f"{number}Each router learns of it by {MEMBERS} and a restart:"
+    else:
+        yield f"{number}Each router learns of it by {MEMBERS} and a restart:"
     for router in routers:
         host, unknown = (_host(router), "") if router.addresses else ("HOST", UNKNOWN)
         copy = f"scp -p {folder}/{MEMBERS} {host}:{PLACE}/{MEMBERS}"
         yield f"     {copy}  # {router.role} {router.name}{unknown}"
+    yield "   In containers no restart does; there it is:"
+    yield f"     {IN_CONTAINERS}"
 
 
 def _robots(profile: Profile) -> str:

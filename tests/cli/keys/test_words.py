@@ -3,6 +3,7 @@
 import msgspec
 import pytest
 
+from cli.docs import DOCS
 from cli.keys import words
 from cli.keys.profile import Profile, profile
 from tests.cli.keys.specimen import member
@@ -29,8 +30,8 @@ def test_a_robots_certificate() -> None:
     assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in told
     assert "     t2 router --config /etc/t2/keys/bus.toml" in told
     assert (
-        told[-1]
-        == "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin"
+        "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin"
+        in told
     )
 
 
@@ -44,8 +45,8 @@ def test_a_drivers_certificate() -> None:
     assert "  may move robot 001, robot 002" in told
     assert "     t2 drive --config driver.anna/bus.toml" in told
     assert (
-        told[-1]
-        == "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001"
+        "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001"
+        in told
     )
 
 
@@ -58,7 +59,7 @@ def test_a_driver_of_every_robot() -> None:
 def test_a_viewers_certificate_before_there_is_a_router() -> None:
     told = list(words.issued(Profile("viewer", "v"), member("viewer", "v"), "viewer.v", []))
     assert "     t2 dashboard --config viewer.v/bus.toml" in told
-    assert told[-1] == "3. Each router wants ./members.json anew, and a restart."
+    assert "3. Each router wants ./members.json anew, and a restart." in told
 
 
 def test_what_becomes_of_the_certificate_before() -> None:
@@ -71,16 +72,27 @@ def test_a_revocation_takes_hold_with_the_routers() -> None:
     told = list(words.struck([member("driver", "anna")], "keys/driver.anna", [ROBOT]))
     assert told[0] == "driver.anna.00000001 is revoked"
     assert "nothing has changed" in told[1]
-    assert told[-1].startswith("     scp -p keys/members.json ")
+    assert told[3].startswith("     scp -p keys/members.json ")
+
+
+@pytest.mark.parametrize("routers", [[], [ROBOT]])
+def test_a_router_in_a_container_learns_of_it_by_settings_made_anew(routers: list[Profile]) -> None:
+    told = list(words.struck([member("driver", "anna")], "keys/driver.anna", routers))
+    assert told[-1].strip() == words.IN_CONTAINERS
+    compose = (DOCS.parent / "compose.yaml").read_text(encoding="utf-8")
+    for service in words.IN_CONTAINERS.partition("--force-recreate ")[2].split():
+        assert f"\n  {service}:\n" in compose
+    for page in ("docs/deploy.md", "docs/keys.md", "SECURITY.md"):
+        assert words.IN_CONTAINERS in (DOCS.parent / page).read_text(encoding="utf-8"), page
 
 
 def test_a_router_that_is_nobody_knows_where_is_named() -> None:
     lost = Profile("robot", "002")
     told = list(words.struck([member("driver", "anna")], "keys/driver.anna", [ROBOT, lost]))
-    assert told[-1] == (
+    assert (
         "     scp -p keys/members.json HOST:/etc/t2/keys/members.json"
         "  # robot 002; where it is, the list does not say"
-    )
+    ) in told
 
 
 def test_a_stolen_router_is_worse() -> None:
