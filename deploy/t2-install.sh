@@ -61,21 +61,27 @@ point() {
 }
 
 use() {
-    before=$(readlink "$HOME_OF_T2/current" || true)
-    if ! "$HOME_OF_T2/$1/bin/python" -P -m cli install --dry-run --root "$ROOT" \
-        --prefix "$HOME_OF_T2/current" >/dev/null; then
-        fail "$1 would not run with these settings; nothing was changed"
-    fi
-    if [ "$before" != "$1" ]; then
-        [ -z "$before" ] || point previous "$before"
-        point current "$1"
-    fi
-    say "current is $1${before:+, before it was $before}"
+    wanted=$1
     shift
+    before=$(readlink "$HOME_OF_T2/current" || true)
+    if ! "$HOME_OF_T2/$wanted/bin/python" -P -m cli install --dry-run --root "$ROOT" \
+        --prefix "$HOME_OF_T2/current" "$@" >/dev/null; then
+        fail "$wanted would not run with these settings; nothing was changed"
+    fi
+    if [ "$before" != "$wanted" ]; then
+        [ -z "$before" ] || point previous "$before"
+        point current "$wanted"
+    fi
+    say "current is $wanted${before:+, before it was $before}"
     "$HOME_OF_T2/current/bin/python" -P -m cli install --root "$ROOT" \
         --prefix "$HOME_OF_T2/current" "$@"
 }
 
+# What is not understood must not install: it may have been meant to go back.
+case "$*" in
+'' | --sim | --rollback) ;;
+*) fail "does not know '$*', nothing was changed: say sudo sh $0 [--sim | --rollback]" ;;
+esac
 check
 if [ "${1:-}" = --rollback ]; then
     previous=$(readlink "$HOME_OF_T2/previous") || fail "there is no version before"

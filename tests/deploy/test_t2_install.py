@@ -101,6 +101,26 @@ def test_a_version_that_refuses_the_settings_is_not_made_current(
     assert link(home, "current") == "1.0"
 
 
+@pytest.mark.parametrize(
+    "words", [("--rolback",), ("--help",), ("--dry-run",), ("--rollback", "--sim"), ("--sim", "x")]
+)
+def test_what_is_not_understood_changes_nothing(
+    home: Path, house: Callable[[str], Path], run: Run, words: tuple[str, ...]
+) -> None:
+    refused = run(house("1.0"), *words)
+    assert refused.returncode == 1
+    assert f"does not know '{' '.join(words)}', nothing was changed" in refused.stderr
+    assert "[--sim | --rollback]" in refused.stderr
+    assert not home.exists()
+
+
+def test_a_version_is_tried_as_it_will_be_installed(
+    home: Path, house: Callable[[str], Path], run: Run
+) -> None:
+    assert run(house("1.0"), "--sim", T2_TEST_REFUSES="--sim").returncode == 1
+    assert not (home / "current").exists()
+
+
 def test_what_was_interrupted_is_made_anew(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:

@@ -14,7 +14,8 @@ OFFLINE = ("unshare", "--map-root-user", "--net")  # root of nothing, and withou
 MAIN = """
 import os, sys
 print("t2", "{version}", *sys.argv[1:])
-sys.exit("the settings will not do" if os.environ.get("T2_TEST_REFUSES") == "{version}" else 0)
+refused = os.environ.get("T2_TEST_REFUSES") in ("{version}", *sys.argv)
+sys.exit("the settings will not do" if refused else 0)
 """
 
 
