@@ -1,0 +1,45 @@
+"""What ``compose.yaml`` makes of its variables, as Compose itself reads it; no engine is asked."""
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.compose.engine import compose
+
+ROOT = Path(__file__).parents[2]
+ENV = "deploy/compose/robot.env"
+OWN_ROUTER, TLS = "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml"
+PROFILES = ("--profile", "sim", "--profile", "laptop")
+OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "dashboard"}
+
+
+def config(*over: str, **environ: str) -> dict[str, str]:
+    """Return what each service is, as text, for whoever has copied ``robot.env``."""
+    if not shutil.which("docker") or not (command := compose()):
+        pytest.skip("there is no Compose")
+    files = [word for file in ("compose.yaml", *over) for word in ("-f", file)]
+    whole = subprocess.run(
+        [*command, "--env-file", ENV, *files, *PROFILES, "config"],
+        cwd=ROOT, env={"PATH": os.environ["PATH"]} | environ,
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    services = re.split(r"^services:\n", whole, flags=re.MULTILINE)[1]
+    services = re.split(r"^\w", services, flags=re.MULTILINE)[0]
+    _, *parts = re.split(r"^  ([\w-]+):\n", services, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+@pytest.mark.parametrize("over", [(TLS,), (OWN_ROUTER, TLS)])
+def test_every_container_knows_which_robot_it_is(over: tuple[str, ...]) -> None:
+    services = config(*over, T2_ROBOT="002")
+    assert services.keys() == OF_T2 | {"sim", "laptop"}
+    for name, text in services.items():
+        assert re.search(r"^ +T2__ROBOT__ID: .?002", text, re.MULTILINE), name
+
+
+def test_a_copy_that_nobody_has_edited_is_the_first_robot() -> None:
+    assert all(re.search(r"T2__ROBOT__ID: .?001", text) for text in config(TLS).values())
