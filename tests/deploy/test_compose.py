@@ -43,3 +43,13 @@ def test_every_container_knows_which_robot_it_is(over: tuple[str, ...]) -> None:
 
 def test_a_copy_that_nobody_has_edited_is_the_first_robot() -> None:
     assert all(re.search(r"T2__ROBOT__ID: .?001", text) for text in config(TLS).values())
+
+
+def test_a_laptop_dials_the_vehicles_wifi() -> None:
+    assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in config(TLS)["laptop"]
+
+
+def test_nobody_is_sent_to_the_boards_cable() -> None:
+    """SECURITY.md wants nobody there, and deploy/nftables/t2.nft drops whoever is."""
+    for file in (ROOT / "compose.yaml", *(ROOT / "deploy" / "compose").iterdir()):
+        assert "10.7.5." not in file.read_text(encoding="utf-8"), file
