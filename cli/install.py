@@ -23,6 +23,8 @@ USER = Path("/etc/sysusers.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
 KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; the way in for laptops
 ENABLED = Path("/etc/systemd/system/multi-user.target.wants/t2.target")
+# By this line every version knows the units of every other one: it stays as it is.
+MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
 SIM = "t2-sim.service"
 BACKOFF = "t2-.service.d/20-backoff.conf"
 BACKOFF_SINCE = 254  # the systemd that knows it
@@ -113,8 +115,8 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
     options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
     for name in names_here(sim or host.has(UNITS / SIM)):
         text = template(name).replace("@PREFIX@", str(prefix))
-        wanted[UNITS / name] = text.replace("@SETTINGS@", options)
-    for path in sorted(ours() - wanted.keys()):
+        wanted[UNITS / name] = MARK + text.replace("@SETTINGS@", options)
+    for path in sorted(ours(host) - wanted.keys()):
         host.remove(path)
     for path, text in sorted(wanted.items()):
         host.write(path, text)
@@ -129,7 +131,7 @@ def uninstall(host: Host) -> None:
     """Remove all but settings and recordings; raise ``RobotError`` while T2 is enabled."""
     if host.has(ENABLED):
         raise RobotError("t2.target is enabled: say `systemctl disable --now t2.target` first")
-    for path in sorted(ours()):
+    for path in sorted(ours(host)):
         host.remove(path)
     print("next: systemctl daemon-reload")
     print(f"{SETTINGS.parent} and /var/lib/t2 are yours, they stay")
@@ -146,9 +148,15 @@ def names() -> list[str]:
     return sorted(str(path.relative_to(TEMPLATES)) for path in files)
 
 
-def ours() -> set[Path]:
-    """Return every file that an installation may have, but for the settings."""
-    return {UNITS / name for name in names()} | {USER}
+def ours(host: Host) -> set[Path]:
+    """Return every file that an installation may have, but for the settings.
+
+    A version with other units than this one's has left its mark in them.
+    """
+    folder = host.at(UNITS)
+    found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
+    marked = (path for path in found if path.read_bytes().startswith(MARK.encode()))
+    return {USER, *(UNITS / n for n in names()), *(UNITS / p.relative_to(folder) for p in marked)}
 
 
 def names_here(sim: bool) -> list[str]:

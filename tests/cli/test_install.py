@@ -125,6 +125,26 @@ def test_an_older_unit_is_replaced_and_what_cannot_run_is_removed(
     assert f"{UNITS}/t2-dashboard.service" not in files(tmp_path)
 
 
+@pytest.mark.parametrize("words", [(), ("--uninstall",)])
+def test_what_another_version_wrote_goes_and_what_somebody_else_wrote_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    t2_install(tmp_path)
+    odom = (tmp_path / UNITS / "t2-odom.service").read_text()
+    theirs = {"t2-lidar.service": "[Service]\nExecStart=lidar\n", "t2-.service.d/50-site.conf": ""}
+    for name in ("t2-lamp.service", "t2-.service.d/30-older.conf"):
+        (tmp_path / UNITS / name).write_text(odom)
+    for name, text in theirs.items():
+        (tmp_path / UNITS / name).write_text(text)
+    (tmp_path / UNITS / "t2-masked.service").symlink_to("/dev/null")
+    capsys.readouterr()
+    assert t2_install(tmp_path, *words) == 0
+    left = {str(path.relative_to(tmp_path / UNITS)) for path in (tmp_path / UNITS).rglob("*")}
+    assert {*theirs, "t2-masked.service"} <= left
+    assert not {"t2-lamp.service", "t2-.service.d/30-older.conf"} & left
+    assert f"remove  /{UNITS}/t2-lamp.service" in capsys.readouterr().out
+
+
 def test_settings_that_will_not_do_are_said_before_anything_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
