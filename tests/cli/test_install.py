@@ -234,6 +234,13 @@ def test_every_service_is_watched(name: str) -> None:
     assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # these machines hold processes up
 
 
+@pytest.mark.parametrize("name", REAL)
+def test_the_bridge_alone_can_reach_the_boards_cable(name: str) -> None:
+    denied = unit(install.template(name))["Service"].get("IPAddressDeny", "").split()
+    cable = {"10.7.5.0/24", "255.255.255.255", "multicast"}  # as in deploy/nftables/t2.nft
+    assert bool({"any"} & {*denied} or cable <= {*denied}) == (name != "t2-bridge.service")
+
+
 def test_the_bridge_is_the_last_to_start_and_the_first_to_stop() -> None:
     after = unit(install.template("t2-bridge.service"))["Unit"]["After"].split()
     assert {"network.target", "t2-router.service", "t2-safety.service", "t2-sim.service"} == {
