@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 PATIENCE_S = 30.0
 NEEDS = ("ip", "nft")
 NAME = f"t2nft{os.getpid()}"
-PC, CABLE, WIFI = f"{NAME}pc", f"{NAME}cable", f"{NAME}wifi"
+PC, CABLE, WIFI, OFFICE, BOX = (f"{NAME}{each}" for each in ("pc", "cable", "wifi", "lan", "box"))
 
 
 def missing() -> str:
@@ -30,14 +30,21 @@ def missing() -> str:
 
 @contextlib.contextmanager
 def vehicle() -> Iterator[None]:
-    """Lay the cable with the board and a stranger on it, and the Wi-Fi with a laptop."""
-    names = (PC, CABLE, WIFI)
+    """Lay the cable with the board and a stranger on it, the Wi-Fi with a laptop, and two more.
+
+    These are a network that is nobody's, and a container's, where published ports lead.
+    """
+    names = (PC, CABLE, WIFI, OFFICE, BOX)
     try:
         for name in names:
             run("ip", "netns", "add", name)
             within(name, "ip", "link", "set", "lo", "up")
         link(CABLE, "cable0", "10.7.5.220/24", ("10.7.5.224/24", "10.7.5.99/24"))
         link(WIFI, "wifi0", "192.168.201.1/24", ("192.168.201.50/24",))
+        link(OFFICE, "office0", "10.0.9.1/24", ("10.0.9.50/24",))
+        link(BOX, "box0", "172.30.0.1/24", ("172.30.0.2/24",))
+        within(OFFICE, "ip", "route", "add", "default", "via", "10.0.9.1")
+        within(BOX, "ip", "route", "add", "default", "via", "172.30.0.1")
         within(PC, "sysctl", "-qw", "net.ipv4.ip_forward=1")
         within(WIFI, "ip", "route", "add", "10.7.5.0/24", "via", "192.168.201.1")
         within(CABLE, "ip", "route", "add", "192.168.201.0/24", "via", "10.7.5.220")

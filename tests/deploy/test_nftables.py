@@ -7,8 +7,24 @@ from pathlib import Path
 
 import pytest
 
-from tests.deploy.network import CABLE, PATIENCE_S, PC, WIFI, missing, python, vehicle, within
+from tests.deploy.network import (
+    BOX,
+    CABLE,
+    OFFICE,
+    PATIENCE_S,
+    PC,
+    WIFI,
+    missing,
+    python,
+    vehicle,
+    within,
+)
 
+# As Docker does it for `ports:`, whatever the address that was dialled.
+PUBLISH = (
+    "add table ip nat; add chain ip nat PREROUTING { type nat hook prerouting priority dstnat; };"
+    "add rule ip nat PREROUTING fib daddr type local tcp dport { 7447, 8080 } dnat to 172.30.0.2"
+)
 RULES = Path(__file__).parents[2] / "deploy" / "nftables" / "t2.nft"
 
 # Prints each datagram that comes, and ends with the one that says so.
@@ -161,17 +177,47 @@ def test_nobody_reaches_the_board_through_the_pc() -> None:
 def test_operators_find_the_router_and_nothing_else(
     name: str, address: str, port: int, answer: str
 ) -> None:
+    assert dialled(PC, name, address, port) == answer
+
+
+@pytest.mark.usefixtures("network")
+@pytest.mark.parametrize(
+    ("name", "address", "port", "answer"),
+    [
+        (WIFI, "192.168.201.1", 7447, "welcome"),
+        (WIFI, "192.168.201.1", 8080, "no answer"),
+        (OFFICE, "10.0.9.1", 7447, "no answer"),
+        (OFFICE, "192.168.201.1", 7447, "no answer"),
+        (CABLE, "10.7.5.220", 7447, "no answer"),
+    ],
+    ids=["router", "dashboard", "another network", "the Wi-Fi's address", "cable"],
+)
+def test_a_port_that_a_container_publishes_has_the_same_doors(
+    name: str, address: str, port: int, answer: str
+) -> None:
+    within(PC, "nft", PUBLISH)
+    try:
+        assert dialled(BOX, name, address, port) == "welcome"  # past `input`, and without rules
+        within(PC, "nft", "-f", str(RULES))
+        assert dialled(BOX, name, address, port) == answer
+    finally:
+        within(PC, "nft", "flush", "ruleset")
+
+
+def dialled(server_at: str, name: str, address: str, port: int) -> str:
+    """Return what somebody who dials a server on TCP is answered."""
     with subprocess.Popen(
-        python(PC, SERVE, str(port)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as server:
+        python(server_at, SERVE, str(port)),
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    ) as server:  # fmt: skip
         try:
             assert server.stdout is not None
             assert server.stdout.readline() == "listening\n"
-            dialled = subprocess.run(
+            done = subprocess.run(
                 python(name, DIAL, address, str(port)),
                 capture_output=True, text=True, timeout=PATIENCE_S, check=True,
             )  # fmt: skip
-            assert dialled.stdout.strip() == answer
+            return done.stdout.strip()
         finally:
             server.kill()
 
