@@ -67,7 +67,7 @@ lint: $(STAMP)
 	$(BIN)/lint-imports
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/safety/test_walk.py
+SEARCH = tests/invariants tests/safety/test_walk.py tests/cli/test_docs_current.py
 
 search: $(STAMP) ## the search for holes in the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
