@@ -1,8 +1,11 @@
-"""How long the machine holds up a process that only wants to sleep, and when."""
+"""Which machine it is, and how long it holds up a process that only wants to sleep, and when."""
 
+import os
+import platform
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -18,6 +21,17 @@ while True:
         print(last, now, flush=True)
     last = now
 """
+
+
+def named() -> str:
+    """Return processor, cores and kernel."""
+    model = next(
+        (line.partition(":")[2].strip()
+         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+         if line.startswith("model name")),
+        platform.processor(),
+    )  # fmt: skip
+    return f"{model}, {os.cpu_count()} cores, Linux {platform.release()}"
 
 
 class HoldUps:

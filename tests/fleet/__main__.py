@@ -7,7 +7,6 @@ from the site. Raw samples go to ``out/fleet``; ``--out`` renews the tables of a
 import argparse
 import contextlib
 import io
-import os
 import platform
 import sys
 import tempfile
@@ -25,6 +24,7 @@ from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.estop import stop
 from cli.inspect.robots import look
 from common.bus.probe import probe
+from tests.faults.machine import named
 from tests.fleet.figures import Window, markdown, shares, uplinks
 from tests.fleet.ground import REAL, Ground, crowd, site, stack, window
 from tests.fleet.paper import scale, units
@@ -139,16 +139,10 @@ def stopped(ground: Ground, robots: int) -> str:
 
 def machine(seconds: float) -> str:
     """Return where and how it was measured."""
-    model = next(
-        (line.partition(":")[2].strip()
-         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-         if line.startswith("model name")),
-        platform.processor(),
-    )  # fmt: skip
     return (
-        f"Made by `make fleet` on {datetime.now(UTC):%Y-%m-%d}: {model}, {os.cpu_count()} cores, "
-        f"Linux {platform.release()}, Python {platform.python_version()}, eclipse-zenoh "
-        f"{version('eclipse-zenoh')}; {seconds:g} s a row."
+        f"Made by `make fleet` on {datetime.now(UTC):%Y-%m-%d}: {named()}, Python "
+        f"{platform.python_version()}, eclipse-zenoh {version('eclipse-zenoh')}; "
+        f"{seconds:g} s a row."
     )
 
 
