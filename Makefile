@@ -8,7 +8,7 @@ UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --p
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
 	$(BIN)/python -m cli.docs
@@ -50,6 +50,11 @@ faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faul
 
 fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
 	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
+
+bench: $(STAMP) ## T2 beside what a user would pick instead, measured; renews docs/performance.md
+	$(UV_INSTALL) --require-hashes -r requirements-bench.lock || \
+	  $(PIP_INSTALL) --require-hashes -r requirements-bench.lock
+	$(BIN)/python -m bench --out docs/performance.md
 
 compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
 	$(BIN)/python -m tests.compose
@@ -102,11 +107,12 @@ LAPTOP = teleop dashboard record report foxglove keys
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
-lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, dashboard, laptop
+lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, dashboard, laptop, bench
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock --extra record --extra dashboard -o requirements-dashboard.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
+	$(subst pyproject.toml,,$(LOCK)) --constraint requirements.lock --group bench -o requirements-bench.lock
 	echo pip | $(subst pyproject.toml,,$(LOCK)) --upgrade - -o deploy/pip.lock
 
 # For a robot without internet: which set, and what its computer is.

@@ -1,0 +1,113 @@
+"""``python -m bench``: T2 beside what a user would pick instead, as a document.
+
+Raw samples are kept in ``out/bench``; parts that are not measured anew are told from there.
+"""
+
+import argparse
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from bench.codec import page as codec_page
+from bench.codec import part as codec_part
+from bench.codec import plot as codec_plot
+from bench.series import RAW, Measured, Series, load, store
+from tests.faults.machine import HoldUps, named
+
+PAGE = Path(__file__).with_name("page.md")
+UNMEASURED = 3  # exit code where something to measure, or to tell, is not there
+BUSY = 0.5  # load of others, in processes, from which on the machine counts as shared
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of the document: how it is measured, told and drawn."""
+
+    measure: Callable[[], list[Series]]
+    versions: Callable[[], str]
+    blocks: Callable[[Sequence[Series]], dict[str, str]]
+    draw: Callable[[Path, Sequence[Series]], None]
+
+
+PARTS = {
+    "codec": Part(codec_part.measure, codec_part.versions, codec_page.blocks, codec_plot.draw),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, keep, tell; return ``UNMEASURED`` where something for that is missing."""
+    options = _arguments().parse_args(argv)
+    for name in [] if options.again else options.only or PARTS:
+        try:
+            print(f"{name}: {store(name, measured(PARTS[name]))}", file=sys.stderr)
+        except ModuleNotFoundError as error:
+            print(f"{error.name} is not installed: say make bench", file=sys.stderr)
+            return UNMEASURED
+    kept = {name: load(name) for name in PARTS}
+    missing = [name for name, one in kept.items() if one is None]
+    if missing:
+        print(f"no samples in {RAW} of {', '.join(missing)}: measure them first", file=sys.stderr)
+        return UNMEASURED
+    told = {name: one for name, one in kept.items() if one is not None}
+    text = page(told)
+    print(text)
+    for name, one in told.items():
+        PARTS[name].draw(RAW / f"{name}.png", one.series)
+        if options.out:
+            PARTS[name].draw(picture(options.out, name), one.series)
+    if options.out:
+        options.out.write_text(text, encoding="utf-8")
+    return 0
+
+
+def measured(part: Part) -> Measured:
+    """Measure a part, with a witness of what else the machine does."""
+    versions = part.versions()
+    before, _, _ = os.getloadavg()
+    with HoldUps() as holdups:
+        begin_ns = time.monotonic_ns()
+        series = part.measure()
+        seconds = (time.monotonic_ns() - begin_ns) / 1e9
+        held_ms = 1000 * holdups.worst_s(begin_ns, seconds)
+    shared = "The machine was shared" if before > BUSY else "Nothing else ran on the machine"
+    return Measured(
+        where=f"{datetime.now(UTC):%Y-%m-%d}: {named()}, Python {platform.python_version()}; "
+        f"{versions}; {seconds / 60:.0f} minutes",
+        noise=f"{shared}: its load was {before:.1f} before, and a process that only sleeps was "
+        f"held up for {held_ms:.0f} ms at worst",
+        series=series,
+    )
+
+
+def page(told: dict[str, Measured]) -> str:
+    """Return the document; a part's blocks have its name in front."""
+    blocks: dict[str, str] = {}
+    for name, one in told.items():
+        own = PARTS[name].blocks(one.series) | {"where": one.where, "noise": one.noise}
+        blocks |= {f"{name}_{block}": text for block, text in own.items()}
+    return PAGE.read_text(encoding="utf-8").format(**blocks)
+
+
+def picture(out: Path, name: str) -> Path:
+    """Return where the picture of a part goes, beside the document."""
+    return out.parent / "images" / f"performance-{name}.png"
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument(
+        "--only", action="append", choices=PARTS, metavar="PART",
+        help=f"measure this anew: {', '.join(PARTS)}; repeatable",
+    )  # fmt: skip
+    parser.add_argument("--again", action="store_true", help="tell what was measured last")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="where the document goes")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Tests of the benchmarks: not how fast, but whether the same is compared."""

@@ -1,0 +1,79 @@
+"""The document, from samples that are made up."""
+
+from pathlib import Path
+
+import pytest
+
+from bench import __main__ as bench
+from bench import series as kept
+from bench.codec import page
+from bench.codec.values import FRAMES, MESSAGES
+from bench.series import Measured, Series, store
+
+BY_FRAME = {"T2": 2000, "struct": 1000, "ctypes": 3000}
+BY_MESSAGE = {"T2": 1000, "msgpack by hand": 1000, "protobuf": 500}
+
+
+def made_up() -> list[Series]:
+    return [
+        Series(name=(name, codec, way), calls=100, samples_ns=[took * 100] * 10, note="12")
+        for names, codecs in ((FRAMES, BY_FRAME), (MESSAGES, BY_MESSAGE))
+        for name in names
+        for codec, took in codecs.items()
+        for way in ("encode", "decode")
+    ]
+
+
+def test_a_row_names_codec_bytes_and_times_of_both_ways() -> None:
+    lines = page.blocks(made_up())["frames"].splitlines()
+    figures = "1.00 | 1.00 | 1.00 | × 0.50"
+    assert lines[3] == f"| velocity report | struct | 12 | {figures} | {figures} |"
+    assert len(lines) == 2 + len(FRAMES) * len(BY_FRAME)
+
+
+def test_what_is_slower_than_the_floor_is_named() -> None:
+    blocks = page.blocks(made_up())
+    assert blocks["messages_verdict"] == "T2 is nowhere slower than msgpack by hand."
+    assert blocks["frames_verdict"].startswith(
+        "T2 is slower than struct in 8 of 8: velocity report, encode × 2.00; "
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_document_is_told_again_from_what_was_kept(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store("codec", Measured(where="a day: a machine", noise="Quiet", series=made_up()))
+    assert bench.main(["--again", "--out", "performance.md"]) == 0
+    text = (folder / "performance.md").read_text(encoding="utf-8")
+    assert "Measured on a day: a machine. Quiet. 10 samples a row" in text
+    assert "| Odometry | protobuf | 12 |" in text
+    assert "images/performance-codec.png" in text
+    assert (folder / "images/performance-codec.png").stat().st_size > 1000
+    assert text in capsys.readouterr().out
+
+
+def test_without_samples_it_says_what_to_do(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bench.main(["--again"]) == bench.UNMEASURED
+    assert f"no samples in {kept.RAW} of codec: measure them first" in capsys.readouterr().err
+    assert not list(folder.iterdir())
+
+
+def test_a_package_that_is_missing_is_named(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lacking() -> str:
+        raise ModuleNotFoundError(name="construct")
+
+    part = bench.Part(lambda: [], lacking, lambda series: {}, lambda file, series: None)
+    monkeypatch.setitem(bench.PARTS, "codec", part)
+    assert bench.main([]) == bench.UNMEASURED
+    assert capsys.readouterr().err == "construct is not installed: say make bench\n"
