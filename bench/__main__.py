@@ -4,7 +4,6 @@ Raw samples are kept in ``out/bench``; parts that are not measured anew are told
 """
 
 import argparse
-import os
 import platform
 import sys
 import time
@@ -17,11 +16,12 @@ from bench.codec import page as codec_page
 from bench.codec import part as codec_part
 from bench.codec import plot as codec_plot
 from bench.series import RAW, Measured, Series, load, store
+from common.freshness import S
 from tests.faults.machine import HoldUps, named
 
 PAGE = Path(__file__).with_name("page.md")
 UNMEASURED = 3  # exit code where something to measure, or to tell, is not there
-BUSY = 0.5  # load of others, in processes, from which on the machine counts as shared
+WHOLE = 0.95  # of a core; who got less has shared it
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +68,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 def measured(part: Part) -> Measured:
     """Measure a part, with a witness of what else the machine does."""
     versions = part.versions()
-    before, _, _ = os.getloadavg()
     with HoldUps() as holdups:
-        begin_ns = time.monotonic_ns()
+        begin_ns, ran_ns = time.monotonic_ns(), time.process_time_ns()
         series = part.measure()
-        seconds = (time.monotonic_ns() - begin_ns) / 1e9
+        seconds = (time.monotonic_ns() - begin_ns) / S
+        core = (time.process_time_ns() - ran_ns) / S / seconds
         held_ms = 1000 * holdups.worst_s(begin_ns, seconds)
-    shared = "The machine was shared" if before > BUSY else "Nothing else ran on the machine"
+    shared = "The machine was shared" if core < WHOLE else "The machine had nothing else to do"
     return Measured(
         where=f"{datetime.now(UTC):%Y-%m-%d}: {named()}, Python {platform.python_version()}; "
         f"{versions}; {seconds / 60:.0f} minutes",
-        noise=f"{shared}: its load was {before:.1f} before, and a process that only sleeps was "
+        noise=f"{shared}: this run got {core:.0%} of a core, and a process that only sleeps was "
         f"held up for {held_ms:.0f} ms at worst",
         series=series,
     )

@@ -12,7 +12,7 @@ from itertools import repeat
 
 from bench.series import Series
 
-SEED = 20_240_607
+SEED = 20_240_607  # any, but always the same
 ROUNDS = 5_000
 WARM_UP = 100
 

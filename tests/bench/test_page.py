@@ -59,6 +59,20 @@ def test_the_document_is_told_again_from_what_was_kept(
     assert text in capsys.readouterr().out
 
 
+def test_a_part_is_measured_kept_and_told(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it = bench.PARTS["codec"]
+    part = bench.Part(made_up, lambda: "struct 1.0", it.blocks, it.draw)
+    monkeypatch.setitem(bench.PARTS, "codec", part)
+    assert bench.main(["--only", "codec"]) == 0
+    told = capsys.readouterr().out
+    assert "; struct 1.0; 0 minutes. The machine " in told
+    assert bench.main(["--again"]) == 0
+    assert capsys.readouterr().out == told
+    assert {file.name for file in (folder / kept.RAW).iterdir()} == {"codec.json.gz", "codec.png"}
+
+
 def test_without_samples_it_says_what_to_do(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
