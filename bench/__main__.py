@@ -15,6 +15,9 @@ from pathlib import Path
 from bench.codec import page as codec_page
 from bench.codec import part as codec_part
 from bench.codec import plot as codec_plot
+from bench.reaction import page as reaction_page
+from bench.reaction import part as reaction_part
+from bench.reaction import plot as reaction_plot
 from bench.series import RAW, Measured, Series, load, store
 from common.freshness import S
 from tests.faults.machine import HoldUps, named
@@ -35,6 +38,9 @@ class Part:
 
 
 PARTS = {
+    "reaction": Part(
+        reaction_part.measure, reaction_part.versions, reaction_page.blocks, reaction_plot.draw
+    ),
     "codec": Part(codec_part.measure, codec_part.versions, codec_page.blocks, codec_plot.draw),
 }
 

@@ -8,6 +8,8 @@ from bench import __main__ as bench
 from bench import series as kept
 from bench.codec import page
 from bench.codec.values import FRAMES, MESSAGES
+from bench.reaction.page import LOADS
+from bench.reaction.responders import JUDGED, LOOP, REFLEX
 from bench.series import Measured, Series, store
 
 BY_FRAME = {"T2": 2000, "struct": 1000, "ctypes": 3000}
@@ -21,6 +23,14 @@ def made_up() -> list[Series]:
         for name in names
         for codec, took in codecs.items()
         for way in ("encode", "decode")
+    ]
+
+
+def reaction() -> list[Series]:
+    return [
+        Series(name=(name, load), calls=1, samples_ns=[100_000] * 10)
+        for name in (LOOP, REFLEX, JUDGED)
+        for load in LOADS
     ]
 
 
@@ -49,13 +59,16 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_document_is_told_again_from_what_was_kept(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    store("codec", Measured(where="a day: a machine", noise="Quiet", series=made_up()))
+    for name, series in (("codec", made_up()), ("reaction", reaction())):
+        store(name, Measured(where="a day: a machine", noise="Quiet", series=series))
     assert bench.main(["--again", "--out", "performance.md"]) == 0
     text = (folder / "performance.md").read_text(encoding="utf-8")
     assert "Measured on a day: a machine. Quiet. 10 samples a row" in text
     assert "| Odometry | protobuf | 12 |" in text
-    assert "images/performance-codec.png" in text
-    assert (folder / "images/performance-codec.png").stat().st_size > 1000
+    assert f"| {REFLEX} | 100 | 100 | 100 | × 1.0 | 100 | 100 | 100 | × 1.0 |" in text
+    for name in bench.PARTS:
+        assert f"images/performance-{name}.png" in text
+        assert (folder / f"images/performance-{name}.png").stat().st_size > 1000
     assert text in capsys.readouterr().out
 
 
@@ -65,19 +78,24 @@ def test_a_part_is_measured_kept_and_told(
     it = bench.PARTS["codec"]
     part = bench.Part(made_up, lambda: "struct 1.0", it.blocks, it.draw)
     monkeypatch.setitem(bench.PARTS, "codec", part)
+    store("reaction", Measured(where="a day: a machine", noise="Quiet", series=reaction()))
     assert bench.main(["--only", "codec"]) == 0
     told = capsys.readouterr().out
     assert "; struct 1.0; 0 minutes. The machine " in told
     assert bench.main(["--again"]) == 0
     assert capsys.readouterr().out == told
-    assert {file.name for file in (folder / kept.RAW).iterdir()} == {"codec.json.gz", "codec.png"}
+    files = {f"{name}.{kind}" for name in bench.PARTS for kind in ("json.gz", "png")}
+    assert {file.name for file in (folder / kept.RAW).iterdir()} == files
 
 
 def test_without_samples_it_says_what_to_do(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert bench.main(["--again"]) == bench.UNMEASURED
-    assert f"no samples in {kept.RAW} of codec: measure them first" in capsys.readouterr().err
+    assert (
+        f"no samples in {kept.RAW} of reaction, codec: measure them first"
+        in capsys.readouterr().err
+    )
     assert not list(folder.iterdir())
 
 
@@ -89,5 +107,5 @@ def test_a_package_that_is_missing_is_named(
 
     part = bench.Part(lambda: [], lacking, lambda series: {}, lambda file, series: None)
     monkeypatch.setitem(bench.PARTS, "codec", part)
-    assert bench.main([]) == bench.UNMEASURED
+    assert bench.main(["--only", "codec"]) == bench.UNMEASURED
     assert capsys.readouterr().err == "construct is not installed: say make bench\n"

@@ -1,0 +1,132 @@
+/* The board of a reaction: it reports a bumper hit and waits for the BREAK that answers it.
+ *
+ * board FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [KEEP ...]
+ *
+ * FROM and TO are ports on loopback: its own, and of whoever reacts. What follows are datagrams as
+ * hexadecimal: the hit, the all-clear, the two answers, and what is sent every 20 ms besides. Before
+ * each hit the other side has said STOP and no BREAK since, so that an old BREAK is not taken for an
+ * answer. One line for each round after the first WARM ones, in which not everybody need be
+ * there yet: nanoseconds from the hit's send to the BREAK's arrival.
+ */
+#define _GNU_SOURCE
+#include <arpa/inet.h>
+#include <poll.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+
+enum { MS = 1000000, LONGEST = 1500, MOST = 8 };
+static const int64_t S = 1000 * MS;
+
+typedef struct {
+    unsigned char bytes[LONGEST];
+    size_t size;
+} Datagram;
+
+static int sock;
+
+static int64_t now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * S + t.tv_nsec;
+}
+
+static void fail(const char *what) {
+    fprintf(stderr, "board: %s\n", what);
+    exit(1);
+}
+
+static Datagram parsed(const char *hex) {
+    Datagram d = {.size = strlen(hex) / 2};
+    for (size_t i = 0; i < d.size; i++)
+        if (sscanf(hex + 2 * i, "%2hhx", &d.bytes[i]) != 1)
+            fail("no hexadecimal");
+    return d;
+}
+
+static struct sockaddr_in port(const char *number) {
+    return (struct sockaddr_in){
+        AF_INET, htons(atoi(number)), {htonl(INADDR_LOOPBACK)}, {0}};
+}
+
+static void say(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
+
+static int is(const Datagram *want, const unsigned char *got, ssize_t size) {
+    return (size_t)size == want->size && !memcmp(got, want->bytes, want->size);
+}
+
+/* Wait for a datagram until a moment; 0 when none comes. */
+static ssize_t heard(unsigned char *got, int64_t until_ns) {
+    for (;;) {
+        ssize_t size = recv(sock, got, LONGEST, MSG_DONTWAIT);
+        int64_t left_ns = until_ns - now();
+        if (size > 0)
+            return size;
+        if (left_ns <= 0)
+            return 0;
+        struct timespec left = {left_ns / S, left_ns % S};
+        ppoll(&(struct pollfd){.fd = sock, .events = POLLIN}, 1, &left, NULL);
+    }
+}
+
+int main(int count, char **given) {
+    if (count < 9 || count > 9 + MOST)
+        fail("FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [KEEP ...]");
+    struct sockaddr_in from = port(given[1]), to = port(given[2]);
+    int rounds = atoi(given[3]), warm = atoi(given[4]), keeps = count - 9;
+    Datagram hit = parsed(given[5]), clear = parsed(given[6]), brake = parsed(given[7]),
+             stop = parsed(given[8]), keep[MOST];
+    for (int i = 0; i < keeps; i++)
+        keep[i] = parsed(given[9 + i]);
+    sock = socket(AF_INET, SOCK_DGRAM, 0);
+    if (bind(sock, (void *)&from, sizeof from) || connect(sock, (void *)&to, sizeof to))
+        fail("cannot have its port");
+
+    unsigned char got[LONGEST];
+    srand(1);
+    for (int round = -warm; round < rounds; round++) {
+        int64_t lost_ns = now() + 30 * S, clear_ns = 0, keep_ns = 0;
+        for (int stopped = 0, clears = 0; !stopped || clears < 4;) {
+            if (now() > lost_ns)
+                fail("nobody says STOP");
+            if (now() >= keep_ns) {
+                for (int i = 0; i < keeps; i++)
+                    say(&keep[i]);
+                keep_ns = now() + 20 * MS;
+            }
+            if (now() >= clear_ns) {
+                say(&clear);
+                clears++;
+                clear_ns = now() + (clears < 4 ? MS / 2 : 20 * MS);
+            }
+            ssize_t size = heard(got, clear_ns);
+            if (is(&brake, got, size))
+                stopped = 0;
+            else if (is(&stop, got, size))
+                stopped = 1;
+        }
+        /* At no fixed distance from anybody's timer. */
+        int64_t due_ns = now() + MS / 2 + rand() % (2 * MS);
+        int again = 0;
+        for (ssize_t size; (size = heard(got, due_ns));)
+            again |= is(&brake, got, size);
+        if (again) {
+            round--;
+            continue;
+        }
+        int64_t hit_ns = now();
+        say(&hit);
+        ssize_t size;
+        while ((size = heard(got, hit_ns + S)) && !is(&brake, got, size))
+            ;
+        if (!size && round >= 0)
+            fail("no BREAK within a second");
+        int64_t took_ns = now() - hit_ns;
+        if (round >= 0)
+            printf("%lld\n", (long long)took_ns);
+    }
+    return 0;
+}

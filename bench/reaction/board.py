@@ -1,0 +1,56 @@
+"""The board's side: what it says, and how long until it is told to BREAK."""
+
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.wire import commands, reports
+from common.wire.framing import Framing
+
+HERE = Path(__file__).parent
+FRAMING = Framing("crc-16", "payload")
+HIT, CLEAR = (FRAMING.pack(reports.BumperReport(on)).hex() for on in (True, False))
+BREAK, STOP = (
+    FRAMING.pack(commands.MotionCommand(kind)).hex()
+    for kind in (commands.MotionKind.BREAK, commands.MotionKind.STOP)
+)
+# A reset wants to see the vehicle stand.
+STANDS = FRAMING.pack(reports.VelocityReport(0, 0)).hex()
+PATIENCE_S = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Programs:
+    """The programs in C, compiled."""
+
+    folder: Path
+
+    @property
+    def echo(self) -> str:
+        """Who answers without thinking."""
+        return str(self.folder / "echo")
+
+    def hits(self, board: int, to: int, rounds: int, warm: int) -> list[int]:
+        """Report so many hits from a port to another; return the ns until each BREAK.
+
+        Raise ``RuntimeError`` when one is not answered.
+        """
+        words = [str(self.folder / "board"), *map(str, (board, to, rounds, warm))]
+        done = subprocess.run(
+            [*words, HIT, CLEAR, BREAK, STOP, STANDS],
+            capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip())
+        return [int(line) for line in done.stdout.split()]
+
+
+def compiled(folder: Path) -> Programs:
+    """Compile them into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
+    if shutil.which("cc") is None:
+        raise FileNotFoundError("no C compiler (Debian: apt-get install gcc libc6-dev)")
+    for name in ("board", "echo"):
+        source, made = str(HERE / f"{name}.c"), str(folder / name)
+        subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", made, source], check=True)
+    return Programs(folder)

@@ -1,0 +1,39 @@
+"""``python -m bench.reaction.resetter ENDPOINT``: an operator who resets as soon as he may."""
+
+import sys
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival, Bus
+from common.loop import Loop
+from common.settings import Bus as Where
+
+
+class Resetter:
+    """Asks again and again, one call at a time, while anything is latched."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._asking = False
+        bus.subscribe(keys.MOTION, self._on_motion)  # it comes more often than the state
+
+    def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
+        if arrival.message.latched and not self._asking:
+            self._asking = True
+            self._bus.ask(keys.RESET, m.ResetRequest(), self._answered, self._answered, 1.0)
+
+    def _answered(self, _: object) -> None:
+        self._asking = False
+
+
+def main() -> None:
+    """Reset until killed."""
+    loop = Loop()
+    bus = Bus(Where(connect=(sys.argv[1],)), "001", loop.post)
+    Resetter(bus)
+    bus.open()
+    loop.run()
+
+
+if __name__ == "__main__":
+    main()

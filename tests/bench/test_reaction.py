@@ -1,0 +1,52 @@
+"""Contact to BREAK: everybody answers hits alone, and what is told of it."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from bench.reaction import loop
+from bench.reaction.board import BREAK, CLEAR, HIT, STANDS, STOP, compiled
+from bench.reaction.page import table, verdict
+from bench.reaction.part import block
+from bench.reaction.responders import DDS, JUDGED, LOOP, REFLEX, RESPONDERS, Responder
+from bench.series import Series
+
+
+def test_the_one_process_speaks_as_the_bridge_does() -> None:
+    assert (loop.command(loop.BREAK).hex(), loop.command(loop.STOP).hex()) == (BREAK, STOP)
+    heard = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
+    assert [loop.is_hit(each) for each in heard] == [True, False, False, False, False]
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("responder", RESPONDERS, ids=lambda each: each.name)
+def test_each_answers_every_hit(responder: Responder, tmp_path: Path) -> None:
+    if responder.lacks:
+        pytest.skip(f"{responder.lacks} is not installed; `make bench` wants it")
+    times_ns = block(compiled(tmp_path), responder, 3)
+    assert len(times_ns) == 3
+    assert all(0 < ns < 1e9 for ns in times_ns)
+
+
+def made_up(name: str, load: str, *times_us: int) -> Series:
+    return Series(name=(name, load), calls=1, samples_ns=[1000 * us for us in times_us])
+
+
+def test_the_verdict_names_each_figure() -> None:
+    series = [
+        made_up(LOOP, "quiet", *[10] * 99, 20),
+        made_up(LOOP, "busy", *[10] * 100),
+        made_up(REFLEX, "quiet", *[12] * 100),
+        made_up(REFLEX, "busy", *[12] * 90, *[99] * 10),
+    ]
+    by_name = {each.name: each for each in series}
+    assert table(by_name).splitlines()[3] == (
+        f"| {REFLEX} | 12 | 12 | 12 | × 1.2 | 12 | 99 | 99 | × 1.2 |"
+    )
+    told = verdict(by_name).splitlines()
+    assert len(told) == 4  # without CycloneDDS nothing is said of it
+    assert told[1].endswith("quiet, p99: × 1.20 of × 1.5: reached")
+    assert told[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
+    both = [made_up(name, load, 10) for name in (JUDGED, DDS) for load in ("quiet", "busy")]
+    assert len(verdict(by_name | {each.name: each for each in both}).splitlines()) == 8
