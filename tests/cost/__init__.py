@@ -1,0 +1,1 @@
+"""What the hot paths cost, in counts that a noisy machine does not change."""

@@ -1,0 +1,134 @@
+"""What stands in for the world around a service: clock, Zenoh session, the board's cable, log.
+
+Everything of ours runs as shipped, down to the call that would enter Zenoh, the kernel or the log's
+thread. What is encoded is dropped there.
+"""
+
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, cast
+from unittest.mock import patch
+
+import zenoh
+
+from common import codec
+from common.bus.bus import Bus
+from common.freshness import S
+from common.loop import Loop
+from common.messages import Message
+from services.bridge.stamp import SO_TIMESTAMPNS, TIMESPEC
+
+START_NS = 1_000 * S
+WALL_NS = 1_700_000_000 * S  # ahead of the monotonic clock
+CABLE_NS = 50_000  # from the kernel's stamp to our read
+BOOT = 2**62 + 1  # always as long in MessagePack and in memory
+
+
+class Clock:
+    """The time, which passes when the replay says so."""
+
+    def __init__(self) -> None:
+        self.now_ns = START_NS
+
+    def install(self) -> None:
+        """Let this process see no other."""
+        time.monotonic_ns = lambda: self.now_ns
+        time.time_ns = lambda: WALL_NS + self.now_ns
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A sample as Zenoh hands it over."""
+
+    key_expr: zenoh.KeyExpr
+    payload: zenoh.ZBytes
+    attachment: zenoh.ZBytes | None
+
+
+class Session:
+    """A Zenoh session with a router and nothing behind it."""
+
+    def __init__(self, bus: Bus, loop: Loop) -> None:
+        self.info = self
+        self.sent: dict[str, bytes] = {}  # the newest of each key
+        self._queues: dict[str, Callable[[Any], None]] = {}
+        self._loop = loop
+        with patch("zenoh.ext.declare_advanced_publisher", Session.declare_publisher):
+            bus._adopt(cast("zenoh.Session", self))
+
+    def routers_zid(self) -> list[str]:
+        """Name the router."""
+        return ["router"]
+
+    def declare_publisher(self, key: str, **_: object) -> "Sink":
+        """Return where a publisher puts."""
+        return Sink(self, key)
+
+    def declare_subscriber(self, key: str, queue: Callable[[Any], None]) -> None:
+        """Keep whom a sample is handed to."""
+        self._queues[key] = queue
+
+    def declare_queryable(self, key: str, queue: Callable[[Any], None]) -> None:
+        """Nobody asks."""
+
+    def deliver(self, key: str, message: Message, subscription: str) -> None:
+        """Hand a message over as Zenoh's thread does, and let the loop take it."""
+        payload = zenoh.ZBytes(codec.encode(message))
+        self._queues[subscription](Sample(zenoh.KeyExpr(key), payload, None))
+        self._loop._drain(0)
+
+
+class Sink:
+    """A declared publisher."""
+
+    def __init__(self, session: Session, key: str) -> None:
+        self._session = session
+        self._key = key
+
+    def put(self, payload: bytes, attachment: bytes | None = None) -> None:
+        """Keep the newest."""
+        self._session.sent[self._key] = payload
+
+
+class Cable(socket.socket):
+    """A socket to the board, which answers what it is told to."""
+
+    def __init__(self, clock: Clock, board: tuple[str, int], answers: dict[bytes, bytes]) -> None:
+        super().__init__(socket.AF_INET, socket.SOCK_DGRAM)  # a descriptor that the loop can watch
+        self.inbox: deque[bytes] = deque()
+        self.sent = b""
+        self._clock = clock
+        self._board = board
+        self._answers = answers  # by the frame that asks
+
+    def recvmsg(self, *_: object) -> tuple[bytes, list[tuple[int, int, bytes]], int, object]:
+        """Return what waits, stamped by the kernel."""
+        if not self.inbox:
+            raise BlockingIOError
+        stamp = TIMESPEC.pack(*divmod(WALL_NS + self._clock.now_ns - CABLE_NS, S))
+        return self.inbox.popleft(), [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], 0, self._board
+
+    def sendto(self, datagram: bytes, *_: object) -> None:  # type: ignore[override]
+        """Take a command, and answer it."""
+        self.sent = datagram
+        if datagram in self._answers:
+            self.inbox.append(self._answers[datagram])
+
+
+class Paper:
+    """A log's file, which nobody reads and no thread writes."""
+
+    def __init__(self, _: object) -> None:
+        pass
+
+    def write(self, _: str) -> None:
+        """Drop a line."""
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def drain(self) -> None:
+        """Nothing waits."""

@@ -1,0 +1,59 @@
+"""No hot path costs more than it did, and what is expected is what it costs."""
+
+import pytest
+
+from tests.cost.kinds import KINDS, Kind
+from tests.cost.ledger import FILE, Page, complaints, read, written
+from tests.cost.syscalls import per_frame
+from tests.cost.uncountable import Uncountable
+
+WAIT = "epoll_wait(4, [{events=EPOLLIN}], 3, 5) = 1\n"
+FRAME = "recvmsg(22, {msg_iov=[...]}, 0) = 12\n"
+NOTHING = "recvmsg(22, {msg_namelen=16}, 0) = -1 EAGAIN (Resource temporarily unavailable)\n"
+WAKING = 'write(15, "\\1\\0\\0\\0\\0\\0\\0\\0", 8) = 8\nfutex(0x7f, FUTEX_WAKE_PRIVATE, 1) = 1\n'
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=[kind.name for kind in KINDS])
+def test_each_path_costs_what_it_did(kind: Kind) -> None:
+    tolerance, pages = read(FILE.read_text(encoding="utf-8"))
+    page = pages[kind.name]
+    if kind.holds_for() != page.holds_for:
+        pytest.skip(f"{kind.name} are known for {page.holds_for}, this is {kind.holds_for()}")
+    try:
+        counted = kind.count()
+    except Uncountable as why:
+        pytest.skip(f"{kind.name} are not counted: {why}")
+    told = list(complaints(kind.name, page.counts, counted, tolerance))
+    assert not told, "\n".join(told)
+
+
+@pytest.mark.parametrize(("count", "told"), [(97.1, 0), (102.9, 0), (96.9, 1), (103.1, 1)])
+def test_a_count_fails_up_and_down(count: float, told: int) -> None:
+    assert len(list(complaints("opcodes", {"a": 100}, {"a": count}, 0.03))) == told
+
+
+def test_a_complaint_says_what_to_do() -> None:
+    assert list(complaints("opcodes", {"a": 100}, {"a": 110}, 0.03)) == [
+        "a: 110 opcodes, 100 expected (+10.0%): find out what for; if it is worth it, "
+        "say `python -m tests.cost --renew`"
+    ]
+
+
+def test_paths_that_came_or_went_are_told() -> None:
+    old, new = complaints("opcodes", {"a": 1}, {"b": 1}, 0.03)
+    assert "stand only in counts.toml" in old
+    assert "stand only counted" in new
+
+
+def test_the_file_is_read_as_it_was_written() -> None:
+    pages = {"opcodes": Page("CPython 3.11.7", {"a": 1653.1, "b": 176103902})}
+    assert read(written(0.03, pages)) == (0.03, pages)
+
+
+def test_turns_with_one_frame_are_counted_without_what_wakes_threads() -> None:
+    alone = WAIT + FRAME + WAKING + NOTHING
+    other = WAIT + FRAME + "write(9, 1) = 1\n" + NOTHING
+    both = WAIT + FRAME + FRAME + NOTHING
+    assert per_frame((2 * alone + both + other) * 20) == 3
+    with pytest.raises(Uncountable, match="too few"):
+        per_frame(both * 30)
