@@ -7,9 +7,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from tests.cost.kinds import KINDS, Kind
 from tests.cost.ledger import FILE, TOLERANCE, Counts, Page, read, written
 from tests.cost.uncountable import Uncountable
+from tests.cost.ways import WAYS
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,24 +20,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     pages: dict[str, Page] = {}
     if FILE.exists():
         _, pages = read(FILE.read_text(encoding="utf-8"))
-    for kind in KINDS:
+    for way in WAYS:
         try:
-            counts = kind.count()
+            counted = way.count()
         except Uncountable as why:
-            print(f"{kind.unit}: not counted, {why}\n")
+            print(f"{' and '.join(way.kinds)} are not counted: {why}\n")
             continue
-        page = pages.get(kind.name)
-        print(table(kind, counts, page.counts if page else {}))
-        pages[kind.name] = Page(kind.holds_for(), counts)
+        for kind, counts in counted.items():
+            print(table(kind, counts, pages[kind].counts if kind in pages else {}))
+            pages[kind] = Page(way.holds_for(), counts)
     if options.renew:
-        in_order = {kind.name: pages[kind.name] for kind in KINDS if kind.name in pages}
-        FILE.write_text(written(TOLERANCE, in_order), encoding="utf-8")
+        kinds = [kind for way in WAYS for kind in way.kinds if kind in pages]
+        text = written(TOLERANCE, {kind: pages[kind] for kind in kinds})
+        FILE.write_text(text, encoding="utf-8")
     return 0
 
 
-def table(kind: Kind, counts: Counts, expected: Counts) -> str:
+def table(kind: str, counts: Counts, expected: Counts) -> str:
     """Return the counts of a kind beside the expected ones."""
-    lines = [f"{kind.unit + ' of a step':28}{'counted':>14}{'expected':>14}"]
+    lines = [f"{kind:28}{'counted':>14}{'expected':>14}"]
     for name, count in counts.items():
         known = f"{expected[name]:,.10g}" if name in expected else "-"
         lines.append(f"{name:28}{count:>14,.10g}{known:>14}")

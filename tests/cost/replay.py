@@ -22,7 +22,7 @@ from typing import Any
 from tests.cost.paths import Walk, walks
 
 HERE = str(Path(__file__).parent)
-WARM = 3  # steps before the first that counts: caches, free lists
+WARM = 1  # steps before the first that counts: caches, free lists
 
 
 def main() -> int:

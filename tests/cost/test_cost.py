@@ -2,10 +2,11 @@
 
 import pytest
 
-from tests.cost.kinds import KINDS, Kind
+from tests.cost.callgrind import allocations, total
 from tests.cost.ledger import FILE, Page, complaints, read, written
 from tests.cost.syscalls import per_frame
 from tests.cost.uncountable import Uncountable
+from tests.cost.ways import WAYS, Way
 
 WAIT = "epoll_wait(4, [{events=EPOLLIN}], 3, 5) = 1\n"
 FRAME = "recvmsg(22, {msg_iov=[...]}, 0) = 12\n"
@@ -13,17 +14,22 @@ NOTHING = "recvmsg(22, {msg_namelen=16}, 0) = -1 EAGAIN (Resource temporarily un
 WAKING = 'write(15, "\\1\\0\\0\\0\\0\\0\\0\\0", 8) = 8\nfutex(0x7f, FUTEX_WAKE_PRIVATE, 1) = 1\n'
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=[kind.name for kind in KINDS])
-def test_each_path_costs_what_it_did(kind: Kind) -> None:
+@pytest.mark.parametrize("way", WAYS, ids=[way.kinds[0] for way in WAYS])
+def test_each_path_costs_what_it_did(way: Way) -> None:
     tolerance, pages = read(FILE.read_text(encoding="utf-8"))
-    page = pages[kind.name]
-    if kind.holds_for() != page.holds_for:
-        pytest.skip(f"{kind.name} are known for {page.holds_for}, this is {kind.holds_for()}")
+    what = " and ".join(way.kinds)
+    known, here = pages[way.kinds[0]].holds_for, way.holds_for()
+    if here != known:
+        pytest.skip(f"{what} are known for {known}, this is {here}")
     try:
-        counted = kind.count()
+        counted = way.count()
     except Uncountable as why:
-        pytest.skip(f"{kind.name} are not counted: {why}")
-    told = list(complaints(kind.name, page.counts, counted, tolerance))
+        pytest.skip(f"{what} are not counted: {why}")
+    told = [
+        complaint
+        for kind in way.kinds
+        for complaint in complaints(kind, pages[kind].counts, counted[kind], tolerance)
+    ]
     assert not told, "\n".join(told)
 
 
@@ -57,3 +63,14 @@ def test_turns_with_one_frame_are_counted_without_what_wakes_threads() -> None:
     assert per_frame((2 * alone + both + other) * 20) == 3
     with pytest.raises(Uncountable, match="too few"):
         per_frame(both * 30)
+
+
+def test_calls_of_the_allocator_are_counted_by_its_number() -> None:
+    lines = [
+        "fn=(1) main", "16 2", "cfn=(7) _PyObject_Malloc", "calls=3 20", "16 40",
+        "cfi=(2) other.c", "cob=(3) libc.so", "cfn=(9) malloc", "calls=5 20",
+        "fn=(8) _PyObject_Calloc", "12 1", "fn=(2) more", "cfi=(4)", "cfn=(7)", "calls=2 20",
+        "cfn=(8)", "calls=1 20", "totals: 99", "",
+    ]  # fmt: skip
+    dump = "\n".join(lines)
+    assert (total(dump), allocations(dump)) == (99, 6)
