@@ -1,10 +1,9 @@
 """``python -m tests.cost.replay WHAT``: walk each hot path, and count in this process.
 
 ``opcodes``       Python instructions of everything but the replay itself, per step
-``bytes``         memory that a step holds at its most, over what it found, by ``tracemalloc``
 ``instructions``  counts nothing: callgrind does, from one ``getpgrp`` to the next
 
-The first two are printed as JSON; the last prints the names and numbers of its steps.
+The first are printed as JSON; the last prints the names and numbers of its steps.
 """
 
 import gc
@@ -12,7 +11,6 @@ import json
 import os
 import subprocess
 import sys
-import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
@@ -67,22 +65,6 @@ def opcodes(walk: Walk) -> float:
     return count / walk.times
 
 
-def most_bytes(walk: Walk) -> float:
-    """Return the bytes that a step holds at its most."""
-    most = 0
-    tracemalloc.start()
-    for once_more in (False, True):  # what free lists held before is not traced: first renew them
-        for _ in range(walk.times):
-            before, _ = tracemalloc.get_traced_memory()
-            tracemalloc.reset_peak()
-            walk.step()
-            if once_more:
-                most = max(most, tracemalloc.get_traced_memory()[1] - before)
-            walk.mend()
-    tracemalloc.stop()
-    return most
-
-
 def begin_instructions() -> None:
     """Have callgrind, which has only run this process so far, take note from here on."""
     # Without the ptrace that a container may forbid: a busy process listens by itself.
@@ -104,7 +86,6 @@ def instructions(walk: Walk) -> int:
 
 COUNTERS: dict[str, Callable[[Walk], float]] = {
     "opcodes": opcodes,
-    "bytes": most_bytes,
     "instructions": instructions,
 }
 

@@ -19,7 +19,7 @@ class Way:
 
 
 def python() -> str:
-    """Name the interpreter whose opcodes and objects are counted."""
+    """Name the interpreter whose opcodes are counted."""
     return f"{platform.python_implementation()} {platform.python_version()}"
 
 
@@ -30,7 +30,6 @@ def build() -> str:
 
 WAYS = (
     Way(("opcodes",), python, lambda: {"opcodes": replayed("opcodes")}),
-    Way(("bytes",), python, lambda: {"bytes": replayed("bytes")}),
     Way(("instructions", "allocations"), build, under_callgrind),
     Way(("syscalls",), platform.system, lambda: {"syscalls": system_calls()}),
 )
