@@ -2,6 +2,7 @@
 
 import select
 import sys
+from typing import Any
 
 import lcm
 
@@ -12,8 +13,9 @@ def board(port: int, url: str) -> None:
     """Stand between the board and the judge until killed."""
     gate, bus = Gate(port), lcm.LCM(url)
     bus.subscribe("verdicts", lambda *_: gate.brake())
+    ends: list[Any] = [gate.sock, bus]
     while True:
-        for ready in select.select([gate.sock, bus], [], [])[0]:
+        for ready in select.select(ends, [], [])[0]:
             if ready is bus:
                 bus.handle()
             elif gate.take():

@@ -17,7 +17,7 @@ from bench.series import Series
 from tests.support import free_port
 
 SEED = 20_240_607
-BLOCKS, HITS, WARM = 5, 1000, 20
+BLOCKS, HITS, WARM = 2, 250, 20
 BUSY = 4  # processes that only count, on the busy machine
 
 

@@ -109,3 +109,8 @@ def test_a_package_that_is_missing_is_named(
     monkeypatch.setitem(bench.PARTS, "codec", part)
     assert bench.main(["--only", "codec"]) == bench.UNMEASURED
     assert capsys.readouterr().err == "construct is not installed: say make bench\n"
+
+
+def test_who_waits_for_others_does_not_tell_of_its_own_share() -> None:
+    part = bench.Part(made_up, lambda: "", lambda series: {}, lambda file, series: None, waits=True)
+    assert bench.measured(part).noise.startswith("A process that only sleeps was held up for ")
