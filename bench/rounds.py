@@ -13,7 +13,7 @@ from itertools import repeat
 from bench.series import Series
 
 SEED = 20_240_607  # any, but always the same
-ROUNDS = 5_000
+ROUNDS = 3_000
 WARM_UP = 100
 
 

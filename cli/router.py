@@ -8,10 +8,8 @@ import threading
 import time
 from pathlib import Path
 
-import structlog
-
 from cli.access import access_control
-from common import log, members
+from common import log, members, realtime
 from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.config import load
 from common.errors import ConfigError
@@ -49,14 +47,18 @@ def run(options: argparse.Namespace) -> int:
         tell(printed, options.print)
         return 0
     os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, when it is first used
+    if config.robot.realtime:
+        realtime.ask(realtime.ROUTER)
     log.configure(config.log, "router")
+    if config.robot.realtime and not realtime.priority():
+        log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
     ended = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: ended.set())
     systemd = Systemd()
     with router(config.bus, access, config.robot.id) as answers:
         listen = list(config.bus.listen)
-        structlog.get_logger().info("started", listen=listen, open_to=open_to(config.bus))
+        log.Logger().info("started", listen=listen, open_to=open_to(config.bus))
         # Routing happens in Zenoh's own threads: that this one lives says nothing about them.
         while not ended.wait(LOOK_S if systemd.listens else None):
             if answers():

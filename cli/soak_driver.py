@@ -11,8 +11,6 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 
-import structlog
-
 from cli.lap.driver import PERIOD_S, Driver
 from cli.lap.script import PATIENT, QUICK, Lap, Pace, lap, wrap
 from cli.settings import Everything
@@ -38,7 +36,7 @@ class Operator:
     def __init__(self, bus: Bus, control: Control, pace: Pace) -> None:
         self._bus, self._control, self._pace = bus, control, pace
         self._driver = Driver(bus, self._new_lap(), lambda _: None)
-        self._log = structlog.get_logger()
+        self._log = log.Logger()
         self._patience_ns = round(STEP_S[pace] * S)
         self._mend: Callable[[], PoseRequest | None] | None = self._put_back
         self._tried_ns = 0
@@ -131,7 +129,7 @@ def main() -> int:
         signal.signal(signal.SIGTERM, lambda *_: loop.stop())
         bus.open()
         loop.every(PERIOD_S, operator.on_beat)
-        structlog.get_logger().info("started")
+        log.Logger().info("started")
         loop.run()
     return 0
 

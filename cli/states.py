@@ -6,11 +6,11 @@ whether a reset is due; what is drawn is what happened.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from functools import cache
 from typing import TypeVar
 
-from msgspec.structs import replace as with_fields
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.freshness import Latest, S
 from common.messages import (
@@ -40,8 +40,7 @@ M = TypeVar("M", bound=Message)
 DRIVER_BOOT, BRIDGE_BOOT = 1, 2
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Struct, frozen=True):
     """What is so around the policy, and its memory."""
 
     state: State
@@ -207,4 +206,4 @@ def _inputs(scene: Scene) -> Inputs:
 
 def _new(message: M, scene: Scene) -> Latest[M]:
     """Return a sample that has just come."""
-    return Latest(with_fields(message, seq=scene.seq, boot=BRIDGE_BOOT), scene.now_ns)
+    return Latest(replace(message, seq=scene.seq, boot=BRIDGE_BOOT), scene.now_ns)

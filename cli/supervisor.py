@@ -13,9 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
-import structlog
-
 from common.backoff import Backoff
+from common.log import Logger
 from common.options import HOPELESS
 
 PATIENCE_S = 5.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand
@@ -49,7 +48,7 @@ class Supervisor:
         self.children = [Child(name, command) for name, command in commands]
         self._output = output
         self._stopped = False
-        self._log = structlog.get_logger()
+        self._log = Logger()
 
     def run(self) -> int:
         """Keep them running; return 0 after ``stop``, or the exit code of a hopeless one."""

@@ -6,8 +6,6 @@ import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-import structlog
-
 from cli.router import add_insecure
 from cli.settings import Everything
 from cli.supervisor import Supervisor
@@ -36,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     supervisor = Supervisor(chosen([*commands(options), *recorder(options)], options.only))
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
-    structlog.get_logger().info(
+    log.Logger().info(
         "starting; `t2 drive` in a second terminal drives it",
         robot=config.robot.id,
         board=f"{config.board.address}:{config.board.port}",

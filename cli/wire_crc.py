@@ -11,7 +11,8 @@ from typing import get_args
 
 import crcmod.predefined
 
-from common.wire.framing import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET, Covers, crc_function
+from common.wire.framing import Covers, crc_function
+from common.wire.header import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET
 
 
 @dataclass(frozen=True, slots=True)

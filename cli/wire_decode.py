@@ -5,20 +5,21 @@ for those of the two emergency brake switches. So each frame is read both ways u
 known.
 """
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, get_args
 
+import msgspec
+
 from common.messages import SONAR_NAMES, FaultName
 from common.settings import Wire
 from common.wire.commands import TO_BOARD
-from common.wire.frame import Frame
+from common.wire.frame import Frame, Kinds
 from common.wire.framing import Framing, Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
 
-TABLES: dict[str, Mapping[int, type[Frame]]] = {"pc": TO_BOARD, "board": FROM_BOARD}
+TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
 SENDERS = (*TABLES, "both")
 
 # When neither reading takes a frame, the reason that got furthest says most.
@@ -54,8 +55,7 @@ def parts(framing: Framing, datagram: bytes, sender: str) -> Iterator[Good | Bad
     tables = TABLES if sender == "both" else {sender: TABLES[sender]}
     offset = 0
     while offset < len(datagram):
-        rest = datagram[offset:]
-        read = {name: next(framing.read(rest, kinds)) for name, kinds in tables.items()}
+        read = {name: framing.part_at(offset, datagram, kinds) for name, kinds in tables.items()}
         part = _best(offset, read)
         yield part
         offset += len(part.raw)
@@ -96,7 +96,7 @@ def as_table(part: Good | Bad, where: str) -> dict[str, Any]:
 def _fields(part: Good) -> list[tuple[str, Any]]:
     """Return the fields; where two senders are possible, both frames have the same ones."""
     frame = next(iter(part.frames.values()))
-    return [(field.name, getattr(frame, field.name)) for field in dataclasses.fields(frame)]
+    return list(msgspec.structs.asdict(frame).items())
 
 
 def _text(name: str, value: Any, wire: Wire) -> str:

@@ -1,15 +1,15 @@
 """The newest value of a stream and when it came, on the receiver's own clock."""
 
-from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+from msgspec import Struct
 
 T = TypeVar("T")
 
 S = 1_000_000_000  # nanoseconds in a second
 
 
-@dataclass(frozen=True, slots=True)
-class Latest(Generic[T]):
+class Latest(Struct, Generic[T], frozen=True):
     """A value with its local receive time; make a new one for each sample."""
 
     value: T

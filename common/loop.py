@@ -102,8 +102,7 @@ class Loop:
 
     def _drain(self, _: int) -> None:
         with contextlib.suppress(BlockingIOError):
-            while self._wake_out.recv(4096):
-                pass
+            self._wake_out.recv(65_536)  # what is left wakes once more
         self._make_posted()
 
     def _make_posted(self) -> None:

@@ -211,6 +211,7 @@ class Health(Message, frozen=True, kw_only=True):
     counters: dict[str, int]  # since start
     lateness: float  # s, how late the loop's latest timer was in the last second
     rss: int  # bytes
+    priority: int = 0  # of SCHED_FIFO; 0 for an ordinary process, which waits its turn
     timing: Timing | None = None  # None where nothing is measured
 
 

@@ -11,16 +11,13 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import FrameType
 from typing import Generic, TypeVar
 
 import msgspec
-import structlog
 
-from common import keys, log
+from common import keys, log, realtime
 from common.bus.bus import Bus
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
@@ -31,6 +28,7 @@ from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.schema import schemas
 from common.settings import Shared
 from common.systemd import OFTEN_S, Systemd
+from common.version import VERSION
 
 REST_S = 2.0  # how long a service may take to come to rest
 BEHIND = 10  # how nice a service is that does not drive
@@ -46,7 +44,7 @@ class Node(Generic[C]):
         self.name = name
         self.config: C = loaded.config
         self.loop = Loop()
-        self.log = structlog.get_logger()
+        self.log = log.Logger()
         self.bus = self.open_bus()
         self.counters: Counter[str] = Counter()
         self.at_rest: Callable[[], bool] = lambda: True  # asked while stopping
@@ -87,12 +85,13 @@ class Node(Generic[C]):
         self._health.put(
             Health(
                 service=self.name,
-                version=package_version(),
+                version=VERSION,
                 uptime=(now_ns - self._started_ns) / S,
                 rates=rates,
                 counters=dict(self.bus.counters + self.counters),
                 lateness=self.loop.take_lateness_s(),
                 rss=resident_bytes(),
+                priority=realtime.priority(),
                 timing=self.timing(),
             )
         )
@@ -117,10 +116,15 @@ def run(
     root: type[C],
     build: Callable[[Node[C]], object],
     argv: Sequence[str] | None = None,
+    *,
+    priority: int = 0,
 ) -> int:
-    """Live a service's life and return its exit code."""
+    """Live a service's life and return its exit code; a ``priority`` is one of ``realtime``'s."""
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
+        if priority and loaded.config.robot.realtime:
+            realtime.ask(priority)  # before there are threads: they follow it
+            realtime.limit()
         log.configure(loaded.config.log, name)
         node = Node(name, loaded)
     except ConfigError as error:
@@ -190,15 +194,6 @@ def _come_to_rest(node: Node[C]) -> None:
 
     node.loop.every(0.02, check)
     node.loop.run()
-
-
-@cache
-def package_version() -> str:
-    """Return the installed version of T2."""
-    try:
-        return version("t2")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def resident_bytes() -> int:

@@ -14,6 +14,7 @@ from common.errors import WireError
 from common.wire.framing import Covers, crc_function
 
 Limits = Mapping[str, tuple[float, float]]
+LogLevel = Literal["debug", "info", "warning", "error"]
 
 # See ``check_protections``.
 PROTECTIVE_OF_BUS: Limits = {"lease": (0.0, 2.0)}
@@ -48,9 +49,10 @@ def check_protections(
 
 
 class Robot(Section, frozen=True, kw_only=True):
-    """Which robot this is."""
+    """Which robot this is, and how its computer treats it."""
 
     id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+\Z")] = "001"
+    realtime: bool = True  # whether what stands before the wheels asks for SCHED_FIFO
 
 
 class Bus(Section, frozen=True, kw_only=True):
@@ -191,7 +193,7 @@ class Wire(Section, frozen=True, kw_only=True):
 class Log(Section, frozen=True, kw_only=True):
     """What is written to standard error."""
 
-    level: Literal["debug", "info", "warning", "error"] = "info"
+    level: LogLevel = "info"
     format: Literal["auto", "text", "json"] = "auto"  # auto: text on a terminal, JSON otherwise
 
 

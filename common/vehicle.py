@@ -1,13 +1,13 @@
 """Where things sit on the vehicle, in ``base_link``: x forward, y left, metres and radians."""
 
 import math
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.settings import Vehicle
 
 
-@dataclass(frozen=True, slots=True)
-class Mount:
+class Mount(Struct, frozen=True):
     """A sonar's place and the way it looks."""
 
     name: str

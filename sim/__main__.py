@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-import structlog
-
 from common import log
 from common.config import load
 from common.errors import ConfigError, LinkError
@@ -39,12 +37,12 @@ def run(options: argparse.Namespace) -> int:
         try:
             process = Process(config, plan, script, trace)
         except LinkError as error:
-            structlog.get_logger().error(str(error))
+            log.Logger().error(str(error))
             return EXIT_LINK
         with process:
             for name in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(name, lambda *_: process.loop.stop())
-            structlog.get_logger().info(
+            log.Logger().info(
                 "started", world=plan.title, board=f"{config.board.address}:{config.board.port}"
             )
             process.run()

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Self
 
 import msgspec
-import structlog
 
 from common.errors import ConfigError
 from common.freshness import S
+from common.log import Logger
 from common.loop import Loop
 from sim import trace as t
 from sim.config import Config
@@ -49,7 +49,7 @@ class Process:
         self.simulation = Simulation(config, plan, now_ns)
         self._injection = Injection(self.simulation, script, now_ns)
         self._trace = trace
-        self._log = structlog.get_logger()
+        self._log = Logger()
         with ExitStack() as stack:  # what is open already is closed when the next port is taken
             self.loop = stack.enter_context(closing(Loop()))
             self._board = stack.enter_context(closing(BoardSocket(config.board)))

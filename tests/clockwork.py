@@ -6,10 +6,9 @@ the same each time. The shells are tested elsewhere, with real processes.
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
-import msgspec
+from msgspec.structs import replace
 
 from cli.lap.script import Ask as Wish
 from cli.lap.script import Lap, View
@@ -147,9 +146,9 @@ class Clockwork:
         latest = {}
         for name, sample in samples.items():
             self._seq[name] += 1
-            stamped = msgspec.structs.replace(sample, seq=self._seq[name], boot=BOOT)
+            stamped = replace(sample, seq=self._seq[name], boot=BOOT)
             latest[name] = Latest(stamped, self.now_ns)
-        self._inputs = replace(self._inputs, **latest)  # type: ignore[arg-type]
+        self._inputs = replace(self._inputs, **latest)
 
     def _decide(self, event: Event | None = None) -> None:
         inputs = replace(self._inputs, event=event)
@@ -159,9 +158,7 @@ class Clockwork:
             self._granted = verdict.reply.done
             self.answers.append((type(event).__name__, verdict.reply.done, verdict.reply.text))
         self._seq["motion"] += 1
-        motion = msgspec.structs.replace(
-            motion_message(self._state, inputs), seq=self._seq["motion"], boot=1
-        )
+        motion = replace(motion_message(self._state, inputs), seq=self._seq["motion"], boot=1)
         self._lease, order, _ = leases.on_motion(
             self._lease, motion, self.now_ns, self._lease_ns, BOOT
         )
@@ -177,7 +174,7 @@ class Clockwork:
             self._decide()
             estimate = self._estimator.estimate(self.now_ns)
             if estimate is not None:
-                self.odometry.append(msgspec.structs.replace(estimate, mono_ns=self.now_ns))
+                self.odometry.append(replace(estimate, mono_ns=self.now_ns))
         if elapsed % 5 == 0:
             beat = self._state.heartbeat.beat(self.now_ns)
             self._state = replace(self._state, heartbeat=beat)

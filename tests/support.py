@@ -12,11 +12,12 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
-from common import settings
+from common import log, settings
 from common.bus.bus import Bus
 from common.loop import Loop
 
 PATIENCE_S = 20.0
+Lines = list[tuple[settings.LogLevel, str, log.About]]  # of a log
 WORKERS = 8  # whose ports do not meet
 T = TypeVar("T")
 

@@ -33,6 +33,21 @@ class Candidate:
         return False
 
 
+def writers(
+    velocity: Callable[[Any], bytes],
+    motion: Callable[[Any], bytes],
+    bumper: Callable[[Any], bytes],
+    ultrasonic: Callable[[Any], bytes],
+) -> Mapping[str, Callable[[Any], bytes]]:
+    """Return who makes which frame."""
+    return {
+        "velocity report": velocity,
+        "run command": motion,
+        "bumper report": bumper,
+        "ultrasonic report": ultrasonic,
+    }
+
+
 def readers(board: Callable[[bytes], Any], robot: Callable[[bytes], Any]) -> Mapping[str, Any]:
     """Return who reads which frame: what the board sends, and what the robot's computer sends."""
     return {

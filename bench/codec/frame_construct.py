@@ -24,7 +24,7 @@ from construct import (
     this,
 )
 
-from bench.codec.candidate import Candidate, readers
+from bench.codec.candidate import Candidate, readers, writers
 from bench.codec.frame_struct import Values, crc, from_wire, to_wire
 
 VELOCITY = ExprAdapter(
@@ -93,16 +93,14 @@ def _plain(name: str, frames: list[Any]) -> Values:
 
 CONSTRUCT = Candidate(
     name="construct",
-    encode={
-        "velocity report": lambda values: _made(
-            REPORT, 0x7426, linear=values[0], angular=values[1]
-        ),
-        "run command": lambda values: _made(
+    encode=writers(
+        velocity=lambda values: _made(REPORT, 0x7426, linear=values[0], angular=values[1]),
+        motion=lambda values: _made(
             COMMAND, 0x7426, kind=values[0], linear=values[1], angular=values[2]
         ),
-        "bumper report": lambda values: _made(REPORT, 0x7602, pressed=values[0]),
-        "ultrasonic report": lambda values: _made(REPORT, 0x7601, ranges=values),
-    },
+        bumper=lambda values: _made(REPORT, 0x7602, pressed=values[0]),
+        ultrasonic=lambda values: _made(REPORT, 0x7601, ranges=values),
+    ),
     decode=readers(_report, _command),
     plain=_plain,
     calls=10,

@@ -4,7 +4,7 @@ import ctypes
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bench.codec.candidate import Candidate, readers
+from bench.codec.candidate import Candidate, readers, writers
 from bench.codec.frame_struct import Values, crc, from_wire, only, to_wire
 
 
@@ -153,12 +153,7 @@ def _command(datagram: bytes) -> list[Values]:
 
 CTYPES = Candidate(
     name="ctypes",
-    encode={
-        "velocity report": velocity,
-        "run command": motion,
-        "bumper report": bumper,
-        "ultrasonic report": ultrasonic,
-    },
+    encode=writers(velocity, motion, bumper, ultrasonic),
     decode=readers(_report, _command),
     plain=only,
 )

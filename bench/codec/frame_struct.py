@@ -10,7 +10,7 @@ from typing import Any
 
 import crcmod.predefined
 
-from bench.codec.candidate import Candidate, readers
+from bench.codec.candidate import Candidate, readers, writers
 
 Values = tuple[Any, ...]
 
@@ -138,12 +138,7 @@ def only(name: str, frames: list[Values]) -> Values:
 
 BY_HAND = Candidate(
     name="struct",
-    encode={
-        "velocity report": velocity,
-        "run command": motion,
-        "bumper report": bumper,
-        "ultrasonic report": ultrasonic,
-    },
+    encode=writers(velocity, motion, bumper, ultrasonic),
     decode=readers(_report, _command),
     plain=only,
 )

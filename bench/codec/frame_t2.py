@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from bench.codec.candidate import Candidate, readers
-from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
+from bench.codec.candidate import Candidate, readers, writers
+from common.wire.commands import MOTION_KINDS, TO_BOARD, MotionCommand
 from common.wire.framing import Framing, Received, Rejected
 from common.wire.reports import FROM_BOARD, BumperReport, UltrasonicReport, VelocityReport
 
@@ -13,11 +13,11 @@ _framing = Framing()
 
 
 def _from_board(datagram: bytes) -> list[Part]:
-    return list(_framing.read(datagram, FROM_BOARD))
+    return _framing.read(datagram, FROM_BOARD)
 
 
 def _to_board(datagram: bytes) -> list[Part]:
-    return list(_framing.read(datagram, TO_BOARD))
+    return _framing.read(datagram, TO_BOARD)
 
 
 def _plain(name: str, parts: list[Part]) -> tuple[Any, ...]:
@@ -36,14 +36,14 @@ def _plain(name: str, parts: list[Part]) -> tuple[Any, ...]:
 
 T2 = Candidate(
     name="T2",
-    encode={
-        "velocity report": lambda values: _framing.pack(VelocityReport(*values)),
-        "run command": lambda values: _framing.pack(
-            MotionCommand(MotionKind(values[0]), values[1], values[2])
+    encode=writers(
+        velocity=lambda values: _framing.pack(VelocityReport(values[0], values[1])),
+        motion=lambda values: _framing.pack(
+            MotionCommand(MOTION_KINDS[values[0]], values[1], values[2])
         ),
-        "bumper report": lambda values: _framing.pack(BumperReport(*values)),
-        "ultrasonic report": lambda values: _framing.pack(UltrasonicReport(values)),
-    },
+        bumper=lambda values: _framing.pack(BumperReport(values[0])),
+        ultrasonic=lambda values: _framing.pack(UltrasonicReport(values)),
+    ),
     decode=readers(_from_board, _to_board),
     plain=_plain,
 )

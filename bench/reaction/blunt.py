@@ -6,6 +6,7 @@ Nothing else differs: a hit is published, and BREAK is sent when safety's motion
 import sys
 from unittest.mock import patch
 
+from common import realtime
 from common.service import run
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
@@ -14,8 +15,8 @@ from services.bridge.wheels import Wheels
 
 def main() -> int:
     """Bridge until it is told to stop; return the exit code."""
-    with patch.object(Wheels, "on_hit", lambda *_: None):
-        return run("bridge", BridgeConfig, Bridge)
+    with patch.multiple(Wheels, brake=lambda _: 0, on_hit=lambda *_: None):
+        return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE)
 
 
 if __name__ == "__main__":

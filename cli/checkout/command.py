@@ -24,7 +24,7 @@ from common import log
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
 from common.options import add_sources, sources
-from common.service import package_version
+from common.version import VERSION
 
 NAMES = [step.name for step in STEPS]
 SECTIONS = ("wire", "board", "vehicle", "bridge")
@@ -74,7 +74,7 @@ def on_the_bus(loaded: Loaded[Everything], only: Sequence[str]) -> Report:
         draft = Report(
             robot=loaded.config.robot.id,
             date=operator.now(),
-            facts=[("board", board), ("T2 of this tool", package_version()), *versions(bench)],
+            facts=[("board", board), ("T2 of this tool", VERSION), *versions(bench)],
             settings=told,
             left_out=[name for name in NAMES if only and name not in only],
         )
@@ -95,7 +95,7 @@ def on_the_wire(loaded: Loaded[Everything]) -> Report:
         draft = Report(
             robot=config.robot.id,
             date=operator.now(),
-            facts=[("board", board), ("T2 of this tool", package_version())],
+            facts=[("board", board), ("T2 of this tool", VERSION)],
             settings=rows(told, SECTIONS),
         )
         what = "The stack must be down, all wheels off the ground, a hand on the vehicle's switch."

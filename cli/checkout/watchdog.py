@@ -64,7 +64,7 @@ class Master:
         ready, _, _ = select.select(self._sockets.sockets, [], [], seconds)
         for sock in ready:
             port = self._sockets.sockets.index(sock)
-            for datagram, _ in self._sockets.read(port):
+            for datagram, _, _ in self._sockets.read(port):
                 for part in self._framing.read(datagram, reports.FROM_BOARD):
                     if isinstance(part, Received):
                         self._port = port

@@ -19,8 +19,8 @@ from cli.inspect.vehicle import at_the_vehicle
 from common import keys
 from common.bus.probe import Probe, probe
 from common.errors import LinkError
-from common.service import package_version
 from common.settings import Shared
+from common.version import VERSION
 
 LISTEN_S = 3.0  # what comes once a second comes twice
 
@@ -65,7 +65,7 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
 
 def look(opened: Probe, robot: str, seconds: float) -> Seen:
     """Return what is seen of one robot within so many seconds."""
-    seen = Seen(zenoh=version("eclipse-zenoh"), t2=package_version())
+    seen = Seen(zenoh=version("eclipse-zenoh"), t2=VERSION)
     told = (str(each.get("version", "")) for each in routers(opened))
     seen.routers = [text.removeprefix("v").partition("-")[0] for text in told]
     listen(opened, robot, seconds, seen)

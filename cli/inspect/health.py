@@ -129,20 +129,21 @@ def as_json(row: Row) -> Mapping[str, object]:
 def as_table(rows: list[Row]) -> str:
     """Return a row for each service."""
     cells = [[row.robot, row.name, *_cells(row)] for row in rows]
-    head = ["robot", "service", "", "version", "up", "late ms", "MB", "messages/s", "counters"]
-    return output.table(head, cells)
+    head = ["robot", "service", "", "version", "up", "late ms", "fifo", "MB", "messages/s"]
+    return output.table([*head, "counters"], cells)
 
 
 def _cells(row: Row) -> list[str]:
     health = row.health
     if not health:
-        return [row.state, *[""] * 6]
+        return [row.state, *[""] * 7]
     counters = " ".join(f"{name}={count}" for name, count in sorted(health.counters.items()))
     return [
         "held up" if health.lateness > LATE_S else row.state,
         health.version,
         up(health.uptime),
         f"{health.lateness * 1000:.1f}",
+        str(health.priority or "-"),
         f"{health.rss / 1e6:.0f}",
         f"{sum(health.rates.values()):.0f}",
         counters or "-",

@@ -12,6 +12,7 @@ import zenoh
 
 from common.bus.thinning import thinned
 from common.errors import ConfigError, LinkError
+from common.log import Logger
 from common.settings import Bus, is_encrypted
 
 RETRY_S = 0.5  # between two tries to find a router
@@ -77,9 +78,7 @@ class Opener:
             return
 
     def _complain(self) -> None:
-        import structlog  # here: it takes 0.17 s, all the rest of the bus 0.10, and tools hurry
-
-        structlog.get_logger().warning(
+        Logger().warning(
             "waiting for a router; `t2 doctor` looks further", endpoints=list(self._where.endpoints)
         )
 

@@ -2,36 +2,41 @@
 
 Velocities are sign and magnitude: bit 15 is the sign, bits 14..0 the magnitude (manual 2.2).
 A frame object always holds values that the wire can carry: making one from others raises
-``WireError``.
+``WireError``, and sending it checks nothing again.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from struct import Struct
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
+
+import msgspec
 
 from common.errors import WireError
+from common.wire.header import HEADER, MAGIC, OPENING
 
 SIGN_BIT = 0x8000
 MAGNITUDE_MAX = 0x7FFF
 
 
 def to_sign_magnitude(value: int) -> int:
-    """Encode a velocity of at most 15 bits and a sign; zero is always 0x0000, never 0x8000."""
-    check(-MAGNITUDE_MAX <= value <= MAGNITUDE_MAX, "velocity", value, "-32767..32767")
-    return value if value >= 0 else SIGN_BIT | -value
+    """Encode a velocity that a frame holds; zero is always 0x0000, never 0x8000."""
+    return value if value >= 0 else SIGN_BIT - value
 
 
 def from_sign_magnitude(raw: int) -> int:
     """Decode a u16 velocity; 0x8000 reads as zero."""
-    magnitude = raw & MAGNITUDE_MAX
-    return -magnitude if raw & SIGN_BIT else magnitude
+    return raw if raw < SIGN_BIT else SIGN_BIT - raw
 
 
-def check(valid: bool, field: str, value: object, allowed: str) -> None:
-    """Raise ``WireError`` with the field, its value and what is allowed."""
-    if not valid:
-        raise WireError(f"{field} is {value}, allowed is {allowed}")
+def refusal(field: str, value: object, allowed: str) -> WireError:
+    """Return the error that names a field, its value and what is allowed."""
+    return WireError(f"{field} is {value}, allowed is {allowed}")
+
+
+def too_fast(*velocities: int) -> WireError:
+    """Return the error that names the one that is furthest beyond 15 bits."""
+    return refusal("velocity", max(velocities, key=abs), "-32767..32767")
 
 
 class Side(IntEnum):
@@ -43,36 +48,32 @@ class Side(IntEnum):
 
 def to_side(value: int) -> Side:
     """Read the side byte of a motor driver frame."""
-    check(value <= Side.RIGHT, "motor driver", value, "0 left, 1 right")
+    if value > Side.RIGHT:
+        raise refusal("motor driver", value, "0 left, 1 right")
     return Side(value)
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(msgspec.Struct, frozen=True, gc=False):
     """A payload without fields; those with fields say how they are packed."""
 
-    ID: ClassVar[int]
+    ID: ClassVar[int] = 0  # no frame that is sent has this one
     LAYOUT: ClassVar[Struct] = Struct("<")
+    OPENING: ClassVar[bytes]  # of its header
+
+    def __init_subclass__(cls) -> None:
+        cls.OPENING = OPENING.pack(MAGIC, HEADER.size + cls.LAYOUT.size, cls.ID)
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
         return b""
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload of exactly ``LAYOUT.size`` bytes; raise ``WireError`` for any other."""
-        return cls(*cls.unpack(payload))
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> tuple[int, ...]:
-        """Split a payload by ``LAYOUT``; raise ``WireError`` for another size."""
-        size = cls.LAYOUT.size
-        check(len(payload) == size, f"{cls.__name__} payload size", len(payload), f"{size} bytes")
-        return cls.LAYOUT.unpack(payload)
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of what ``LAYOUT`` found in a payload; raise ``WireError`` if it cannot be."""
+        return cls(*values)
 
 
-@dataclass(frozen=True, slots=True)
-class Switch(Frame):
+class Switch(Frame, frozen=True):
     """A payload of one byte: 0 off, 1 on."""
 
     LAYOUT = Struct("<B")
@@ -81,16 +82,34 @@ class Switch(Frame):
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
-        return self.LAYOUT.pack(self.on)
+        return b"\x01" if self.on else b"\x00"
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload; raise ``WireError`` when it is none."""
-        (value,) = cls.unpack(payload)
-        check(value <= 1, cls.__name__, value, "0 or 1")
-        return cls(bool(value))
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of its byte; raise ``WireError`` for neither 0 nor 1."""
+        (value,) = values
+        if value > 1:
+            raise refusal(cls.__name__, value, "0 or 1")
+        return cls(value == 1)
 
 
-def by_id(*frames: type[Frame]) -> dict[int, type[Frame]]:
-    """Index frame classes by the command id of their header."""
-    return {frame.ID: frame for frame in frames}
+class Kind(NamedTuple):
+    """A frame class, with all that reading takes looked up already."""
+
+    frame: type[Frame]
+    size: int  # of the whole frame, header included
+    unpack: Callable[[bytes], tuple[int, ...]]
+    from_wire: Callable[[tuple[int, ...]], Frame]
+
+
+Kinds = Mapping[bytes, Kind]
+
+
+def by_opening(*frames: type[Frame]) -> Kinds:
+    """Index frame classes by what their frames begin with."""
+    return {
+        frame.OPENING: Kind(
+            frame, HEADER.size + frame.LAYOUT.size, frame.LAYOUT.unpack, frame.from_wire
+        )
+        for frame in frames
+    }

@@ -1,36 +1,26 @@
 """Datagrams to frames and back.
 
-A datagram holds one frame or several, back to back. A frame is a header and a payload,
-little-endian (manual 2.1):
-
-====== ======= ========================================================================
-offset bytes   field
-====== ======= ========================================================================
-0      2       magic, ``47 53`` ("GS")
-2      2       size of the whole frame, header included
-4      2       command id, see ``commands`` and ``reports``
-6      2       CRC, over the payload alone: the header is not protected
-8      size-8  payload
-====== ======= ========================================================================
+A datagram holds one frame or several, back to back; ``header`` draws what each begins with.
 
 Reading never raises. What is no frame becomes a ``Rejected`` run of bytes with one named reason,
 and reading goes on at the next magic; the runs and the frames together are the whole datagram.
+A frame is read without asking what might be wrong with it; that is worked out for what is none.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+import struct
+from collections.abc import Callable
 from enum import StrEnum
-from struct import Struct
 from typing import Literal
 
 import crcmod.predefined
+import msgspec
 
 from common.errors import WireError
-from common.wire.frame import Frame
+from common.wire.frame import Frame, Kinds
+from common.wire.header import HEADER, MAGIC, OPENING, PAYLOAD_OFFSET
 
-MAGIC = b"GS"
-HEADER = Struct("<2sHHH")
-CRC_OFFSET, PAYLOAD_OFFSET = 6, 8
+# Bound here: to look these up in what is imported takes as long as the call itself.
+pack_header, unpack_header = HEADER.pack, HEADER.unpack_from
 
 Covers = Literal["payload", "header_and_payload"]
 
@@ -46,16 +36,14 @@ class Reason(StrEnum):
     BAD_VALUE = "bad_value"
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
+class Received(msgspec.Struct, frozen=True, gc=False):
     """A frame as it stood in the datagram, header and payload in ``raw``."""
 
     frame: Frame
     raw: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Rejected:
+class Rejected(msgspec.Struct, frozen=True, gc=False):
     """A run of bytes that is no frame, and why."""
 
     reason: Reason
@@ -71,62 +59,47 @@ class Framing:
     """
 
     def __init__(self, crc: str = "crc-16", covers: Covers = "payload") -> None:
-        self._crc = crc_function(crc)
+        self._checksum = crc_function(crc)
         self._covers_header = covers != "payload"
 
     def pack(self, frame: Frame) -> bytes:
         """Return the frame with its header."""
         payload = frame.to_bytes()
-        size = HEADER.size + len(payload)
-        crc = self._checksum(HEADER.pack(MAGIC, size, frame.ID, 0), payload)
-        return HEADER.pack(MAGIC, size, frame.ID, crc) + payload
+        checksum, opening = self._checksum, frame.OPENING
+        covered = pack_header(opening, 0) + payload if self._covers_header else payload
+        return pack_header(opening, checksum(covered)) + payload
 
-    def read(
-        self, datagram: bytes, kinds: Mapping[int, type[Frame]]
-    ) -> Iterator[Received | Rejected]:
-        """Yield all that a datagram holds, in order; ``kinds`` is what its sender may say."""
-        start = 0
-        while start < len(datagram):
-            part = self._read_one(datagram, start, kinds)
+    def read(self, datagram: bytes, kinds: Kinds) -> list[Received | Rejected]:
+        """Return all that a datagram holds, in order; ``kinds`` is what its sender may say."""
+        parts: list[Received | Rejected] = []
+        start, end = 0, len(datagram)
+        for _ in datagram:  # a part has a byte or more: this ends, whatever the datagram holds
+            part = self.part_at(start, datagram, kinds)
+            parts.append(part)
             start += len(part.raw)
-            yield part
+            if start == end:
+                break
+        return parts
 
-    def _read_one(
-        self, datagram: bytes, start: int, kinds: Mapping[int, type[Frame]]
-    ) -> Received | Rejected:
-        if not datagram.startswith(MAGIC, start):
-            return _reject(datagram, start, Reason.NO_MAGIC, "does not start with 47 53")
-        left = len(datagram) - start
-        if left < HEADER.size:
-            return _reject(datagram, start, Reason.TRUNCATED, f"{left} bytes of an 8-byte header")
-        _, size, command_id, crc = HEADER.unpack_from(datagram, start)
-        kind = kinds.get(command_id)
-        if kind is None:
-            return _reject(datagram, start, Reason.UNKNOWN_ID, f"id 0x{command_id:04x}")
-        expected = HEADER.size + kind.LAYOUT.size
-        if size != expected:
-            detail = f"{kind.__name__} has {expected} bytes, its header says {size}"
-            return _reject(datagram, start, Reason.BAD_SIZE, detail)
-        if left < size:
-            return _reject(datagram, start, Reason.TRUNCATED, f"{left} of {size} bytes")
-        return self._open(datagram, start, kind, crc)
-
-    def _open(
-        self, datagram: bytes, start: int, kind: type[Frame], crc: int
-    ) -> Received | Rejected:
-        raw = datagram[start : start + HEADER.size + kind.LAYOUT.size]
-        payload = raw[PAYLOAD_OFFSET:]
-        computed = self._checksum(raw[:CRC_OFFSET] + b"\0\0", payload)
+    def part_at(self, start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
+        """Return the frame that begins at ``start``, or the run of bytes that is none."""
+        try:
+            opening, crc = unpack_header(datagram, start)
+            _, size, unpack, from_wire = kinds[opening]
+            raw = datagram[start : start + size]
+            payload = raw[PAYLOAD_OFFSET:]
+            values = unpack(payload)
+        except (struct.error, KeyError):  # it is cut short, or no such frame begins here
+            return _reject(datagram, start, *_fault(datagram, start, kinds))
+        checksum = self._checksum
+        computed = checksum(pack_header(opening, 0) + payload if self._covers_header else payload)
         if computed != crc:
             detail = f"header says 0x{crc:04x}, the bytes give 0x{computed:04x}"
             return _reject(datagram, start, Reason.BAD_CRC, detail)
         try:
-            return Received(kind.from_bytes(payload), raw)
+            return Received(from_wire(values), raw)
         except WireError as error:
             return _reject(datagram, start, Reason.BAD_VALUE, str(error))
-
-    def _checksum(self, header: bytes, payload: bytes) -> int:
-        return self._crc(header + payload if self._covers_header else payload)
 
 
 def crc_function(name: str) -> Callable[[bytes], int]:
@@ -139,6 +112,23 @@ def crc_function(name: str) -> Callable[[bytes], int]:
         raise WireError(f"CRC {name!r} has {crc.digest_size * 8} bits, the header has room for 16")
     function: Callable[[bytes], int] = crcmod.predefined.mkCrcFun(name)
     return function
+
+
+def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
+    """Say why no frame of these kinds begins at ``start``, or not all of one."""
+    if not datagram.startswith(MAGIC, start):
+        return Reason.NO_MAGIC, "does not start with 47 53"
+    left = len(datagram) - start
+    if left < HEADER.size:
+        return Reason.TRUNCATED, f"{left} bytes of an 8-byte header"
+    _, size, command_id = OPENING.unpack_from(datagram, start)
+    kind = {kind.frame.ID: kind for kind in kinds.values()}.get(command_id)
+    if kind is None:
+        return Reason.UNKNOWN_ID, f"id 0x{command_id:04x}"
+    if size != kind.size:
+        name = kind.frame.__name__
+        return Reason.BAD_SIZE, f"{name} has {kind.size} bytes, its header says {size}"
+    return Reason.TRUNCATED, f"{left} of {size} bytes"
 
 
 def _reject(datagram: bytes, start: int, reason: Reason, detail: str) -> Rejected:

@@ -1,4 +1,4 @@
-"""What the main board sends to the PC, one frozen dataclass per frame.
+"""What the main board sends to the PC, one frozen struct per frame.
 
 Packed and little-endian (manual 2.2 to 2.7; the LED answer is not in the manual):
 
@@ -19,19 +19,21 @@ id     name                        payload
 fault; the rest answers a query.
 """
 
-from dataclasses import dataclass
+import struct
 from struct import Struct
 from typing import Self
 
 from common.wire.frame import (
+    MAGNITUDE_MAX,
     Frame,
     Side,
     Switch,
-    by_id,
-    check,
+    by_opening,
     from_sign_magnitude,
+    refusal,
     to_side,
     to_sign_magnitude,
+    too_fast,
 )
 
 SONAR_FAULT_MM = 0xFFFF
@@ -40,8 +42,7 @@ LED_DONE = 0x55
 LED_FAILED = 0xAA
 
 
-@dataclass(frozen=True, slots=True)
-class VelocityReport(Frame):
+class VelocityReport(Frame, frozen=True):
     """Board to PC, unasked and continuous: the measured velocity (manual 2.2)."""
 
     ID = 0x7426
@@ -51,8 +52,8 @@ class VelocityReport(Frame):
     angular_raw: int
 
     def __post_init__(self) -> None:
-        to_sign_magnitude(self.linear_mmps)
-        to_sign_magnitude(self.angular_raw)
+        if abs(self.linear_mmps) > MAGNITUDE_MAX or abs(self.angular_raw) > MAGNITUDE_MAX:
+            raise too_fast(self.linear_mmps, self.angular_raw)
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
@@ -61,14 +62,13 @@ class VelocityReport(Frame):
         )
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload; raise ``WireError`` when it is none."""
-        linear, angular = cls.unpack(payload)
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of both velocities."""
+        linear, angular = values
         return cls(from_sign_magnitude(linear), from_sign_magnitude(angular))
 
 
-@dataclass(frozen=True, slots=True)
-class DistanceReport(Frame):
+class DistanceReport(Frame, frozen=True):
     """Board to PC: distance and heading counted since power-on (manual 2.3)."""
 
     ID = 0x7600
@@ -78,65 +78,60 @@ class DistanceReport(Frame):
     heading_ddeg: int  # 0.1 deg, counter-clockwise positive, -1800..1800
 
     def __post_init__(self) -> None:
-        check(-(2**31) <= self.distance_mm < 2**31, "distance", self.distance_mm, "32 bits")
-        limit = HEADING_MAX_DDEG
-        check(-limit <= self.heading_ddeg <= limit, "heading", self.heading_ddeg, "-1800..1800")
+        if not -(2**31) <= self.distance_mm < 2**31:
+            raise refusal("distance", self.distance_mm, "32 bits")
+        if not -HEADING_MAX_DDEG <= self.heading_ddeg <= HEADING_MAX_DDEG:
+            raise refusal("heading", self.heading_ddeg, "-1800..1800")
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
         return self.LAYOUT.pack(self.distance_mm, self.heading_ddeg)
 
 
-@dataclass(frozen=True, slots=True)
-class UltrasonicReport(Frame):
+class UltrasonicReport(Frame, frozen=True):
     """Board to PC: eight ranges, counted clockwise from the left; 0xFFFF is a faulty sensor."""
 
     ID = 0x7601
     LAYOUT = Struct("<8H")
 
     # left, front-left, front, front-right, right, rear-right, rear, rear-left
-    ranges_mm: tuple[int, int, int, int, int, int, int, int]
+    ranges_mm: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        check(len(self.ranges_mm) == 8, "number of ranges", len(self.ranges_mm), "8")
-        for value in self.ranges_mm:
-            check(0 <= value <= 0xFFFF, "range", value, "0..65535")
+        try:
+            self.LAYOUT.pack(*self.ranges_mm)  # half of what it takes to compare each of them
+        except struct.error:
+            raise refusal("ranges_mm", self.ranges_mm, "8 of 0..65535") from None
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
         return self.LAYOUT.pack(*self.ranges_mm)
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload; raise ``WireError`` when it is none."""
-        left, front_left, front, front_right, *rest = cls.unpack(payload)
-        right, rear_right, rear, rear_left = rest
-        return cls((left, front_left, front, front_right, right, rear_right, rear, rear_left))
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of the eight ranges."""
+        return cls(values)
 
 
-@dataclass(frozen=True, slots=True)
-class BumperReport(Switch):
+class BumperReport(Switch, frozen=True):
     """Board to PC: on while the bumper is pressed (manual 2.4)."""
 
     ID = 0x7602
 
 
-@dataclass(frozen=True, slots=True)
-class UltrasonicBrakeReport(Switch):
+class UltrasonicBrakeReport(Switch, frozen=True):
     """Board to PC: the echo of that switch (manual 2.5)."""
 
     ID = 0x7603
 
 
-@dataclass(frozen=True, slots=True)
-class BumperBrakeReport(Switch):
+class BumperBrakeReport(Switch, frozen=True):
     """Board to PC: the echo of that switch (manual 2.6)."""
 
     ID = 0x7604
 
 
-@dataclass(frozen=True, slots=True)
-class DriverReport(Frame):
+class DriverReport(Frame, frozen=True):
     """Board to PC, on a query and unasked on a fault (manual 2.7).
 
     Bits: 0 over-current, 1 over-voltage, 2 encoder, 3 under-voltage, 4 overload, 5..31 reserved.
@@ -149,21 +144,21 @@ class DriverReport(Frame):
     fault_bits: int
 
     def __post_init__(self) -> None:
-        check(0 <= self.fault_bits < 2**32, "fault bits", self.fault_bits, "32 bits")
+        if not 0 <= self.fault_bits < 2**32:
+            raise refusal("fault bits", self.fault_bits, "32 bits")
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
         return self.LAYOUT.pack(self.side, self.fault_bits)
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload; raise ``WireError`` when it is none."""
-        side, bits = cls.unpack(payload)
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of side and bits; raise ``WireError`` for a third side."""
+        side, bits = values
         return cls(to_side(side), bits)
 
 
-@dataclass(frozen=True, slots=True)
-class LedReport(Frame):
+class LedReport(Frame, frozen=True):
     """Board to PC: whether the lamp was set."""
 
     ID = 0x7503
@@ -176,15 +171,16 @@ class LedReport(Frame):
         return self.LAYOUT.pack(LED_DONE if self.done else LED_FAILED)
 
     @classmethod
-    def from_bytes(cls, payload: bytes) -> Self:
-        """Read a payload; raise ``WireError`` when it is none."""
-        (value,) = cls.unpack(payload)
-        check(value in (LED_DONE, LED_FAILED), "LED answer", hex(value), "0x55 or 0xaa")
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Make it of the answer; raise ``WireError`` for another."""
+        (value,) = values
+        if value not in (LED_DONE, LED_FAILED):
+            raise refusal("LED answer", hex(value), "0x55 or 0xaa")
         return cls(value == LED_DONE)
 
 
-# What the board may send, by the id in the header.
-FROM_BOARD = by_id(
+# What the board may send, by what its frame begins with.
+FROM_BOARD = by_opening(
     VelocityReport, DistanceReport, UltrasonicReport, BumperReport,
     UltrasonicBrakeReport, BumperBrakeReport, DriverReport, LedReport,
 )  # fmt: skip

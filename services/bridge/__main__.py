@@ -4,9 +4,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-import structlog
-
-from common import log
+from common import log, realtime
 from common.config import load
 from common.errors import ConfigError, LinkError
 from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
@@ -27,11 +25,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
-    log.configure(config.log, "guard")
+    if config.robot.realtime:
+        realtime.ask(realtime.GUARD)
+    log.configure(config.log, "guard")  # its thread holds Python's lock now and then: it follows
+    if config.robot.realtime:
+        realtime.ask(realtime.GUARD, alone=True)
+        realtime.limit()
+        if not realtime.priority():
+            log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
     try:
         sockets = bound(config.board)
     except LinkError as error:
-        structlog.get_logger().error(str(error))
+        log.Logger().error(str(error))
         return EXIT_LINK
     return Guard(config, sockets, [sys.executable, "-m", "services.bridge.guarded", *given]).run()
 

@@ -53,7 +53,10 @@ class Bridge:
         self._rejected: Counter[str] = Counter()
         self._frames: Counter[str] = Counter()
         self._rates: dict[str, float] = {}
-        self._receipt = Receipt(None, 0)  # of the datagram that is being taken in
+        self._hit = self._framing.pack(reports.BumperReport(True))
+        # Of the datagram that is being taken in: when it came, and when it was braked for.
+        self._receipt = Receipt(None, 0)
+        self._braked_ns: int | None = None
         self._told: tuple[object, ...] = ()
         self._publish()
         self._begin()
@@ -96,11 +99,14 @@ class Bridge:
         # The active port first: after a pause both have something, and the other one must not
         # take over only because it is looked at first.
         active = self._readiness.link.active
-        for port in sorted(range(len(self._sockets.sockets)), key=lambda port: port != active):
-            for datagram, receipt in self._sockets.read(port):
-                self._receipt = receipt
+        for port in (active, *(p for p in range(len(self._sockets.sockets)) if p != active)):
+            for datagram, ancillary, read_ns in self._sockets.read(port):
+                # The reflex, before anything else: a hit that comes alone is known at a glance.
+                new = datagram == self._hit and port == active and not self._bumper.pressed
+                self._braked_ns = self._wheels.brake() if new else None
+                self._receipt = self._sockets.receipt(ancillary, read_ns)
                 self._on_datagram(datagram, port, now_ns)
-                self._timings.on_read(receipt)  # after what must not wait
+                self._timings.on_read(self._receipt)
 
     def _on_datagram(self, datagram: bytes, port: int, now_ns: int) -> None:
         if not self._readiness.believes(port, now_ns):
@@ -125,8 +131,9 @@ class Bridge:
 
     def _on_bumper(self, frame: reports.BumperReport, raw: bytes, now_ns: int) -> None:
         message, hit = self._bumper.take(frame.on)
-        if hit:  # the reflex: before anything else
-            self._wheels.on_hit(self._to_bumper.next_seq, now_ns, self._receipt)
+        if hit:
+            seq = self._to_bumper.next_seq
+            self._wheels.on_hit(seq, now_ns, self._receipt, self._braked_ns)
         if message is not None:
             # A short hit stays in the samples until safety has judged one: it may have lost some.
             unjudged = self._wheels.lease.hit is not None

@@ -24,9 +24,8 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
-import structlog
-
 from common.backoff import Backoff
+from common.log import Logger
 from common.options import HOPELESS
 from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
@@ -55,7 +54,7 @@ class Guard:
         self._stopping = False
         self._child: subprocess.Popen[bytes] | None = None  # the one that signals go to
         self._backoff = Backoff()
-        self._log = structlog.get_logger()
+        self._log = Logger()
         self._systemd = Systemd()
 
     def run(self) -> int:
@@ -110,8 +109,8 @@ class Guard:
                 self.brake()
                 timeout_ms = BRAKE_MS
                 missed += 1
-        self._log.error("the bridge hangs: killed")
         child.kill()
+        self._log.error("the bridge hangs: killed")
 
     def _end(self, child: "subprocess.Popen[bytes]") -> int:
         """Brake until the child is gone, and return its exit code as a shell would."""

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 
+from common import realtime
 from common.service import run
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
@@ -19,7 +20,9 @@ def main() -> int:
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     handover = received(os.environ)
-    return run("bridge", BridgeConfig, lambda node: Bridge(node, handover))
+    # Never ahead of its guard, which has to brake for it.
+    ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, handover), priority=ahead)
 
 
 if __name__ == "__main__":

@@ -7,13 +7,13 @@ that commands leave from. The pipe's end is the bridge's last word, or its death
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 NAME = "T2_BRIDGE_HANDOVER"
 
 
-@dataclass(frozen=True, slots=True)
-class Handover:
+class Handover(Struct, frozen=True):
     """Descriptors that a parent leaves open for its child."""
 
     sockets: tuple[int, ...]  # in the order of ``board.listen_ports``

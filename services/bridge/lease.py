@@ -26,8 +26,10 @@ same one says that it was reset, or its heir has taken it on. A successor that l
 of its own, before it has heard of the latch that is due, takes nothing on.
 """
 
-from dataclasses import dataclass, replace
 from enum import StrEnum
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import Motion
@@ -57,8 +59,7 @@ class Refusal(StrEnum):
     NOT_HEIR = "latch_not_taken_on"
 
 
-@dataclass(frozen=True, slots=True)
-class Lease:
+class Lease(Struct, frozen=True):
     """Who may move the vehicle, until when, and what is missing."""
 
     boot: int | None = None  # the authority's

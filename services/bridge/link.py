@@ -7,13 +7,13 @@ other takes over. So nothing is taken twice, and one dead port costs no link.
 ``never`` --frame--> ``up`` --silence--> ``lost`` --frame--> ``up``
 """
 
-from dataclasses import dataclass, replace
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.messages import LinkState
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(Struct, frozen=True):
     """What was heard of the board, and where."""
 
     state: LinkState = "never"

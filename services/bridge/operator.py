@@ -5,7 +5,8 @@ Both answer with the board's own echo, or with the reason why there is none.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common import keys
 from common import messages as m
@@ -18,8 +19,7 @@ from services.bridge.config import BridgeConfig
 from services.bridge.readiness import Readiness
 
 
-@dataclass(frozen=True, slots=True)
-class Waiting:
+class Waiting(Struct, frozen=True):
     """A call whose echo is due."""
 
     caller: Caller[m.Done]

@@ -17,7 +17,8 @@ anything else             the time of reception
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 # Linux's SO_TIMESTAMPNS_NEW, of which Python has no name: 64 bits for seconds and nanoseconds on
 # every machine. The same number names the ancillary data.
@@ -28,8 +29,7 @@ TOLERANCE_NS = 1_000  # clocks are read to the nanosecond, and nobody sets one b
 S_NS = 1_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Receipt:
+class Receipt(Struct, frozen=True):
     """When a datagram came, in nanoseconds of the monotonic clock."""
 
     kernel_ns: int | None  # None without a stamp, or with one that is not believed

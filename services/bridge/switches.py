@@ -6,7 +6,8 @@ are asked for every tenth of a second, and after the echo timeout the bridge cou
 From then on they are asked for once a second, because the wire has no query for them.
 """
 
-from dataclasses import dataclass, replace
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
@@ -16,8 +17,7 @@ ASK_NS = S // 10
 AGAIN_NS = S  # a board that restarted between two frames has forgotten, and nothing else tells
 
 
-@dataclass(frozen=True, slots=True)
-class Switches:
+class Switches(Struct, frozen=True):
     """What is wanted of the two brakes, and what the board echoed last."""
 
     want_ultrasonic: bool = True

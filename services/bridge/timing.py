@@ -25,6 +25,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
+from msgspec import Struct
+
 from common.freshness import S
 from common.messages import Durations, Motion, Timing
 from services.bridge.stamp import Receipt
@@ -36,8 +38,7 @@ LONGEST_NS = 10 * S  # a reaction that took longer is a clock that jumped
 Times = Sequence[int | None]  # ns on the monotonic clock; None for unknown
 
 
-@dataclass(frozen=True, slots=True)
-class Way:
+class Way(Struct, frozen=True):
     """A reaction, and the hops that it is made of."""
 
     name: str
@@ -83,6 +84,7 @@ class Timings:
 
     def __init__(self) -> None:
         self._histograms = {name: Histogram() for way in WAYS for name in way.names}
+        self._of = {way.name: [self._histograms[name] for name in way.names] for way in WAYS}
         self._not_counted: Counter[str] = Counter()
         self._hit: tuple[int, Receipt] | None = None  # ``seq`` of its message, and when it came
 
@@ -132,11 +134,11 @@ class Timings:
 
     def _add(self, way: Way, begin_ns: int | None, times: Times) -> None:
         spans = [(begin_ns, times[-1]), *(pairwise(times) if way.hops else ())]
-        for name, (from_ns, to_ns) in zip(way.names, spans, strict=True):
+        for histogram, (from_ns, to_ns) in zip(self._of[way.name], spans, strict=True):
             if from_ns is None or to_ns is None:
                 continue
             if 0 <= to_ns - from_ns <= LONGEST_NS:
-                self._histograms[name].add(to_ns - from_ns)
+                histogram.add(to_ns - from_ns)
             else:
                 self._not_counted["implausible"] += 1
 

@@ -14,6 +14,9 @@ from services.bridge.stamp import ANCILLARY_MAX, SO_TIMESTAMPNS, Receipt, WallCl
 DATAGRAM_MAX = 2048
 # A flood must not keep the loop from its timers: the rest waits for the next round.
 BURST = 64
+BREATH_S = 20e-6
+
+Ancillary = list[tuple[int, int, bytes]]
 
 
 class Sockets:
@@ -35,8 +38,12 @@ class Sockets:
         for sock in self.sockets:
             want_stamps(sock)
 
-    def read(self, port: int) -> Iterator[tuple[bytes, Receipt]]:
-        """Yield the datagrams of the board that wait on the port of this index, and their times."""
+    def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
+        """Yield what the board sent to the port of this index: bytes, ancillary data, read time.
+
+        A burst ends with a short sleep: in a flood Linux would take us for one that runs away, and
+        end us (``realtime.limit``).
+        """
         sock = self.sockets[port]
         for _ in range(BURST):
             try:
@@ -46,17 +53,19 @@ class Sockets:
             except OSError:
                 continue  # an earlier command found no board, or no network
             if source == self._board or (self._any_port and source[0] == self._board[0]):
-                yield datagram, self._receipt(ancillary)
+                yield datagram, ancillary, time.monotonic_ns()
             else:
                 self.refused += 1
                 self.last_stranger = source
+        time.sleep(BREATH_S)
 
-    def _receipt(self, ancillary: list[tuple[int, int, bytes]]) -> Receipt:
+    def receipt(self, ancillary: Ancillary, read_ns: int) -> Receipt:
+        """Return when a datagram came that was read with these ancillary data."""
         before_ns, wall_ns, now_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
         self.wall.look(before_ns, wall_ns, now_ns)
         stamp_ns = stamp_in(ancillary)
-        kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, now_ns)
-        return Receipt(kernel_ns, now_ns)
+        kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)
+        return Receipt(kernel_ns, read_ns)
 
     def send(self, datagram: bytes, port: int) -> None:
         """Send to the board from the port of this index; an absent network loses it."""

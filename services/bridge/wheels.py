@@ -40,6 +40,7 @@ class Wheels:
         self._framing = framing
         self._translator = translator
         self._timings = timings
+        self._brake = framing.pack(translator.command(Order.BRAKE))
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
         self._rivals: set[int] = set()  # second senders that were told of already
@@ -80,11 +81,18 @@ class Wheels:
         """Take in the measured velocity."""
         self._velocity = velocity, now_ns
 
-    def on_hit(self, seq: int, now_ns: int, receipt: Receipt) -> None:
-        """BREAK at once: the bumper was hit in the sample that will be published as ``seq``."""
+    def brake(self) -> int:
+        """BREAK at once, for a hit that ``on_hit`` takes in next; return when it was sent."""
+        self._sockets.send(self._brake, self.port)
+        return time.monotonic_ns()
+
+    def on_hit(self, seq: int, now_ns: int, receipt: Receipt, braked_ns: int | None = None) -> None:
+        """Take in a hit, in the sample that will be published as ``seq``: BREAK, and stay so."""
         self.lease, order = lease.on_hit(self.lease, seq, now_ns)
-        self._order(order)
-        self._timings.on_reflex(seq, receipt, time.monotonic_ns())
+        if braked_ns is None:
+            self._order(order)
+            braked_ns = time.monotonic_ns()
+        self._timings.on_reflex(seq, receipt, braked_ns)
 
     def on_ready(self, ready: bool) -> None:
         """Take in whether the board may be driven."""

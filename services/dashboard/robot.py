@@ -7,13 +7,13 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgspec
-import structlog
 
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.codec import finite
 from common.keys import Call, Topic
+from common.log import Logger
 from common.requests import Phase, Requests, Twist
 from common.source import DriveSource
 from services.dashboard.config import Dashboard
@@ -61,7 +61,7 @@ class Robot:
         self._creeping = self._creep_pending = False
         self._creep_answer = ""
         self._asked_around = False
-        self._log = structlog.get_logger().bind(robot=bus.robot)
+        self._log = Logger(robot=bus.robot)
         for topic in PLAIN:
             bus.subscribe(topic, self._hear)
         for side in ("left", "right"):

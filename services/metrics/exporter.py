@@ -23,7 +23,7 @@ from common.freshness import Latest
 from common.service import Node
 from services.metrics.certificates import ends
 from services.metrics.config import Metrics, MetricsConfig
-from services.metrics.robot import Robot
+from services.metrics.robot import Robot, prune
 from services.metrics.samples import sheet
 
 DEPTH = 2000  # samples of all robots that may wait, of one stream
@@ -86,9 +86,7 @@ class Exporter(Collector):
         return self._robots.setdefault(key.split("/")[2], Robot())
 
     def _forget(self, now_ns: int) -> None:
-        for name, robot in list(self._robots.items()):
-            if name != self._own and (robot.forget(now_ns) or not robot.is_robot):
-                del self._robots[name]
+        prune(self._robots, self._own, now_ns)
 
     def _read(self, file: Path) -> None:
         """Look when certificates end; a list that cannot be read tells nothing of them."""

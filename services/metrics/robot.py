@@ -117,3 +117,11 @@ class Robot:
         service = self.services.setdefault(name, Service())
         service.seen_ns = now_ns
         return service
+
+
+def prune(robots: dict[str, Robot], own: str, now_ns: int) -> None:
+    """Forget what is long gone, and who only bears an id; of ``own`` the robot itself is kept."""
+    for name, robot in list(robots.items()):
+        gone = robot.forget(now_ns)
+        if name != own and (gone or not robot.is_robot):
+            del robots[name]

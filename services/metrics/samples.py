@@ -57,6 +57,7 @@ FAMILIES = (
     Family("t2_service_info", "gauge", (*EACH, "version"), "Always 1; the version is the label"),
     Family("t2_service_uptime_seconds", "gauge", EACH, "Since it was started"),
     Family("t2_service_resident_memory_bytes", "gauge", EACH, "Memory that it holds"),
+    Family("t2_service_realtime_priority", "gauge", EACH, "Of SCHED_FIFO; 0 if ordinary"),
     Family(
         "t2_service_message_rate_hertz", "gauge", (*EACH, "key"), "Messages in the last second"
     ),
@@ -195,6 +196,7 @@ def _health(made: Sheet, labels: tuple[str, str], health: Health) -> None:
     made.put("t2_service_info", 1, *labels, health.version)
     made.put("t2_service_uptime_seconds", health.uptime, *labels)
     made.put("t2_service_resident_memory_bytes", health.rss, *labels)
+    made.put("t2_service_realtime_priority", health.priority, *labels)
     for key, rate in sorted(health.rates.items()):
         short = key.removeprefix(f"{ROOT}/{labels[0]}/")  # stands in the labels already
         made.put("t2_service_message_rate_hertz", rate, *labels, short)

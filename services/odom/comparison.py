@@ -2,7 +2,8 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.freshness import S
 from services.odom.config import Odom
@@ -15,8 +16,7 @@ COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Struct, frozen=True):
     """A velocity in ``base_link``, m/s and rad/s, with its two variances."""
 
     linear: float
@@ -25,8 +25,7 @@ class Twist:
     angular_variance: float
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """The way between two counter samples, as counted and as the velocities had it."""
 
     end_ns: int

@@ -22,8 +22,9 @@ nearest to what the velocities saw.
 """
 
 import math
-from dataclasses import replace
 from enum import StrEnum
+
+from msgspec.structs import replace
 
 from common import messages as m
 from common.codec import finite

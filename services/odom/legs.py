@@ -5,11 +5,11 @@ The counters say how long the way was and how far it turned; the velocities say 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
+class Leg(Struct, frozen=True):
     """One arc; ``seen`` while there was a velocity, else nothing is known of it but its time."""
 
     distance: float  # m, forward positive

@@ -14,14 +14,14 @@ is carried on by the derivatives of these lines.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Self
+
+from msgspec import Struct
 
 SMALL_TURN = 1e-4  # rad; below it, the difference in the derivative loses its digits
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(Struct, frozen=True):
     """A place in ``odom``: metres, radians, heading wrapped to -pi..pi."""
 
     x: float
@@ -47,8 +47,7 @@ def chord_ratio(turn: float) -> tuple[float, float]:
     return ratio, (math.cos(turn / 2) - ratio) / turn
 
 
-@dataclass(frozen=True, slots=True)
-class Covariance:
+class Covariance(Struct, frozen=True):
     """Of x, y and heading (m², m rad, rad²); six numbers, so that it cannot but be symmetric."""
 
     xx: float
@@ -85,8 +84,7 @@ class Covariance:
         return (self.xx, self.xy, self.xh, self.xy, self.yy, self.yh, self.xh, self.yh, self.hh)
 
 
-@dataclass(frozen=True, slots=True)
-class Spread:
+class Spread(Struct, frozen=True):
     """The variances of one arc: of its length, of its turn, and of its end in every direction."""
 
     distance: float
@@ -94,8 +92,7 @@ class Spread:
     place: float
 
 
-@dataclass(frozen=True, slots=True)
-class Belief:
+class Belief(Struct, frozen=True):
     """A pose and how far it may be off."""
 
     pose: Pose

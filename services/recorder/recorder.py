@@ -8,7 +8,8 @@ from common import codec, keys
 from common.errors import MessageError
 from common.messages import SafetyState
 from common.sample import Sample
-from common.service import Node, package_version
+from common.service import Node
+from common.version import VERSION
 from services.recorder.blackbox import BlackBox
 from services.recorder.config import MB, RecorderConfig
 from services.recorder.latches import Latches
@@ -107,7 +108,7 @@ class Recorder:
         path = self._shelf.path(self._node.bus.robot, first.wall_ns, why)
         about = {
             "robot": self._node.bus.robot,
-            "version": package_version(),
+            "version": VERSION,
             "why": why or "everything",
         }
         recording = Recording(path, self._translator, about)

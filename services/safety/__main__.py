@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 
+from common import realtime
 from common.bus.bus import Bus
 from common.service import Node, run
 from services.safety.config import SafetyConfig
@@ -24,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             node.log.warning("protections taken away on purpose", settings=list(accepted))
 
     try:
-        return run("safety", SafetyConfig, build, argv)
+        return run("safety", SafetyConfig, build, argv, priority=realtime.SAFETY)
     finally:
         for reader in readers:
             reader.close()

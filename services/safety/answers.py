@@ -5,7 +5,7 @@ stays, and what else is latched and gone is cleared. Otherwise each would wait f
 reset for the bumper and the release that frees the bumper for the reset.
 """
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from services.safety.causes import wants_neutral
 from services.safety.config import Safety

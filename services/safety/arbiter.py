@@ -17,7 +17,9 @@ own start, and after every cause that asks for it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common import codec
 from common.freshness import S
@@ -30,8 +32,7 @@ from services.safety.twist import STILL, Twist
 RIVAL_NS = S // 2  # only one publisher must be left for this long
 
 
-@dataclass(frozen=True, slots=True)
-class Channel:
+class Channel(Struct, frozen=True):
     """One source as safety knows it."""
 
     boot: int | None = None
@@ -50,12 +51,11 @@ class Channel:
         return self.rival_ns is not None and now_ns - self.rival_ns < RIVAL_NS
 
 
-@dataclass(frozen=True, slots=True)
-class Arbiter:
+class Arbiter(Struct, frozen=True):
     """All sources of the settings."""
 
     sources: Mapping[str, Source]
-    channels: Mapping[str, Channel] = field(default_factory=dict)
+    channels: Mapping[str, Channel] = {}
 
     def take(
         self, ask: Ask, heartbeat: Heartbeat, max_age_ns: int, now_ns: int

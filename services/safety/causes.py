@@ -16,8 +16,9 @@ Two things are no causes: a request that is refused is counted and changes nothi
 speed or acceleration bends a request without a word.
 """
 
-from dataclasses import dataclass
 from enum import Enum
+
+from msgspec import Struct
 
 from common.messages import Action
 
@@ -32,8 +33,7 @@ class Clears(Enum):
     AT_ONCE = "at once"
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """One row: what a cause does and how it clears; ``text`` tells the operator."""
 
     name: str

@@ -1,6 +1,6 @@
 """All eight sonars: each new sample to each of them, and none when the stream dries up."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from common.freshness import Latest, S, fresh
 from common.messages import SONAR_NAMES, Ultrasonic
@@ -13,8 +13,7 @@ SILENT = tuple(Sonar() for _ in SONAR_NAMES)
 LONGEST_STEP_S = 0.3  # between two samples; over longer gaps the motion is unknown
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Struct, frozen=True):
     """The sonars in the manual's order, and the sample that they know."""
 
     sonars: tuple[Sonar, ...] = SILENT
@@ -36,8 +35,7 @@ class Heard:
         return ", ".join(f"{name} {fault}" for name, fault in bad)
 
 
-@dataclass(frozen=True, slots=True)
-class Ears:
+class Ears(Struct, frozen=True):
     """How samples are taken in."""
 
     zones: Zones

@@ -4,7 +4,7 @@ A failure costs a whole point; good time earns one back slowly. So failures drai
 than it refills, and flapping trips although each single failure clears by itself.
 """
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from common.freshness import S
 
@@ -12,8 +12,7 @@ FAILURES = 5.0  # so many close together trip
 REFILL_PER_S = 0.1  # one failure is forgiven in ten good seconds
 
 
-@dataclass(frozen=True, slots=True)
-class Credit:
+class Credit(Struct, frozen=True):
     """How many failures are still forgiven."""
 
     left: float = FAILURES

@@ -5,13 +5,12 @@ that number went out is known on our own clock. After a gap Zenoh delivers a bur
 their echoes give them away. Numbers start at random, so that echoes of an earlier life are unknown.
 """
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 CAPACITY = 256  # at 20 states a second, and some at once, far more than an age of 0.4 s needs
 
 
-@dataclass(frozen=True, slots=True)
-class Heartbeat:
+class Heartbeat(Struct, frozen=True):
     """The newest number, and when the last ones were sent."""
 
     number: int = 0

@@ -1,6 +1,6 @@
 """What a decision is made from: the newest sample of each stream, and at most one event."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from common import codec
 from common.freshness import Latest, fresh
@@ -8,8 +8,7 @@ from common.messages import Bumper, Drive, Driver, Link, Switches, Ultrasonic, V
 from services.safety.twist import Twist
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
+class Ask(Struct, frozen=True):
     """A request on a source; None where the payload was none."""
 
     source: str
@@ -18,18 +17,15 @@ class Ask:
     shares_clock: bool = False  # whether its own stamp is of this host's clock
 
 
-@dataclass(frozen=True, slots=True)
-class Estop:
+class Estop(Struct, frozen=True):
     """Someone put or deleted on the estop key."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reset:
+class Reset(Struct, frozen=True):
     """An operator asks to clear the latches."""
 
 
-@dataclass(frozen=True, slots=True)
-class Hold:
+class Hold(Struct, frozen=True):
     """An operator holds the release, or lets go of it."""
 
     held: bool
@@ -38,8 +34,7 @@ class Hold:
 Event = Ask | Estop | Reset | Hold
 
 
-@dataclass(frozen=True, slots=True)
-class Inputs:
+class Inputs(Struct, frozen=True):
     """A snapshot; None for a stream of which nothing has come yet."""
 
     velocity: Latest[Velocity] | None = None

@@ -5,7 +5,9 @@ counted by tokens, so that looking twice at one sample proves nothing twice.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from services.safety.causes import BY_NAME, Clears, clears, severity
 
@@ -14,8 +16,7 @@ Token = tuple[int, int]  # boot and seq of a sample, or (0, time) where there is
 GOOD_SAMPLES = 3  # so many without the cause before a reset may clear it
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
+class Observation(Struct, frozen=True):
     """Whether a sample shows a cause, and what to tell the operator."""
 
     name: str
@@ -24,8 +25,7 @@ class Observation:
     text: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Held:
+class Held(Struct, frozen=True):
     """A cause that is in force."""
 
     since_ns: int

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.messages import SONAR_NAMES
 from common.settings import Vehicle
@@ -15,16 +16,14 @@ from services.safety.twist import STILL, Twist
 from services.safety.zones import zones
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
+class Wish(Struct, frozen=True):
     """Who asks for which motion, within the limits."""
 
     source: str
     twist: Twist
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Struct, frozen=True):
     """What the wish comes down to."""
 
     twist: Twist = STILL

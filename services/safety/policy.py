@@ -15,7 +15,8 @@ there is a fresh wish.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import Command

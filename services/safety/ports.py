@@ -2,8 +2,9 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TypeVar
+
+from msgspec.structs import replace
 
 from common import keys
 from common.bus.bus import Arrival, Bus
@@ -69,7 +70,7 @@ class Ports:
 
         def take(arrival: Arrival[M]) -> None:
             latest = Latest(arrival.message, arrival.received_ns)
-            self._inputs = replace(self._inputs, **{field: latest})  # type: ignore[arg-type]
+            self._inputs = replace(self._inputs, **{field: latest})
             if at_once:
                 self._decide()
 

@@ -7,14 +7,14 @@ wheels end it too. A press ends when the bumper was clear for three samples; onl
 its way anew.
 """
 
-from dataclasses import dataclass, replace
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.freshness import S
 from services.safety.twist import STILL, Twist
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(Struct, frozen=True):
     """The press that is on, and how far it was crept off."""
 
     before: Twist | None = None  # the last measured motion before the press

@@ -1,8 +1,8 @@
 """What is told: the state for everybody, in words too, and the transitions as events."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import S
@@ -20,8 +20,7 @@ MOVING = ("run", "slow")
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(Struct, frozen=True):
     """One transition, worth an event."""
 
     name: str

@@ -8,13 +8,12 @@ Bad is: over the envelope by the tolerance, or moving against a command whose op
 envelope is used up. Bad time adds up; good time takes away half as fast, so that flapping trips.
 """
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 GOOD_PER_BAD = 0.5  # a second of good takes away half a second of bad
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
+class Bounds(Struct, frozen=True):
     """What one axis may do, in m and s or rad and s."""
 
     deceleration: float  # what the vehicle surely reaches
@@ -23,8 +22,7 @@ class Bounds:
     patience_s: float  # bad time that trips
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
+class Axis(Struct, frozen=True):
     """One axis: the envelope both ways, as magnitudes, and for how long it has been bad."""
 
     ahead: float = 0.0

@@ -10,7 +10,9 @@ sonar's axis: echoes of a real wall vary.
 """
 
 import math
-from dataclasses import dataclass, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common.messages import RangeStatus
 
@@ -18,8 +20,7 @@ FARTHER_SAMPLES = 3
 SAME_M = 0.0015  # the board counts millimetres
 
 
-@dataclass(frozen=True, slots=True)
-class Sonar:
+class Sonar(Struct, frozen=True):
     """One sonar; ``fault`` is empty when its distance can be trusted."""
 
     distance: float = 0.0  # m; 0 while it has a fault, infinity for no echo
@@ -49,8 +50,7 @@ def read(
     return replace(sonar, distance=min(farther), fault="", farther=())
 
 
-@dataclass(frozen=True, slots=True)
-class Rules:
+class Rules(Struct, frozen=True):
     """When a reading is believed; metres."""
 
     hysteresis: float

@@ -1,6 +1,6 @@
 """What safety remembers from one decision to the next, and what a decision is."""
 
-from dataclasses import dataclass, field
+from msgspec import Struct
 
 from common.messages import Command
 from common.messages import Verdict as VerdictName
@@ -16,16 +16,14 @@ from services.safety.twist import STILL, Twist
 RELEASE = "release"  # stands where a source stands while the vehicle creeps off its bumper
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
+class Reply(Struct, frozen=True):
     """What a reset or a release is answered."""
 
     done: bool
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Struct, frozen=True):
     """What the bridge is told, and what became of the event that came with the inputs."""
 
     name: VerdictName = "inhibited"
@@ -37,19 +35,18 @@ class Verdict:
     refused: str = ""  # why the request was refused, by the names in ``arbiter.py``
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(Struct, frozen=True):
     """Everything that decisions depend on besides the inputs."""
 
     arbiter: Arbiter
-    heartbeat: Heartbeat = field(default_factory=Heartbeat)
-    latches: Latches = field(default_factory=dict)
-    heard: Heard = field(default_factory=Heard)
-    linear: Axis = field(default_factory=Axis)
-    angular: Axis = field(default_factory=Axis)
-    credit: Credit = field(default_factory=Credit)
-    release: Release = field(default_factory=Release)
+    heartbeat: Heartbeat = Heartbeat()
+    latches: Latches = {}
+    heard: Heard = Heard()
+    linear: Axis = Axis()
+    angular: Axis = Axis()
+    credit: Credit = Credit()
+    release: Release = Release()
     moved: Twist | None = None  # the last measured velocity that was a motion
     reader_was_up: bool = False
     decided_ns: int | None = None
-    verdict: Verdict = field(default_factory=Verdict)
+    verdict: Verdict = Verdict()

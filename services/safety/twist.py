@@ -1,13 +1,12 @@
 """A planar velocity, and when a measured one counts as standstill."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 STANDING_MPS = 0.02
 STANDING_RADPS = 0.05  # 3 deg/s: the board resolves 0.1 deg/s, its sensor is noisier
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Struct, frozen=True):
     """Velocity in ``base_link``: m/s forward positive, rad/s counter-clockwise positive."""
 
     linear: float = 0.0

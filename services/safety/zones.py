@@ -13,7 +13,8 @@ the curve stays. No approach, no limit: the way out stays open.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.settings import Vehicle
 from common.vehicle import Mount, sonar_mounts
@@ -25,20 +26,25 @@ MEASURED_EXCESS_MPS = 0.2  # what lag and noise may put on top of the allowed sp
 MEASURED_CREEP_MPS = 0.05  # inside the margin
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
+class Limit(Struct, frozen=True):
     """The tightest limit on a twist, and the sonar that sets it (None for no limit)."""
 
     factor: float  # 0..1, to scale the twist with
     sonar: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Zones:
+class Axis(Struct, frozen=True):
+    """How fast a sonar closes in along its axis (m/s), for each m/s and each rad/s of a twist."""
+
+    linear: float
+    angular: float
+    swing: float = 0.0  # m from the middle to the corner that swings out to its side, if any
+
+
+class Zones(Struct, frozen=True):
     """The field around one vehicle; distances are in the manual's order of sonars."""
 
-    mounts: tuple[Mount, ...]
-    corner: float  # m from the middle to the bumpers
+    axes: tuple[Axis, ...]
     margin: float  # m
     react: float  # s
     deceleration: float  # m/s^2
@@ -51,12 +57,9 @@ class Zones:
 
     def approach(self, sonar: int, twist: Twist) -> float:
         """Return how fast (m/s) the vehicle closes in on what this sonar sees."""
-        mount = self.mounts[sonar]
-        across = twist.linear - twist.angular * mount.y, twist.angular * mount.x
-        along = across[0] * math.cos(mount.yaw) + across[1] * math.sin(mount.yaw)
-        if mount.name in ("left", "right"):
-            return max(along, abs(twist.angular) * self.corner)
-        return along
+        axis = self.axes[sonar]
+        along = twist.linear * axis.linear + twist.angular * axis.angular
+        return max(along, abs(twist.angular) * axis.swing) if axis.swing else along
 
     def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
         """Return how far the twist must be slowed; a factor of 0 is a blocked way."""
@@ -82,10 +85,16 @@ class Zones:
 
 def zones(vehicle: Vehicle, settings: Safety) -> Zones:
     """Return the zones of this vehicle with these settings."""
+    corner = vehicle.length / 2
     return Zones(
-        mounts=sonar_mounts(vehicle),
-        corner=vehicle.length / 2,
+        axes=tuple(_axis(mount, corner) for mount in sonar_mounts(vehicle)),
         margin=settings.margin,
         react=settings.react,
         deceleration=settings.deceleration,
     )
+
+
+def _axis(mount: Mount, corner: float) -> Axis:
+    along, across = math.cos(mount.yaw), math.sin(mount.yaw)
+    flank = mount.name in ("left", "right")
+    return Axis(along, mount.x * across - mount.y * along, corner if flank else 0.0)

@@ -3,20 +3,16 @@
 While the screen is up, standard error is the operator's picture, so the log must not go there.
 """
 
-import logging
 import threading
 import time
 from collections import deque
-from typing import cast
 
-import structlog
-
+from common import log
 from common.messages import Level
-from common.settings import Log
+from common.settings import Log, LogLevel
 from services.teleop.view import Line
 
 KEPT = 100
-LEVELS: dict[str, Level] = {"warning": "warning", "error": "error", "critical": "error"}
 
 
 class Logbook:
@@ -39,15 +35,7 @@ class Logbook:
 
     def take_log(self, settings: Log) -> None:
         """Let every log line of this process end here and nowhere else."""
-        structlog.configure(
-            processors=[self._keep],
-            wrapper_class=structlog.make_filtering_bound_logger(
-                logging.getLevelNamesMapping()[settings.level.upper()]
-            ),
-        )
+        log.hand_to(self._keep, settings.level)
 
-    def _keep(
-        self, _: object, method: str, event: structlog.typing.EventDict
-    ) -> structlog.typing.EventDict:
-        self.add("teleop", LEVELS.get(method, "info"), cast(str, event["event"]))
-        raise structlog.DropEvent
+    def _keep(self, level: LogLevel, event: str, _: log.About) -> None:
+        self.add("teleop", "info" if level == "debug" else level, event)

@@ -1,7 +1,6 @@
 """Motions and leases that the tests of the lease begin with."""
 
-from dataclasses import replace
-
+from msgspec.structs import replace
 from msgspec.structs import replace as replace_message
 
 from common.freshness import S

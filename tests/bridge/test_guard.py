@@ -39,6 +39,14 @@ def breaks_since(made: Board, count: int) -> int:
     return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)
 
 
+def test_break_goes_first_then_the_bridges_stop() -> None:
+    with guarded_rig(2.0) as (made, _):
+        kinds = [motion.kind for motion in made.motions]
+    first_stop = kinds.index(MotionKind.STOP)
+    assert first_stop > 0
+    assert set(kinds[:first_stop]) == {MotionKind.BREAK}
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
 def test_a_bridge_that_dies_is_braked_for_and_started_again(
     rig: Rig, number: signal.Signals

@@ -1,8 +1,7 @@
 """A latch that outlives its safety service: who may move the vehicle, and who takes it on."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 from msgspec.structs import replace as replace_message
 
 from common.messages import Motion

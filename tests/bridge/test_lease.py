@@ -1,10 +1,9 @@
 """The lease: state by event, dense where something tips over."""
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import Motion

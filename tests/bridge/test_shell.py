@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,9 @@ from common.freshness import S
 from common.messages import Bumper, Command, Motion
 from common.service import Node
 from common.settings import Board as Settings
-from common.wire.reports import BumperReport, DistanceReport
+from common.wire.commands import MotionCommand, MotionKind
+from common.wire.framing import Framing
+from common.wire.reports import BumperReport, DistanceReport, VelocityReport
 from services.bridge import bridge as shell
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
@@ -50,6 +53,51 @@ def test_a_board_that_starts_anew_disarms_at_once(
     monkeypatch.setattr(shell, "restarted", lambda *_, **__: True)
     bridge._on_distance(DistanceReport(0, 0), b"", NOW + 1)
     assert (bridge._wheels.lease.ready, bridge._wheels.lease.neutral) == (False, False)
+
+
+HIT, CLEAR, STANDS, BREAK = (
+    Framing().pack(frame)
+    for frame in (
+        BumperReport(True),
+        BumperReport(False),
+        VelocityReport(0, 0),
+        MotionCommand(MotionKind.BREAK),
+    )
+)
+
+
+@pytest.mark.parametrize("datagram", [HIT, STANDS + HIT, HIT + STANDS])
+def test_a_hit_is_braked_for_once_alone_in_its_datagram_or_not(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch, datagram: bytes
+) -> None:
+    sent = comes(bridge, monkeypatch, 0, CLEAR, CLEAR, CLEAR, datagram, HIT, HIT)
+    bridge._read(NOW)
+    assert sent == [BREAK]
+    assert bridge._wheels.lease.hit is not None
+    timing = bridge._node.timing()
+    assert timing is not None
+    assert sum(timing.durations["contact_to_break"].counts) == 1
+
+
+def test_a_hit_on_a_port_that_is_not_believed_is_none(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bridge._readiness.link = Link(state="up", heard_ns=NOW)
+    sent = comes(bridge, monkeypatch, 1, HIT)
+    bridge._read(NOW)
+    assert sent == []
+    assert bridge._wheels.lease.hit is None
+
+
+def comes(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch, port: int, *datagrams: bytes
+) -> list[bytes]:
+    """Let these wait on a port; return what is sent from now on."""
+    sent: list[bytes] = []
+    waiting: dict[int, Any] = {port: [(each, [], time.monotonic_ns()) for each in datagrams]}
+    monkeypatch.setattr(bridge._sockets, "read", lambda port: waiting.pop(port, []))
+    monkeypatch.setattr(bridge._sockets, "send", lambda datagram, _: sent.append(datagram))
+    return sent
 
 
 def test_a_short_hit_is_told_until_safety_has_judged_it(bridge: Bridge) -> None:

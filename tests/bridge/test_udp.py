@@ -11,7 +11,7 @@ import pytest
 from common.freshness import S
 from common.settings import Board
 from services.bridge.stamp import Receipt
-from services.bridge.udp import Sockets, want_stamps
+from services.bridge.udp import BREATH_S, BURST, Sockets, want_stamps
 from tests.support import free_port, wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux stamps datagrams by itself")
@@ -37,7 +37,8 @@ def received(sockets: Sockets) -> tuple[bytes, Receipt]:
     came: list[tuple[bytes, Receipt]] = []
 
     def come() -> list[tuple[bytes, Receipt]]:
-        came.extend(sockets.read(0))
+        for datagram, ancillary, read_ns in sockets.read(0):
+            came.append((datagram, sockets.receipt(ancillary, read_ns)))
         return came
 
     wait_until(come, "a datagram")
@@ -66,6 +67,20 @@ def test_a_datagram_came_when_the_kernel_got_it_not_when_it_was_read(peer: socke
         # The kernel turns stamping on a moment later than it is asked to.
         wait_until(in_time, "a stamp of the moment of sending")
         assert sockets.wall.steps == 0
+
+
+def test_a_flood_is_read_in_bursts_with_a_breath_after_each(
+    peer: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sockets_of(peer) as sockets:
+        for _ in range(BURST + 1):
+            peer.sendto(b"frame", sockets.sockets[0].getsockname())
+        slept: list[float] = []
+        monkeypatch.setattr(time, "sleep", slept.append)
+        assert len(list(sockets.read(0))) == BURST
+        assert slept == [BREATH_S]
+        assert len(list(sockets.read(0))) == 1
+        assert slept == [BREATH_S]
 
 
 @LINUX

@@ -8,6 +8,7 @@ import pytest
 from cli import install
 from cli.__main__ import main
 from cli.settings import Everything
+from common import realtime
 from common.config import DEFAULT_FILE, Sources, load
 from common.options import EXIT_CONFIG
 
@@ -248,6 +249,14 @@ def test_the_bridge_is_the_last_to_start_and_the_first_to_stop() -> None:
     }
     for name in SERVICES:
         assert "t2-bridge" not in unit(install.template(name))["Unit"].get("After", "")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_who_stands_before_the_wheels_alone_may_go_ahead(name: str) -> None:
+    service = unit(install.template(name))["Service"]
+    ahead = name in ("t2-router.service", "t2-safety.service", "t2-bridge.service")
+    assert service.get("LimitRTPRIO") == (str(realtime.GUARD) if ahead else None)
+    assert service.get("RestrictRealtime") == (None if ahead else "yes")
 
 
 def test_the_common_part_overrides_nothing_of_a_services_own() -> None:

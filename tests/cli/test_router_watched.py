@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
+from common.bus.session import READERS_ENV
 from tests.cli.processes import PATIENCE_S
 from tests.common.manager import Manager
 from tests.support import free_port, router_process, wait_until
@@ -46,6 +47,7 @@ def test_one_that_does_not_answer_gives_no_beat(
     def deaf(*_: object) -> Iterator[Callable[[], bool]]:
         yield answers
 
+    monkeypatch.setenv(READERS_ENV, "")  # which it sets for this process
     monkeypatch.setattr("cli.router.router", deaf)
     monkeypatch.setattr("cli.router.LOOK_S", 0.01)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}

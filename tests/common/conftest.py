@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from common import log
 from tests.common.desk import Desk
 from tests.common.rig import Rig
-from tests.support import free_port, router_process
+from tests.support import Lines, free_port, router_process
 
 
 @pytest.fixture(scope="package")
@@ -23,6 +24,14 @@ def rig(shared_router: str) -> Iterator[Rig]:
     """Give a robot, and buses of it."""
     with Rig(shared_router) as made:
         yield made
+
+
+@pytest.fixture
+def lines() -> Lines:
+    """Collect what is logged."""
+    said: Lines = []
+    log.hand_to(lambda *line: said.append(line), "debug")
+    return said
 
 
 @pytest.fixture

@@ -7,14 +7,15 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
 from typing import TextIO
 
 import pytest
-import structlog
 
 from common import log
 from common.settings import Log
-from tests.support import PATIENCE_S, wait_until
+from tests.support import PATIENCE_S, Lines, wait_until
 
 
 class Screen(io.StringIO):
@@ -28,20 +29,13 @@ class Screen(io.StringIO):
         return self._tty
 
 
-@pytest.fixture(autouse=True)
-def _as_before() -> Iterator[None]:
-    before = structlog.get_config()
-    yield
-    structlog.configure(**before)
-
-
 def written(
     monkeypatch: pytest.MonkeyPatch, settings: Log, *, tty: bool, level: str = "warning"
 ) -> str:
     screen = Screen(tty)
     monkeypatch.setattr(sys, "stderr", screen)
     lossy = log.configure(settings, "bridge")
-    getattr(structlog.get_logger(), level)("link lost", epoch=2)
+    getattr(log.Logger(), level)("link lost", epoch=2)
     lossy.drain(PATIENCE_S)
     return screen.getvalue()
 
@@ -86,16 +80,43 @@ def test_the_level_decides(
     assert bool(written(monkeypatch, settings, tty=False, level=given)) is shown
 
 
-def test_an_error_brings_its_traceback_into_the_json(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(tty=False)
-    monkeypatch.setattr(sys, "stderr", screen)
-    lossy = log.configure(Log(), "bridge")
-    try:
-        raise KeyError("key")
-    except KeyError:
-        structlog.get_logger().exception("failed")
-    lossy.drain(PATIENCE_S)
-    assert "KeyError: 'key'" in json.loads(screen.getvalue())["exception"]
+def test_what_is_no_json_is_told_in_words() -> None:
+    entry = json.loads(log.as_json("info", "Größe × 2", {"at": Path("a"), "values": (1, None)}))
+    assert (entry["event"], entry["at"]) == ("Größe × 2", repr(Path("a")))
+    assert entry["values"] == [1, None]
+
+
+def test_the_text_holds_what_it_is_about() -> None:
+    about = {"service": "up", "code": 1, "why": "no room", "world": ""}
+    stamp, line = log.as_text("error", "ended", about).split(" ", 1)
+    assert datetime.fromisoformat(stamp).tzinfo is None
+    assert line == "[error  ] ended" + 26 * " " + "service=up code=1 why='no room' world=''\n"
+
+
+@pytest.mark.parametrize(("refused", "coloured"), [(False, True), (True, False)])
+def test_a_terminal_shows_the_level_in_colour(
+    monkeypatch: pytest.MonkeyPatch, refused: bool, coloured: bool
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    if refused:
+        monkeypatch.setenv("NO_COLOR", "1")
+    line = written(monkeypatch, Log(), tty=True)
+    assert ("\x1b[33mwarning\x1b[0m" in line) is coloured
+    assert "\x1b" not in written(monkeypatch, Log(format="text"), tty=False)
+
+
+def test_a_logger_says_what_it_is_about_itself(lines: Lines) -> None:
+    log.Logger(robot="007").info("stopped", asked_by="hall")
+    assert lines == [("info", "stopped", {"robot": "007", "asked_by": "hall"})]
+
+
+def test_before_it_is_told_where_it_is_text_on_standard_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    log.Logger().warning("early")
+    told = capsys.readouterr()
+    assert "[warning] early\n" in told.err
+    assert not told.out
 
 
 @pytest.fixture

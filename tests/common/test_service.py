@@ -3,7 +3,6 @@
 import json
 import signal
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError
 
 import msgspec
 import pytest
@@ -14,8 +13,9 @@ from common.bus.bus import Bus
 from common.bus.session import router
 from common.messages import Event, Health
 from common.options import EXIT_CONFIG, EXIT_LINK
-from common.service import Node, package_version, resident_bytes, run
+from common.service import Node, resident_bytes, run
 from common.settings import Shared
+from common.version import VERSION
 from tests.common.program import Program, program
 from tests.common.rig import Rig
 from tests.support import free_port, listening, wait_until
@@ -110,7 +110,7 @@ def test_its_health_comes_every_second(lived: Lived) -> None:
     rig, _, witness = lived
     first, last = witness.health[0], witness.health[-1]
     assert last.service == "specimen"
-    assert last.version == package_version()
+    assert last.version == VERSION
     assert last.uptime > first.uptime >= 0
     assert last.boot == first.boot != 0
     assert last.counters["resets"] == 1
@@ -241,16 +241,3 @@ def test_memory_is_unknown_where_the_system_does_not_tell(monkeypatch: pytest.Mo
 
     monkeypatch.setattr("common.service.Path.read_text", absent)
     assert resident_bytes() == 0
-
-
-def test_the_version_is_that_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    package_version.cache_clear()
-    assert package_version()[0].isdigit()
-
-    def absent(_: str) -> str:
-        raise PackageNotFoundError
-
-    package_version.cache_clear()
-    monkeypatch.setattr("common.service.version", absent)
-    assert package_version() == "unknown"
-    package_version.cache_clear()

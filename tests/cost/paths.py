@@ -53,7 +53,7 @@ def node(name: str, root: type[C]) -> Node[C]:
     with (
         patch.object(log, "Lossy", Paper),
         patch.object(buses, "host_id", lambda: BOOT),
-        patch("secrets.randbits", lambda _: BOOT),
+        patch("os.urandom", lambda size: (BOOT << 1).to_bytes(size, "big")),
     ):
         log.configure(loaded.config.log, name)
         return Node(name, loaded)

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from common import realtime
 from tests.compose.engine import compose
 
 ROOT = Path(__file__).parents[2]
 ENV = "deploy/compose/robot.env"
 OWN_ROUTER, TLS = "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml"
+REALTIME = "deploy/compose/realtime.yaml"
 PROFILES = ("--profile", "sim", "--profile", "laptop")
 OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "dashboard"}
 
@@ -47,6 +49,13 @@ def test_a_copy_that_nobody_has_edited_is_the_first_robot() -> None:
 
 def test_a_laptop_dials_the_vehicles_wifi() -> None:
     assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in config(TLS)["laptop"]
+
+
+def test_who_stands_before_the_wheels_alone_may_go_ahead() -> None:
+    granted = re.compile(rf"^ +rtprio: {realtime.GUARD}$", re.MULTILINE)
+    ahead = {name for name, text in config(TLS, REALTIME).items() if granted.search(text)}
+    assert ahead == {"router", "bridge", "safety"}
+    assert not any("rtprio" in text for text in config(TLS).values())
 
 
 def test_nobody_is_sent_to_the_boards_cable() -> None:

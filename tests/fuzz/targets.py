@@ -41,7 +41,7 @@ def frames(data: bytes) -> None:
     """Read a datagram; the first byte picks the sender and what its CRC covers."""
     framing, kinds = FRAMINGS[data[0] % len(FRAMINGS) if data else 0]
     datagram = data[1:]
-    parts = list(framing.read(datagram, kinds))
+    parts = framing.read(datagram, kinds)
     assert b"".join(part.raw for part in parts) == datagram, "bytes were lost or made up"
     for part in parts:
         if isinstance(part, Received):

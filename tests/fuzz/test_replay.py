@@ -82,7 +82,7 @@ def _crash(*_: object) -> None:
 @pytest.mark.parametrize(
     ("name", "owner", "attribute"),
     [
-        ("frames", Framing, "_read_one"),
+        ("frames", Framing, "part_at"),
         ("messages", codec, "_decoder"),
         ("toml", config, "_leaves"),
         ("environ", config, "_parse"),

@@ -1,11 +1,11 @@
 """Protections taken out one by one, and what the judge then objects to."""
 
+import dataclasses
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
-from msgspec.structs import replace as with_fields
+from msgspec.structs import replace
 
 from common import keys
 from common import messages as m
@@ -15,6 +15,7 @@ from services.bridge import lease as leases
 from services.bridge import link as links
 from services.bridge.lease import Lease, Order
 from services.bridge.readiness import Readiness
+from services.bridge.wheels import Wheels
 from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
@@ -189,7 +190,11 @@ def successor_hears_of_no_latch(stack: Stack) -> None:
 
     def old(take: Callable[[Letter], None], letter: Letter) -> None:
         assert isinstance(letter.message, m.Link)
-        take(replace(letter, message=with_fields(letter.message, latched_by=None, armed=True)))
+        take(
+            dataclasses.replace(
+                letter, message=replace(letter.message, latched_by=None, armed=True)
+            )
+        )
 
     successor(stack, old)
     stack.sticks["teleop"].asks = (0.0, 0.0)
@@ -209,7 +214,7 @@ def whoever(lease: Lease, motion: m.Motion) -> Any:
 
 
 def untold(lease: Lease, motion: m.Motion, *rest: Any) -> Any:
-    return ON_MOTION(lease, with_fields(motion, latched=False), *rest)
+    return ON_MOTION(lease, replace(motion, latched=False), *rest)
 
 
 def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
@@ -218,10 +223,6 @@ def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
 
 def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
     return replace(lease, sent_ns=now_ns), Order.BRAKE
-
-
-def stop_instead(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
-    return replace(lease, hit=seq, sent_ns=now_ns), Order.STOP
 
 
 ORDER = leases._order
@@ -279,6 +280,6 @@ BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] =
         leases, "on_hit", unjudged, hit_while_a_run_is_under_way, "bridge knows of contact",
     ),
     "the reflex does not brake": (
-        leases, "on_hit", stop_instead, hit_while_a_run_is_under_way, "without a BREAK",
+        Wheels, "brake", lambda _: 1, hit_while_a_run_is_under_way, "without a BREAK",
     ),
 }  # fmt: skip

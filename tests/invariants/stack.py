@@ -18,6 +18,7 @@ from common.wire.reports import FROM_BOARD
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.stamp import Receipt, WallClock
+from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
 from services.safety.ports import Ports
 from tests.invariants.judge import STEP_NS, Judge
@@ -51,7 +52,7 @@ class Sockets:
         self._process = process
         self._framing = Framing()
 
-    def read(self, port: int) -> Iterator[tuple[bytes, Receipt]]:
+    def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
         """Yield what waits, after the judge has seen it."""
         inbox = self._stack.vehicle.inbox
         while inbox:
@@ -59,7 +60,11 @@ class Sockets:
             parts = self._framing.read(datagram, FROM_BOARD)
             frames = [part.frame for part in parts if isinstance(part, Received)]
             self._stack.judge.on_report(self._process, frames)
-            yield datagram, Receipt(None, self._stack.net.now_ns)
+            yield datagram, [], self._stack.net.now_ns
+
+    def receipt(self, _: Ancillary, read_ns: int) -> Receipt:
+        """Return when a datagram was read; nobody has stamped it."""
+        return Receipt(None, read_ns)
 
     def send(self, datagram: bytes, port: int) -> None:
         """Send to the board, with the judge's complaints."""

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from common.freshness import Latest, S
-from services.metrics.robot import EXPECTED, KEPT_S, NAMES, WORTH_S, Robot, Tally
+from services.metrics.robot import EXPECTED, KEPT_S, NAMES, WORTH_S, Robot, Tally, prune
 from tests.metrics.heard import NOW_NS, event, health, link, whole
 
 LATE_NS = NOW_NS + round(WORTH_S * S) + 1
@@ -137,3 +137,15 @@ def test_a_robot_whose_streams_alone_are_heard_is_kept() -> None:
     robot.link = Latest(link(), NOW_NS)
     assert not robot.forget(LONG_NS - 1)
     assert robot.forget(LONG_NS)
+
+
+def test_of_ones_own_robot_services_are_forgotten_and_the_robot_is_not() -> None:
+    robots = {"007": whole(), "008": whole(), "laptop": Robot()}
+    for name in ("007", "008"):
+        for service in list(robots[name].services):
+            robots[name].on_live(service, "a", False, NOW_NS)
+    prune(robots, "007", LONG_NS - 1)
+    assert set(robots) == {"007", "008"}
+    prune(robots, "007", LONG_NS)
+    assert set(robots) == {"007"}
+    assert set(robots["007"].services) == set(EXPECTED)

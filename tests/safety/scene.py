@@ -1,8 +1,7 @@
 """A bridge, a driver and a clock for the policy, without a bus: time passes only here."""
 
-from dataclasses import replace
-
 import msgspec
+from msgspec.structs import replace
 
 from common.freshness import Latest, S
 from common.messages import (
@@ -90,7 +89,7 @@ class Scene:
     def put(self, name: str, sample: Message) -> None:
         stamped = msgspec.structs.replace(sample, seq=self.seq, boot=self.boot)
         latest = Latest(stamped, self.now_ns)
-        self.inputs = replace(self.inputs, **{name: latest})  # type: ignore[arg-type]
+        self.inputs = replace(self.inputs, **{name: latest})
 
     def tick(self, ticks: int = 1) -> Verdict:
         """Let time pass, with samples."""

@@ -1,8 +1,7 @@
 """The policy where one wrong sign or number would show: ages, edges, what is remembered."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import SONAR_NAMES

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 import zenoh
 
-from common import codec, keys
+from common import codec, keys, realtime
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.config import Sources, load
@@ -201,8 +201,14 @@ def test_the_program_opens_a_reader_and_closes_it(
     opened: list[Bus] = []
 
     def run(
-        name: str, root: object, build: Callable[[Node[SafetyConfig]], None], argv: object
+        name: str,
+        root: object,
+        build: Callable[[Node[SafetyConfig]], None],
+        argv: object,
+        *,
+        priority: int,
     ) -> int:
+        assert priority == realtime.SAFETY
         node = make_node(endpoint, "safety.margin=0.0", 'safety.i_accept=["margin"]')
         opened.append(node.open_bus())
         monkeypatch.setattr(node, "open_bus", lambda: opened[0])

@@ -1,7 +1,6 @@
 """A latch outlives the service that holds it: the bridge remembers it, the next one takes it on."""
 
-from dataclasses import replace
-
+from msgspec.structs import replace
 from msgspec.structs import replace as with_fields
 
 from services.safety.latches import latched

@@ -1,8 +1,7 @@
 """Creeping off a pressed bumper, through the whole decision."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from services.safety.causes import BY_NAME
 from services.safety.flapping import Credit

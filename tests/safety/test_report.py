@@ -1,8 +1,7 @@
 """What is told: sentences, causes, limits, and events on transitions only."""
 
-from dataclasses import replace
-
 import pytest
+from msgspec.structs import replace
 
 from common.messages import Drive
 from services.safety.inputs import Ask, Estop, Event, Hold, Reset

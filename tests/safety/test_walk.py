@@ -7,10 +7,10 @@ table in ``causes.py``. ``pytest -s`` prints how many combinations were walked.
 import math
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, product, starmap
 
-from msgspec.structs import replace as with_fields
+from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import SONAR_NAMES
@@ -39,7 +39,7 @@ def sample(name: str, **fields: object) -> Change:
 
     def change(scene: Scene) -> None:
         latest = getattr(scene.inputs, name)
-        changed = replace(latest, value=with_fields(latest.value, **fields))
+        changed = replace(latest, value=replace(latest.value, **fields))
         scene.inputs = replace(scene.inputs, **{name: changed})
 
     return change

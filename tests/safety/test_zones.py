@@ -1,11 +1,11 @@
 """Allowed speeds: the formula, the geometry of each sonar, and what holds for any twist."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
 from common.settings import Vehicle
@@ -29,7 +29,21 @@ def field() -> Zones:
 def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
     vehicle = Vehicle(length=1.2, width=0.8)
     settings = Safety(margin=0.3, react=0.2, deceleration=0.5, i_accept=("deceleration",))
-    assert zones(vehicle, settings) == Zones(sonar_mounts(vehicle), 0.6, 0.3, 0.2, 0.5)
+    field = zones(vehicle, settings)
+    assert (field.margin, field.react, field.deceleration) == (0.3, 0.2, 0.5)
+    assert [axis.swing for axis in field.axes] == [0.6, 0, 0, 0, 0.6, 0, 0, 0]
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_a_sonar_closes_in_as_its_place_moves_along_the_way_it_looks(
+    field: Zones, linear: float, angular: float
+) -> None:
+    for sonar, mount in enumerate(sonar_mounts(Vehicle())):
+        place = linear - angular * mount.y, angular * mount.x
+        along = place[0] * math.cos(mount.yaw) + place[1] * math.sin(mount.yaw)
+        swings = abs(angular) * Vehicle().length / 2 if mount.name in ("left", "right") else along
+        expected = pytest.approx(max(along, swings), abs=1e-12)
+        assert field.approach(sonar, Twist(linear, angular)) == expected
 
 
 def only(name: str, distance: float) -> tuple[float, ...]:

@@ -6,7 +6,6 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
 
 import pytest
-import structlog
 from textual.events import AppBlur
 from textual.pilot import Pilot
 
@@ -60,7 +59,6 @@ def bench() -> Iterator[Bench]:
     bench = Bench()
     yield bench
     bench.node.loop.close()
-    structlog.reset_defaults()
 
 
 def play(bench: Bench, act: Callable[[Pilot[None]], Awaitable[None]], *size: int) -> None:

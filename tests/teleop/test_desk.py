@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import structlog
 
 from common import keys
 from common.bus.publisher import Publisher
@@ -75,7 +74,6 @@ def operator() -> Iterator[Operator]:
     operator = Operator()
     yield operator
     operator.node.loop.close()
-    structlog.reset_defaults()
 
 
 def test_a_tap_is_asked_for_and_then_there_is_silence(operator: Operator) -> None:

@@ -1,19 +1,11 @@
 """The log ends in the logbook, and nowhere else."""
 
-from collections.abc import Iterator
-
 import pytest
-import structlog
 
+from common.log import Logger
 from common.settings import Log
 from services.teleop.logbook import KEPT, Logbook
 from services.teleop.view import Line
-
-
-@pytest.fixture(autouse=True)
-def _plain_logs() -> Iterator[None]:
-    yield
-    structlog.reset_defaults()
 
 
 def test_lines_are_kept_the_newest_last() -> None:
@@ -30,11 +22,11 @@ def test_lines_are_kept_the_newest_last() -> None:
 def test_log_lines_come_here_and_not_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
     logbook = Logbook()
     logbook.take_log(Log(level="info"))
-    log = structlog.get_logger()
+    log = Logger()
     log.debug("unseen")
     log.info("started")
     log.warning("waiting for a router", endpoints=["tcp/127.0.0.1:1"])
-    log.critical("broken")
+    log.error("broken")
     assert [(line.level, line.text) for line in logbook.last(9)] == [
         ("info", "started"),
         ("warning", "waiting for a router"),

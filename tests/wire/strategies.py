@@ -1,16 +1,16 @@
 """Hypothesis strategies for every frame of the wire, plain examples of each, and their reader."""
 
-from collections.abc import Mapping
-from itertools import islice
+from typing import TypeVar
 
 from hypothesis import strategies as st
 
 from common.wire import commands as c
 from common.wire import reports as r
-from common.wire.frame import Frame, Side
+from common.wire.frame import Frame, Kinds, Side
 from common.wire.framing import Framing, Received, Rejected
 
 Part = Received | Rejected
+FrameT = TypeVar("FrameT", bound=Frame)
 
 velocities = st.integers(-32767, 32767)
 octets = st.integers(0, 255)
@@ -62,8 +62,14 @@ REPORTS: tuple[Frame, ...] = (
 )
 
 
-def read_all(framing: Framing, raw: bytes, kinds: Mapping[int, type[Frame]]) -> list[Part]:
-    """Read a datagram; no byte is lost, and each part has one, so that reading ends."""
-    parts = list(islice(framing.read(raw, kinds), len(raw) + 1))
+def read_all(framing: Framing, raw: bytes, kinds: Kinds) -> list[Part]:
+    """Read a datagram; no byte is lost, and each part has one."""
+    parts = framing.read(raw, kinds)
     assert b"".join(part.raw for part in parts) == raw
+    assert all(part.raw for part in parts)
     return parts
+
+
+def made(kind: type[FrameT], payload: bytes) -> FrameT:
+    """Return the frame of a payload, or raise ``WireError``."""
+    return kind.from_wire(kind.LAYOUT.unpack(payload))

@@ -1,6 +1,6 @@
 """Datagrams to frames and back: round trips, damage, garbage, resynchronisation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import crcmod.predefined
 import pytest
@@ -9,21 +9,12 @@ from hypothesis import strategies as st
 
 from common.errors import WireError
 from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCommand, MotionKind
-from common.wire.frame import Frame, Side
-from common.wire.framing import (
-    HEADER,
-    MAGIC,
-    Covers,
-    Framing,
-    Reason,
-    Received,
-    Rejected,
-    crc_function,
-)
+from common.wire.frame import Frame, Kinds, Side
+from common.wire.framing import Covers, Framing, Reason, Received, Rejected, crc_function
+from common.wire.header import HEADER, MAGIC, OPENING
 from common.wire.reports import FROM_BOARD, BumperReport, LedReport
 from tests.wire.strategies import COMMANDS, REPORTS, commands, read_all, reports
 
-Kinds = Mapping[int, type[Frame]]
 BOTH: list[tuple[Kinds, tuple[Frame, ...]]] = [(TO_BOARD, COMMANDS), (FROM_BOARD, REPORTS)]
 EACH = [(kinds, frame) for kinds, frames in BOTH for frame in frames]
 NAMES = [type(frame).__name__ for _, frame in EACH]
@@ -34,6 +25,10 @@ garbage = st.binary(max_size=12).filter(lambda raw: b"G" not in raw)
 
 def read(raw: bytes, kinds: Kinds) -> list[Received | Rejected]:
     return read_all(framing, raw, kinds)
+
+
+def header(size: int, command: int, crc: int) -> bytes:
+    return HEADER.pack(OPENING.pack(MAGIC, size, command), crc)
 
 
 def frames(parts: Sequence[Received | Rejected]) -> list[Frame]:
@@ -139,9 +134,9 @@ def test_arbitrary_bytes_never_raise_and_none_is_lost(raw: bytes, to_board: bool
 
 
 headers = st.builds(
-    lambda size, command, crc, rest: HEADER.pack(MAGIC, size, command, crc) + rest,
+    lambda size, command, crc, rest: header(size, command, crc) + rest,
     st.integers(0, 40) | st.integers(0, 0xFFFF),
-    st.sampled_from(sorted(FROM_BOARD)) | st.integers(0, 0xFFFF),
+    st.sampled_from(sorted(kind.frame.ID for kind in FROM_BOARD.values())) | st.integers(0, 0xFFFF),
     st.just(0) | st.integers(0, 0xFFFF),
     st.binary(max_size=24) | st.integers(0, 24).map(bytes),
 )
@@ -171,7 +166,7 @@ def frame_bytes(command: int, payload: bytes, size: int | None = None) -> bytes:
     """Return a frame with a right CRC and any id, payload and size field."""
     crc = crc_function("crc-16")(payload)
     size = HEADER.size + len(payload) if size is None else size
-    return HEADER.pack(MAGIC, size, command, crc) + payload
+    return header(size, command, crc) + payload
 
 
 QUERY = "DistanceQuery has 8 bytes, its header says"
@@ -201,10 +196,14 @@ REASONS = [
 
 @pytest.mark.parametrize(("raw", "reason", "detail"), REASONS)
 def test_each_reason_is_named_with_its_detail(raw: bytes, reason: Reason, detail: str) -> None:
-    (part,) = read(raw, TO_BOARD)
-    assert isinstance(part, Rejected)
-    assert part.reason is reason
-    assert part.detail == detail
+    assert read(raw, TO_BOARD) == [Rejected(reason, raw, detail)]
+
+
+@pytest.mark.parametrize(("raw", "reason", "detail"), REASONS)
+def test_each_reason_is_the_same_behind_a_frame(raw: bytes, reason: Reason, detail: str) -> None:
+    whole = framing.pack(DistanceQuery())
+    parts = read(whole + raw, TO_BOARD)
+    assert parts == [Received(DistanceQuery(), whole), Rejected(reason, raw, detail)]
 
 
 def test_every_reason_is_covered() -> None:

@@ -21,7 +21,7 @@ def test_health(rig: Rig, tool: Tool) -> None:
     result = tool("health", "--text")
     assert result.code == 1
     rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
-    assert rows["bridge"] == ["ok", "1", "0m03s", "0.0", "5", "0", "overrun=2"]
+    assert rows["bridge"] == ["ok", "1", "0m03s", "0.0", "53", "5", "0", "overrun=2"]
     assert rows["odom"] == ["hangs"]
     assert "odom of robot" in result.err
     assert "it hangs" in result.err

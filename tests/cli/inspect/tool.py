@@ -54,7 +54,7 @@ def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
     """Return what a service tells of itself."""
     return Health(
         service=service, version=version, uptime=3.0, rates={}, counters={"overrun": 2},
-        lateness=lateness, rss=5_000_000,
+        lateness=lateness, rss=5_000_000, priority=53,
     )  # fmt: skip
 
 

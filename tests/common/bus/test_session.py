@@ -6,8 +6,6 @@ import time
 from pathlib import Path
 
 import pytest
-import structlog
-import structlog.testing
 import zenoh
 
 from common import keys, settings
@@ -18,7 +16,7 @@ from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Done, Event, ResetRequest
 from tests.common.rig import Rig, until_heard
-from tests.support import at, free_port, listening, wait_until
+from tests.support import Lines, at, free_port, listening, wait_until
 
 
 def nowhere() -> str:
@@ -52,43 +50,39 @@ def test_a_client_never_scouts_and_notices_a_silent_partition() -> None:
 
 
 def test_without_a_router_it_says_so_again_and_again(
-    monkeypatch: pytest.MonkeyPatch, tries: list[float]
+    monkeypatch: pytest.MonkeyPatch, lines: Lines, tries: list[float]
 ) -> None:
     monkeypatch.setattr(session_module, "COMPLAIN_S", 0.2)
     where = nowhere()
-    with structlog.testing.capture_logs() as lines:
-        bus = Bus(at(where), "001", lambda call: call())
-        bus.open()
-        wait_until(lambda: len(lines) >= 3, "three lines")
-        assert not bus.connected
-        bus.close()
-    assert {line["event"] for line in lines} == {"waiting for a router; `t2 doctor` looks further"}
-    assert lines[0]["endpoints"] == [where]
-    assert lines[0]["log_level"] == "warning"
+    bus = Bus(at(where), "001", lambda call: call())
+    bus.open()
+    wait_until(lambda: len(lines) >= 3, "three lines")
+    assert not bus.connected
+    bus.close()
+    said = "waiting for a router; `t2 doctor` looks further"
+    assert lines == [("warning", said, {"endpoints": [where]})] * len(lines)
 
 
-def test_it_says_so_once_in_five_seconds(tries: list[float]) -> None:
-    with structlog.testing.capture_logs() as lines:
-        bus = Bus(at(nowhere()), "001", lambda call: call())
-        bus.open()
-        wait_until(lambda: len(tries) >= 3, "three tries")
-        bus.close()
+def test_it_says_so_once_in_five_seconds(lines: Lines, tries: list[float]) -> None:
+    bus = Bus(at(nowhere()), "001", lambda call: call())
+    bus.open()
+    wait_until(lambda: len(tries) >= 3, "three tries")
+    bus.close()
     assert len(lines) <= 1 + (tries[-1] - tries[0]) / session_module.COMPLAIN_S
 
 
-def test_a_router_that_comes_later_is_found(rig: Rig) -> None:
+def test_a_router_that_comes_later_is_found(rig: Rig, lines: Lines) -> None:
     where = nowhere()
     rig.endpoint = where
     heard: list[Arrival[Bumper]] = []
-    with structlog.testing.capture_logs() as lines:
-        hearer = Bus(at(where), rig.robot, rig.loop.post)
-        hearer.subscribe(keys.BUMPER, heard.append)
-        hearer.open()
-        wait_until(lambda: lines, "the line that says so")
-        with router(listening(where)):
-            publisher = rig.bus().publisher(keys.BUMPER)
-            until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
-            hearer.close()
+    hearer = Bus(at(where), rig.robot, rig.loop.post)
+    hearer.subscribe(keys.BUMPER, heard.append)
+    hearer.open()
+    wait_until(lambda: lines, "the line that says so")
+    with router(listening(where)):
+        publisher = rig.bus().publisher(keys.BUMPER)
+        until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        hearer.close()
 
 
 def test_a_router_behind_one_that_is_silent_is_found(rig: Rig) -> None:
