@@ -10,15 +10,29 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from bench.codec import page as codec_page
 from bench.codec import part as codec_part
 from bench.codec import plot as codec_plot
+from bench.command import part as command_part
+from bench.growth import page as growth_page
+from bench.growth import part as growth_part
+from bench.growth import plot as growth_plot
+from bench.load import page as load_page
+from bench.load import part as load_part
+from bench.load import plot as load_plot
+from bench.path import page as path_page
 from bench.reaction import page as reaction_page
 from bench.reaction import part as reaction_part
 from bench.reaction import plot as reaction_plot
 from bench.series import RAW, Measured, Series, load, store
+from bench.start import page as start_page
+from bench.start import part as start_part
+from bench.start import plot as start_plot
+from bench.telemetry import page as telemetry_page
+from bench.telemetry import part as telemetry_part
 from common.freshness import S
 from tests.faults.machine import HoldUps, named
 
@@ -43,10 +57,33 @@ PARTS = {
         reaction_part.measure,
         reaction_part.versions,
         reaction_page.blocks,
-        reaction_plot.draw,
+        partial(reaction_plot.draw, what="contact to BREAK"),
+        waits=True,
+    ),
+    "start": Part(
+        start_part.measure, start_part.versions, start_page.blocks, start_plot.draw, waits=True
+    ),
+    "command": Part(
+        command_part.measure,
+        command_part.versions,
+        path_page.blocks,
+        partial(reaction_plot.draw, what="request to frame"),
+        waits=True,
+    ),
+    "telemetry": Part(
+        telemetry_part.measure,
+        telemetry_part.versions,
+        telemetry_page.blocks,
+        partial(reaction_plot.draw, what="frame to consumer"),
         waits=True,
     ),
     "codec": Part(codec_part.measure, codec_part.versions, codec_page.blocks, codec_plot.draw),
+    "load": Part(
+        load_part.measure, load_part.versions, load_page.blocks, load_plot.draw, waits=True
+    ),
+    "growth": Part(
+        growth_part.measure, growth_part.versions, growth_page.blocks, growth_plot.draw, waits=True
+    ),
 }
 
 

@@ -8,49 +8,11 @@
  * answer. One line for each round after the first WARM ones, in which not everybody need be
  * there yet: nanoseconds from the hit's send to the BREAK's arrival.
  */
-#define _GNU_SOURCE
-#include <arpa/inet.h>
-#include <poll.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <time.h>
+#include "../path/datagram.h"
 
-enum { MS = 1000000, LONGEST = 1500, MOST = 8 };
-static const int64_t S = 1000 * MS;
-
-typedef struct {
-    unsigned char bytes[LONGEST];
-    size_t size;
-} Datagram;
+enum { MOST = 8 };
 
 static int sock;
-
-static int64_t now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * S + t.tv_nsec;
-}
-
-static void fail(const char *what) {
-    fprintf(stderr, "board: %s\n", what);
-    exit(1);
-}
-
-static Datagram parsed(const char *hex) {
-    Datagram d = {.size = strlen(hex) / 2};
-    for (size_t i = 0; i < d.size; i++)
-        if (sscanf(hex + 2 * i, "%2hhx", &d.bytes[i]) != 1)
-            fail("no hexadecimal");
-    return d;
-}
-
-static struct sockaddr_in port(const char *number) {
-    return (struct sockaddr_in){
-        AF_INET, htons(atoi(number)), {htonl(INADDR_LOOPBACK)}, {0}};
-}
 
 static void say(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
 
@@ -75,15 +37,14 @@ static ssize_t heard(unsigned char *got, int64_t until_ns) {
 int main(int count, char **given) {
     if (count < 9 || count > 9 + MOST)
         fail("FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [KEEP ...]");
-    struct sockaddr_in from = port(given[1]), to = port(given[2]);
     int rounds = atoi(given[3]), warm = atoi(given[4]), keeps = count - 9;
     Datagram hit = parsed(given[5]), clear = parsed(given[6]), brake = parsed(given[7]),
              stop = parsed(given[8]), keep[MOST];
     for (int i = 0; i < keeps; i++)
         keep[i] = parsed(given[9 + i]);
-    sock = socket(AF_INET, SOCK_DGRAM, 0);
-    if (bind(sock, (void *)&from, sizeof from) || connect(sock, (void *)&to, sizeof to))
-        fail("cannot have its port");
+    sock = bound(given[1], given[2]);
+
+    go_ahead();
 
     unsigned char got[LONGEST];
     srand(1);

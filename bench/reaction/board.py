@@ -1,10 +1,10 @@
 """The board's side: what it says, and how long until it is told to BREAK."""
 
-import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.path import processes
 from common.wire import commands, reports
 from common.wire.framing import Framing
 
@@ -48,9 +48,6 @@ class Programs:
 
 def compiled(folder: Path) -> Programs:
     """Compile them into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
-    if shutil.which("cc") is None:
-        raise FileNotFoundError("no C compiler (Debian: apt-get install gcc libc6-dev)")
     for name in ("board", "echo"):
-        source, made = str(HERE / f"{name}.c"), str(folder / name)
-        subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", made, source], check=True)
+        processes.compiled(HERE / f"{name}.c", folder)
     return Programs(folder)

@@ -4,6 +4,7 @@ What somebody writes in an hour: it knows frames and CRC, answers a bumper hit w
 everything else with STOP.
 """
 
+import math
 import socket
 import struct
 import sys
@@ -13,23 +14,37 @@ import crcmod.predefined
 CRC = crcmod.predefined.mkCrcFun("crc-16")
 HEADER = struct.Struct("<2sHHH")
 BUMPER, MOTION = 0x7602, 0x7426
-STOP, BREAK = 0, 2
+STOP, RUN, BREAK = 0, 1, 2
 
 
-def command(kind: int) -> bytes:
-    """Return a motion frame that does not move."""
-    payload = struct.pack("<BHH", kind, 0, 0)
+def command(kind: int, linear_mmps: int = 0) -> bytes:
+    """Return a motion frame, forward or standing."""
+    payload = struct.pack("<BHH", kind, linear_mmps, 0)
     return HEADER.pack(b"GS", HEADER.size + len(payload), MOTION, CRC(payload)) + payload
+
+
+def payload_of(datagram: bytes, name: int) -> bytes | None:
+    """Return what a sound frame of this name holds; None when it is none."""
+    if len(datagram) < HEADER.size:
+        return None
+    magic, size, named, crc = HEADER.unpack_from(datagram)
+    payload = datagram[HEADER.size : size]
+    sound = magic == b"GS" and size == len(datagram) and crc == CRC(payload) and named == name
+    return payload if sound else None
 
 
 def is_hit(datagram: bytes) -> bool:
     """Tell whether a datagram is a sound bumper report that says pressed."""
-    if len(datagram) < HEADER.size:
-        return False
-    magic, size, name, crc = HEADER.unpack_from(datagram)
-    payload = datagram[HEADER.size : size]
-    sound: bool = magic == b"GS" and size == len(datagram) and crc == CRC(payload)
-    return sound and name == BUMPER and payload == b"\1"
+    return payload_of(datagram, BUMPER) == b"\1"
+
+
+def velocity(datagram: bytes) -> tuple[float, float] | None:
+    """Return what a velocity report says, m/s and rad/s, forward or standing; None for others."""
+    payload = payload_of(datagram, MOTION)
+    if payload is None:
+        return None
+    linear_mmps, angular_ddegps = struct.unpack("<HH", payload)
+    return linear_mmps / 1000, math.radians(angular_ddegps / 10)
 
 
 def main() -> None:

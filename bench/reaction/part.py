@@ -1,23 +1,22 @@
 """The part ``reaction``: everybody in turn, block by block, on a quiet machine and a busy one."""
 
-import contextlib
 import random
 import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 
+from bench.path import processes
 from bench.reaction.board import Programs, compiled
 from bench.reaction.page import LOADS
 from bench.reaction.responders import RESPONDERS, Responder
 from bench.series import Series
+from common import realtime
 from tests.support import free_port
 
 SEED = 20_240_607
-BLOCKS, HITS, WARM = 2, 250, 20
+BLOCKS, HITS, WARM = 2, 150, 20
 BUSY = 4  # processes that only count, on the busy machine
 
 
@@ -34,9 +33,12 @@ def measure(blocks: int = BLOCKS, hits: int = HITS) -> list[Series]:
             turns = [(each, load) for each in here for load in LOADS]
             shuffler.shuffle(turns)
             for responder, load in turns:
-                with loaded(BUSY if load == "busy" else 0):
+                with processes.loaded(BUSY if load == "busy" else 0):
                     samples[responder.name, load] += block(programs, responder, hits)
-    return [Series(name=name, calls=1, samples_ns=some) for name, some in samples.items()]
+    note = "granted" if is_granted() else "not granted, so that these rows say nothing"
+    return [
+        Series(name=name, calls=1, samples_ns=some, note=note) for name, some in samples.items()
+    ]
 
 
 def block(programs: Programs, responder: Responder, hits: int) -> list[int]:
@@ -46,22 +48,13 @@ def block(programs: Programs, responder: Responder, hits: int) -> list[int]:
         return programs.hits(board, port, hits, WARM)
 
 
-@contextlib.contextmanager
-def loaded(processes: int) -> Iterator[None]:
-    """Keep so many processes counting while the context lasts."""
-    command = [sys.executable, "-S", "-c", "while True: pass"]
-    with contextlib.ExitStack() as stack:
-        for _ in range(processes):
-            busy = stack.enter_context(subprocess.Popen(command))
-            stack.callback(busy.kill)
-        yield
+def is_granted() -> bool:
+    """Tell whether a process of ours may go ahead of ordinary ones."""
+    script = "from common import realtime as r; r.ask(r.GUARD); print(r.priority())"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    return done.stdout.strip() == str(realtime.GUARD).encode()
 
 
 def versions() -> str:
     """Return what is compared, with versions, and what is not here."""
-    here = [each.package for each in RESPONDERS if each.package and not each.lacks]
-    told = [f"{name} {version(name)}" for name in ("eclipse-zenoh", *here)]
-    lacking = [
-        f"{each.name} left out, {each.lacks} is not installed" for each in RESPONDERS if each.lacks
-    ]
-    return ", ".join([*told, *lacking])
+    return processes.versions(RESPONDERS)

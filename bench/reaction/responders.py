@@ -1,22 +1,17 @@
 """Who reacts: each a few processes, up while its context lasts."""
 
 import contextlib
-import shutil
-import socket
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
+from bench.path import bus
+from bench.path.processes import lacking, module, running
+from bench.path.stack import BRIDGE, SAFETY, plain, services
 from bench.reaction.board import BREAK, HIT, STOP, Programs
-from tests.support import free_port, wait_until
+from tests.support import at, free_port
 
 Start = Callable[[Programs, int, int], AbstractContextManager[None]]  # its port, the board's
-Command = Sequence[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,29 +26,10 @@ class Responder:
     @property
     def lacks(self) -> str:
         """What is not installed here; empty when it can run."""
-        try:
-            if self.package:
-                version(self.package)
-        except PackageNotFoundError:
-            return self.package
-        return self.program if self.program and shutil.which(self.program) is None else ""
+        return lacking(self.package, self.program)
 
 
-@contextlib.contextmanager
-def running(*commands: Command) -> Iterator[None]:
-    """Run these processes while the context lasts."""
-    with contextlib.ExitStack() as stack:
-        for command in commands:
-            process = stack.enter_context(
-                subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            )
-            stack.callback(process.kill)
-        yield
-
-
-def module(name: str, *words: object) -> Command:
-    """Return how a module is run."""
-    return [sys.executable, "-m", *name.split(), *map(str, words)]
+DIRECT = "bench.reaction.direct"
 
 
 def echo(programs: Programs, port: int, _: int) -> AbstractContextManager[None]:
@@ -61,91 +37,70 @@ def echo(programs: Programs, port: int, _: int) -> AbstractContextManager[None]:
     return running([programs.echo, str(port), HIT, BREAK, STOP])
 
 
-def alone(name: str) -> Start:
+def alone(name: str, ahead: str = "") -> Start:
     """Run one process that is no service."""
-    return lambda _, port, __: running(module(f"bench.reaction.{name}", port))
+    return lambda _, port, __: running(module(f"{ahead} bench.reaction.{name}", port))
 
 
-def stack(bridge: str) -> Start:
-    """Run router, bridge, safety and an operator who resets: as shipped, with this bridge."""
+def stack(
+    bridge: str = BRIDGE,
+    safety: str = SAFETY,
+    attached: Sequence[str] = (),
+    sets: Sequence[str] = (),
+) -> Start:
+    """Run router, bridge, safety and an operator who resets, with a consumer for each attached.
+
+    As shipped, but for what is given; a consumer takes so many ms for a sample.
+    """
 
     def start(_: Programs, port: int, board: int) -> AbstractContextManager[None]:
         endpoint = f"tcp/127.0.0.1:{free_port()}"
-        standby = free_port(socket.SOCK_DGRAM)
-        sets = (
-            f"board.port={board}",
-            f"board.listen_ports=[{port}, {standby}]",
-            f"bus.listen={endpoint}",
-        )
-        given = [word for each in sets for word in ("--set", each)]
-        ours = [module(name, *given) for name in ("cli router", bridge, "services.safety")]
-        return running(*ours, module("bench.reaction.resetter", endpoint))
+        listen = f"bus.listen={endpoint}"
+        ours = services(board, port, listen, *sets, bridge=bridge, safety=safety)
+        ours = ours[1:] if safety == DIRECT else ours  # it takes the router's place
+        beside = [module("bench.path.attached", plain(at(endpoint)), ms) for ms in attached]
+        return running(*ours, module("bench.reaction.resetter", endpoint), *beside)
 
     return start
 
 
-def pair(name: str, port: int, where: object) -> AbstractContextManager[None]:
-    """Run one process at the board and one that decides, on a bus that is there."""
-    script = f"bench.reaction.by_{name}"
-    return running(module(script, "judge", where), module(script, "board", port, where))
+def pair(other: bus.Other, ahead: str = "") -> Responder:
+    """Run one process at the board and one that decides, on somebody else's bus."""
 
-
-@contextlib.contextmanager
-def by_zmq(_: Programs, port: int, __: int) -> Iterator[None]:
-    """Run the pair on ZeroMQ."""
-    with tempfile.TemporaryDirectory() as folder, pair("zmq", port, f"ipc://{folder}/bus"):
-        yield
-
-
-def by_dds(_: Programs, port: int, __: int) -> AbstractContextManager[None]:
-    """Run the pair on CycloneDDS, in a domain that nobody else has."""
-    return pair("dds", port, 1 + port % 200)
-
-
-def by_lcm(_: Programs, port: int, __: int) -> AbstractContextManager[None]:
-    """Run the pair on LCM; its packets stay on this host."""
-    return pair("lcm", port, f"udpm://239.255.76.67:{free_port(socket.SOCK_DGRAM)}?ttl=0")
-
-
-@contextlib.contextmanager
-def by_mqtt(_: Programs, port: int, __: int) -> Iterator[None]:
-    """Run the pair on MQTT, with a broker of its own on loopback."""
-    broker = free_port()
-    with running(["mosquitto", "-p", str(broker)]):
-        wait_until(lambda: answers(broker), "mosquitto")
-        with pair("mqtt", port, broker):
+    @contextlib.contextmanager
+    def start(_: Programs, port: int, __: int) -> Iterator[None]:
+        script = f"{ahead} bench.reaction.by_{other.name}"
+        with (
+            other.stand() as where,
+            running(module(script, "judge", where), module(script, "board", port, where)),
+        ):
             yield
 
-
-@contextlib.contextmanager
-def by_redis(_: Programs, port: int, __: int) -> Iterator[None]:
-    """Run the pair on Redis, with a server of its own that writes nothing down."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = f"{folder}/redis.sock"
-        server = ["redis-server", "--port", "0", "--unixsocket", path, "--save", ""]
-        with running([*server, "--dir", folder]):
-            wait_until(Path(path).exists, "redis-server")
-            with pair("redis", port, path):
-                yield
+    title = other.title + (FIFO if ahead else "")
+    return Responder(title, start, other.package, other.program)
 
 
-def answers(port: int) -> bool:
-    """Tell whether somebody listens on a port of loopback."""
-    with socket.socket() as sock:
-        return sock.connect_ex(("127.0.0.1", port)) == 0
-
-
+FIFO = ", SCHED_FIFO"
 FLOOR, LOOP, REFLEX = "C, compares bytes", "Python, one process", "T2, reflex"
-JUDGED, DDS = "T2, judged stop", "CycloneDDS"
+JUDGED, DDS = "T2, judged stop", bus.OTHERS[0].title
+BLUNT = "bench.reaction.blunt"
+AHEAD = "bench.path.ahead"
+ORDINARY = ("robot.realtime=false",)
+FIVE, SLOW = ("0",) * 5, ("50",)
 RESPONDERS = (
     Responder(FLOOR, echo),
     Responder(LOOP, alone("loop")),
+    Responder(LOOP + FIFO, alone("loop", AHEAD)),
     Responder("asyncio, one process", alone("aio")),
-    Responder(REFLEX, stack("services.bridge")),
-    Responder(JUDGED, stack("bench.reaction.blunt")),
-    Responder(DDS, by_dds, "cyclonedds"),
-    Responder("ZeroMQ, IPC", by_zmq, "pyzmq"),
-    Responder("LCM", by_lcm, "lcm"),
-    Responder("MQTT, mosquitto", by_mqtt, "paho-mqtt", "mosquitto"),
-    Responder("Redis, unix socket", by_redis, "redis", "redis-server"),
+    Responder(REFLEX, stack()),
+    Responder(f"{REFLEX}, ordinary", stack(sets=ORDINARY)),
+    Responder(f"{REFLEX}, 5 consumers attached", stack(attached=FIVE)),
+    Responder(f"{REFLEX}, a slow consumer", stack(attached=SLOW)),
+    Responder(JUDGED, stack(BLUNT)),
+    Responder(f"{JUDGED}, ordinary", stack(BLUNT, sets=ORDINARY)),
+    Responder(f"{JUDGED}, 5 consumers attached", stack(BLUNT, attached=FIVE)),
+    Responder(f"{JUDGED}, a slow consumer", stack(BLUNT, attached=SLOW)),
+    Responder(f"{JUDGED}, no router", stack(BLUNT, DIRECT)),
+    *map(pair, bus.OTHERS),
+    pair(bus.OTHERS[0], AHEAD),
 )

@@ -1,5 +1,7 @@
 """The document, from samples that are made up."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,9 +10,12 @@ from bench import __main__ as bench
 from bench import series as kept
 from bench.codec import page
 from bench.codec.values import FRAMES, MESSAGES
+from bench.path.page import FLOOR
 from bench.reaction.page import LOADS
 from bench.reaction.responders import JUDGED, LOOP, REFLEX
 from bench.series import Measured, Series, store
+from bench.telemetry.page import AGE, STREAMS
+from tests.bench import test_growth, test_load, test_start
 
 BY_FRAME = {"T2": 2000, "struct": 1000, "ctypes": 3000}
 BY_MESSAGE = {"T2": 1000, "msgpack by hand": 1000, "protobuf": 500}
@@ -32,6 +37,37 @@ def reaction() -> list[Series]:
         for name in (LOOP, REFLEX, JUDGED)
         for load in LOADS
     ]
+
+
+def path() -> list[Series]:
+    return [Series(name=(FLOOR, load), calls=1, samples_ns=[100_000] * 10) for load in LOADS]
+
+
+def telemetry() -> list[Series]:
+    return [
+        *path(),
+        *(
+            Series(name=(stream, AGE, load), calls=1, samples_ns=[100_000] * 10)
+            for stream, *_ in STREAMS
+            for load in LOADS
+        ),
+    ]
+
+
+SERIES: dict[str, Callable[[], list[Series]]] = {
+    "reaction": reaction,
+    "start": partial(test_start.made_up, 200),
+    "command": path,
+    "telemetry": telemetry,
+    "codec": made_up,
+    "load": test_load.made_up,
+    "growth": test_growth.made_up,
+}
+
+
+def keep(*names: str) -> None:
+    for name in names:
+        store(name, Measured(where="a day: a machine", noise="Quiet", series=SERIES[name]()))
 
 
 def test_a_row_names_codec_bytes_and_times_of_both_ways() -> None:
@@ -59,8 +95,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_document_is_told_again_from_what_was_kept(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name, series in (("codec", made_up()), ("reaction", reaction())):
-        store(name, Measured(where="a day: a machine", noise="Quiet", series=series))
+    keep(*bench.PARTS)
     assert bench.main(["--again", "--out", "performance.md"]) == 0
     text = (folder / "performance.md").read_text(encoding="utf-8")
     assert "Measured on a day: a machine. Quiet. 10 samples a row" in text
@@ -78,7 +113,7 @@ def test_a_part_is_measured_kept_and_told(
     it = bench.PARTS["codec"]
     part = bench.Part(made_up, lambda: "struct 1.0", it.blocks, it.draw)
     monkeypatch.setitem(bench.PARTS, "codec", part)
-    store("reaction", Measured(where="a day: a machine", noise="Quiet", series=reaction()))
+    keep(*(name for name in bench.PARTS if name != "codec"))
     assert bench.main(["--only", "codec"]) == 0
     told = capsys.readouterr().out
     assert "; struct 1.0; 0 minutes. The machine " in told
@@ -93,7 +128,7 @@ def test_without_samples_it_says_what_to_do(
 ) -> None:
     assert bench.main(["--again"]) == bench.UNMEASURED
     assert (
-        f"no samples in {kept.RAW} of reaction, codec: measure them first"
+        f"no samples in {kept.RAW} of {', '.join(bench.PARTS)}: measure them first"
         in capsys.readouterr().err
     )
     assert not list(folder.iterdir())

@@ -1,0 +1,1 @@
+"""Command path: how soon the board has the frame that a request to move comes to."""

@@ -1,0 +1,1 @@
+"""What consumers, robots, keys and bytes cost as there are more of them."""

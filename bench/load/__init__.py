@@ -1,0 +1,1 @@
+"""How much the bridge bears, and what the chain on board takes of the machine."""

@@ -1,0 +1,76 @@
+"""The board's side: what it says unasked, how it answers, and frames at a rate."""
+
+import contextlib
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.path import processes
+from common.wire import commands, reports
+from common.wire.frame import Frame, Side
+from common.wire.framing import Framing
+
+SOURCE = Path(__file__).with_name("board.c")
+FRAMING = Framing("crc-16", "payload")
+PATIENCE_S = 30.0
+CLEAR = reports.UltrasonicReport((4000,) * 8)
+ANSWERS: Mapping[Frame, Frame] = {
+    commands.BumperQuery(): reports.BumperReport(False),
+    commands.DistanceQuery(): reports.DistanceReport(0, 0),
+    commands.UltrasonicQuery(): CLEAR,
+    commands.DriverQuery(Side.LEFT): reports.DriverReport(Side.LEFT, 0),
+    commands.DriverQuery(Side.RIGHT): reports.DriverReport(Side.RIGHT, 0),
+    commands.UltrasonicBrakeSet(True): reports.UltrasonicBrakeReport(True),
+    commands.BumperBrakeSet(True): reports.BumperBrakeReport(True),
+}
+STANDS = reports.VelocityReport(0, 0)
+# What it says unasked, in Hz. Ten times as much: what the bridge asks for besides makes it full.
+SHIPPED: Mapping[Frame, float] = {STANDS: 50.0}
+TENFOLD: Mapping[Frame, float] = {
+    STANDS: 500.0,
+    reports.BumperReport(False): 450.0,
+    reports.DistanceReport(0, 0): 450.0,
+    CLEAR: 180.0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """One that runs."""
+
+    process: "subprocess.Popen[str]"
+
+    def send(self, hz: float, count: int) -> float:
+        """Send so many velocity reports, so many a second; return the rate that it was."""
+        out, back = self.process.stdin, self.process.stdout
+        assert out is not None
+        assert back is not None
+        out.write(f"{hz} {count}\n")
+        out.flush()
+        took_ns = int(back.readline())
+        return count * 1e9 / took_ns
+
+
+def compiled(folder: Path) -> Path:
+    """Compile it into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
+    return processes.compiled(SOURCE, folder)
+
+
+@contextlib.contextmanager
+def board(program: Path, port: int, to: int, says: Mapping[Frame, float]) -> Iterator[Board]:
+    """Run it while the context lasts, from a port of loopback to another."""
+    unasked = [f"{_hex(frame)}@{hz}" for frame, hz in says.items()]
+    asked = [f"{_hex(query)}={_hex(answer)}" for query, answer in ANSWERS.items()]
+    command = [str(program), str(port), str(to), *unasked, *asked]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield Board(process)
+        finally:
+            process.kill()
+
+
+def _hex(frame: Frame) -> str:
+    return FRAMING.pack(frame).hex()

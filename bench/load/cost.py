@@ -1,0 +1,100 @@
+"""What the chain on board takes of CPU and memory, beside two processes that do the same by hand.
+
+Memory is kept as samples, too: bytes.
+"""
+
+import contextlib
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from functools import partial
+from pathlib import Path
+
+from bench.load.board import SHIPPED, TENFOLD, board
+from bench.load.gauges import Shares, memory
+from bench.load.page import BARE, CHAIN, TOGETHER
+from bench.load.stack import Pids, Ports, stack
+from bench.series import Series
+from cli.soak_watch import tree
+from tests.fleet.part import Part
+from tests.support import wait_until
+
+TURNS = 3
+WATCHED_S = 5.0  # of each at each rate in a turn
+PATIENCE_S = 120.0
+RATES = {"shipped": SHIPPED, "tenfold": TENFOLD}
+
+Steady = Callable[[], bool]
+Running = tuple[Pids, Steady]
+Start = Callable[[Ports], AbstractContextManager[Running]]
+
+
+def measure(program: Path, turns: int = TURNS, seconds: float = WATCHED_S) -> list[Series]:
+    """Return CPU and memory of each process of both, who take turns."""
+    samples = defaultdict[tuple[str, ...], list[int]](list)
+    for _ in range(turns):
+        for name, start in ((CHAIN, on_board), (BARE, by_hand)):
+            whole = partial(turn, program, start, seconds)
+            made = wait_until(whole, f"a turn of {name} in which nobody ends", PATIENCE_S)
+            for what, values in made.items():
+                for who, value in {**values, TOGETHER: sum(values.values())}.items():
+                    samples[name, what, who].append(value)
+    return [Series(name=name, calls=1, samples_ns=some) for name, some in samples.items()]
+
+
+def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int]]:
+    """Return each process's CPU by the rate, and memory by its kind; empty when one has ended.
+
+    A guard that is kept waiting on a busy machine starts its bridge anew.
+    """
+    made, ports = {}, Ports()
+    with start(ports) as (pids, steady):
+        for rate, says in RATES.items():
+            with board(program, ports.board, ports.bridge, says):
+                wait_until(steady, "all at work", PATIENCE_S)
+                with Shares(pids) as shares:
+                    time.sleep(seconds)
+            if not pids.keys() <= shares.ns.keys():
+                return {}
+            made[rate] = {who: shares.ns[who] for who in pids}
+        used = {who: memory(pid) for who, pid in pids.items()}
+    for kind in ("rss", "pss"):
+        made[kind] = {who: of[kind] for who, of in used.items()}
+    return made
+
+
+@contextlib.contextmanager
+def on_board(ports: Ports) -> Iterator[Running]:
+    """Run the chain while somebody drives it, as teleop does."""
+    with stack(ports) as pids, Part("tests.fleet.hand", ports.endpoint, "001") as hand:
+
+        def drives() -> bool:
+            hand.begin()
+            time.sleep(1.0)
+            told = hand.end()
+            return bool(told["asked"]) and not told["refused"]
+
+        yield pids, drives
+
+
+@contextlib.contextmanager
+def by_hand(ports: Ports) -> Iterator[Running]:
+    """Run the two processes."""
+    words = "-m", "bench.load.bare", str(ports.bridge), str(ports.board)
+    with subprocess.Popen([sys.executable, *words]) as process:
+
+        def both() -> list[int]:
+            return [pid for _, pid in tree("", process.pid)]
+
+        def steady() -> bool:
+            time.sleep(1.0)
+            return True
+
+        try:
+            wait_until(lambda: len(both()) == 2, "both of them")
+            yield dict(zip(("at the board", "decides"), both(), strict=True)), steady
+        finally:
+            process.kill()

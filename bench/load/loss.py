@@ -1,0 +1,55 @@
+"""Where frames went that did not arrive. Pure."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+BEHIND_S = 0.2  # a consumer whose last messages are older does not keep up
+SLOW = 0.99  # of the rate that was asked for; a slower board has not asked for it
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """What became of the frames that were sent in a row."""
+
+    sent: int
+    dropped: int  # by the kernel: the bridge's socket had no room
+    published: int  # by the bridge
+    received: Sequence[int]  # by each consumer
+    late_s: float = 0.0  # how old messages were, all or the last
+    pace: float = 1.0  # of the rate that was asked for
+
+    @property
+    def losses(self) -> dict[str, int]:
+        """Return how many are missing by place; what all consumers miss is lost before them."""
+        missing = [self.published - each for each in self.received]
+        shared, unread = min(missing), self.sent - self.published
+        dropped = min(self.dropped, unread)  # the kernel's count has answers in it, too
+        lost = {
+            "in the socket": dropped,
+            "in the bridge": unread - dropped,
+            "between bridge and consumers": shared,
+            "at single consumers": sum(missing) - shared * len(missing),
+        }
+        return {place: count for place, count in lost.items() if count}
+
+    @property
+    def words(self) -> str:
+        """Say what was lost, late or not sent in time; empty when all is well."""
+        said = [f"{count:,} {place}" for place, count in self.losses.items()]
+        if self.late_s > BEHIND_S:
+            said.append(f"{self.late_s:.1f} s behind")
+        if self.pace < SLOW:
+            said.append(f"the board was at {self.pace:.0%} of it")
+        return ", ".join(said)
+
+
+def highest(rates: Sequence[int], holds: Callable[[int], bool]) -> int:
+    """Return the highest of rising rates that holds, by bisection; 0 where none does."""
+    low, high = -1, len(rates)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if holds(rates[middle]):
+            low = middle
+        else:
+            high = middle
+    return rates[low] if low >= 0 else 0

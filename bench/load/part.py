@@ -1,0 +1,21 @@
+"""The part ``load``: what the bridge bears, and what the chain on board costs."""
+
+import tempfile
+from importlib.metadata import version
+from pathlib import Path
+
+from bench.load import cost, throughput
+from bench.load.board import compiled
+from bench.series import Series
+
+
+def measure() -> list[Series]:
+    """Return all samples."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = compiled(Path(folder))
+        return [*throughput.measure(program), *cost.measure(program)]
+
+
+def versions() -> str:
+    """Return what is measured, with versions."""
+    return ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "msgpack"))

@@ -1,0 +1,61 @@
+"""The chain on board as processes of its own, each known by its name."""
+
+import contextlib
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from cli.soak_watch import tree
+from tests.support import free_port, router_process, wait_until
+
+CHAIN = ("bridge", "safety", "odom")
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """Where board, bridge and router listen on loopback."""
+
+    board: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
+    bridge: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
+    standby: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
+    router: int = field(default_factory=free_port)
+
+    @property
+    def endpoint(self) -> str:
+        """Where the bus is."""
+        return f"tcp/127.0.0.1:{self.router}"
+
+    @property
+    def sets(self) -> list[str]:
+        """The settings that say so, as options of a service."""
+        texts = (
+            f"board.port={self.board}",
+            f"board.listen_ports=[{self.bridge}, {self.standby}]",
+            f"bus.listen={self.endpoint}",
+        )
+        return [word for text in texts for word in ("--set", text)]
+
+
+Pids = dict[str, int]  # of each process, the guard's and its bridge's apart
+
+
+@contextlib.contextmanager
+def stack(ports: Ports, services: Sequence[str] = CHAIN) -> Iterator[Pids]:
+    """Run router and services while the context lasts, each as shipped."""
+    with contextlib.ExitStack() as held:
+        pids = {"router": held.enter_context(router_process(ports.endpoint)).pid}
+        for name in services:
+            command = [sys.executable, "-m", f"services.{name}", *ports.sets]
+            process = held.enter_context(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+            held.callback(process.kill)
+            pids[name] = process.pid
+        guard = pids["bridge"]
+        yield pids | {"guard": guard, "bridge": guarded(guard)}
+
+
+def guarded(guard: int) -> int:
+    """Return the bridge under a guard, as soon as there is one."""
+    found = wait_until(lambda: [pid for _, pid in tree("", guard)][1:], "a bridge under its guard")
+    return found[0]

@@ -1,0 +1,32 @@
+"""``python -m bench.reaction.direct``: safety without a router; whoever dials one dials safety.
+
+Its first session listens where the router would, as a peer; nothing else differs.
+"""
+
+import json
+import sys
+from itertools import chain, repeat
+from unittest.mock import patch
+
+import zenoh
+
+from common.bus import session
+from common.settings import Bus
+from services.safety.__main__ import main
+
+AS_SHIPPED = session.client_config
+
+
+def listening(where: Bus, turn: int = 0) -> zenoh.Config:
+    """Return how the first session joins: nobody, but others join it."""
+    config = AS_SHIPPED(where, turn)
+    config.insert_json5("mode", '"peer"')
+    config.insert_json5("connect/endpoints", "[]")
+    config.insert_json5("listen/endpoints", json.dumps(where.listen))
+    return config
+
+
+if __name__ == "__main__":
+    joins = chain((listening,), repeat(AS_SHIPPED))
+    with patch.object(session, "client_config", lambda *given: next(joins)(*given)):
+        sys.exit(main())

@@ -1,0 +1,29 @@
+"""The part ``start`` as a picture: the median of each start as a bar, with p90 as a line."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from bench.series import Series
+from bench.start.page import MEMORY, TO_REACH_MS
+
+
+def draw(file: Path, series: Sequence[Series]) -> None:
+    """Draw the soonest on top, and where the first STOP should be."""
+    starts = sorted(
+        (each for each in series if each.name[0] != MEMORY), key=lambda one: -one.p50_ns
+    )
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    names = [", ".join(each.name).replace("`", "") for each in starts]
+    medians = [each.p50_ns / 1e6 for each in starts]
+    late = [each.call_ns(0.9) / 1e6 - each.p50_ns / 1e6 for each in starts]
+    axes.barh(names, medians, xerr=[[0.0] * len(late), late], color="0.7")
+    axes.axvline(TO_REACH_MS, linestyle="--", color="tab:red")
+    axes.set_xlabel("from the start, ms")
+    axes.grid(axis="x", alpha=0.3)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=110)

@@ -1,0 +1,64 @@
+"""``python -m bench.telemetry.consumer WITNESS ...``: who waits for velocities, decoded.
+
+``frames PORT`` has them from the board, ``by NAME WHERE`` by somebody else's bus, ``t2 CONFIG``
+with Zenoh and MessagePack alone. It tells the witness's port of each, and when it was there.
+"""
+
+import socket
+import sys
+import threading
+import time
+
+import msgpack
+import zenoh
+
+from bench.path.bus import carrier
+from bench.path.stamp import stamped
+from bench.path.twist import Say
+from bench.reaction.loop import velocity
+from common import keys
+
+
+def by_frames(port: str, take: Say) -> None:
+    """Take what the board sends to a port."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(("127.0.0.1", int(port)))
+    while True:
+        measured = velocity(sock.recv(2048))
+        if measured:
+            take(*measured)
+
+
+def by_t2(config: str, take: Say) -> None:
+    """Take what the bridge publishes."""
+
+    def decode(sample: zenoh.Sample) -> None:
+        message = msgpack.unpackb(sample.payload.to_bytes())
+        take(message["linear"], message["angular"])
+
+    with zenoh.open(zenoh.Config.from_json5(config)) as session:
+        declared = session.declare_subscriber(keys.VELOCITY.on("001"), decode)
+        threading.Event().wait()
+        del declared
+
+
+def main(witness: str, *words: str) -> None:
+    """Consume until killed."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    there = ("127.0.0.1", int(witness))
+
+    def take(linear: float, _: float) -> None:
+        at_ns = time.monotonic_ns()
+        sock.sendto(stamped(round(1000 * linear), at_ns), there)
+
+    match words:
+        case ["frames", port]:
+            by_frames(port, take)
+        case ["t2", config]:
+            by_t2(config, take)
+        case ["by", name, where]:
+            carrier(name).listen(where, take)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

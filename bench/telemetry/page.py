@@ -1,0 +1,42 @@
+"""What the part ``telemetry`` says in the document. Pure."""
+
+from collections.abc import Sequence
+
+from bench.path import page
+from bench.reaction.page import LOADS, rows
+from bench.series import Series
+from common import keys
+from services.safety.config import Safety
+
+AGE = "age"  # in the name of a series: stream, this, load
+MS = 1_000_000
+SAFETY = Safety()
+STREAMS = (
+    ("velocity", keys.VELOCITY, SAFETY.velocity_age),
+    ("ultrasonic", keys.ULTRASONIC, SAFETY.ultrasonic_age),
+    ("bumper", keys.BUMPER, SAFETY.bumper_age),
+)
+
+
+def blocks(series: Sequence[Series]) -> dict[str, str]:
+    """Return the blocks of the document by their names."""
+    aged = {one.name: one for one in series if AGE in one.name}
+    return {
+        **page.blocks([one for one in series if AGE not in one.name]),
+        "ages": ages(aged),
+        "decisions": f"{min(len(one.samples_ns) for one in aged.values()):,}",
+    }
+
+
+def ages(by_name: dict[tuple[str, ...], Series]) -> str:
+    """Return a row for each stream, times in ms."""
+    figures = [f"{load} {figure}" for load in LOADS for figure in ("p50", "p99", "max")]
+    lines = [["sample", "Hz", *figures, "allowed"]]
+    lines.append(["---"] * len(lines[0]))
+    for name, topic, allowed_s in STREAMS:
+        cells = [name, f"{topic.rate_hz:g}"]
+        for load in LOADS:
+            one = by_name[name, AGE, load]
+            cells += [f"{ns / MS:.1f}" for ns in (one.p50_ns, one.p99_ns, max(one.samples_ns))]
+        lines.append([*cells, f"{1000 * allowed_s:.0f}"])
+    return rows(lines)

@@ -1,0 +1,117 @@
+"""What more of it costs: small runs, and where made-up curves bend."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from bench.growth import curves, page
+from bench.growth.bend import Point, bend
+from bench.load.board import compiled
+from bench.series import Series
+from tests.fleet.part import Part
+from tests.support import free_port, router_process
+
+
+def curve(*costs: float) -> list[Point]:
+    """Return a curve over 1, 2, 4, 8, ..."""
+    return [(2.0**index, cost) for index, cost in enumerate(costs)]
+
+
+@pytest.mark.parametrize(
+    ("points", "at"),
+    [
+        ([], None),
+        (curve(3), None),
+        (curve(1, 2, 4, 8, 16), None),  # in step
+        (curve(5, 5, 5, 5, 5), None),
+        (curve(5, 6, 8, 12, 20), None),  # a share that does not grow
+        (curve(1, 4, 16, 64, 256), 1),
+        (curve(4, 4, 5, 20, 80), 4),
+        (curve(1, 1, 1, 1, 9), 8),
+        (curve(1, 9, 9, 9, 9), None),  # it has come back into step
+        (curve(1, 2.4, 4.8, 9.6), None),  # within the margin
+        (curve(1, 2.6, 5.2, 10.4), 1),  # out of step for good
+        (curve(0, 1, 4, 16), 2),  # of nothing, all is too much
+        ([(10.0, 400.0), (1.0, 1.0)], 1),  # in any order
+    ],
+)
+def test_where_a_curve_bends(points: Sequence[Point], at: float | None) -> None:
+    assert bend(points) == at
+
+
+@pytest.mark.alone
+def test_what_goes_from_one_to_the_other_is_timed() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with (
+        router_process(endpoint),
+        Part("bench.growth.pair", endpoint, "3", "100", "500") as pair,
+    ):
+        told = pair.end()
+        while len(told["ages_ns"]) < 10:
+            told = pair.end()
+    assert all(0 < ns < 1e10 for ns in told["ages_ns"])
+    assert 0 < told["arrived"] <= 1
+    assert told["declared_s"] > 0
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.alone
+def test_consumers_and_sizes_are_measured_at_a_real_bridge(tmp_path: Path) -> None:
+    with curves.robot(compiled(tmp_path)) as it:
+        made = curves.consumers(it, (1, 2), 0.5)
+        made += curves.pairs(it, page.SIZES, (16, 100_000), 0.5)
+    by_name = {one.name: one for one in made}
+    for name, number in ((page.CONSUMERS, 2), (page.SIZES, 100_000)):
+        assert by_name[name, str(number), "delay"].samples_ns
+        assert page.points(by_name, name, "bridge")
+
+
+@pytest.mark.alone
+def test_robots_are_measured_at_a_real_router() -> None:
+    made = {one.name: one for one in curves.robots((2,), 1.0)}
+    assert len(made[page.ROBOTS, "2", "delay"].samples_ns) > 10
+    assert {name[2] for name in made} == {"delay", "router", "machine"}
+
+
+def made_up() -> list[Series]:
+    """Return curves that bend at 10; nothing has come from the robots."""
+    made = []
+    for name in page.CURVES:
+        for number, ns in ((1, 1000), (10, 2000), (100, 90_000)):
+            note = "7% arrived" if number == 100 else ""
+            point = curves.point((name, str(number)), {"router": ns}, [ns] * 5, 1.0, note)
+            made += [one for one in point if name != page.ROBOTS or one.name[2] == "router"]
+            if name == page.ROBOTS:
+                made.append(Series(name=(name, str(number), "delay"), calls=1, samples_ns=[]))
+    return made
+
+
+def test_a_table_says_where_it_bends() -> None:
+    blocks = page.blocks(made_up())
+    assert blocks["consumers"].splitlines() == [
+        "| consumers | router CPU % | delay p50 us | p99 us |  |",
+        "| --- | --- | --- | --- | --- |",
+        "| 1 | 0.0 | 1 | 1 |  |",
+        "| 10 | 0.0 | 2 | 2 |  |",
+        "| 100 | 0.0 | 90 | 90 | 7% arrived |",
+        "",
+        "Grows faster than the number of consumers: CPU of the router: from 10 on; "
+        "delay, p50: from 10 on; delay, p99: from 10 on.",
+    ]
+    assert "| 10 | 0.0 | - | - |  |" in blocks["robots"]
+    assert blocks["robots"].endswith("CPU of the router: from 10 on.")
+
+
+def test_what_did_not_arrive_is_noted() -> None:
+    delay, router = curves.point((page.KEYS, "3"), {"router": 5}, [1, 2], 0.5, "1.0 s to declare")
+    assert (delay.note, router.note) == ("50% arrived", "")
+    assert curves.point((page.KEYS, "3"), {}, [], 0.99, "so")[0].note == "so"
+
+
+def test_a_bridge_that_was_gone_has_no_figure() -> None:
+    made = curves.point((page.CONSUMERS, "1"), {"router": 1, "bridge": 10_000_000}, [1], 1.0)
+    made += curves.point((page.CONSUMERS, "2"), {"router": 1}, [1], 1.0)
+    rows = page.table({one.name: one for one in made}, page.CONSUMERS).splitlines()
+    assert [row.split(" | ")[2] for row in rows[2:]] == ["1.0", "-"]

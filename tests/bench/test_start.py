@@ -1,0 +1,103 @@
+"""From nothing to the first STOP: each is started and seen, and what is told of it."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from bench.reaction.board import STOP
+from bench.series import Series
+from bench.start.memory import held
+from bench.start.page import ENOUGH, MEMORY, blocks
+from bench.start.processes import children, started
+from bench.start.rows import (
+    BARE,
+    BRIDGE,
+    FIRST_BREAK,
+    FIRST_STOP,
+    NOTHING,
+    ODOM,
+    ON_BUS,
+    ROUTER,
+    ROWS,
+    SAFETY,
+    WORDS,
+    site,
+)  # fmt: skip
+from tests.support import wait_until
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+
+@LINUX
+@pytest.mark.alone
+def test_each_is_started_and_seen() -> None:
+    with site() as here:
+        times = {name: ns for row in ROWS for name, ns in row(here).items()}
+    whats = {(BRIDGE, what) for what in (FIRST_BREAK, FIRST_STOP, ON_BUS)}
+    assert set(times) == {NOTHING, BARE, ROUTER, SAFETY, ODOM} | whats
+    assert all(0 < ns < 20e9 for ns in times.values())
+    assert times[BRIDGE, FIRST_BREAK] < times[BRIDGE, FIRST_STOP]
+
+
+def test_the_script_says_what_the_bridge_says() -> None:
+    assert WORDS[bytes.fromhex(STOP)] == FIRST_STOP
+
+
+@LINUX
+def test_nobody_is_left_behind() -> None:
+    sleep = "import time; time.sleep(1000)"
+    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {sleep!r}])"
+    with started("-c", code) as (process, _):
+        (child,) = wait_until(lambda: children(process.pid), "the child")
+    assert process.returncode is not None
+    wait_until(lambda: not lives(child), "the end of the child")
+
+
+def lives(pid: int) -> bool:
+    """Tell whether a process runs; one that nobody has buried does not."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    except FileNotFoundError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
+
+
+@LINUX
+def test_the_memory_of_each_is_told() -> None:
+    sizes = held(settled_s=0.0)
+    assert len(sizes) == 5
+    assert all(0 < pss <= rss for rss, pss in sizes.values())
+
+
+def made_up(stop_ms: int, samples: int = 10) -> list[Series]:
+    times = {NOTHING: 10, BARE: 40, (BRIDGE, FIRST_BREAK): 100, (BRIDGE, FIRST_STOP): stop_ms}
+    return [
+        *(
+            Series(name=name, calls=1, samples_ns=[ms * 1_000_000] * samples)
+            for name, ms in times.items()
+        ),
+        Series(name=(MEMORY, "guard"), calls=1, samples_ns=(), note="20000000 10000000"),
+        Series(name=(MEMORY, "bridge"), calls=1, samples_ns=(), note="160000000 90000000"),
+    ]
+
+
+def test_the_table_is_in_the_order_of_the_starts() -> None:
+    told = blocks(list(reversed(made_up(200))))
+    assert told["samples"] == "10"
+    assert told["table"].splitlines()[2:] == [
+        "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |",
+        "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |",
+        "| T2, guard and bridge | first BREAK | 100 | 100 |  | × 2.5 |",
+        "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 |",
+    ]
+    assert told["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
+    assert "| 200 | 200 | 200 | × 5.0 |" in blocks(made_up(200, ENOUGH))["table"]
+
+
+@pytest.mark.parametrize(("stop_ms", "word"), [(250, "reached"), (251, "not reached")])
+def test_the_verdict_names_each_aim(stop_ms: int, word: str) -> None:
+    assert blocks(made_up(stop_ms))["verdict"].splitlines() == [
+        f"- T2's first STOP, p50: {stop_ms} of 250 ms: {word}",
+        "- memory of all on board, PSS: 100 of 150 MB: reached",
+    ]
