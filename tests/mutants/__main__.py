@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from tests.mutants.trial import TrialError, run
@@ -17,6 +18,7 @@ from tests.mutants.verdict import Mutant, complaints, entries
 ROOT = Path(__file__).parents[2]
 ALLOWED = Path(__file__).with_name("allowed.toml")
 SCRATCH = Path("mutants")
+AT_ONCE = os.cpu_count() or 1
 
 
 def gated() -> dict[str, list[str]]:
@@ -76,7 +78,10 @@ def main(words: list[str]) -> None:
     chosen = changed(files) if words == ["--changed"] else words or list(files)
     if strange := set(chosen) - set(files):
         sys.exit(f"mutants: not in the gate: {', '.join(sorted(strange))}")
-    found = {file: tried(file, files[file]) for file in chosen}
+    chosen = sorted(chosen, key=lambda file: -Path(file).stat().st_size)  # the long ones first
+    with ProcessPoolExecutor(AT_ONCE) as pool:
+        results = pool.map(tried, chosen, [files[file] for file in chosen])
+        found = dict(zip(chosen, results, strict=True))
     counts = {file: count for file, (count, _) in found.items()}
     living = [mutant for _, alive in found.values() for mutant in alive]
     wrong = complaints(counts, living, entries(ALLOWED))
