@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from common.freshness import S
 
-Handler = Callable[[int], None]  # takes the monotonic time in nanoseconds
+Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
 
 
 @dataclass(slots=True)
@@ -25,6 +25,10 @@ class Timer:
     due_ns: int
     handler: Handler
 
+    def put_off(self, now_ns: int) -> None:
+        """Make the next call a period from now, as what it is for has just been done."""
+        self.due_ns = now_ns + self.period_ns
+
 
 class Loop:
     """Waits for what is due next and does it, until ``stop``."""
@@ -32,7 +36,7 @@ class Loop:
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
         self._timers: list[Timer] = []
-        self._posted: deque[Callable[[], None]] = deque()
+        self._posted: deque[Callable[[], object]] = deque()
         self._wake_in, self._wake_out = socket.socketpair()
         self._wake_in.setblocking(False)
         self._wake_out.setblocking(False)
@@ -44,14 +48,16 @@ class Loop:
         """Call the handler whenever the socket can be read."""
         self._selector.register(sock, selectors.EVENT_READ, handler)
 
-    def every(self, period_s: float, handler: Handler) -> None:
+    def every(self, period_s: float, handler: Handler) -> Timer:
         """Call the handler every ``period_s`` seconds, the first time at once.
 
         Like ``watch`` it is for the loop's own thread; another thread posts it.
         """
-        self._timers.append(Timer(round(period_s * S), time.monotonic_ns(), handler))
+        timer = Timer(round(period_s * S), time.monotonic_ns(), handler)
+        self._timers.append(timer)
+        return timer
 
-    def post(self, call: Callable[[], None]) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Hand a call over from any thread; it is made in the loop's own."""
         self._posted.append(call)
         # A full pipe already holds a wake-up; a closed one has nobody left to wake.

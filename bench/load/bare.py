@@ -11,6 +11,7 @@ import socket
 import struct
 import sys
 import time
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgpack
@@ -19,6 +20,7 @@ from bench.codec.frame_struct import REPORTS, Kinds, framed, motion, read
 
 RUN, SPEED_MMPS = 1, 300
 MOTION_S = 0.02
+MOTION = msgpack.packb({"kind": RUN, "linear": SPEED_MMPS, "angular": 0})
 KINDS: Kinds = {
     **REPORTS,
     0x7600: (struct.Struct("<ii"), lambda *counted: counted),
@@ -37,24 +39,22 @@ QUERIES = {
 
 
 class Gate:
-    """The process at the board."""
+    """The process at the board; ``tell`` gives the other one a message."""
 
-    def __init__(self, port: int, board: int, judge: socket.socket) -> None:
+    def __init__(self, port: int, board: int, tell: Callable[[bytes], object]) -> None:
         self._sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._sock.bind(("127.0.0.1", port))
         self._board = ("127.0.0.1", board)
-        self._judge = judge
+        self._tell = tell
         self._due_s = dict.fromkeys(QUERIES, time.monotonic())
 
-    def run(self) -> None:
-        """Stand between the board and the judge until killed."""
+    def run(self, heard: Mapping[socket.socket, Callable[[], object]] = {}) -> None:
+        """Stand between the board and the other one until killed, and call for what is heard."""
+        calls = {self._sock: self._report, **heard}
         while True:
             wait_s = max(0.0, min(self._due_s.values()) - time.monotonic())
-            for ready in select.select([self._sock, self._judge], [], [], wait_s)[0]:
-                if ready is self._sock:
-                    self._report()
-                else:
-                    self._command()
+            for ready in select.select(list(calls), [], [], wait_s)[0]:
+                calls[ready]()
             self._ask()
 
     def _report(self) -> None:
@@ -64,10 +64,11 @@ class Gate:
         kind = int.from_bytes(datagram[4:6], "little")  # this board sends them one by one
         for values in read(datagram, KINDS):
             message = {"kind": kind, "values": values, "mono_ns": time.monotonic_ns()}
-            self._judge.send(msgpack.packb(message))
+            self._tell(msgpack.packb(message))
 
-    def _command(self) -> None:
-        told = msgpack.unpackb(self._judge.recv(2048))
+    def obey(self, raw: bytes) -> None:
+        """Make a frame of a motion."""
+        told = msgpack.unpackb(raw)
         values = told["kind"], told["linear"], told["angular"]
         self._sock.sendto(motion(values), self._board)
 
@@ -91,7 +92,7 @@ def judge(gate: socket.socket) -> None:
             message = msgpack.unpackb(raw)
             newest[message["kind"]] = message["values"]
         if due_s <= time.monotonic():
-            gate.send(msgpack.packb({"kind": RUN, "linear": SPEED_MMPS, "angular": 0}))
+            gate.send(MOTION)
             due_s += MOTION_S
 
 
@@ -101,7 +102,8 @@ def main() -> None:
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     if os.fork():
         there.close()
-        Gate(port, board, here).run()
+        gate = Gate(port, board, here.send)
+        gate.run({here: lambda: gate.obey(here.recv(2048))})
     else:
         here.close()
         judge(there)

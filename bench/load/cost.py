@@ -15,12 +15,12 @@ from pathlib import Path
 
 from bench.load.board import SHIPPED, TENFOLD, board
 from bench.load.gauges import Shares, memory
-from bench.load.page import BARE, CHAIN, TOGETHER
+from bench.load.page import BARE, BUS, CHAIN, TOGETHER
 from bench.load.stack import Pids, Ports, stack
 from bench.series import Series
 from cli.soak_watch import tree
 from tests.fleet.part import Part
-from tests.support import wait_until
+from tests.support import router_process, wait_until
 
 TURNS = 3
 WATCHED_S = 5.0  # of each at each rate in a turn
@@ -33,10 +33,10 @@ Start = Callable[[Ports], AbstractContextManager[Running]]
 
 
 def measure(program: Path, turns: int = TURNS, seconds: float = WATCHED_S) -> list[Series]:
-    """Return CPU and memory of each process of both, who take turns."""
+    """Return CPU and memory of each process of all, who take turns."""
     samples = defaultdict[tuple[str, ...], list[int]](list)
     for _ in range(turns):
-        for name, start in ((CHAIN, on_board), (BARE, by_hand)):
+        for name, start in ((CHAIN, on_board), (BARE, by_hand), (BUS, by_zenoh)):
             whole = partial(turn, program, start, seconds)
             made = wait_until(whole, f"a turn of {name} in which nobody ends", PATIENCE_S)
             for what, values in made.items():
@@ -89,12 +89,32 @@ def by_hand(ports: Ports) -> Iterator[Running]:
         def both() -> list[int]:
             return [pid for _, pid in tree("", process.pid)]
 
-        def steady() -> bool:
-            time.sleep(1.0)
-            return True
-
         try:
             wait_until(lambda: len(both()) == 2, "both of them")
-            yield dict(zip(("at the board", "decides"), both(), strict=True)), steady
+            yield dict(zip(("at the board", "decides"), both(), strict=True)), settled
         finally:
             process.kill()
+
+
+@contextlib.contextmanager
+def by_zenoh(ports: Ports) -> Iterator[Running]:
+    """Run the same two, each a client of a router."""
+    module = sys.executable, "-m", "bench.load.bare_zenoh"
+    with (
+        router_process(ports.endpoint) as router,
+        subprocess.Popen(
+            [*module, "board", str(ports.bridge), str(ports.board), ports.endpoint]
+        ) as gate,
+        subprocess.Popen([*module, "judge", ports.endpoint]) as judge,
+    ):
+        try:
+            yield {"router": router.pid, "at the board": gate.pid, "decides": judge.pid}, settled
+        finally:
+            for process in (gate, judge):
+                process.kill()
+
+
+def settled() -> bool:
+    """Let them begin."""
+    time.sleep(1.0)
+    return True

@@ -8,7 +8,8 @@ from bench.series import Series
 FRAMES_HZ = 5000  # to reach, without a loss
 CPU_RATIO = 1.5  # of the two processes by hand, at most
 MEMORY_MB = 150.0  # together, at most
-CHAIN, BARE, TOGETHER = "T2", "two processes by hand", "together"
+CHAIN, TOGETHER = "T2", "together"
+BARE, BUS = "two processes by hand", "the same two, Zenoh, a router"
 
 ByName = Mapping[tuple[str, ...], Series]
 
@@ -79,7 +80,7 @@ def cost(by_name: ByName) -> str:
     """Return a row for each process: CPU at both rates, and memory."""
     head = ["", "process", "CPU %", "CPU % tenfold", "RSS MB", "PSS MB"]
     lines = [head, ["---"] * len(head)]
-    for who in (CHAIN, BARE):
+    for who in (CHAIN, BARE, BUS):
         names = [name[2] for name in by_name if name[:2] == (who, "shipped")]
         for name in names:
             shares = [middle(by_name, who, rate, name) / 1e7 for rate in ("shipped", "tenfold")]
@@ -96,6 +97,8 @@ def cost_verdict(by_name: ByName) -> str:
         ratio = middle(by_name, CHAIN, rate, TOGETHER) / middle(by_name, BARE, rate, TOGETHER)
         word = "reached" if ratio <= CPU_RATIO else "not reached"
         said.append(f"- {words} beside {BARE}: × {ratio:.1f} of × {CPU_RATIO}: {word}")
+        ratio = middle(by_name, BUS, rate, TOGETHER) / middle(by_name, BARE, rate, TOGETHER)
+        said.append(f"  - of that, {BUS}: × {ratio:.1f}")
     for kind, words in (("pss", "shared pages once"), ("rss", "shared pages in each")):
         size = middle(by_name, CHAIN, kind, TOGETHER) / 1e6
         word = "reached" if size <= MEMORY_MB else "not reached"

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
 
-from bench.path.processes import answers, running
+from bench.path.processes import answers, given, module, running
 from bench.path.twist import Say
 from tests.support import free_port, wait_until
 
@@ -86,11 +86,25 @@ def redis() -> Iterator[str]:
             yield path
 
 
+@contextlib.contextmanager
+def zenoh(*, ahead: bool = False) -> Iterator[str]:
+    """Run T2's router; ahead of ordinary processes when it is told to, as in T2."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with running(
+        module(
+            "cli router", *given(f"bus.listen={endpoint}", f"robot.realtime={str(ahead).lower()}")
+        )
+    ):
+        yield endpoint
+
+
 UDP = Other("UDP", "udp", udp)
+ZENOH = Other("Zenoh, a router", "zenoh", zenoh)
 OTHERS = (
     Other("CycloneDDS", "dds", dds, "cyclonedds"),
     Other("ZeroMQ, IPC", "zmq", zmq, "pyzmq"),
     Other("LCM", "lcm", lcm, "lcm"),
     Other("MQTT, mosquitto", "mqtt", mqtt, "paho-mqtt", "mosquitto"),
     Other("Redis, unix socket", "redis", redis, "redis", "redis-server"),
+    ZENOH,
 )

@@ -37,6 +37,11 @@ def module(name: str, *words: object) -> Command:
     return [sys.executable, "-m", *name.split(), *map(str, words)]
 
 
+def given(*sets: str) -> list[str]:
+    """Return settings as options."""
+    return [word for each in sets for word in ("--set", each)]
+
+
 def compiled(source: Path, folder: Path) -> Path:
     """Compile a C program into a folder; raise ``FileNotFoundError`` where there is no compiler."""
     if shutil.which("cc") is None:
@@ -83,4 +88,4 @@ def versions(rows: Sequence[Wanting]) -> str:
     here = [row.package for row in rows if row.package and not row.lacks]
     told = [f"{name} {version(name)}" for name in ("eclipse-zenoh", *here)]
     left_out = [f"{row.name} left out, {row.lacks} is not installed" for row in rows if row.lacks]
-    return ", ".join([*told, *left_out])
+    return ", ".join([*dict.fromkeys(told), *left_out])

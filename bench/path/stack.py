@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from bench.path.processes import Command, module, running
+from bench.path.processes import Command, given, module, running
 from common.settings import Bus
 from tests.cli.site import ADDRESS, Site, dialling
 from tests.support import at, free_port
@@ -52,11 +52,6 @@ def secured(board: int, port: int, *sets: str) -> Iterator[Bus]:
         sets = (f"bus.listen=[{door!r}, {onboard!r}]", EVERY_ONE, *files(robot), *sets)
         with running(*services(board, port, *sets)):
             yield dialling(driver, door)
-
-
-def given(*sets: str) -> list[str]:
-    """Return settings as options."""
-    return [word for each in sets for word in ("--set", each)]
 
 
 def files(bus: Bus) -> list[str]:

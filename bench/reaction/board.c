@@ -61,7 +61,7 @@ int main(int count, char **given) {
             if (now() >= clear_ns) {
                 say(&clear);
                 clears++;
-                clear_ns = now() + (clears < 4 ? MS / 2 : 20 * MS);
+                clear_ns = now() + (clears < 4 ? MS / 2 : MS);
             }
             ssize_t size = heard(got, clear_ns);
             if (is(&brake, got, size))

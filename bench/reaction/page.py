@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from bench.reaction.responders import DDS, FIFO, JUDGED, LOOP, REFLEX
+from bench.reaction.responders import DDS, FIFO, JUDGED, LOOP, REFLEX, ZENOH
 from bench.series import Series
 
 LOADS = ("quiet", "busy")
@@ -25,6 +25,7 @@ def blocks(series: Sequence[Series]) -> dict[str, str]:
     return {
         "table": table(by_name),
         "verdict": verdict(by_name),
+        "share": share(by_name),
         "samples": f"{min(len(each.samples_ns) for each in series):,}",
         "ahead": series[0].note,
     }
@@ -66,6 +67,21 @@ def verdict(by_name: ByName) -> str:
                     f"- {ours} beside {other}, {load}, {figure}: × {ratio:.2f} of × {limit}: {word}"
                 )
     return "\n".join(said)
+
+
+def share(by_name: ByName) -> str:
+    """Say how much of a judged stop is the bus's, beside CycloneDDS where that is installed."""
+    told = []
+    for load in LOADS:
+        bus, other, ours = (
+            by_name.get((name, load)) for name in (ZENOH + FIFO, DDS + FIFO, JUDGED)
+        )
+        if bus and other and ours:
+            told.append(
+                f"{load}, × {bus.ratio(other):.1f} of CycloneDDS's, and T2 × {ours.ratio(bus):.1f}"
+                " of theirs"
+            )
+    return "; ".join(told)
 
 
 def figures(one: Series) -> dict[str, float]:

@@ -16,7 +16,7 @@ from common import realtime
 from tests.support import free_port
 
 SEED = 20_240_607
-BLOCKS, HITS, WARM = 2, 150, 20
+BLOCKS, HITS, WARM = 2, 750, 20
 BUSY = 4  # processes that only count, on the busy machine
 
 

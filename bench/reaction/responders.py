@@ -3,7 +3,8 @@
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 from bench.path import bus
 from bench.path.processes import lacking, module, running
@@ -80,9 +81,15 @@ def pair(other: bus.Other, ahead: str = "") -> Responder:
     return Responder(title, start, other.package, other.program)
 
 
+@contextlib.contextmanager
+def direct() -> Iterator[str]:
+    """Tell an endpoint that one of the two listens on."""
+    yield f"tcp/127.0.0.1:{free_port()}"
+
+
 FIFO = ", SCHED_FIFO"
 FLOOR, LOOP, REFLEX = "C, compares bytes", "Python, one process", "T2, reflex"
-JUDGED, DDS = "T2, judged stop", bus.OTHERS[0].title
+JUDGED, DDS, ZENOH = "T2, judged stop", bus.OTHERS[0].title, bus.ZENOH.title
 BLUNT = "bench.reaction.blunt"
 AHEAD = "bench.path.ahead"
 ORDINARY = ("robot.realtime=false",)
@@ -103,4 +110,6 @@ RESPONDERS = (
     Responder(f"{JUDGED}, no router", stack(BLUNT, DIRECT)),
     *map(pair, bus.OTHERS),
     pair(bus.OTHERS[0], AHEAD),
+    pair(replace(bus.ZENOH, stand=partial(bus.zenoh, ahead=True)), AHEAD),
+    pair(bus.Other("Zenoh, direct", "zenoh_direct", direct), AHEAD),
 )

@@ -88,9 +88,11 @@ class Bus:
         A newer one pushes the oldest out. ``refused`` gets the key and the error of what is no such
         message; it is counted in any case.
         """
+        expression = topic.on(self.robot, **names)
+        only = "" if "*" in expression else expression  # to ask a sample for its key takes time
 
         def take(sample: zenoh.Sample, received_ns: int) -> None:
-            key = str(sample.key_expr)
+            key = only or str(sample.key_expr)
             self.counts[key] += 1
             try:
                 message = codec.decode(sample.payload.to_bytes(), topic.message)
@@ -102,7 +104,7 @@ class Bus:
             raw = sample.attachment.to_bytes() if sample.attachment else None
             handler(Arrival(message, key, received_ns, raw))
 
-        self._subscribe(topic.on(self.robot, **names), take, depth, topic.service.history)
+        self._subscribe(expression, take, depth, topic.service.history)
 
     def tap(self, expression: str, handler: Callable[[Sample], None], *, depth: int) -> None:
         """Call the handler with each sample on these keys, just as it came; see ``subscribe``.

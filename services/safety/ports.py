@@ -21,7 +21,7 @@ from services.safety.report import motion_message, notes, signature, state_messa
 
 M = TypeVar("M", bound=Message)
 
-DECIDE_S = 1 / 50
+DECIDE_S = 1 / 50  # from one decision to the next, at most
 TELL_S = 1 / 20
 # One sample latches, a hit or a driver's fault, and the next one may say that it is over: none must
 # be pushed out or left undecided, even after a second's stall.
@@ -44,7 +44,7 @@ class Ports:
         self._safety = node.bus.publisher(keys.SAFETY)
         self._listen()
         node.at_rest = self._come_to_rest
-        node.loop.every(DECIDE_S, lambda _: self._decide())
+        self._due = node.loop.every(DECIDE_S, lambda _: self._decide())
         node.loop.every(TELL_S, self._tell)
 
     def _listen(self) -> None:
@@ -103,6 +103,7 @@ class Ports:
         self, event: Event | None = None, answer: Callable[[bool, str], None] | None = None
     ) -> None:
         now_ns = time.monotonic_ns()
+        self._due.put_off(now_ns)
         inputs = replace(self._inputs, reader=self._reader.connected, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)

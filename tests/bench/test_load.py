@@ -25,7 +25,11 @@ from services.bridge.bridge import queries
 from services.bridge.config import Bridge
 from tests.support import free_port, wait_until
 
-PROCESSES = {page.CHAIN: ("router", "bridge"), page.BARE: ("at the board", "decides")}
+PROCESSES = {
+    page.CHAIN: ("router", "bridge"),
+    page.BARE: ("at the board", "decides"),
+    page.BUS: ("router", "decides"),
+}
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
 
@@ -105,10 +109,10 @@ def test_both_are_measured_in_turns(program: Path) -> None:
     by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.3)}
     chain = {name[2] for name in by_name if name[0] == page.CHAIN}
     assert chain == {"router", "guard", "bridge", "safety", "odom", page.TOGETHER}
-    for who in (page.CHAIN, page.BARE):
+    for who in (page.CHAIN, page.BARE, page.BUS):
         for what in ("tenfold", "rss", "pss"):
             assert page.middle(by_name, who, what, page.TOGETHER) > 0
-    assert page.cost(by_name).count("\n") == 1 + len(chain) + 3
+    assert page.cost(by_name).count("\n") == 1 + len(chain) + 3 + 4
 
 
 def test_what_the_kernel_had_no_room_for_is_counted(sock: socket.socket) -> None:
@@ -194,7 +198,7 @@ def made_up() -> list[Series]:
         made.append(Series(name=(*name, "delay"), calls=1, samples_ns=[400_000] * 9, note=note))
         for who in ("router", "bridge", "machine"):
             made.append(Series(name=(*name, who), calls=1, samples_ns=[250_000_000]))
-    for who, each in ((page.CHAIN, 30), (page.BARE, 20)):
+    for who, each in ((page.CHAIN, 30), (page.BARE, 20), (page.BUS, 25)):
         for what, value in (("shipped", 1e6), ("tenfold", 1e7), ("rss", 3e6), ("pss", 1e6)):
             for name_of in PROCESSES[who]:
                 made.append(sample(who, what, name_of, each * value))
@@ -225,7 +229,9 @@ def test_cost_is_told_beside_the_two_by_hand() -> None:
     assert blocks["cost"].splitlines()[4] == "| T2 | together | 6.0 | 60.0 | 180 | 60 |"
     assert blocks["cost_verdict"].splitlines() == [
         f"- CPU at the shipped rates beside {page.BARE}: × 1.5 of × 1.5: reached",
+        f"  - of that, {page.BUS}: × 1.2",
         f"- CPU at tenfold beside {page.BARE}: × 1.5 of × 1.5: reached",
+        f"  - of that, {page.BUS}: × 1.2",
         "- memory together, PSS (shared pages once): 60 of 150 MB: reached",
         "- memory together, RSS (shared pages in each): 180 of 150 MB: not reached",
     ]

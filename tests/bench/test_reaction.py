@@ -7,9 +7,18 @@ import pytest
 
 from bench.reaction import loop
 from bench.reaction.board import BREAK, CLEAR, HIT, STANDS, STOP, compiled
-from bench.reaction.page import table, verdict
+from bench.reaction.page import share, table, verdict
 from bench.reaction.part import block
-from bench.reaction.responders import DDS, JUDGED, LOOP, REFLEX, RESPONDERS, Responder
+from bench.reaction.responders import (
+    DDS,
+    FIFO,
+    JUDGED,
+    LOOP,
+    REFLEX,
+    RESPONDERS,
+    ZENOH,
+    Responder,
+)
 from bench.series import Series
 
 
@@ -51,3 +60,19 @@ def test_the_verdict_names_each_figure() -> None:
     assert told[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
     both = [made_up(name, load, 10) for name in (JUDGED, DDS) for load in ("quiet", "busy")]
     assert len(verdict(by_name | {each.name: each for each in both}).splitlines()) == 8
+
+
+def test_what_is_the_buss_share() -> None:
+    rows = [(JUDGED, 20, 60), (ZENOH + FIFO, 10, 20), (DDS + FIFO, 5, 20)]
+    series = [
+        made_up(name, load, us)
+        for name, *times_us in rows
+        for load, us in zip(("quiet", "busy"), times_us, strict=True)
+    ]
+    by_name = {each.name: each for each in series}
+    assert share(by_name) == (
+        "quiet, × 2.0 of CycloneDDS's, and T2 × 2.0 of theirs; "
+        "busy, × 1.0 of CycloneDDS's, and T2 × 3.0 of theirs"
+    )
+    del by_name[DDS + FIFO, "quiet"], by_name[DDS + FIFO, "busy"]
+    assert share(by_name) == ""

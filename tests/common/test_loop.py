@@ -76,6 +76,20 @@ def test_a_late_timer_is_called_once_and_keeps_its_beat(loop: Loop, clock: Clock
     assert calls[2:] == [106 * S]
 
 
+def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock) -> None:
+    calls: list[int] = []
+    timer = loop.every(1.0, calls.append)
+    turn(loop)
+    for _ in range(3):
+        clock.pass_s(0.9)
+        timer.put_off(clock.now_ns)
+        turn(loop)
+    assert calls == [100 * S]
+    clock.pass_s(1.0)
+    turn(loop)
+    assert calls[1:] == [round(103.7 * S)]
+
+
 def test_lateness_is_the_worst_since_it_was_asked_for(loop: Loop, clock: Clock) -> None:
     loop.every(1.0, lambda _: None)
     loop.every(0.5, lambda _: None)
