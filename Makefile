@@ -51,9 +51,15 @@ faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faul
 fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
 	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
 
+# What costs on board is measured with what a robot installs.
+ROBOT = out/robot
+
 bench: $(STAMP) ## T2 beside what a user would pick instead, measured; renews docs/performance.md
 	$(UV_INSTALL) --require-hashes -r requirements-bench.lock || \
 	  $(PIP_INSTALL) --require-hashes -r requirements-bench.lock
+	$(BIN)/python -m venv --clear $(ROBOT)
+	$(subst $(BIN)/python,$(ROBOT)/bin/python,$(UV_INSTALL)) --require-hashes -r requirements-robot.lock || \
+	  $(ROBOT)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-robot.lock
 	$(BIN)/python -m bench --out docs/performance.md
 
 compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run

@@ -6,8 +6,9 @@ router, and nobody is told; see ``docs/security.md``.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from common import keys
 from common.members import Member
@@ -44,8 +45,7 @@ SEATS = ("dashboard", "metrics")
 DRIVERS_SEATS = (*SEATS, "teleop")
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """One rule of Zenoh's: what passes, and on which keys."""
 
     id: str

@@ -12,7 +12,6 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_origin, get_type_hints
 
@@ -36,25 +35,22 @@ SECTIONS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Sources:
+class Sources(Struct, frozen=True):
     """Where settings come from, weakest first."""
 
     files: Sequence[Path] = (DEFAULT_FILE,)
-    environ: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
+    environ: Mapping[str, str] = msgspec.field(default_factory=lambda: dict(os.environ))
     sets: Sequence[str] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """One value and where it came from."""
 
     value: Any
     origin: str
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded(Generic[C]):
+class Loaded(Struct, Generic[C], frozen=True):
     """A valid configuration, and every setting in it by path."""
 
     config: C

@@ -5,7 +5,6 @@ made by mistake does not reach it. ``estop`` is not, on purpose: ``put t2/v1/*/e
 fleet.
 """
 
-from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 from msgspec import Struct
@@ -21,8 +20,7 @@ ReplyT = TypeVar("ReplyT", bound=Struct)
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA"]
 
 
-@dataclass(frozen=True, slots=True)
-class ClassOfService:
+class ClassOfService(Struct, frozen=True):
     """How Zenoh carries a key; congestion always drops, because blocking stalls the healthy."""
 
     name: str
@@ -42,8 +40,7 @@ SLOW = ClassOfService("slow", "DATA", "people and records read it")
 EVENT = ClassOfService("event", "DATA", "rare, and worth having late", history=100)
 
 
-@dataclass(frozen=True, slots=True)
-class Topic(Generic[MessageT]):
+class Topic(Struct, Generic[MessageT], frozen=True):
     """A key that is published; ``{name}`` in its path is filled in by ``on``."""
 
     path: str
@@ -58,8 +55,7 @@ class Topic(Generic[MessageT]):
         return f"{ROOT}/{robot}/{self.path.format(**names)}"
 
 
-@dataclass(frozen=True, slots=True)
-class Call(Generic[RequestT, ReplyT]):
+class Call(Struct, Generic[RequestT, ReplyT], frozen=True):
     """A key that answers queries: one request, one reply or a refusal with its reason."""
 
     path: str

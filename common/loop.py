@@ -10,15 +10,15 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.freshness import S
 
 Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
 
 
-@dataclass(slots=True)
-class Timer:
+class Timer(Struct):
     """A call that is due every period; a late one is made once, never caught up in a burst."""
 
     period_ns: int

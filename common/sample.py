@@ -1,10 +1,9 @@
 """What was put on a key, just as it came: no type is asked of it."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(Struct, frozen=True):
     """A sample as it came: ``received_ns`` on the monotonic clock, ``wall_ns`` on the other."""
 
     key: str

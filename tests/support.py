@@ -66,9 +66,11 @@ def listening(endpoint: str, *uplink: str) -> settings.Bus:
 
 
 @contextlib.contextmanager
-def router_process(endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
+def router_process(
+    endpoint: str, python: str = sys.executable
+) -> Iterator[subprocess.Popen[bytes]]:
     """Run ``t2 router`` as a process of its own, listening when the context begins."""
-    command = [sys.executable, "-m", "cli", "router", "--set", f"bus.listen={endpoint}"]
+    command = [python, "-m", "cli", "router", "--set", f"bus.listen={endpoint}"]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         try:

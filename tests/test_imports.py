@@ -12,8 +12,8 @@ ON_BOARD = (
 )  # fmt: skip
 # What each of them costs stands where it is done without. The rest is for laptops.
 HEAVY = {
-    "asyncio", "email", "hashlib", "importlib.metadata", "logging", "shutil", "structlog",
-    "jinja2", "matplotlib", "mcap", "nicegui", "rich", "textual",
+    "asyncio", "dataclasses", "email", "hashlib", "importlib.metadata", "logging", "shutil",
+    "jinja2", "matplotlib", "mcap", "nicegui", "rich", "structlog", "textual",
 }  # fmt: skip
 
 

@@ -5,7 +5,6 @@ Memory is kept as samples, too: bytes.
 
 import contextlib
 import subprocess
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -17,6 +16,7 @@ from bench.load.board import SHIPPED, TENFOLD, board
 from bench.load.gauges import Shares, memory
 from bench.load.page import BARE, BUS, CHAIN, TOGETHER
 from bench.load.stack import Pids, Ports, stack
+from bench.path.processes import robots_python
 from bench.series import Series
 from cli.soak_watch import tree
 from tests.fleet.part import Part
@@ -84,7 +84,7 @@ def on_board(ports: Ports) -> Iterator[Running]:
 def by_hand(ports: Ports) -> Iterator[Running]:
     """Run the two processes."""
     words = "-m", "bench.load.bare", str(ports.bridge), str(ports.board)
-    with subprocess.Popen([sys.executable, *words]) as process:
+    with subprocess.Popen([robots_python(), *words]) as process:
 
         def both() -> list[int]:
             return [pid for _, pid in tree("", process.pid)]
@@ -99,9 +99,10 @@ def by_hand(ports: Ports) -> Iterator[Running]:
 @contextlib.contextmanager
 def by_zenoh(ports: Ports) -> Iterator[Running]:
     """Run the same two, each a client of a router."""
-    module = sys.executable, "-m", "bench.load.bare_zenoh"
+    python = robots_python()
+    module = python, "-m", "bench.load.bare_zenoh"
     with (
-        router_process(ports.endpoint) as router,
+        router_process(ports.endpoint, python) as router,
         subprocess.Popen(
             [*module, "board", str(ports.bridge), str(ports.board), ports.endpoint]
         ) as gate,

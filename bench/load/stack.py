@@ -3,10 +3,10 @@
 import contextlib
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from bench.path.processes import robots_python
 from cli.soak_watch import tree
 from tests.support import free_port, router_process, wait_until
 
@@ -44,10 +44,11 @@ Pids = dict[str, int]  # of each process, the guard's and its bridge's apart
 @contextlib.contextmanager
 def stack(ports: Ports, services: Sequence[str] = CHAIN) -> Iterator[Pids]:
     """Run router and services while the context lasts, each as shipped."""
+    python = robots_python()
     with contextlib.ExitStack() as held:
-        pids = {"router": held.enter_context(router_process(ports.endpoint)).pid}
+        pids = {"router": held.enter_context(router_process(ports.endpoint, python)).pid}
         for name in services:
-            command = [sys.executable, "-m", f"services.{name}", *ports.sets]
+            command = [python, "-m", f"services.{name}", *ports.sets]
             process = held.enter_context(subprocess.Popen(command, stderr=subprocess.DEVNULL))
             held.callback(process.kill)
             pids[name] = process.pid

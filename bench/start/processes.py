@@ -4,10 +4,11 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+
+from bench.path.processes import robots_python
 
 UNKEPT = "PYTHONDONTWRITEBYTECODE"
 
@@ -18,7 +19,7 @@ def started(*words: str) -> Iterator[tuple["subprocess.Popen[bytes]", int]]:
     # Byte code is kept, as in every installation, whatever the one who measures does himself.
     environ = {name: text for name, text in os.environ.items() if name != UNKEPT}
     begin_ns = time.monotonic_ns()
-    process = subprocess.Popen([sys.executable, *words], env=environ, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen([robots_python(), *words], env=environ, stderr=subprocess.DEVNULL)
     try:
         yield process, begin_ns
     finally:

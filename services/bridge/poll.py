@@ -6,7 +6,8 @@ is busy is so not flooded, and one that recovers is not kept waiting.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from common.freshness import S
 from common.wire.frame import Frame
@@ -14,8 +15,7 @@ from common.wire.frame import Frame
 SLOWEST = 4  # times the period
 
 
-@dataclass(slots=True)
-class Query:
+class Query(Struct):
     """One query and what became of it."""
 
     name: str

@@ -22,10 +22,9 @@ What cannot be true is not counted, and this is counted.
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 from common.freshness import S
 from common.messages import Durations, Motion, Timing
@@ -62,8 +61,7 @@ REQUEST = Way(
 WAYS = (READ, CONTACT, JUDGED, REQUEST)
 
 
-@dataclass(slots=True)
-class Histogram:
+class Histogram(Struct):
     """Durations by size."""
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(BOUNDS_NS) + 1))

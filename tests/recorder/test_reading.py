@@ -122,7 +122,7 @@ def test_the_time_of_a_file_does_not_jump_with_the_clock(tmp_path: Path) -> None
     made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
     first, second = (sample("tel/x", specimen.velocity(), at_s) for at_s in (0.0, 1.0))
     made.write(first)
-    stepped = {name: getattr(second, name) for name in second.__slots__} | {"wall_ns": 5}
+    stepped = {name: getattr(second, name) for name in second.__struct_fields__} | {"wall_ns": 5}
     made.write(type(second)(**stepped))
     made.close()
     assert [each.log_ns for each in read(made.path)[0]] == [BEGIN_NS, BEGIN_NS + S]
