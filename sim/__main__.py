@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from common import log
+from common import log, realtime
 from common.config import load
 from common.errors import ConfigError, LinkError
 from common.options import EXIT_CONFIG, EXIT_LINK, add_sources, sources
@@ -32,6 +32,8 @@ def run(options: argparse.Namespace) -> int:
     config = load(Config, sources(options)).config
     plan = load_plan(config.sim.world, config.vehicle)
     script = load_script(options.faults) if options.faults else Script()
+    if config.robot.realtime:
+        realtime.ask(realtime.BOARD)
     log.configure(config.log, "sim")
     with closing(Trace(options.trace)) as trace:
         try:

@@ -9,7 +9,7 @@ from functools import cache
 import pytest
 
 from common import realtime
-from common.realtime import BRIDGE, GUARD, ROUTER, SAFETY
+from common.realtime import BOARD, BRIDGE, GUARD, ROUTER, SAFETY
 
 PATIENCE_S = 60
 TELL = "from common import realtime as r; import os, threading, resource; "
@@ -34,7 +34,7 @@ needs_right = pytest.mark.skipif(
 
 
 def test_who_is_nearer_to_the_wheels_is_ahead() -> None:
-    assert GUARD > BRIDGE > SAFETY > ROUTER > 0
+    assert BOARD > GUARD > BRIDGE > SAFETY > ROUTER > 0
 
 
 def test_this_process_is_ordinary() -> None:

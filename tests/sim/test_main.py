@@ -14,6 +14,7 @@ import msgspec
 import pytest
 
 from cli.__main__ import main as t2
+from common import realtime
 from common.errors import LinkError
 from common.options import EXIT_CONFIG, EXIT_LINK
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
@@ -24,6 +25,7 @@ from sim.control import Control
 from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
 from sim.trace import read
 from sim.world import Box
+from tests.common.test_realtime import needs_right
 from tests.support import PATIENCE_S, free_port, wait_until
 
 FRAMING = Framing()
@@ -113,6 +115,13 @@ def test_a_process_ends_on_sigint(bench: Bench) -> None:
         assert running.wait(PATIENCE_S) == 0
         assert running.stderr is not None
         assert b"Traceback" not in running.stderr.read()
+
+
+@needs_right
+@pytest.mark.parametrize(("asked", "priority"), [("true", realtime.BOARD), ("false", 0)])
+def test_nobody_on_board_keeps_it_waiting(bench: Bench, asked: str, priority: int) -> None:
+    with process(bench, "--set", f"robot.realtime={asked}") as running:
+        assert realtime.priority(running.pid) == priority
 
 
 @contextmanager
