@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from bench.load.page import BARE, CHAIN, FRAMES_HZ, TOGETHER, ByName, consumers, middle, tried
+from bench.load.page import BARE, BUS, CHAIN, FRAMES_HZ, TOGETHER, ByName, consumers, middle, tried
 from bench.series import Series
 
 READABLE = 2.0  # % of a core; a smaller bar has no room for its name
+LABEL = 18  # characters in a line below a bar
 
 
 def draw(file: Path, series: Sequence[Series]) -> None:
@@ -44,7 +46,7 @@ def _rates(axes: Axes, by_name: ByName) -> None:
 
 def _cpu(axes: Axes, by_name: ByName) -> None:
     rates = ("shipped", "tenfold")
-    bars = [(who, rate) for rate in rates for who in (CHAIN, BARE)]
+    bars = [(who, rate) for rate in rates for who in (CHAIN, BARE, BUS)]
     for at, (who, rate) in enumerate(bars):
         bottom = 0.0
         names = [name[2] for name in by_name if name[:2] == (who, rate) and name[2] != TOGETHER]
@@ -54,6 +56,7 @@ def _cpu(axes: Axes, by_name: ByName) -> None:
             if share > READABLE:
                 axes.annotate(name, (at, bottom + share / 2), ha="center", va="center", fontsize=7)
             bottom += share
-    axes.set_xticks(range(len(bars)), [f"{who},\n{rate}" for who, rate in bars], fontsize=8)
+    labels = [fill(f"{who}, {rate}", LABEL) for who, rate in bars]
+    axes.set_xticks(range(len(bars)), labels, fontsize=8)
     axes.set_ylabel("CPU, % of a core")
     axes.grid(axis="y", alpha=0.3)

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from bench.reaction.page import LOADS
 from bench.series import Series
 
-COLOURS = 10  # then they begin anew, dashed
+COLOURS = 10  # then they begin anew, in the next style
+STYLES = "-", "--", ":"
 
 
 def draw(file: Path, series: Sequence[Series], what: str) -> None:
@@ -36,5 +37,5 @@ def lines(axes: Axes, series: Sequence[Series]) -> None:
         times = sorted(one.samples_ns)
         count = len(times)
         left = [(count - each) / count for each in range(count)]
-        style = "-" if number < COLOURS else "--"
+        style = STYLES[number // COLOURS]
         axes.plot([ns / 1000 for ns in times], left, style, label=one.name[0])
