@@ -24,9 +24,20 @@ class Timer(Struct):
     period_ns: int
     due_ns: int
     handler: Handler
+    late_ns: int = 0  # at worst
+
+    def call(self, now_ns: int) -> None:
+        """Make the call if it is due."""
+        late_ns = now_ns - self.due_ns
+        if late_ns < 0:
+            return
+        self.late_ns = max(self.late_ns, late_ns)
+        self.due_ns += self.period_ns * (late_ns // self.period_ns + 1)
+        self.handler(now_ns)
 
     def put_off(self, now_ns: int) -> None:
         """Make the next call a period from now, as what it is for has just been done."""
+        self.late_ns = max(self.late_ns, now_ns - self.due_ns)
         self.due_ns = now_ns + self.period_ns
 
 
@@ -41,7 +52,6 @@ class Loop:
         self._wake_in.setblocking(False)
         self._wake_out.setblocking(False)
         self._selector.register(self._wake_out, selectors.EVENT_READ, self._drain)
-        self._late_ns = 0
         self._stopped = False
 
     def watch(self, sock: socket.socket, handler: Handler) -> None:
@@ -87,8 +97,10 @@ class Loop:
 
     def take_lateness_s(self) -> float:
         """Return how late the latest timer was since the last call, in seconds."""
-        late, self._late_ns = self._late_ns, 0
-        return late / S
+        late_ns = max((timer.late_ns for timer in self._timers), default=0)
+        for timer in self._timers:
+            timer.late_ns = 0
+        return late_ns / S
 
     def _until_due_s(self) -> float | None:
         if not self._timers:
@@ -98,13 +110,7 @@ class Loop:
 
     def _call_due(self) -> None:
         for timer in self._timers:
-            now = time.monotonic_ns()
-            late = now - timer.due_ns
-            if late < 0:
-                continue
-            self._late_ns = max(self._late_ns, late)
-            timer.due_ns += timer.period_ns * (late // timer.period_ns + 1)
-            timer.handler(now)
+            timer.call(time.monotonic_ns())
 
     def _drain(self, _: int) -> None:
         with contextlib.suppress(BlockingIOError):

@@ -13,10 +13,12 @@ safety  52       the bridge, whose lease runs out
 router  51       safety and bridge: each misses the other
 ======= ======== ===================================================
 
-The simulated board, 55, is ahead of them all: the real one is another machine.
+The simulated board, 55, is ahead of them all: the real one is another machine, which nothing on
+this one keeps waiting.
 
 A thread that computes on for ``LONGEST_US`` without waiting for anything runs away, and Linux ends
-its process. The router is spared: a thread of it that passes on all that it can does not wait.
+its process. The router is spared: a thread of it that passes on all that it can does not wait. So
+is the simulated board, which may be told to flood its bridge.
 
 Where the right to go ahead is missing, and on other systems, things go on as ordinary.
 """

@@ -100,19 +100,28 @@ def by_hand(ports: Ports) -> Iterator[Running]:
 def by_zenoh(ports: Ports) -> Iterator[Running]:
     """Run the same two, each a client of a router."""
     python = robots_python()
-    module = python, "-m", "bench.load.bare_zenoh"
-    with (
-        router_process(ports.endpoint, python) as router,
-        subprocess.Popen(
-            [*module, "board", str(ports.bridge), str(ports.board), ports.endpoint]
-        ) as gate,
-        subprocess.Popen([*module, "judge", ports.endpoint]) as judge,
-    ):
-        try:
-            yield {"router": router.pid, "at the board": gate.pid, "decides": judge.pid}, settled
-        finally:
-            for process in (gate, judge):
-                process.kill()
+    words = {
+        "at the board": ("board", str(ports.bridge), str(ports.board), ports.endpoint),
+        "decides": ("judge", ports.endpoint),
+    }
+    with contextlib.ExitStack() as held:
+        pids = {"router": held.enter_context(router_process(ports.endpoint, python)).pid}
+        silent = []
+        for name, given in words.items():
+            command = [python, "-m", "bench.load.bare_zenoh", *given]
+            process = held.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            held.callback(process.kill)
+            pids[name] = process.pid
+            silent.append(process)
+
+        def steady() -> bool:
+            while silent:
+                heard = silent.pop().stdout
+                assert heard is not None
+                assert heard.readline() == b"heard\n"
+            return settled()
+
+        yield pids, steady
 
 
 def settled() -> bool:

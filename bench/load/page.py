@@ -98,7 +98,7 @@ def cost_verdict(by_name: ByName) -> str:
         word = "reached" if ratio <= CPU_RATIO else "not reached"
         said.append(f"- {words} beside {BARE}: × {ratio:.1f} of × {CPU_RATIO}: {word}")
         ratio = middle(by_name, BUS, rate, TOGETHER) / middle(by_name, BARE, rate, TOGETHER)
-        said.append(f"  - of that, {BUS}: × {ratio:.1f}")
+        said.append(f"  - {BUS}: × {ratio:.1f}")
     for kind, words in (("pss", "shared pages once"), ("rss", "shared pages in each")):
         size = middle(by_name, CHAIN, kind, TOGETHER) / 1e6
         word = "reached" if size <= MEMORY_MB else "not reached"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bench.load import cost, throughput
 from bench.load.board import compiled
+from bench.path.processes import packages
 from bench.series import Series
 
 
@@ -18,4 +19,5 @@ def measure() -> list[Series]:
 
 def versions() -> str:
     """Return what is measured, with versions."""
-    return ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "msgpack"))
+    told = ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "msgpack"))
+    return f"{told}, {packages()}"

@@ -46,6 +46,11 @@ def robots_python() -> str:
     return str(ROBOTS) if ROBOTS.exists() else sys.executable
 
 
+def packages() -> str:
+    """Say whose packages that Python has."""
+    return "a robot's packages" if ROBOTS.exists() else "all packages of this checkout"
+
+
 def given(*sets: str) -> list[str]:
     """Return settings as options."""
     return [word for each in sets for word in ("--set", each)]

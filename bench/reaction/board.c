@@ -5,7 +5,7 @@
  * FROM and TO are ports on loopback: its own, and of whoever reacts. What follows are datagrams as
  * hexadecimal: the hit, the all-clear, the two answers, and what is sent every 20 ms besides. Before
  * each hit the other side has said STOP and no BREAK since, so that an old BREAK is not taken for an
- * answer. One line for each round after the first WARM ones, in which not everybody need be
+ * answer; until then the all-clear is sent each millisecond. One line for each round after the first WARM ones, in which not everybody need be
  * there yet: nanoseconds from the hit's send to the BREAK's arrival.
  */
 #include "../path/datagram.h"
@@ -69,7 +69,7 @@ int main(int count, char **given) {
             else if (is(&stop, got, size))
                 stopped = 1;
         }
-        /* At no fixed distance from anybody's timer. */
+        /* At no fixed distance from anything. */
         int64_t due_ns = now() + MS / 2 + rand() % (2 * MS);
         int again = 0;
         for (ssize_t size; (size = heard(got, due_ns));)

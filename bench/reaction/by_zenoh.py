@@ -12,6 +12,8 @@ from typing import Any
 import zenoh
 
 from bench.reaction.pair import HIT, Gate
+from common.bus.publisher import qos
+from common.keys import ESTOP_CLASS, ClassOfService
 
 FOR_EVER = -1  # who dials waits until the other one listens
 ALONE = {"scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}}}
@@ -28,14 +30,11 @@ def joined(endpoint: str, settings: Mapping[str, Any] = {}) -> zenoh.Session:
     return opened({"mode": "client", "connect": connect, **settings})
 
 
-def publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
-    """Declare what sends without waiting for more to send."""
-    return session.declare_publisher(
-        key,
-        congestion_control=zenoh.CongestionControl.DROP,
-        priority=zenoh.Priority.REAL_TIME,
-        express=True,
-    )
+def publisher(
+    session: zenoh.Session, key: str, service: ClassOfService = ESTOP_CLASS
+) -> zenoh.Publisher:
+    """Declare what sends; at once, unless its class may wait for more to send."""
+    return session.declare_publisher(key, **qos(service))
 
 
 def subscribe(session: zenoh.Session, key: str, take: Callable[[zenoh.Sample], object]) -> None:

@@ -70,18 +70,16 @@ def verdict(by_name: ByName) -> str:
 
 
 def share(by_name: ByName) -> str:
-    """Say how much of a judged stop is the bus's, beside CycloneDDS where that is installed."""
+    """Say how much of a judged stop is the bus's; of CycloneDDS where that is installed."""
     told = []
     for load in LOADS:
-        bus, other, ours = (
-            by_name.get((name, load)) for name in (ZENOH + FIFO, DDS + FIFO, JUDGED)
-        )
-        if bus and other and ours:
-            told.append(
-                f"{load}, × {bus.ratio(other):.1f} of CycloneDDS's, and T2 × {ours.ratio(bus):.1f}"
-                " of theirs"
-            )
-    return "; ".join(told)
+        bus = by_name[ZENOH + FIFO, load]
+        words = f"{bus.p50_ns / 1000:.0f} us"
+        if (DDS + FIFO, load) in by_name:
+            words += f", × {bus.ratio(by_name[DDS + FIFO, load]):.1f} of what CycloneDDS takes"
+        ours = by_name[JUDGED, load].ratio(bus)
+        told.append(f"{load.capitalize()}: {words}; T2 takes × {ours:.1f} of that")
+    return ". ".join(told)
 
 
 def figures(one: Series) -> dict[str, float]:

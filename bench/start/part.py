@@ -4,6 +4,7 @@ import random
 from collections import defaultdict
 from importlib.metadata import version
 
+from bench.path.processes import packages
 from bench.series import Series
 from bench.start.memory import held
 from bench.start.page import MEMORY
@@ -34,4 +35,5 @@ def measure(rounds: int = ROUNDS) -> list[Series]:
 
 def versions() -> str:
     """Return what is started, with versions."""
-    return f"eclipse-zenoh {version('eclipse-zenoh')}, msgspec {version('msgspec')}"
+    told = ", ".join(f"{name} {version(name)}" for name in ("eclipse-zenoh", "msgspec"))
+    return f"{told}, {packages()}"

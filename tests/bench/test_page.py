@@ -12,7 +12,7 @@ from bench.codec import page
 from bench.codec.values import FRAMES, MESSAGES
 from bench.path.page import FLOOR
 from bench.reaction.page import LOADS
-from bench.reaction.responders import JUDGED, LOOP, REFLEX
+from bench.reaction.responders import FIFO, JUDGED, LOOP, REFLEX, ZENOH
 from bench.series import Measured, Series, store
 from bench.telemetry.page import AGE, STREAMS
 from tests.bench import test_growth, test_load, test_start
@@ -34,7 +34,7 @@ def made_up() -> list[Series]:
 def reaction() -> list[Series]:
     return [
         Series(name=(name, load), calls=1, samples_ns=[100_000] * 10)
-        for name in (LOOP, REFLEX, JUDGED)
+        for name in (LOOP, REFLEX, JUDGED, ZENOH + FIFO)
         for load in LOADS
     ]
 

@@ -71,8 +71,8 @@ def test_what_is_the_buss_share() -> None:
     ]
     by_name = {each.name: each for each in series}
     assert share(by_name) == (
-        "quiet, × 2.0 of CycloneDDS's, and T2 × 2.0 of theirs; "
-        "busy, × 1.0 of CycloneDDS's, and T2 × 3.0 of theirs"
+        "Quiet: 10 us, × 2.0 of what CycloneDDS takes; T2 takes × 2.0 of that. "
+        "Busy: 20 us, × 1.0 of what CycloneDDS takes; T2 takes × 3.0 of that"
     )
     del by_name[DDS + FIFO, "quiet"], by_name[DDS + FIFO, "busy"]
-    assert share(by_name) == ""
+    assert share(by_name).startswith("Quiet: 10 us; T2 takes × 2.0 of that.")

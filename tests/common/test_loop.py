@@ -90,6 +90,15 @@ def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock)
     assert calls[1:] == [round(103.7 * S)]
 
 
+def test_who_is_put_off_too_late_was_late(loop: Loop, clock: Clock) -> None:
+    timer = loop.every(1.0, lambda _: None)
+    turn(loop)
+    clock.pass_s(1.5)
+    loop.post(lambda: timer.put_off(clock.now_ns))
+    turn(loop)
+    assert loop.take_lateness_s() == 0.5
+
+
 def test_lateness_is_the_worst_since_it_was_asked_for(loop: Loop, clock: Clock) -> None:
     loop.every(1.0, lambda _: None)
     loop.every(0.5, lambda _: None)

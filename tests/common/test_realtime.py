@@ -25,11 +25,11 @@ def said(script: str) -> list[str]:
 
 @cache
 def granted() -> bool:
-    return said("r.ask(1); print(r.priority())") == ["1"]
+    return said("r.ask(r.BOARD); print(r.priority())") == [str(BOARD)]
 
 
 needs_right = pytest.mark.skipif(
-    not granted(), reason="needs the right to SCHED_FIFO: root, or `ulimit -r 54`"
+    not granted(), reason="needs the right to SCHED_FIFO: root, or `ulimit -r 55`"
 )
 
 

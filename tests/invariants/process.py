@@ -9,6 +9,7 @@ import msgspec
 
 from common.bus.bus import Arrival
 from common.keys import Call, Topic
+from common.loop import Timer
 from common.messages import Message
 from tests.invariants.net import Caller, Ear, Letter, Net
 
@@ -54,12 +55,14 @@ class Loop:
 
     def __init__(self, net: Net) -> None:
         self._net = net
-        self._timers: list[list[Any]] = []  # period, due, handler
+        self._timers: list[Timer] = []
         self._sockets: list[Callable[[int], None]] = []
 
-    def every(self, period_s: float, handler: Callable[[int], None]) -> None:
+    def every(self, period_s: float, handler: Callable[[int], None]) -> Timer:
         """Call it every period, the first time at once."""
-        self._timers.append([round(period_s * 1e9), self._net.now_ns, handler])
+        timer = Timer(round(period_s * 1e9), self._net.now_ns, handler)
+        self._timers.append(timer)
+        return timer
 
     def watch(self, sock: object, handler: Callable[[int], None]) -> None:
         """Call it when there may be something to read."""
@@ -73,10 +76,7 @@ class Loop:
     def call_due(self) -> None:
         """Call the timers that are due; a late one once."""
         for timer in self._timers:
-            late = self._net.now_ns - timer[1]
-            if late >= 0:
-                timer[1] += timer[0] * (late // timer[0] + 1)
-                timer[2](self._net.now_ns)
+            timer.call(self._net.now_ns)
 
 
 class Silent:
