@@ -19,6 +19,8 @@ COPY --from=build /opt/robot /
 COPY deploy/image/etc /etc
 # A volume that is mounted here for the first time takes over whose folder it is.
 COPY --from=build --chown=10001:10001 /opt/empty /run/t2
+# Of what is copied, a folder inside keeps its mode; bridge and safety want 700.
+COPY --from=build --chown=10001:10001 /opt/private /run
 COPY --from=build --chown=10001:10001 /opt/empty /recordings
 ENV PATH=/opt/venv/bin HOME=/tmp LANG=C.UTF-8 PYTHONUNBUFFERED=1
 USER 10001:10001

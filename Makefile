@@ -35,9 +35,12 @@ up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder
 # Most tests wait for other processes most of the time; some measure, and no other may run then.
 TOGETHER = -n 4 --dist worksteal -m "not alone"
 
+# What fails runs a second time, alone: docs/adr/0026-second-run.md.
+TESTS = $(BIN)/python -m tools.run_tests
+
 test: $(STAMP) ## all tests
-	$(BIN)/pytest $(TOGETHER)
-	$(BIN)/pytest -m alone
+	$(TESTS) $(TOGETHER)
+	$(TESTS) -m alone
 
 fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
@@ -85,8 +88,8 @@ search: $(STAMP) ## the search for holes in the invariants
 
 cover: $(STAMP) ## all tests but the search, with what those cover that do not measure
 	$(BIN)/coverage erase
-	$(BIN)/pytest --cov --cov-report= $(addprefix --ignore=,$(SEARCH)) $(TOGETHER)
-	$(BIN)/pytest $(addprefix --ignore=,$(SEARCH)) -m alone
+	$(TESTS) --cov --cov-report= $(addprefix --ignore=,$(SEARCH)) $(TOGETHER)
+	$(TESTS) $(addprefix --ignore=,$(SEARCH)) -m alone
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 

@@ -9,49 +9,65 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
+from typing import NoReturn
 
 from common.errors import ConfigError, LinkError, RobotError
 from common.options import EXIT_CONFIG, EXIT_LINK
+from common.version import VERSION
 
-COMMANDS = {
-    "up": "router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c",
-    "demo": "a simulated T2 drives a lap through the real services",
-    "soak": "lap after lap with random faults and kill -9, watching memory and more",
-    "drive": "drive from this terminal, by keys or gamepad",
-    "dashboard": "see it, drive it and stop it in a browser",
-    "router": "the embedded Zenoh router alone",
-    "sim": "the simulated vehicle alone",
-    "latency": "how fast the bridge reacts, hop by hop",
-    "config": "what is in force and where each value came from",
-    "keys": "make, renew, revoke and list the certificates of a site",
-    "wire": "read captured frames",
-    "checkout": "check the real vehicle before its first drive, and write a report",
-    "doctor": "find out what is wrong between this laptop and the wheels",
-    "ls": "the keys that are alive: type, rate, publisher",
-    "list": "the same as ls",
-    "echo": "show what comes on a key",
-    "hz": "how often a key comes, its gaps and losses",
-    "delay": "how long messages are under way",
-    "bw": "how many bytes a key takes",
-    "pub": "publish on a key of your own",
-    "call": "make a call to a service, such as safety/reset",
-    "estop": "stop the robot now, a site's or all; they stay so until a reset",
-    "robots": "the robots that are there: verdict, speed, driver",
-    "services": "who is there, who publishes and who reads",
-    "health": "how the services fare",
-    "schema": "the fields of a message type",
-    "topic": "list, echo, hz, delay, bw, info, pub: the words of ros2 topic",
-    "record": "everything on the bus to files, until ctrl-c",
-    "info": "what is in a recording",
-    "metrics": "health, link, safety and odometry for Prometheus",
-    "report": "a recording as one page: path, speeds, stops, streams",
-    "replay": "a recording onto the bus again, or its frames to a bridge",
-    "foxglove": "the bus, live, to Foxglove or Lichtblick",
-    "install": "have systemd run the services on this computer",
-    "completion": "what bash, zsh or fish want to complete t2",
+GROUPS = {
+    "Run": {
+        "up": "the whole stack with a simulated vehicle, until Ctrl-C",
+        "demo": "a simulated T2 drives a lap through the real services",
+        "drive": "drive from this terminal, by keys or gamepad",
+        "dashboard": "see the robot, drive it and stop it in a browser",
+        "estop": "emergency stop: a robot, a site or all, until a reset",
+        "router": "the embedded Zenoh router alone",
+        "sim": "the simulated vehicle alone",
+    },
+    "Inspect": {
+        "doctor": "find what is wrong between this laptop and the wheels",
+        "robots": "the robots on the bus: verdict, speed, driver",
+        "services": "the services on the bus, and who publishes and reads what",
+        "health": "service health",
+        "ls": "the keys that are alive: type, rate, publisher",
+        "list": "the same as ls",
+        "echo": "print messages received on a key",
+        "hz": "rate, gaps and losses of a key",
+        "delay": "transport delay of the messages on a key",
+        "bw": "bandwidth of a key",
+        "pub": "publish on a key of your own",
+        "call": "call a service, such as safety/reset",
+        "latency": "reaction times of the bridge, hop by hop",
+        "topic": "as ros2 topic: list, echo, hz, delay, bw, info, pub",
+        "schema": "the fields of a message type",
+    },
+    "Record": {
+        "record": "record everything on the bus to files, until Ctrl-C",
+        "info": "show what is in a recording",
+        "replay": "play a recording onto the bus, or its frames to a bridge",
+        "report": "a recording as one page: path, speeds, stops, streams",
+        "foxglove": "the bus, live, to Foxglove or Lichtblick",
+        "metrics": "health, link, safety and odometry for Prometheus",
+    },
+    "Commission": {
+        "checkout": "check the real vehicle before its first drive",
+        "wire": "decode captured frames",
+    },
+    "Administer": {
+        "config": "show the effective configuration and the source of each value",
+        "install": "install the services as systemd units on this computer",
+        "keys": "create, renew, revoke and list certificates",
+        "completion": "print the shell completion for bash, zsh or fish",
+    },
+    "Develop": {
+        "soak": "laps with random faults and kill -9, watching memory",
+    },
 }
+COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 INSPECT = (
     "doctor", "ls", "echo", "hz", "delay", "bw", "pub", "call", "estop", "robots", "services",
     "health", "schema", "topic", "completion",
@@ -70,14 +86,9 @@ EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the subcommand that the arguments name, and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
-    parser = argparse.ArgumentParser(prog="t2", description="The drive stack of the T2 robot.")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    named = next((word for word in words if word in COMMANDS), None)
-    for name, text in COMMANDS.items():
-        subparser = subparsers.add_parser(name, help=text, description=text)
-        if name == named:
-            module(name).add_arguments(subparser)
-    options = parser.parse_args(words)
+    if not words:
+        words = ["--help"]
+    options = parsed(words)
     try:
         code: int = module(options.command).run(options)
         sys.stdout.flush()
@@ -91,6 +102,52 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code
+
+
+def parsed(words: Sequence[str]) -> argparse.Namespace:
+    """Return the options; end with usage and exit code 2 when they are wrong."""
+    parser = argparse.ArgumentParser(
+        prog="t2",
+        usage="t2 COMMAND [OPTIONS]",
+        description="The drive stack of the T2 robot.",
+        epilog=overview(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"t2 {VERSION}")
+    # Listed by the overview: argparse has no groups of commands.
+    subparsers = parser.add_subparsers(
+        prog="t2", dest="command", metavar="COMMAND", help=argparse.SUPPRESS
+    )
+    named = words[0]
+    if named not in COMMANDS:
+        refuse(parser, words)
+    subparser = subparsers.add_parser(named, description=COMMANDS[named])
+    module(named).add_arguments(subparser)
+    options, strange = parser.parse_known_args(words)
+    if strange:
+        subparser.error(f"unrecognized arguments: {' '.join(strange)}")
+    return options
+
+
+def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
+    """Show help or version, or say which command may be meant, and end."""
+    first = words[0]
+    if first in ("-h", "--help", "--version"):
+        parser.parse_args(words[:1])
+    if first.startswith("-"):
+        parser.error(f"{first}: options follow the command, as in: t2 COMMAND {first}")
+    near = get_close_matches(first, COMMANDS, n=1)
+    hint = f'did you mean "t2 {near[0]}"?' if near else '"t2 --help" lists the commands'
+    parser.error(f"unknown command {first!r}; {hint}")
+
+
+def overview() -> str:
+    """Return the commands by groups."""
+    width = max(map(len, COMMANDS)) + 2
+    lines: list[str] = []
+    for title, commands in GROUPS.items():
+        lines += [f"{title}:", *(f"  {name:{width}}{text}" for name, text in commands.items()), ""]
+    return "\n".join([*lines, '"t2 COMMAND --help" shows the options of a command.'])
 
 
 def module(name: str) -> ModuleType:

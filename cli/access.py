@@ -13,7 +13,7 @@ from msgspec import Struct
 from common import keys
 from common.members import Member
 
-Verb = Literal["read", "know", "write", "ask", "serve", "live"]
+Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
 Rights = Mapping[Verb, Sequence[str]]
 
 # What comes in from a member, and what goes out to it.
@@ -24,6 +24,10 @@ VERBS: Mapping[Verb, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     # Who listens: a publisher that knows of nobody sends one sample and then no more.
     "know": ((), ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")),
+    # What advanced publishers keep: zenoh-ext asks by ``@adv/**``, and the answers have the events'
+    # own keys.
+    "recall": ((), ("query", "reply")),
+    "keep": (("reply",), ()),
     "write": (("put", "delete"), ("declare_subscriber",)),
     "ask": (("query",), ("declare_queryable", "reply")),
     "serve": (("declare_queryable", "reply"), ("query",)),
@@ -34,15 +38,20 @@ ANY = "*"
 # ``**`` passes by what begins with ``@``: our commands, and what advanced publishers keep.
 EVERY_KEY = f"{keys.ROOT}/**"
 EVERY_COMMAND = f"{keys.ROOT}/*/@cmd/**"
-KEPT = f"{keys.ROOT}/**/@adv/**"
+# zenoh-ext subscribes to ``KEY/@adv/pub/**`` and asks ``KEY/@adv/**``, for events alone; what it
+# publishes and keeps has exactly these chunks: zid, entity or clock, and a name or ``_``.
+KEPT = f"{keys.EVENTS.on(ANY, service=ANY)}/@adv/**"
+KEPT_KEY = "@adv/pub/*/*/*"
+RECALLED = (KEPT, keys.EVENTS.on(ANY, service=ANY))
 EVERYTHING = (EVERY_KEY, EVERY_COMMAND, KEPT)
 ROUTERS = "@/*/*/**"  # their admin space: version, sessions, who declared what
-ASKED = (f"{keys.ROOT}/*/info/**", KEPT, ROUTERS)
+ASKED = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 
 # The services that a laptop runs: a member may speak for these, and for no others. A dead recorder
 # on board must be missed, so that one on a laptop is not heard, and does without.
 SEATS = ("dashboard", "metrics")
 DRIVERS_SEATS = (*SEATS, "teleop")
+KNOWING: Rights = {"know": (EVERY_KEY, KEPT), "recall": RECALLED}
 
 
 class Rule(Struct, frozen=True):
@@ -103,7 +112,7 @@ def rights(member: Member) -> Rights:
     if member.role == "site":
         return site()
     if member.role == "driver":
-        return driver(member.robots)
+        return driver(member.robots, member.sources or (ANY,))
     return fleet() if member.role == "fleet" else viewer()
 
 
@@ -111,22 +120,22 @@ def viewer() -> Rights:
     """See everything, move nothing."""
     return {
         "read": EVERYTHING,
-        "know": (EVERY_KEY,),
+        **KNOWING,
         "ask": ASKED,
         **seats(SEATS),
     }
 
 
-def driver(robots: Iterable[str]) -> Rights:
-    """See everything; drive, stop and call the robots named."""
+def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
+    """See everything; drive as the sources named, stop and call the robots named."""
     moved = tuple(robots)
     sitting = seats(DRIVERS_SEATS)
     return {
         "read": EVERYTHING,
-        "know": (EVERY_KEY,),
+        **KNOWING,
         "ask": (*ASKED, *(call.on(each) for each in moved for call in keys.CALLS)),
         **sitting,
-        "write": (*sitting["write"], *(key for each in moved for key in orders(each))),
+        "write": (*sitting["write"], *(key for each in moved for key in orders(each, sources))),
     }
 
 
@@ -141,6 +150,7 @@ def site() -> Rights:
     return {
         "read": EVERYTHING,
         "know": EVERYTHING,
+        "recall": RECALLED,
         "ask": (*ASKED, *(call.on(ANY) for call in keys.CALLS)),
         "write": orders(ANY),
     }
@@ -149,19 +159,21 @@ def site() -> Rights:
 def robot(name: str) -> Rights:
     """What a robot's router may say at its site's: everything of its own robot, nothing else."""
     root = f"{keys.ROOT}/{name}"
-    own = (f"{root}/**", f"{root}/@cmd/**", f"{root}/**/@adv/**")
+    own = (f"{root}/**", f"{root}/@cmd/**", f"{keys.EVENTS.on(name, service=ANY)}/@adv/**")
     return {
         "read": (*own, keys.estop_key(ANY)),
         "know": EVERYTHING,
+        "ask": (ROUTERS,),  # its own probe, where nothing on board can dial without TLS
         "write": own,
         "serve": own,
         "live": own,
     }
 
 
-def orders(robot: str) -> tuple[str, ...]:
+def orders(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
     """Return the keys that move and stop a robot, but for what is safety's alone."""
-    return (keys.DRIVE.on(robot, source=ANY), keys.estop_key(robot))
+    driven = (keys.DRIVE.on(robot, source=source) for source in sources)
+    return (*driven, keys.estop_key(robot))
 
 
 def seats(services: Iterable[str]) -> dict[Verb, Sequence[str]]:
@@ -169,10 +181,11 @@ def seats(services: Iterable[str]) -> dict[Verb, Sequence[str]]:
     names = tuple(services)
     health = tuple(keys.HEALTH.on(ANY, service=name) for name in names)
     events = tuple(keys.EVENTS.on(ANY, service=name) for name in names)
-    kept = tuple(f"{event}/@adv/**" for event in events)
+    kept = tuple(f"{event}/{KEPT_KEY}" for event in events)
     return {
         "write": (*health, *events, *kept),
-        "serve": (*(keys.info_key(ANY, name, "**") for name in names), *kept),
+        "keep": events,
+        "serve": (*(keys.info_key(ANY, name, ANY) for name in names), *kept),
         "live": (*(keys.live_key(ANY, name, ANY) for name in names), *kept),
     }
 

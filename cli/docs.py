@@ -68,7 +68,9 @@ def kinds() -> list[type[Struct]]:
     of_topics = [topic.message for topic in keys.TOPICS]
     of_calls = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
     return list(
-        dict.fromkeys([m.Message, *of_topics, m.Cause, m.Limits, m.Timing, m.Durations, *of_calls])
+        dict.fromkeys(
+            [m.Message, *of_topics, m.Cause, m.Limits, m.Release, m.Timing, m.Durations, *of_calls]
+        )
     )
 
 

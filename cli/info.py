@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
-from cli.inspect.shell import wants_json
+from cli.inspect.shell import add_output, wants_json
 from cli.recorded import opened
 from common.freshness import S
 from common.keys import ROOT
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("files", metavar="FILE", type=Path, nargs="+")
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument("--json", action="store_true", help="a line of JSON, as in a pipe")
-    shown.add_argument("--text", action="store_true", help="text, as on a terminal")
+    add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` mak
 SIM = "t2-sim.service"
 BACKOFF = "t2-.service.d/20-backoff.conf"
 BACKOFF_SINCE = 254  # the systemd that knows it
-EXTRAS = {"t2-recorder.service": "mcap", "t2-dashboard.service": "nicegui"}
+EXTRAS = {"t2-recorder.service": "mcap", "t2-dashboard.service": "uvicorn"}
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the units
 
 

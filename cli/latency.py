@@ -1,8 +1,7 @@
 """``t2 latency``: how fast the bridge reacts, hop by hop, live.
 
-On a terminal a table, elsewhere a line of JSON for each of the bridge's health messages, one a
-second. All figures are since the bridge's start. p50 and p99 are bounds of buckets that are a third
-apart: at most so long.
+A table, or with ``-o json`` a JSON line for each of the bridge's health messages, one a second. All
+figures are since the bridge's start. p50 and p99 are upper bounds of buckets a third apart.
 """
 
 import argparse
@@ -15,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from cli.inspect.shell import add_output, wants_json
 from common import keys, log
 from common.bus.bus import Arrival, Bus
 from common.config import load
@@ -51,6 +51,7 @@ Show = Callable[[Health | None, bool], None]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("--once", action="store_true", help="show it once, and end")
+    add_output(parser)
     add_sources(parser)
 
 
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     with (
         closing(Loop()) as loop,
         closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
-        shown(options.once) as show,
+        shown(options.once, wants_json(options)) as show,
     ):
         watch = Watch(loop, show, options.once)
         bus.subscribe(keys.HEALTH, watch.take, service="bridge")
@@ -117,9 +118,9 @@ def until_nobody_reads() -> Iterator[None]:
 
 
 @contextmanager
-def shown(once: bool) -> Iterator[Show]:
-    """Give what shows: a table on a terminal, which it gets back, lines of JSON elsewhere."""
-    if not sys.stdout.isatty():
+def shown(once: bool, as_json: bool) -> Iterator[Show]:
+    """Yield what shows: JSON lines, or a table, which a terminal shows in place."""
+    if as_json:
         yield print_line
         return
     try:
@@ -127,11 +128,10 @@ def shown(once: bool) -> Iterator[Show]:
         from rich.live import Live
     except ImportError as error:
         raise RobotError(
-            f"the table wants {error.name}: pip install -e '.[demo]', "
-            "or have JSON: t2 latency | cat"
+            f"the table wants {error.name}: pip install -e '.[demo]', or use: t2 latency -o json"
         ) from None
     console = Console(highlight=False, markup=False)
-    if once:
+    if once or not console.is_terminal:
         yield lambda newest, silent: console.print(table(newest, silent))
         return
     with Live(table(None, False), console=console, auto_refresh=False) as live:

@@ -23,5 +23,5 @@ def run(options: argparse.Namespace) -> int:
         "robot.id": options.robot,
     }
     sets = [f"{path}={value}" for path, value in given.items() if value is not None]
-    options.sets = [*options.sets, *sets]
+    options.sets = ["recorder.make_room=false", *options.sets, *sets]
     return life.main(passed_on(options))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from cli import access
 from cli.access import Rights, Verb
+from cli.keys.profile import OPERATORS_SOURCES
 from common import keys
 from common.bus.probe import includes
 
@@ -11,16 +12,20 @@ MINE, OTHER = "001", "002"  # a driver's robot, and one that it was not given
 
 ROLES: Mapping[str, Rights] = {
     "viewer": access.viewer(),
-    "driver of 001": access.driver((MINE,)),
+    "driver of 001": access.driver((MINE,), OPERATORS_SOURCES),
     "fleet": access.fleet(),
     "site's router": access.site(),
     "router of 001": access.robot(MINE),
 }
+DASHBOARD = keys.EVENTS.on(MINE, service="dashboard")
 # One key of each class, with the words that the table has for it.
 CLASSES: Mapping[str, str] = {
     "measured, decided, health": keys.VELOCITY.on(MINE),
     "events": keys.EVENTS.on(MINE, service="safety"),
+    "events that an operator's dashboard keeps": f"{DASHBOARD}/@adv/pub/1/uhlc/_",
+    "any longer key below these": f"{DASHBOARD}/@adv/pub/1/uhlc/_/a/a/a",
     "requests to move": keys.DRIVE.on(MINE, source="teleop"),
+    "requests to move as a source that is not hers": keys.DRIVE.on(MINE, source="nav"),
     "requests to move another robot": keys.DRIVE.on(OTHER, source="teleop"),
     "what safety lets through": keys.MOTION.on(MINE),
     "emergency stop": keys.estop_key(MINE),

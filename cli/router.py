@@ -4,11 +4,11 @@ import argparse
 import json
 import os
 import signal
-import threading
 import time
 from pathlib import Path
 
 from cli.access import access_control
+from cli.router_watch import Watch
 from common import log, members, realtime
 from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.config import load
@@ -16,8 +16,6 @@ from common.errors import ConfigError
 from common.options import add_sources, sources
 from common.settings import Bus, Shared, is_encrypted
 from common.systemd import Systemd
-
-LOOK_S = 0.25  # between two questions to the router, where systemd wants to know
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,17 +50,15 @@ def run(options: argparse.Namespace) -> int:
     log.configure(config.log, "router")
     if config.robot.realtime and not realtime.priority():
         log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
-    ended = threading.Event()
+    watch = Watch(config.bus, config.log)
     for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda *_: ended.set())
+        signal.signal(name, lambda *_: watch.stop())
     systemd = Systemd()
-    with router(config.bus, access, config.robot.id) as answers:
+    with router(config.bus, access, config.robot.id):
         listen = list(config.bus.listen)
         log.Logger().info("started", listen=listen, open_to=open_to(config.bus))
         # Routing happens in Zenoh's own threads: that this one lives says nothing about them.
-        while not ended.wait(LOOK_S if systemd.listens else None):
-            if answers():
-                systemd.ready(time.monotonic_ns())
+        watch.run(lambda: systemd.ready(time.monotonic_ns()))
         systemd.stopping()
     return 0
 

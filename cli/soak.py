@@ -2,7 +2,6 @@
 
 import argparse
 import socket
-import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -22,7 +21,7 @@ from cli.soak_watch import PROC
 from cli.soak_yard import Yard
 from cli.supervisor import Supervisor
 from cli.up import passed_on
-from common import log
+from common import child_process, log
 from common.bus.bus import Bus
 from common.config import load
 from common.errors import LinkError, RobotError
@@ -136,7 +135,7 @@ def budget_s(config: Everything) -> float:
 def driver_command(options: argparse.Namespace, patient: bool) -> list[str]:
     """Return how the driver is run."""
     words = ["--patient"] if patient else []
-    return [sys.executable, "-m", "cli.soak_driver", *words, *passed_on(options)]
+    return child_process.command("cli.soak_driver", *words, *passed_on(options))
 
 
 def _minutes(text: str) -> float:

@@ -11,6 +11,8 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 
+from msgspec.structs import replace
+
 from cli.lap.driver import PERIOD_S, Driver
 from cli.lap.script import PATIENT, QUICK, Lap, Pace, lap, wrap
 from cli.settings import Everything
@@ -89,7 +91,9 @@ class Operator:
         except (LinkError, MessageError) as error:
             self._log.warning("cannot set it right yet", error=str(error))
             return
-        if pose is not None:
+        safety = self._driver.safety
+        if pose is not None and safety is not None:
+            pose = replace(pose, echo=safety.heartbeat)
             self._bus.ask(keys.SET_POSE, pose, self._done, self._refused)
 
     def _put_back(self) -> PoseRequest | None:

@@ -87,7 +87,7 @@ STIMULI: dict[str, Stimulus] = {
     "obstacle in the margin": lambda it: (replace(it, ahead_m=INSIDE_M), None),
     "way free": lambda it: (replace(it, ahead_m=FREE_M), None),
     "emergency stop": lambda it: (it, Estop()),
-    "reset": lambda it: (it, Reset()),
+    "reset": lambda it: (it, _reset(it)),
     "release held": lambda it: (replace(it, holds=True), None),
     "release let go": lambda it: (replace(it, holds=False), Hold(False)),
 }
@@ -146,8 +146,14 @@ def _situation(scene: Scene) -> tuple[object, ...]:
     """Return what tells situations apart; the rest is history."""
     armed = any(one.neutral for one in scene.state.arbiter.channels.values())
     around = scene.asks, scene.holds, scene.link, scene.pressed, scene.faulty, scene.ahead_m
-    has_moved = scene.state.moved is not None  # a release knows the way back only then
-    return scene.name, armed, has_moved, latched(scene.state.latches), around
+    return scene.name, armed, latched(scene.state.latches), around
+
+
+def _reset(scene: Scene) -> Reset:
+    """Return an operator's call for everything that is latched."""
+    latches = scene.state.latches
+    ids = tuple(latches[name].id for name in latched(latches))
+    return Reset(scene.state.heartbeat.number, ids)
 
 
 def _run(policy: Policy, scene: Scene, event: Event | None) -> Scene:
@@ -176,9 +182,9 @@ def _events(scene: Scene, event: Event | None) -> Iterator[Event | None]:
             seq=scene.seq,
             boot=DRIVER_BOOT,
         )
-        yield Ask("teleop", drive)
+        yield Ask("teleop", drive, scene.now_ns)
     if scene.holds:
-        yield Hold(True)
+        yield Hold(True, "backward", scene.state.heartbeat.number)
 
 
 def _inputs(scene: Scene) -> Inputs:

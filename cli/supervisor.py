@@ -4,6 +4,7 @@ A process that says that a restart will not help (exit codes 78 and 69) ends the
 """
 
 import ctypes
+import os
 import signal
 import subprocess
 import sys
@@ -11,8 +12,10 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import BinaryIO
 
+from common import child_process
 from common.backoff import Backoff
 from common.log import Logger
 from common.options import HOPELESS
@@ -91,17 +94,25 @@ class Supervisor:
 
 
 def _start(command: Sequence[str], output: BinaryIO | None) -> "subprocess.Popen[bytes]":
-    # A group of its own keeps ctrl-c from reaching all at once: the bridge must find its board
-    # still there when it stops the vehicle.
+    # A session of its own keeps ctrl-c from reaching all at once: the bridge must find its board
+    # still there when it stops the vehicle. A kill of the supervisor's session or group leaves
+    # the bridge and its guard: they stop the vehicle by the signal that the system sends them then.
     return subprocess.Popen(
-        command, stdout=output, stderr=output, process_group=0, preexec_fn=_die_with_parent
+        command,
+        env=child_process.environ(),
+        stdout=output,
+        stderr=output,
+        start_new_session=True,
+        preexec_fn=partial(_die_with_parent, os.getpid()),
     )
 
 
-def _die_with_parent() -> None:
+def _die_with_parent(parent: int) -> None:
     """Have the system end the child when the supervisor is killed; other systems do without."""
     if _prctl is not None:
         _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent:  # killed before that
+            os._exit(1)
 
 
 def _end(child: Child) -> None:

@@ -2,14 +2,14 @@
 
 import argparse
 import signal
-import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 
+from cli.ports import claimed, wanted
 from cli.router import add_insecure
 from cli.settings import Everything
 from cli.supervisor import Supervisor
-from common import log
+from common import child_process, log, realtime
 from common.config import load
 from common.errors import ConfigError
 from common.options import add_sources, sources
@@ -30,15 +30,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
     config = load(Everything, sources(options)).config
+    if config.robot.realtime:
+        realtime.ask(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
-    supervisor = Supervisor(chosen([*commands(options), *recorder(options)], options.only))
+    started = chosen([*commands(options), *recorder(options)], options.only)
+    with claimed(wanted(config, [name for name, _ in started])):
+        return supervised(started, config, simulated=not options.no_sim)
+
+
+def supervised(started: Commands, config: Everything, *, simulated: bool) -> int:
+    """Keep these running until a signal."""
+    supervisor = Supervisor(started)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
     log.Logger().info(
         "starting; `t2 drive` in a second terminal drives it",
         robot=config.robot.id,
         board=f"{config.board.address}:{config.board.port}",
-        simulated=not options.no_sim,
+        simulated=simulated,
         bus=list(config.bus.endpoints),
     )
     return supervisor.run()
@@ -60,14 +69,14 @@ def commands(options: argparse.Namespace) -> Commands:
     if not options.no_sim:
         modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
     modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}
-    return [(name, [sys.executable, "-m", *words, *passed]) for name, words in modules.items()]
+    return [(name, child_process.command(*words, *passed)) for name, words in modules.items()]
 
 
 def recorder(options: argparse.Namespace) -> Commands:
     """Return the black box, where its library is installed: nobody waits for it."""
     if find_spec("mcap") is None:
         return []
-    return [("recorder", [sys.executable, "-m", "services.recorder", *passed_on(options)])]
+    return [("recorder", child_process.command("services.recorder", *passed_on(options)))]
 
 
 def passed_on(options: argparse.Namespace) -> list[str]:

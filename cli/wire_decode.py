@@ -13,8 +13,8 @@ from typing import Any, get_args
 import msgspec
 
 from common.messages import SONAR_NAMES, FaultName
-from common.settings import Wire
-from common.wire.commands import TO_BOARD
+from common.settings import AngularUnit, Wire
+from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Kinds
 from common.wire.framing import Framing, Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
@@ -77,7 +77,9 @@ def as_text(part: Good | Bad, wire: Wire) -> str:
         return f"+{part.offset:<4} BAD {part.reason}: {part.detail}: {part.raw.hex()}"
     senders = " or ".join(part.frames)
     names = " or ".join(type(frame).__name__ for frame in part.frames.values())
-    texts = [_text(name, value, wire) for name, value in _fields(part)]
+    commands = isinstance(next(iter(part.frames.values())), MotionCommand)
+    unit = wire.command_angular_unit if commands else wire.feedback_angular_unit
+    texts = [_text(name, value, unit) for name, value in _fields(part)]
     return f"+{part.offset:<4} {senders:<5} {names} {', '.join(texts)}".rstrip()
 
 
@@ -99,9 +101,9 @@ def _fields(part: Good) -> list[tuple[str, Any]]:
     return list(msgspec.structs.asdict(frame).items())
 
 
-def _text(name: str, value: Any, wire: Wire) -> str:
+def _text(name: str, value: Any, unit: AngularUnit) -> str:
     if name == "angular_raw":
-        return _angular(value, wire)
+        return _angular(value, unit)
     if name == "ranges_mm":
         shown = ("fault" if range_ == SONAR_FAULT_MM else str(range_) for range_ in value)
         pairs = zip(SONAR_NAMES, shown, strict=True)
@@ -123,8 +125,8 @@ def _number(name: str, value: int) -> str:
     return f"{name} {value}"
 
 
-def _angular(value: int, wire: Wire) -> str:
-    if wire.angular_unit == "milliradian":
+def _angular(value: int, unit: AngularUnit) -> str:
+    if unit == "milliradian":
         return f"angular {value / 1000:.3f} rad/s"
     return f"angular {value / 10:.1f} deg/s"
 

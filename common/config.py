@@ -28,6 +28,11 @@ ENV_PREFIX = "T2__"
 # Files that a file names lie beside it: the folder of a certificate works wherever it is put.
 BESIDE = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 
+# Settings that have been replaced, and by what.
+REPLACED = {
+    "wire.angular_unit": "wire.command_angular_unit and wire.feedback_angular_unit",
+}
+
 # Whose sections may stand in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "bus", "board", "wire", "log", "vehicle",
@@ -214,6 +219,9 @@ def _explain(
     if unknown:
         known = [part.name for part in kind.fields]
         path = f"{path}.{unknown[1]}"
+        if path in REPLACED:
+            text = f"was replaced by {REPLACED[path]}"
+            return ConfigError(f"{_origin(path, given)}: {path}: {text}")
         return ConfigError(f"{_origin(path, given)}: {path}: unknown{_meant(unknown[1], known)}")
     shown = f" = {given[path].value!r}" if path in given else ""
     return ConfigError(f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}")

@@ -5,6 +5,7 @@ made by mistake does not reach it. ``estop`` is not, on purpose: ``put t2/v1/*/e
 fleet.
 """
 
+from collections.abc import Collection, Mapping
 from typing import Generic, Literal, TypeVar
 
 from msgspec import Struct
@@ -12,6 +13,10 @@ from msgspec import Struct
 from common import messages as m
 
 ROOT = "t2/v1"
+
+# Known values of a ``{name}`` in a path; those of sources are in the settings.
+SERVICES = ("bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics")
+KNOWN: Mapping[str, Collection[str]] = {"service": SERVICES, "side": ("left", "right")}
 
 MessageT = TypeVar("MessageT", bound=m.Message)
 RequestT = TypeVar("RequestT", bound=Struct)
@@ -53,6 +58,15 @@ class Topic(Struct, Generic[MessageT], frozen=True):
     def on(self, robot: str, **names: str) -> str:
         """Return the whole key for one robot, or a key expression for ``*``."""
         return f"{ROOT}/{robot}/{self.path.format(**names)}"
+
+    def known(self, robot: str, names: Mapping[str, str], known: Collection[str]) -> frozenset[str]:
+        """Return the known keys in an expression: of ``known``, otherwise of ``KNOWN``."""
+        return frozenset(
+            self.on(robot, **{**names, name: each})
+            for name in names
+            if names[name] == "*"
+            for each in known or KNOWN.get(name, ())
+        )
 
 
 class Call(Struct, Generic[RequestT, ReplyT], frozen=True):
@@ -107,7 +121,9 @@ SET_SWITCHES = Call(
     "srv/bridge/switches", m.SwitchesRequest, m.Switches, "bridge", "set the emergency brakes"
 )
 SET_LED = Call("srv/bridge/led", m.LedRequest, m.Done, "bridge", "set one lamp channel")
-RESET = Call("srv/safety/reset", m.ResetRequest, m.Done, "safety", "clear the latches")
+RESET = Call(
+    "srv/safety/reset", m.ResetRequest, m.ResetDone, "safety", "clear the causes that are named"
+)
 RELEASE = Call(
     "srv/safety/release", m.ReleaseRequest, m.Done, "safety", "creep off a pressed bumper, held"
 )

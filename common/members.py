@@ -16,6 +16,8 @@ from common.errors import ConfigError
 Role = Literal["robot", "driver", "viewer", "fleet", "site"]
 ROLES: tuple[Role, ...] = ("robot", "driver", "viewer", "fleet", "site")
 
+# The name of a source of motion requests, as in ``safety.sources``.
+SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
 # A robot's id, and whatever else becomes a part of a certificate's name: one chunk of a key.
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
 
@@ -27,6 +29,7 @@ class Member(Struct, frozen=True, kw_only=True):
     role: Role
     name: Name
     robots: tuple[str, ...] = ()  # that a driver may move, or that a robot is
+    sources: tuple[SourceName, ...] = ()  # that a driver may use; empty means any
     addresses: tuple[str, ...] = ()  # where a router is dialled; lists of before have none
     expires: datetime  # UTC
     revoked: bool = False

@@ -21,6 +21,7 @@ Verdict = Literal["run", "slow", "stop", "brake", "inhibited"]
 Action = Literal["slow", "stop", "brake"]
 Command = Literal["run", "stop", "brake"]
 Level = Literal["info", "warning", "error"]
+Direction = Literal["forward", "backward"]
 
 Ranges = Annotated[tuple[float | None, ...], Meta(min_length=8, max_length=8)]
 Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
@@ -67,6 +68,7 @@ class Bumper(Message, frozen=True, kw_only=True):
     """The bumper strip, one bit for the whole vehicle (manual 2.4)."""
 
     pressed: bool
+    lost: int = 0  # bumper polls of the last 0.2 s that the board did not answer
 
 
 class Driver(Message, frozen=True, kw_only=True):
@@ -94,7 +96,11 @@ class Link(Message, frozen=True, kw_only=True):
     rates: dict[str, float]  # frames per second by name, over the last second
     rejected: dict[str, int]  # frames and datagrams refused since start, by reason
     round_trip: float | None  # s, the median of the last queries
-    latched_by: int | None = None  # ``boot`` of the safety service whose latch nobody has reset
+    latched_by: int | None = (
+        None  # ``boot`` of the safety, or this bridge, whose latch is not reset
+    )
+    ports: dict[str, int] = {}  # our UDP port that each frame is taken from, by the frame's name
+    send_errors: int = 0  # datagrams that the system refused to send, since start
 
 
 # --- tel/odom, tel/safety -------------------------------------------------------------------
@@ -124,6 +130,7 @@ class Cause(Struct, frozen=True, kw_only=True):
     action: Action
     age: float  # s since it became active
     text: str  # in words, for the operator
+    id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one each time it comes back
 
 
 class Limits(Struct, frozen=True, kw_only=True):
@@ -132,6 +139,16 @@ class Limits(Struct, frozen=True, kw_only=True):
     forward: float  # m/s
     backward: float  # m/s, as a positive number
     angular: float  # rad/s, either way
+
+
+class Release(Struct, frozen=True, kw_only=True):
+    """What is known about moving off a pressed bumper; the operator chooses the direction."""
+
+    believed_free: Direction | None  # opposite of the last motion; None when none is known
+    travelled: float  # m, net travel by the counters over the last metre before the contact
+    age: float | None  # s since that motion; None when none is known
+    forbidden: tuple[Direction, ...]  # refused until a reset: the bumper was pressed that way
+    left: float  # m that may still be travelled until a reset
 
 
 class SafetyState(Message, frozen=True, kw_only=True):
@@ -144,6 +161,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     limits: Limits
     heartbeat: int  # echoed by whoever drives, see ``Drive.echo``
     text: str  # one sentence: why the vehicle does or does not move
+    release: Release | None = None  # None while there is no contact
 
 
 # --- @cmd -----------------------------------------------------------------------------------
@@ -223,6 +241,7 @@ class SwitchesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     ultrasonic_brake: bool | None = None
     bumper_brake: bool | None = None
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
 class LedRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -240,13 +259,18 @@ class LedRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Ask safety to clear its latches."""
+    """Clear the causes that the operator saw, and no others."""
+
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+    causes: tuple[int, ...] = ()  # ``Cause.id`` of each
 
 
 class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Creep off a pressed bumper while the operator holds; repeat within the lease."""
+    """Move slowly off a pressed bumper while the operator holds; repeat within the lease."""
 
     held: bool = True  # False ends it
+    direction: Direction | None = None  # chosen by the operator; required while held
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
 class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -255,9 +279,18 @@ class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     x: float = 0.0  # m
     y: float = 0.0  # m
     heading: float = 0.0  # rad
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
 class Done(Struct, frozen=True, kw_only=True):
     """A call was carried out."""
 
     text: str
+    boot: int = 0  # of the service that answers; 0 when it does not say
+
+
+class ResetDone(Done, frozen=True, kw_only=True):
+    """The answer to a reset; ``common.operator`` checks it against safety's state."""
+
+    heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
+    cleared: tuple[int, ...] = ()  # ``Cause.id`` of each cause that was cleared

@@ -10,7 +10,8 @@ process priority its hang is found by
 guard   54       systemd's watchdog
 bridge  53       the guard, which brakes
 safety  52       the bridge, whose lease runs out
-router  51       safety and bridge: each misses the other
+probe   52       systemd's watchdog: the router gives no sign of life without it
+router  51       the probe, which kills it
 ======= ======== ===================================================
 
 The simulated board, 55, is ahead of them all: the real one is another machine, which nothing on
@@ -27,7 +28,10 @@ import os
 import sys
 from contextlib import suppress
 
-BOARD, GUARD, BRIDGE, SAFETY, ROUTER = 55, 54, 53, 52, 51
+BOARD, GUARD, BRIDGE, SAFETY, PROBE, ROUTER = 55, 54, 53, 52, 52, 51
+# `t2 up` itself: on a busy machine a killed process ends only when it is scheduled, and only then
+# its children get their signal.
+SUPERVISOR = 51
 LONGEST_US = 1_000_000
 
 

@@ -2,7 +2,8 @@
 
 ``run`` reads the settings (exit code 78 names what is wrong, before anything opens), builds the
 service around a ``Node``, and serves until SIGINT or SIGTERM. The first signal lets the service
-come to rest; a second one ends the process at once.
+come to rest; a second one ends the process at once. The exit actions run once on every way out: a
+signal that arrives while they run changes nothing.
 """
 
 import os
@@ -19,6 +20,7 @@ import msgspec
 
 from common import keys, log, realtime
 from common.bus.bus import Bus
+from common.bus.drive import DriveLink, LinkWatch
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import S
@@ -40,6 +42,8 @@ C = TypeVar("C", bound=Shared)
 class Node(Generic[C]):
     """What a service is built on: its settings, its loop, its bus, its events and counters."""
 
+    drive: DriveLink  # of bridge and safety, see ``open_drive``
+
     def __init__(self, name: str, loaded: Loaded[C]) -> None:
         self.name = name
         self.config: C = loaded.config
@@ -47,8 +51,8 @@ class Node(Generic[C]):
         self.log = log.Logger()
         self.bus = self.open_bus()
         self.counters: Counter[str] = Counter()
-        self.at_rest: Callable[[], bool] = lambda: True  # asked while stopping
-        self.last_words: Callable[[], None] = lambda: None  # on every way out, a crash too
+        self.is_stopped: Callable[[], bool] = lambda: True  # asked while stopping
+        self.on_exit: Callable[[], None] = lambda: None  # on every way out, a crash too
         self.timing: Callable[[], Timing | None] = lambda: None  # what goes into the health
         self._loaded = loaded
         self._events = self.bus.publisher(keys.EVENTS, service=name)
@@ -59,6 +63,12 @@ class Node(Generic[C]):
     def open_bus(self) -> Bus:
         """Return a bus of its own session, not yet open; the first one is ``bus``."""
         return Bus(self.config.bus, self.config.robot.id, self.loop.post)
+
+    def open_drive(self, *, listens: bool) -> DriveLink:
+        """Make this service's end of the drive link, which opens and closes with ``bus``."""
+        self.drive = DriveLink(self.bus, listens=listens)
+        self.loop.every(1.0, LinkWatch(self.drive, self.event).look)
+        return self.drive
 
     def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
         """Publish and log a transition."""
@@ -132,9 +142,9 @@ def run(
         return EXIT_CONFIG
     try:
         build(node)
-    except LinkError as error:
+    except (LinkError, ConfigError) as error:
         node.log.error(str(error))
-        return EXIT_LINK
+        return EXIT_LINK if isinstance(error, LinkError) else EXIT_CONFIG
     node.present()
     return serve(node)
 
@@ -165,7 +175,8 @@ def run_behind(
 
 def serve(node: Node[C]) -> int:
     """Run the loop until a signal, let the service come to rest, and leave."""
-    _on_signal(node)
+    exit_actions = ExitActions(node)
+    _on_signal(node, exit_actions)
     systemd = Systemd()
     if systemd.listens:
         node.loop.every(OFTEN_S, systemd.ready)
@@ -177,7 +188,7 @@ def serve(node: Node[C]) -> int:
         systemd.stopping()
         _come_to_rest(node)
     finally:
-        node.last_words()
+        exit_actions.run()
         # After a bug of ours too: an open session keeps a process that has failed from ending.
         node.bus.close()
         node.loop.close()
@@ -189,7 +200,7 @@ def _come_to_rest(node: Node[C]) -> None:
     deadline_ns = time.monotonic_ns() + round(REST_S * S)
 
     def check(now_ns: int) -> None:
-        if node.at_rest() or now_ns > deadline_ns:
+        if node.is_stopped() or now_ns > deadline_ns:
             node.loop.stop()
 
     node.loop.every(0.02, check)
@@ -205,15 +216,40 @@ def resident_bytes() -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def _on_signal(node: Node[C]) -> None:
+class ExitActions:
+    """The exit actions of a service, run once."""
+
+    def __init__(self, node: Node[C]) -> None:
+        self._node = node
+        self._begun = self._over = False
+
+    @property
+    def under_way(self) -> bool:
+        """Whether they have begun and are not over."""
+        return self._begun and not self._over
+
+    def run(self) -> None:
+        """Run them, unless they ran or are running."""
+        if self._begun:
+            return
+        self._begun = True
+        try:
+            self._node.on_exit()
+        finally:
+            self._over = True
+
+
+def _on_signal(node: Node[C], exit_actions: ExitActions) -> None:
     def stop(number: int, _: FrameType | None) -> None:
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, leave)
         node.loop.stop()
 
     def leave(number: int, _: FrameType | None) -> None:
+        if exit_actions.under_way:
+            return  # the interrupted call ends the process
         try:
-            node.last_words()
+            exit_actions.run()
         finally:
             os._exit(128 + number)
 

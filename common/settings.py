@@ -14,6 +14,7 @@ from common.errors import WireError
 from common.wire.framing import Covers, crc_function
 
 Limits = Mapping[str, tuple[float, float]]
+AngularUnit = Literal["decidegree", "milliradian"]
 LogLevel = Literal["debug", "info", "warning", "error"]
 
 # See ``check_protections``.
@@ -24,6 +25,7 @@ Port = Annotated[int, Meta(ge=1, le=65535)]
 # What the wheel of eclipse-zenoh can carry; a client would look for anything else forever.
 ENDPOINT = re.compile(r"((tcp|udp|tls|quic|ws)/.+:\d+|unixsock-stream/.+)([?#].*)?")
 ENCRYPTED = ("tls/", "quic/")
+SOCKET_BYTES = 107  # of the path of a Unix socket, on Linux
 
 
 class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -62,7 +64,11 @@ class Bus(Section, frozen=True, kw_only=True):
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
     uplink: tuple[str, ...] = ()  # the site's router, dialled by the robot's own
+    # The drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
+    drive: str = ""
     lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is noticed
+    # s for the router's answer to its probe: a router that misses it twice is restarted.
+    probe_deadline: Annotated[float, Meta(ge=0.5, le=60.0)] = 1.0
     ca: str = ""  # PEM files of `t2 keys`, for tls/ endpoints
     certificate: str = ""
     private_key: str = ""
@@ -77,6 +83,8 @@ class Bus(Section, frozen=True, kw_only=True):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
         if not (self.listen or self.connect):
             raise ValueError("one of listen and connect needs an endpoint")
+        if self.drive:
+            drive_path(self.drive)
         self._check_open()
         self._check_encrypted()
 
@@ -132,6 +140,22 @@ def protocol(endpoint: str) -> str:
     return endpoint.partition("/")[0]
 
 
+def drive_path(endpoint: str) -> str:
+    """Return the path in the drive link's endpoint; raise ``ValueError`` if it cannot be one."""
+    kind, _, path = endpoint.partition("/")
+    if kind != "unixsock-stream" or not path.startswith("/") or set(path) & set("?#"):
+        raise ValueError(
+            f"drive {endpoint!r} should look like unixsock-stream//run/t2-drive/drive.sock"
+        )
+    length = len(path.encode())
+    if length > SOCKET_BYTES:
+        raise ValueError(
+            f"drive: the path of a Unix socket has at most {SOCKET_BYTES} bytes, "
+            f"{path} has {length}"
+        )
+    return path
+
+
 def is_encrypted(endpoint: str) -> bool:
     """Tell whether an endpoint asks for certificates."""
     return endpoint.startswith(ENCRYPTED)
@@ -163,11 +187,7 @@ class Board(Section, frozen=True, kw_only=True):
         given = {"any_source_port": self.any_source_port}
         check_protections(given, PROTECTIVE_OF_BOARD, self.i_accept)
         for name in ("address", "listen_address"):
-            value = getattr(self, name)
-            try:
-                ip_address(value)
-            except ValueError:
-                raise ValueError(f"{name} is {value!r}, allowed is an IP address") from None
+            _check_ipv4(name, getattr(self, name))
         if len(set(self.listen_ports)) < len(self.listen_ports):
             raise ValueError(f"listen_ports {self.listen_ports} names a port twice")
         if self.address == self.listen_address and self.port in self.listen_ports:
@@ -176,12 +196,22 @@ class Board(Section, frozen=True, kw_only=True):
             )
 
 
+def _check_ipv4(name: str, value: str) -> None:
+    try:
+        version = ip_address(value).version
+    except ValueError:
+        raise ValueError(f"{name} is {value!r}, allowed is an IPv4 address") from None
+    if version != 4:
+        raise ValueError(f"{name} is {value!r}: the board needs IPv4, allowed is an IPv4 address")
+
+
 class Wire(Section, frozen=True, kw_only=True):
     """What the manual leaves open about the frames; the defaults are today's answers."""
 
     crc: str = "crc-16"  # a 16-bit name of crcmod.predefined
     crc_covers: Covers = "payload"
-    angular_unit: Literal["decidegree", "milliradian"] = "decidegree"  # per second
+    command_angular_unit: AngularUnit = "decidegree"  # per second, of motion commands
+    feedback_angular_unit: AngularUnit = "decidegree"  # per second, of measured velocities
 
     def __post_init__(self) -> None:
         try:

@@ -27,7 +27,7 @@ from sim.geometry import wrapped
 from sim.sonar import Ranges
 from sim.vehicle import Twist
 
-# rad/s for one unit of the wire; which unit it is, is a setting.
+# rad/s for one unit of the wire; which unit it is each way, is a setting.
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}
 DRIVER_SIDES = {"left": Side.LEFT, "right": Side.RIGHT}
 FORWARD_SONARS, BACKWARD_SONARS = (1, 2, 3), (5, 6, 7)
@@ -42,7 +42,8 @@ class Board:
     """State since power-on; ``sense`` tells it what its sensors see."""
 
     def __init__(self, wire: Wire, settings: Sim, ranges: Ranges) -> None:
-        self._unit = RADIANS[wire.angular_unit]
+        self._command_unit = RADIANS[wire.command_angular_unit]
+        self._feedback_unit = RADIANS[wire.feedback_angular_unit]
         self._settings = settings
         self._twist = Twist()
         self._ranges = ranges
@@ -74,7 +75,7 @@ class Board:
 
     def target(self, command: c.MotionCommand) -> Twist:
         """Return what a command asks for, in SI."""
-        return Twist(command.linear_mmps / 1000, command.angular_raw * self._unit)
+        return Twist(command.linear_mmps / 1000, command.angular_raw * self._command_unit)
 
     def drive(self) -> c.MotionCommand:
         """Return what the motors are told: the command that is held, or BREAK."""
@@ -96,7 +97,7 @@ class Board:
     def velocity(self) -> r.VelocityReport:
         """Return what comes unasked, all the time."""
         return r.VelocityReport(
-            round(self._twist.linear * 1000), round(self._twist.angular / self._unit)
+            round(self._twist.linear * 1000), round(self._twist.angular / self._feedback_unit)
         )
 
     def driver(self, side: Side) -> r.DriverReport:

@@ -87,10 +87,20 @@ class Injection:
                 simulation.freeze(request.seconds, now_ns)
             case q.PowerCycle():
                 simulation.power_cycle(request.seconds, now_ns)
+            case q.Flood():
+                simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
+            case _:
+                self._disturb_firmware(request)
+
+    def _disturb_firmware(self, request: q.Asked) -> None:
+        simulation = self._simulation
+        match request:
             case q.Mute():
                 simulation.muted = frozenset(REPORTS[name] for name in request.reports)
-            case q.Flood():  # pragma: no branch - there is no other
-                simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
+            case q.Lose():
+                simulation.lose(frozenset(REPORTS[name] for name in request.reports), request.every)
+            case q.Firmware():  # pragma: no branch - there is no other
+                simulation.firmware = request
 
     def _wire(self, faults: q.Wire) -> None:
         if faults.direction in ("to_pc", "both"):

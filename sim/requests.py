@@ -19,6 +19,8 @@ SonarName = Literal[
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left"
 ]
 ReportName = Literal["velocity", "mileage", "ultrasonic", "bumper", "driver"]
+MotionName = Literal["stop", "run", "break"]
+Where = Literal["asked", "first", "second", "both"]  # of the PC's two ports
 Seconds = Annotated[float, Meta(ge=0.0, le=3600.0)]
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -65,6 +67,22 @@ class Mute(Request, frozen=True, kw_only=True, tag="mute"):
     """Let the board not say these reports any more, asked or not; it says all without any."""
 
     reports: tuple[ReportName, ...] = ()
+
+
+class Firmware(Request, frozen=True, kw_only=True, tag="firmware"):
+    """Make the board deviate from the manual; fields left out mean the default."""
+
+    answers: Where = "asked"  # where answers go: to the port that asked, by default
+    hits: Where | None = None  # where reports of a pressed bumper go; None: as answers
+    echoes: bool = True  # whether it echoes its emergency brake switches
+    ignores: tuple[MotionName, ...] = ()  # motion commands that it does not obey
+
+
+class Lose(Request, frozen=True, kw_only=True, tag="lose"):
+    """Drop every n-th datagram with one of these reports; no reports: none."""
+
+    reports: tuple[ReportName, ...] = ()
+    every: Annotated[int, Meta(ge=1)] = 3
 
 
 class Flood(Request, frozen=True, kw_only=True, tag="flood"):
@@ -121,7 +139,7 @@ class AskTruth(Request, frozen=True, kw_only=True, tag="truth"):
 
 
 Asked = (
-    Bumper | Sonar | Driver | Freeze | PowerCycle | Mute | Flood | Wire
+    Bumper | Sonar | Driver | Freeze | PowerCycle | Mute | Firmware | Lose | Flood | Wire
     | Place | AddBox | RemoveBox | AskTruth
 )  # fmt: skip
 

@@ -15,12 +15,18 @@ from common.freshness import S
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
-from common.wire.reports import FROM_BOARD, BumperReport
+from common.wire.reports import (
+    FROM_BOARD,
+    BumperBrakeReport,
+    BumperReport,
+    UltrasonicBrakeReport,
+)
 from sim import trace as t
 from sim.board import Board
 from sim.config import Config
 from sim.faults import Cable, Datagram
 from sim.geometry import Rectangle
+from sim.requests import Firmware, Where
 from sim.sonar import Sonars
 from sim.vehicle import Twist, go, next_twist, wheels
 from sim.world import Plan, World
@@ -32,6 +38,7 @@ TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = S // 2  # a longer hole is skipped: the world stood still meanwhile
 GARBAGE = b"GS" + bytes(20)  # begins as a frame does
 
+ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
 KINDS: tuple[t.Kind, ...] = ("stop", "run", "break")
 
 
@@ -60,6 +67,9 @@ class Simulation:
         self._silent_until_ns = now_ns
         self._powered = True
         self.muted: frozenset[type[Frame]] = frozenset()
+        self.firmware = Firmware()
+        self._losing: tuple[frozenset[type[Frame]], int] = frozenset(), 1
+        self._losable: Counter[type[Frame]] = Counter()
         self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
         self._flood_until_ns = now_ns
         self._said_pressed = False
@@ -117,6 +127,11 @@ class Simulation:
         """Send so many datagrams a second besides, for that long."""
         self._flood = rate * STEP_NS // S, GARBAGE if garbage else None
         self._flood_until_ns = now_ns + round(seconds * S)
+
+    def lose(self, reports: frozenset[type[Frame]], every: int) -> None:
+        """Lose every n-th of these reports from now on."""
+        self._losing = reports, every
+        self._losable.clear()
 
     def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
         """Set a driver's fault bits; the board reports a fault unasked."""
@@ -199,12 +214,35 @@ class Simulation:
                 self.counters[f"rejected_{part.reason}"] += 1
                 continue
             self.counters[type(part.frame).__name__] += 1
-            answer = self.board.answer(part.frame)
             if isinstance(part.frame, MotionCommand):
                 self._hold(part.frame, now_ns)
                 self.record(self._command)
+                if self._command.kind in self.firmware.ignores:
+                    continue
+            answer = self.board.answer(part.frame)
             if answer is not None:
-                self._send(answer, datagram.port, now_ns)
+                self._answer(answer, datagram.port, now_ns)
+
+    def _answer(self, frame: Frame, asked: int, now_ns: int) -> None:
+        """Send an answer to the port of this firmware, unless it is withheld."""
+        if isinstance(frame, ECHOES) and not self.firmware.echoes:
+            return
+        where = self.firmware.answers
+        if isinstance(frame, BumperReport) and frame.on and self.firmware.hits is not None:
+            where = self.firmware.hits
+        for port in self._ports(where, asked):
+            self._send(frame, port, now_ns)
+
+    def _ports(self, where: Where, asked: int) -> Sequence[int]:
+        ports = self._config.board.listen_ports
+        return {"asked": (asked,), "first": ports[:1], "second": ports[-1:], "both": ports}[where]
+
+    def _is_lost(self, kind: type[Frame]) -> bool:
+        kinds, every = self._losing
+        if kind not in kinds:
+            return False
+        self._losable[kind] += 1
+        return self._losable[kind] % every == 0
 
     def _hold(self, command: MotionCommand, now_ns: int) -> None:
         target = self.board.target(command)
@@ -226,7 +264,8 @@ class Simulation:
             self.to_pc.put(Datagram(payload, ports[number % len(ports)]), self.now_ns)
 
     def _send(self, frame: Frame, port: int, now_ns: int) -> None:
-        if not self._silent(now_ns) and type(frame) not in self.muted:
+        kind = type(frame)
+        if not self._silent(now_ns) and kind not in self.muted and not self._is_lost(kind):
             self.to_pc.put(Datagram(self._framing.pack(frame), port), now_ns)
 
     def _note_bumper(self, datagram: Datagram, now_ns: int) -> None:

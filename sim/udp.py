@@ -3,7 +3,6 @@
 import contextlib
 import socket
 from collections.abc import Iterator
-from ipaddress import ip_address
 
 from common.errors import LinkError
 from common.settings import Board
@@ -47,8 +46,7 @@ class BoardSocket:
 
 def bound(address: str, port: int, setting: str) -> socket.socket:
     """Return a UDP socket that does not block; raise ``LinkError`` when it cannot be had."""
-    family = socket.AF_INET6 if ip_address(address).version == 6 else socket.AF_INET
-    sock = socket.socket(family, socket.SOCK_DGRAM)
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sock.bind((address, port))
     except OSError as error:

@@ -12,7 +12,6 @@ from playwright.sync_api import Browser, sync_playwright
 
 from common.config import Sources, load
 from common.service import Node
-from services.teleop.app import TeleopApp
 from services.teleop.config import TeleopConfig
 from services.teleop.desk import Desk
 from services.teleop.gamepad import find
@@ -20,9 +19,9 @@ from services.teleop.logbook import Logbook
 from sim.requests import Place
 from tests.chain import Chain, chain
 from tests.dashboard.rig import dashboard
-from tests.dashboard.test_browser import CHROMIUM
-from tests.dashboard.window import opened, takes
+from tests.dashboard.window import CHROMIUM, opened, takes
 from tests.support import running, wait_until
+from tests.teleop.near import NearApp
 
 IMAGES = Path("docs/images")
 COLUMNS, ROWS = 104, 34
@@ -51,7 +50,7 @@ async def terminal_screen(stack: Chain) -> str:
     desk = Desk(node, Logbook())
     node.present()
     desk.plug(find(node.config.teleop))
-    app = TeleopApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):
         node.bus.open()
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:

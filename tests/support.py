@@ -15,11 +15,25 @@ from typing import TypeVar
 from common import log, settings
 from common.bus.bus import Bus
 from common.loop import Loop
+from common.messages import Limits, SafetyState
 
 PATIENCE_S = 20.0
 Lines = list[tuple[settings.LogLevel, str, log.About]]  # of a log
 WORKERS = 8  # whose ports do not meet
 T = TypeVar("T")
+
+
+def safety_state(heartbeat: int) -> SafetyState:
+    """Return a state of safety in which nothing is wrong; the publisher adds its ``boot``."""
+    return SafetyState(
+        verdict="run",
+        latched=(),
+        causes=(),
+        source=None,
+        limits=Limits(forward=1.0, backward=1.0, angular=1.0),
+        heartbeat=heartbeat,
+        text="",
+    )
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
@@ -67,10 +81,14 @@ def listening(endpoint: str, *uplink: str) -> settings.Bus:
 
 @contextlib.contextmanager
 def router_process(
-    endpoint: str, python: str = sys.executable
+    endpoint: str, python: str = sys.executable, probe_deadline: float = 30.0
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Run ``t2 router`` as a process of its own, listening when the context begins."""
-    command = [python, "-m", "cli", "router", "--set", f"bus.listen={endpoint}"]
+    """Run ``t2 router`` as a process of its own, listening when the context begins.
+
+    Its probe is patient: other tests may keep this router from the processor for seconds.
+    """
+    settings = [f"bus.listen={endpoint}", f"bus.probe_deadline={probe_deadline}"]
+    command = [python, "-m", "cli", "router", *(w for each in settings for w in ("--set", each))]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         try:

@@ -3,18 +3,16 @@
 import threading
 import time
 from collections.abc import Iterator
-from functools import partial
-from pathlib import Path
 
 import pytest
 
-from common.bus.bus import Bus
-from common.loop import Loop
-from common.source import DriveSource
 from sim.requests import Bumper
-from tests.chain import Chain, Witness, chain, until_still_s
-from tests.support import bus_on, running, wait_until
+from tests.chain import Chain, Witness, until_still_s
+from tests.stick import Stick, kinds_since, moves_since, push, stack, stick
+from tests.support import wait_until
 from tests.teleop.terminal import Terminal, terminal
+
+__all__ = ["stack", "stick"]  # fixtures
 
 pytestmark = pytest.mark.alone
 
@@ -22,12 +20,6 @@ pytestmark = pytest.mark.alone
 # command to move.
 REST_S = 0.3
 STARTED = '"service": "safety", "robot": "001", "event": "started"'
-
-
-@pytest.fixture
-def stack(tmp_path: Path) -> Iterator[Chain]:
-    with chain(tmp_path) as it:
-        yield it
 
 
 # Teleop takes no key for held that has been down since before it could drive.
@@ -103,56 +95,6 @@ def test_the_death_of_any_part_stops_the_vehicle(stack: Chain, hand: Hand, victi
         f"the machine held processes up for {held_up_s:.3f} s"
     )
     assert stack.last() in ("stop", "break")
-
-
-class Stick:
-    """A source that asks without a pause: unlike a held key, it is never let go by mistake."""
-
-    def __init__(self, loop: Loop) -> None:
-        self.linear = 0.0
-        self._loop = loop
-
-    def declare(self, bus: Bus) -> None:
-        source = DriveSource(bus, "teleop")
-
-        def ask(_: int) -> None:
-            source.ask(self.linear, 0.0)
-
-        self._loop.post(lambda: self._loop.every(0.05, ask))
-
-
-@pytest.fixture
-def stick(stack: Chain) -> Iterator[Stick]:
-    with running(Loop()) as loop:
-        stick = Stick(loop)
-        with bus_on(stack.endpoint, loop, stick.declare):
-            yield stick
-
-
-def push(stack: Chain, stick: Stick) -> None:
-    """Push the stick until the vehicle moves; center it first when safety wants a neutral."""
-    for _ in range(10):
-        stick.linear = 0.0
-        centered = partial(kinds_since, stack, len(stack.trace().commands))
-        wait_until(lambda: "run" in centered(), "a neutral is taken")  # noqa: B023
-        stick.linear = 0.5
-        try:
-            wait_until(lambda: stack.speed() > 0.1, "the vehicle moves", patience_s=6)
-        except AssertionError:
-            continue
-        return
-    raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
-
-
-def kinds_since(stack: Chain, count: int) -> set[str]:
-    """Return what was commanded after that many commands."""
-    return {command.kind for command in stack.trace().commands[count:]}
-
-
-def moves_since(stack: Chain, count: int) -> bool:
-    """Tell whether the board was told to move after that many commands, of a hundred more."""
-    wait_until(lambda: len(stack.trace().commands) > count + 100, "a hundred commands")
-    return any(c.kind == "run" and (c.linear or c.angular) for c in stack.trace().commands[count:])
 
 
 def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(

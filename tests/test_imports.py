@@ -1,19 +1,21 @@
 """What runs on board starts fast and small: none of it brings along what it does not use."""
 
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 ON_BOARD = (
-    "cli.router", "services.bridge.__main__", "services.bridge.guarded",
+    "cli.router", "services.bridge.__main__", "services.bridge.child",
     "services.safety.__main__", "services.odom.__main__",
 )  # fmt: skip
 # What each of them costs stands where it is done without. The rest is for laptops.
 HEAVY = {
     "asyncio", "dataclasses", "email", "hashlib", "importlib.metadata", "logging", "shutil",
-    "jinja2", "matplotlib", "mcap", "nicegui", "rich", "structlog", "textual",
+    "jinja2", "matplotlib", "mcap", "rich", "starlette", "structlog", "textual", "uvicorn",
 }  # fmt: skip
 
 
@@ -37,4 +39,20 @@ def test_it_would_be_seen() -> None:
 
 def test_the_guard_knows_no_bus() -> None:
     assert "zenoh" not in imported("services.bridge.__main__")
-    assert "zenoh" in imported("services.bridge.guarded")
+    assert "zenoh" in imported("services.bridge.child")
+
+
+IMPORTS_A_TEST = re.compile(
+    r"^(from|import) tests(\.\w+)*\.test_\w+|^from tests(\.\w+)* import .*\btest_", re.M
+)
+
+
+def test_no_module_imports_a_test_module() -> None:
+    tree = Path(__file__).parents[1]
+    found = [
+        path.relative_to(tree).as_posix()
+        for folder in ("tests", "bench", "tools")
+        for path in (tree / folder).rglob("*.py")
+        if IMPORTS_A_TEST.search(path.read_text(encoding="utf-8"))
+    ]
+    assert found == []

@@ -12,9 +12,9 @@ from common.freshness import S
 from sim.requests import Bumper
 from tests.chain import Chain
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
+from tests.stick import Stick, push, stack, stick
 from tests.support import wait_until
 from tests.teleop.terminal import terminal
-from tests.test_chain import Stick, push, stack, stick
 
 __all__ = ["stack", "stick"]  # fixtures
 
@@ -30,8 +30,8 @@ WAYS = {
 
 
 def told_once(stack: Chain) -> dict[str, Any]:
-    """Return what ``t2 latency --once`` prints into a pipe."""
-    result = ran("latency", "--once", *sets(f"bus.connect={stack.endpoint}"))
+    """Return what ``t2 latency --once`` prints as JSON."""
+    result = ran("latency", "--once", "-o", "json", *sets(f"bus.connect={stack.endpoint}"))
     assert result.returncode == 0, result.stderr
     told: dict[str, Any] = json.loads(result.stdout)
     return told
@@ -47,7 +47,7 @@ def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
     pressed_ns = time.monotonic_ns()
     stack.control.do(Bumper(pressed=True))
     lines = tmp_path / "lines"
-    with running(t2("latency", *sets(f"bus.connect={stack.endpoint}")), lines):
+    with running(t2("latency", "-o", "json", *sets(f"bus.connect={stack.endpoint}")), lines):
         wait_until(lambda: judged(lines), "the judged stop", PATIENCE_S)
     took_s = (time.monotonic_ns() - pressed_ns) / S
     told = json.loads(lines.read_text(encoding="utf-8").split("\n")[-2])

@@ -14,7 +14,7 @@ import pytest
 
 from cli.lap import holdup
 from tests.support import free_port, wait_until
-from tests.teleop.terminal import Terminal, at_terminal
+from tests.teleop.terminal import PATIENT, Terminal, at_terminal
 
 ROOT = Path(__file__).parents[1]
 TOUR = ROOT / "docs" / "tour.md"
@@ -109,6 +109,7 @@ def elsewhere() -> dict[str, str]:
         f"bus.listen=tcp/127.0.0.1:{free_port()}",
         f"dashboard.port={page}",
         *holdup.settings(holdup.measured()),
+        *PATIENT[1::2],
     ]
     named = (one.split("=", 1) for one in settings)
     env = {f"T2__{path.upper().replace('.', '__')}": value for path, value in named}

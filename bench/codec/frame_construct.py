@@ -12,7 +12,6 @@ from construct import (
     ExprAdapter,
     Int8ul,
     Int16ul,
-    Mapping,
     OneOf,
     Padding,
     Pointer,
@@ -32,9 +31,12 @@ VELOCITY = ExprAdapter(
     decoder=lambda raw, context: from_wire(raw),
     encoder=lambda value, context: to_wire(value),
 )
+PRESSED = ExprAdapter(
+    Int8ul, decoder=lambda raw, context: raw != 0, encoder=lambda value, context: int(value)
+)
 REPORTS = {
     0x7426: (4, Struct("linear" / VELOCITY, "angular" / VELOCITY)),
-    0x7602: (1, Struct("pressed" / Mapping(Int8ul, {False: 0, True: 1}))),
+    0x7602: (1, Struct("pressed" / PRESSED)),
     0x7601: (16, Struct("ranges" / Array(8, Int16ul))),
 }
 COMMANDS = {

@@ -100,10 +100,8 @@ def motion_of(it: Motion) -> Values:
 
 
 def bumper_of(it: Bumper) -> Values:
-    """Return the value of a bumper report; raise ``ValueError`` if it is neither 0 nor 1."""
-    if it.pressed > 1:
-        raise ValueError(it.pressed)
-    return (it.pressed == 1,)
+    """Return the value of a bumper report: any byte but 0 is pressed."""
+    return (it.pressed != 0,)
 
 
 def ultrasonic_of(it: Ultrasonic) -> Values:

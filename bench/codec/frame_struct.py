@@ -78,10 +78,8 @@ def motion_of(kind: int, linear: int, angular: int) -> Values:
 
 
 def bumper_of(value: int) -> Values:
-    """Return the value of a bumper report; raise ``ValueError`` if it is neither 0 nor 1."""
-    if value > 1:
-        raise ValueError(value)
-    return (value == 1,)
+    """Return the value of a bumper report: any byte but 0 is pressed."""
+    return (value != 0,)
 
 
 def ultrasonic_of(*ranges_mm: int) -> Values:

@@ -84,6 +84,7 @@ def bumper(raw: bytes) -> Fields:
     """Read a bumper sample."""
     fields = opened(raw)
     truth(fields["pressed"], "pressed")
+    integer(fields, "lost", 0)
     return fields
 
 
@@ -129,6 +130,7 @@ def cause(fields: Fields) -> None:
         refuse("action")
     number(fields, "age")
     text(fields, "text")
+    integer(fields, "id", 0)
 
 
 def state(raw: bytes) -> Fields:
@@ -152,6 +154,8 @@ def state(raw: bytes) -> Fields:
         refuse("source")
     integer(fields, "heartbeat")
     text(fields, "text")
+    if fields.setdefault("release", None) is not None:
+        refuse("release")
     return fields
 
 

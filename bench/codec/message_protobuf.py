@@ -30,7 +30,7 @@ HEADER = ("int64 seq", "int64 boot", "int64 t_ns", "int64 mono_ns", "int64 host"
 # A field is "type name", and before it "repeated" or "optional" as in a proto file.
 SCHEMA: Mapping[str, Sequence[str]] = {
     "Velocity": (*HEADER, "double linear", "double angular"),
-    "Bumper": (*HEADER, "bool pressed"),
+    "Bumper": (*HEADER, "bool pressed", "int64 lost"),
     "Range": ("optional double m",),
     "Ultrasonic": (*HEADER, "repeated Range ranges", "repeated Status status"),
     "Motion": (
@@ -38,11 +38,12 @@ SCHEMA: Mapping[str, Sequence[str]] = {
         "int64 judged", "int64 judged_boot", "bool latched", "optional int64 predecessor",
         "int64 asked_ns", "int64 heard_ns", "int64 judged_ns",
     ),
-    "Cause": ("string name", "Action action", "double age", "string text"),
+    "Cause": ("string name", "Action action", "double age", "string text", "int64 id"),
     "Limits": ("double forward", "double backward", "double angular"),
     "SafetyState": (
         *HEADER, "Verdict verdict", "repeated string latched", "repeated Cause causes",
         "optional string source", "Limits limits", "int64 heartbeat", "string text",
+        "optional string release",
     ),
     "Odometry": (
         *HEADER, "double x", "double y", "double heading", "double linear", "double angular",

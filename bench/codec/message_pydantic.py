@@ -41,6 +41,7 @@ class Bumper(Message):
     """The bumper strip."""
 
     pressed: bool
+    lost: int = 0
 
 
 class Ultrasonic(Message):
@@ -73,6 +74,7 @@ class Cause(Model):
     action: Literal["slow", "stop", "brake"]
     age: float
     text: str
+    id: int = 0
 
 
 class Limits(Model):
@@ -93,6 +95,7 @@ class SafetyState(Message):
     limits: Limits
     heartbeat: int
     text: str
+    release: None = None
 
 
 class Odometry(Message):

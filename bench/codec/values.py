@@ -20,7 +20,7 @@ FRAMES: dict[str, tuple[Any, ...]] = {
 
 MESSAGES: dict[str, dict[str, Any]] = {
     "Velocity": {**HEADER, "linear": -0.987, "angular": 0.436},
-    "Bumper": {**HEADER, "pressed": True},
+    "Bumper": {**HEADER, "pressed": True, "lost": 0},
     "Ultrasonic": {
         **HEADER,
         "ranges": (1.234, 0.8, None, 2.05, 3.141, None, 4.2, 0.62),
@@ -50,13 +50,21 @@ MESSAGES: dict[str, dict[str, Any]] = {
                 "action": "brake",
                 "age": 1.25,
                 "text": "the bumper was pressed; reset to drive on",
+                "id": 4_712,
             },
-            {"name": "near", "action": "slow", "age": 0.4, "text": "0.62 m ahead on the left"},
+            {
+                "name": "near",
+                "action": "slow",
+                "age": 0.4,
+                "text": "0.62 m ahead on the left",
+                "id": 4_713,
+            },
         ),
         "source": "teleop",
         "limits": {"forward": 0.3, "backward": 0.5, "angular": 0.8},
         "heartbeat": 4_711,
         "text": "slowed down: 0.62 m ahead on the left",
+        "release": None,
     },
     "Odometry": {
         **HEADER,

@@ -17,7 +17,8 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.config import Sources, load
 from common.loop import Loop
-from common.messages import ResetRequest, SafetyState
+from common.messages import SafetyState
+from common.operator import reset_request
 from common.settings import Shared
 from common.source import DriveSource
 
@@ -39,7 +40,7 @@ def by_t2(sock: socket.socket, sets: Sequence[str]) -> None:
 
     def reset(arrival: Arrival[SafetyState]) -> None:
         if arrival.message.latched:
-            bus.ask(keys.RESET, ResetRequest(), lambda _: None, lambda _: None)
+            bus.ask(keys.RESET, reset_request(arrival.message), lambda _: None, lambda _: None)
 
     bus.subscribe(keys.SAFETY, reset)
     loop.watch(sock, lambda _: ask(sock, source.ask))

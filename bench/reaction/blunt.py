@@ -10,13 +10,25 @@ from common import realtime
 from common.service import run
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.wheels import Wheels
+from services.bridge.core import Core
+from services.bridge.motion_output import MotionOutput
+from services.bridge.output import Output
+
+take = Core.datagram
 
 
 def main() -> int:
     """Bridge until it is told to stop; return the exit code."""
-    with patch.multiple(Wheels, brake=lambda _: 0, on_hit=lambda *_: None):
+    with (
+        patch.multiple(Core, reflex=lambda *_: None, datagram=unbraked),
+        patch.object(MotionOutput, "on_hit", lambda *_: None),
+    ):
         return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE)
+
+
+def unbraked(core: Core, datagram: bytes, port: int, now_ns: int, *, braked: bool) -> Output:
+    """Take in a datagram as if the reflex had sent BRAKE for it."""
+    return take(core, datagram, port, now_ns, braked=True)
 
 
 if __name__ == "__main__":

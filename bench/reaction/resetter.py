@@ -6,6 +6,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
+from common.operator import reset_request
 from common.settings import Bus as Where
 
 
@@ -15,12 +16,18 @@ class Resetter:
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._asking = False
+        self._state: m.SafetyState | None = None
+        bus.subscribe(keys.SAFETY, self._on_state)
         bus.subscribe(keys.MOTION, self._on_motion)  # it comes more often than the state
 
+    def _on_state(self, arrival: Arrival[m.SafetyState]) -> None:
+        self._state = arrival.message
+
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
-        if arrival.message.latched and not self._asking:
+        state = self._state
+        if arrival.message.latched and state is not None and state.latched and not self._asking:
             self._asking = True
-            self._bus.ask(keys.RESET, m.ResetRequest(), self._answered, self._answered, 1.0)
+            self._bus.ask(keys.RESET, reset_request(state), self._answered, self._answered, 1.0)
 
     def _answered(self, _: object) -> None:
         self._asking = False

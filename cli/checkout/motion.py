@@ -11,7 +11,10 @@ about 1           about 1              all is well
 negative          about 1              the motion is the wrong way round
 about 1           negative             the measured velocity is the wrong way round
 0                 -                    nothing turns, or the counter does not count this
-of another unit   that unit, inverted  the firmware has another unit than ``wire.angular_unit``
+of another unit   -                    the firmware takes another unit than the setting
+                                       ``wire.command_angular_unit``
+-                 another, inverted    it measures in another one than
+                                       ``wire.feedback_angular_unit``
 ================= ==================== =====================================================
 """
 
@@ -33,7 +36,7 @@ NOTHING = 0.15  # of what was commanded
 RATIO = 0.25  # off 1 by more is wrong; the next unit is off by 0.43
 UNIT_MATCH = 0.15  # of a known unit's ratio
 STOP_NS = 2 * S  # to stand, after a speed of this tool
-# rad/s for one unit of the wire, by the name of ``wire.angular_unit`` when there is such a setting
+# rad/s for one unit of the wire, by the name of the setting where there is one
 UNITS = {
     "decidegree": math.radians(0.1),
     "milliradian": 0.001,
@@ -50,7 +53,8 @@ class Run:
     """One motion that was asked for, and all that was heard from its start to standstill."""
 
     asked: Twist  # one of the two is zero
-    unit: str  # ``wire.angular_unit`` of the bridge
+    unit: str  # ``wire.command_angular_unit`` of the bridge
+    feedback: str  # ``wire.feedback_angular_unit`` of the bridge
     released_ns: int  # when zero was asked for
     motions: Sequence[Latest[Motion]]
     velocities: Sequence[Latest[Velocity]]
@@ -159,10 +163,7 @@ def _problems(run: Run, it: Measured) -> Iterator[str]:
     if turned and it.velocity / it.counted < 0:
         yield "The measured velocity has the wrong sign: it contradicts the counter."
     elif turned and abs(it.velocity / it.counted - 1) > RATIO:
-        yield (
-            f"The measured velocity is {abs(it.velocity / it.counted):.2f} times what the counter "
-            "says."
-        )
+        yield _wrong_velocity(run, abs(it.velocity / it.counted))
 
 
 def _nothing_counted(run: Run, it: Measured) -> str:
@@ -186,9 +187,21 @@ def _wrong_ratio(run: Run, ratio: float) -> str:
 
 def _factor(run: Run, ratio: float) -> str:
     text = f"It goes {ratio:.2f} times as fast as commanded."
-    unit = unit_of(ratio, run.unit) if run.turns else None
+    return _with_unit(run, text, unit_of(ratio, run.unit), "command")
+
+
+def _wrong_velocity(run: Run, ratio: float) -> str:
+    text = f"The measured velocity is {ratio:.2f} times the velocity of the counter."
+    # The larger the firmware's unit is, the smaller is what we read.
+    return _with_unit(run, text, unit_of(1 / ratio, run.feedback) if ratio else None, "feedback")
+
+
+def _with_unit(run: Run, text: str, unit: str | None, way: str) -> str:
+    if not run.turns:
+        return text
     if unit in SETTINGS:
-        return f'{text} The firmware\'s unit is another: set wire.angular_unit = "{unit}".'
+        setting = f"wire.{way}_angular_unit"
+        return f'{text} The firmware\'s unit is another: set {setting} = "{unit}".'
     if unit is not None:
         return f"{text} The firmware's unit seems to be {unit}, for which there is no setting."
     return text

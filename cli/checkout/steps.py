@@ -88,6 +88,9 @@ def estop(bench: Bench, operator: Operator) -> Verdict:
     return judge_estop(Trip("estop", at_ns, True, states, motions, done))
 
 
+WAYS = ("command", "feedback")  # of the angular units
+
+
 def moving(asked: Twist) -> Listener:
     """Return a step that asks for a motion, once the operator has typed that it may."""
 
@@ -96,7 +99,8 @@ def moving(asked: Twist) -> Listener:
             return judged([refusal], "")
         if not operator.confirm("The wheels will turn. All of them must hang free.", BLOCKS):
             return judged(["Not confirmed: nothing was moved."], "")
-        unit = str(bench.settings("bridge")["wire.angular_unit"][0])
+        settings = bench.settings("bridge")
+        unit, feedback = (str(settings[f"wire.{way}_angular_unit"][0]) for way in WAYS)
         tape = bench.tape
         tape.mark()
         operator.say("Turning. ctrl-c stops.")
@@ -104,7 +108,16 @@ def moving(asked: Twist) -> Listener:
         if released_ns is None:
             return judged([_not_let_in(bench)], "")
         return judge_motion(
-            Run(asked, unit, released_ns, tape.motions, tape.velocities, tape.mileages, tape.safety)
+            Run(
+                asked,
+                unit,
+                feedback,
+                released_ns,
+                tape.motions,
+                tape.velocities,
+                tape.mileages,
+                tape.safety,
+            )
         )
 
     return run

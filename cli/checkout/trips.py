@@ -4,17 +4,22 @@ from cli.checkout.bench import Bench
 from cli.checkout.latches import Reset
 from cli.checkout.operator import Operator
 from common import keys
-from common import messages as m
+from common.operator import reset_request
 
 AFTER_S = 2.0  # for safety to say that nothing is latched any more
 PHRASE = "reset"
 
 
 def reset(bench: Bench) -> Reset:
-    """Ask for a reset, and say what stayed latched after it."""
+    """Request a reset of what is latched now, and return what stayed latched after it."""
     tape = bench.tape
+    tape.mark()
+    bench.until(lambda: tape.safety, AFTER_S)
+    if not tape.safety:
+        return Reset(tape.mark(), False, "no state of safety arrives", ())
+    request = reset_request(tape.safety[-1].value)
     asked_ns = tape.mark()
-    granted, text = bench.call(keys.RESET, m.ResetRequest())
+    granted, text = bench.call(keys.RESET, request)
     if granted:
         bench.until(lambda: tape.safety and not bench.latched(), AFTER_S)
     else:

@@ -54,8 +54,8 @@ def is_many(robot: str) -> bool:
 def expression(word: str, robot: str) -> str:
     """Return the whole key or key expression for what was typed.
 
-    ``/tel/odom/odometry`` is taken for ``tel/odom/odometry``, as in ROS; the last part alone will
-    do where one row of the table ends with it (``odometry``, ``health``).
+    ``/tel/odom/odometry`` is taken for ``tel/odom/odometry``, as in ROS; the last parts will do
+    where one row of the table ends with them (``odometry``, ``safety/state``, ``safety/health``).
     """
     path = word.strip("/")
     if path.startswith(f"{keys.ROOT}/"):
@@ -100,11 +100,20 @@ def topic_of(key: str) -> keys.Topic[Message] | None:
 
 
 def _path(word: str) -> str:
-    if "/" in word or "*" in word:
+    typed = word.split("/")
+    if "**" in typed:
         return word
-    wild = [
-        "/".join("*" if part.startswith("{") else part for part in topic.path.split("/"))
-        for topic in keys.TOPICS
-    ]
-    found = [path for path in wild if path.split("/")[-1] == word]
-    return found[0] if len(found) == 1 else word
+    found = {path for topic in keys.TOPICS if (path := _ending(topic.path.split("/"), typed))}
+    return found.pop() if len(found) == 1 else word
+
+
+def _ending(row: list[str], typed: list[str]) -> str:
+    """Return a row's path when it ends with what was typed, which fills its gaps; else nothing."""
+    rest, end = row[: -len(typed)], row[-len(typed) :]
+    matches = [ours == theirs for ours, theirs in zip(end, typed, strict=False)]
+    gaps = [ours.startswith("{") for ours in end]
+    if len(end) != len(typed) or not any(matches):
+        return ""
+    if not all(same or gap for same, gap in zip(matches, gaps, strict=True)):
+        return ""
+    return "/".join([*("*" if part.startswith("{") else part for part in rest), *typed])

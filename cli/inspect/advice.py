@@ -26,6 +26,7 @@ BOARD_NEVER = (
 )
 BOARD_LOST = "look at the board's power and cable; it comes back by itself"
 BOARD_REFUSED = "`t2 wire decode` shows what is wrong with the frames; see wire.crc"
+SEND_ERRORS = "look at the robot's network interface, its firewall and the address in board.address"
 SWITCHES = """t2 call bridge/switches '{"ultrasonic_brake": true, "bumper_brake": true}'"""
 BUMPER = "free it; if it cannot be freed: `t2 drive`, hold F to creep off; then reset"
 SONAR_FAULT = "look at its cable; the vehicle does not move into its sector until it measures"
@@ -42,6 +43,8 @@ CAUSES = {
     "estop_reader": f"safety had lost the router; {RESET}",
     "predecessor": RESET,
     "runaway": f"look at the wheels and what they stand on; {RESET}",
+    "uncommanded_motion": f"look for a push or a slope; {RESET}",
+    "not_stopping": "use the switch on the vehicle; then look at its brakes and the ground",
     "driver_left": DRIVER,
     "driver_right": DRIVER,
     "flapping": f"find out which input comes and goes (t2 echo evt/safety); {RESET}",
@@ -50,6 +53,7 @@ CAUSES = {
     "link": BOARD_LOST,
     "switches": SWITCHES,
     "bumper": SILENT,
+    "bumper_lossy": "look at the cable and the board's load: t2 echo tel/bridge/bumper",
     "silent": SILENT,
     "unarmed": "see the link above: the bridge says what it waits for",
     "two_publishers": ONE_DRIVER,

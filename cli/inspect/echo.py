@@ -15,17 +15,20 @@ from common.freshness import S
 from common.sample import Sample
 
 SOON_S = 2.0  # the slowest streams come once a second
+ONCE_S = 10.0  # for --once without --duration
 HEADER = ("seq", "boot", "t_ns", "mono_ns", "host")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     add_key(parser)
-    parser.add_argument("--once", action="store_true", help="show one and end")
+    parser.add_argument(
+        "--once", action="store_true", help=f"show one and end; gives up after {ONCE_S:g} s"
+    )
     parser.add_argument(
         "--field", metavar="NAME", help="this field alone, such as x or causes.0.name"
     )
-    parser.add_argument("--header", action="store_true", help="the whole header, on a terminal too")
+    parser.add_argument("--header", action="store_true", help="the whole header, too")
     add_end(parser)
     add_options(parser)
 
@@ -34,12 +37,13 @@ def run(options: argparse.Namespace) -> int:
     """Show what comes until it ends; 0 when anything came."""
     shown = 0
     most = 1 if options.once else options.count
+    duration_s = options.duration or (ONCE_S if options.once else None)
     with seated(options) as seat:
         wanted = expression(options.key, seat.robot)
         # Events are rare: those that their publishers have kept are shown first.
         seat.probe.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
         with quietly():
-            for heard in coming(seat, wanted, options.duration):
+            for heard in coming(seat, wanted, duration_s):
                 shown += 1
                 show(heard, seat, options)
                 if shown == most:
@@ -48,7 +52,9 @@ def run(options: argparse.Namespace) -> int:
     if left_out:
         print(f"t2 echo: {left_out} more came faster than they could be shown", file=sys.stderr)
     if not shown:
-        print(f"t2 echo: nothing was heard on {wanted}; `t2 ls` shows what is", file=sys.stderr)
+        within = f" within {duration_s:g} s" if duration_s else ""
+        text = f"t2 echo: no message on {wanted}{within}; `t2 ls` lists the keys that are alive"
+        print(text, file=sys.stderr)
     return 0 if shown else 1
 
 
@@ -72,6 +78,8 @@ def show(heard: Sample, seat: Seat, options: argparse.Namespace) -> None:
         output.line(value) if wants_json(options) else print(output.fields(value), flush=True)
     elif wants_json(options):
         output.line(as_json(heard, reading, seat.robot))
+    elif options.output == "table":
+        print(as_row(heard, reading, seat.robot, options.header), flush=True)
     else:
         print(as_text(heard, reading, seat.robot, options.header), flush=True)
 
@@ -97,15 +105,32 @@ def as_json(heard: Sample, reading: Reading, robot: str) -> dict[str, Any]:
 def as_text(heard: Sample, reading: Reading, robot: str, header: bool) -> str:
     """Return a sample for people: a line that names it, its fields, and ``---`` as in ROS."""
     value = reading.value
-    wall = time.strftime("%H:%M:%S", time.localtime(heard.wall_ns // S))
     seq = f"  seq {value['seq']}" if isinstance(value, dict) and "seq" in value else ""
     what = "DELETE" if heard.deleted else reading.kind
-    milliseconds = heard.wall_ns // 1_000_000 % 1000
-    lines = [f"# {short(heard.key, robot)}  {what}{seq}  {wall}.{milliseconds:03d}"]
+    lines = [f"# {short(heard.key, robot)}  {what}{seq}  {clock(heard)}"]
     if reading.complaint:
         lines.append(f"# not as it should be: {reading.complaint}")
-    if isinstance(value, dict) and not header:
-        value = {name: each for name, each in value.items() if name not in HEADER}
+    value = body(value, header)
     if value not in (None, {}):
         lines.append(output.fields(value))
     return "\n".join([*lines, "---"])
+
+
+def as_row(heard: Sample, reading: Reading, robot: str, header: bool) -> str:
+    """Return a sample as one line: time, key, and its fields as JSON."""
+    value = "DELETE" if heard.deleted else output.json(body(reading.value, header))
+    complaint = f"  # not as it should be: {reading.complaint}" if reading.complaint else ""
+    return f"{clock(heard)}  {short(heard.key, robot)}  {output.printable(value)}{complaint}"
+
+
+def body(value: Any, header: bool) -> Any:
+    """Return a message without its header, unless that is wanted."""
+    if header or not isinstance(value, dict):
+        return value
+    return {name: each for name, each in value.items() if name not in HEADER}
+
+
+def clock(heard: Sample) -> str:
+    """Return the local time at which a sample was received, to the millisecond."""
+    wall = time.strftime("%H:%M:%S", time.localtime(heard.wall_ns // S))
+    return f"{wall}.{heard.wall_ns // 1_000_000 % 1000:03d}"

@@ -40,7 +40,10 @@ def run(options: argparse.Namespace, name: str, measure: Measure) -> int:
             seat.probe.listen(wanted)
             follow(seat, options, meters, name, measure)
     if not meters:
-        print(f"t2 {name}: nothing was heard on {wanted}; `t2 ls` shows what is", file=sys.stderr)
+        print(
+            f"t2 {name}: no message on {wanted}; `t2 ls` lists the keys that are alive",
+            file=sys.stderr,
+        )
     return 0 if meters else 1
 
 

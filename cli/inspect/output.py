@@ -9,8 +9,13 @@ import msgspec
 
 def line(thing: object) -> None:
     """Print one JSON line; what is no number becomes null, and bytes hexadecimal."""
-    sys.stdout.write(msgspec.json.encode(plain(thing)).decode() + "\n")
+    sys.stdout.write(json(thing) + "\n")
     sys.stdout.flush()
+
+
+def json(thing: object) -> str:
+    """Return it as JSON on one line; what is no number becomes null, and bytes hexadecimal."""
+    return msgspec.json.encode(plain(thing)).decode()
 
 
 def plain(thing: Any) -> Any:

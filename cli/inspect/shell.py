@@ -2,7 +2,6 @@
 
 import argparse
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,10 +32,22 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
         which.add_argument(
             "--all", dest="robot", action="store_const", const=EVERY_ROBOT, help="all robots"
         )
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument("--json", action="store_true", help="JSON lines, as in a pipe")
-    shown.add_argument("--text", action="store_true", help="text, as on a terminal")
+    add_output(parser)
     add_sources(parser)
+
+
+def add_output(parser: argparse.ArgumentParser) -> None:
+    """Add the option that chooses the form of the output; the same on a terminal and in a pipe."""
+    parser.add_argument(
+        "-o", "--output", choices=["text", "table", "json"], default="text",
+        help="text (default), table: one line per message where text has several, json: JSON lines",
+    )  # fmt: skip
+    parser.add_argument(
+        "--json", dest="output", action="store_const", const="json", help="the same as -o json"
+    )
+    parser.add_argument(
+        "--text", dest="output", action="store_const", const="text", help="the same as -o text"
+    )
 
 
 def one_robot(text: str) -> str:
@@ -71,8 +82,8 @@ def whole(text: str) -> int:
 
 
 def wants_json(options: argparse.Namespace) -> bool:
-    """Tell whether programs read what is shown."""
-    return bool(options.json) or not (options.text or sys.stdout.isatty())
+    """Return whether the output is JSON lines."""
+    return bool(options.output == "json")
 
 
 def settings(options: argparse.Namespace) -> Shared:

@@ -45,6 +45,10 @@ def link(now: Link, before: Link | None) -> Iterator[Finding]:
     if bad:
         text = f"the bridge refuses what the board sends: {bad}"
         yield Finding("link", "note", text, advice.BOARD_REFUSED)
+    refused = now.send_errors - (before.send_errors if before else 0)
+    if refused > 0:
+        text = f"the system refused to send {refused} datagrams to the board"
+        yield Finding("link", "wrong", text, advice.SEND_ERRORS)
     trip = "" if now.round_trip is None else f", answers in {now.round_trip * 1000:.1f} ms"
     yield Finding("link", "ok", f"the board at {now.board} is there{trip}")
     if not now.armed:

@@ -94,7 +94,8 @@ class Authority:
         )  # fmt: skip
         member = Member(
             common_name=name, role=profile.role, name=profile.name, robots=profile.robots,
-            addresses=profile.addresses, expires=signed.not_valid_after_utc,
+            sources=profile.sources, addresses=profile.addresses,
+            expires=signed.not_valid_after_utc,
         )  # fmt: skip
         return Issued(certificate_pem(signed), key_pem(key), member)
 

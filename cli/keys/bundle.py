@@ -29,6 +29,7 @@ def bus_toml(profile: Profile, routers: Sequence[Profile]) -> str:
     if profile.role == "robot" and site:
         lines += [_line("uplink", endpoints(site)[:1])]
     lines += [_line("ca", CA), _line("certificate", CERTIFICATE), _line("private_key", PRIVATE_KEY)]
+    lines += _driven_as(profile)
     return "\n".join(lines) + "\n"
 
 
@@ -41,6 +42,19 @@ def endpoints(routers: Sequence[Profile]) -> list[str]:
         if address not in LOCAL
     ]
     return found or [f"tls/{LOCAL[0]}:{PORT}"]
+
+
+def _driven_as(profile: Profile) -> list[str]:
+    """Return the source of each screen whose own name this certificate may not use."""
+    if not profile.sources:
+        return []
+    shipped = {"teleop": "teleop", "dashboard": "web"}
+    return [
+        line
+        for section, source in shipped.items()
+        if source not in profile.sources
+        for line in ("", f"[{section}]", _line("source", profile.sources[0]))
+    ]
 
 
 def _dialled(found: Sequence[str]) -> list[str]:

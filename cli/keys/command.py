@@ -7,7 +7,7 @@
 import argparse
 from pathlib import Path
 
-from cli.keys.profile import DAYS
+from cli.keys.profile import DAYS, OPERATORS_SOURCES
 from common.errors import RobotError
 from common.members import ROLES
 
@@ -61,6 +61,11 @@ def _add_issue(parser: argparse.ArgumentParser) -> None:
         help="for a driver: may move this robot; may be repeated",
     )  # fmt: skip
     parser.add_argument("--every", action="store_true", help="for a driver: may move every robot")
+    parser.add_argument(
+        "--source", action="append", default=[], metavar="NAME",
+        help="for a driver: may ask for motion under this name alone, as in safety.sources; may be "
+        f"repeated; {', '.join(OPERATORS_SOURCES)} by default",
+    )  # fmt: skip
     _add_signing(parser)
 
 

@@ -50,6 +50,7 @@ def as_json(members: Members, authority_ends_s: float, now_s: float) -> dict[str
                 "role": member.role,
                 "name": member.name,
                 "robots": list(member.robots),
+                "sources": list(member.sources),
                 "expires": f"{member.expires:%Y-%m-%dT%H:%M:%SZ}",
                 "days": days(member.expires.timestamp(), now_s),
                 "state": state(member, now_s),

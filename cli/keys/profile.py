@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from common.errors import ConfigError, RobotError
-from common.members import Name, Role
+from common.members import Name, Role, SourceName
 
 DAY_S = 86_400
 CA_DAYS = 3650
@@ -25,6 +25,7 @@ LISTENERS: tuple[Role, ...] = ("robot", "site")
 LOCAL = ("localhost", "127.0.0.1")  # for what runs on the same host, or comes through a tunnel
 VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (manual 1 and 1.1)
 EVERY_ROBOT = "*"
+OPERATORS_SOURCES = ("teleop", "web", "checkout")  # what a person's screens drive as
 LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role and serial too
 
 LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
@@ -39,6 +40,7 @@ class Profile:
     name: str
     robots: tuple[str, ...] = ()  # ids; that a driver may move, or the one that it is
     addresses: tuple[str, ...] = ()  # IP addresses and host names, where it listens
+    sources: tuple[str, ...] = ()  # that a driver may use; empty means any
 
     @property
     def who(self) -> str:
@@ -63,23 +65,27 @@ class Span:
     ends_s: float
 
 
-def profile(role: Role, name: str, robots: Sequence[str], addresses: Sequence[str]) -> Profile:
+def profile(
+    role: Role,
+    name: str,
+    robots: Sequence[str],
+    addresses: Sequence[str],
+    sources: Sequence[str] = (),
+) -> Profile:
     """Return what was asked for; raise ``ConfigError`` for what such a certificate cannot be."""
     for each in (name, *(robot for robot in robots if robot != EVERY_ROBOT)):
         _check_name(each)
     for address in addresses:
         _check_address(address)
-    if role == "driver" and not robots:
-        raise ConfigError("a driver wants --robot ID for each robot that it may move, or --every")
-    if role != "driver" and robots:
-        raise ConfigError(f"--robot and --every are for drivers; a {role} has no robots to name")
+    _check_driver(role, robots, sources)
     if role not in LISTENERS and addresses:
         raise ConfigError(f"--address is for routers; a {role} dials, and nobody dials it")
     if role == "site" and not addresses:
         raise ConfigError("a site's router wants --address: where robots and laptops find it")
     if role == "robot":
         robots, addresses = (name,), addresses or VEHICLE
-    return Profile(role, name, unique(robots), unique(addresses and (*addresses, *LOCAL)))
+    found_at = unique(addresses and (*addresses, *LOCAL))
+    return Profile(role, name, unique(robots), found_at, unique(sources))
 
 
 def span(now_s: float, days: int, authority_ends_s: float) -> Span:
@@ -115,6 +121,28 @@ def _check_name(name: str) -> None:
     except msgspec.ValidationError:
         raise ConfigError(
             f"{name!r} is no name: 1 to {LONGEST} letters, digits, dots, hyphens and underscores"
+        ) from None
+
+
+def _check_driver(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
+    """Refuse driver options for other roles, and a driver without robots."""
+    for source in sources:
+        _check_source(source)
+    if role == "driver" and not robots:
+        raise ConfigError("a driver needs --robot ID for each robot that it may move, or --every")
+    if role != "driver" and robots:
+        raise ConfigError(f"--robot and --every are for drivers; a {role} has no robots to name")
+    if role != "driver" and sources:
+        raise ConfigError(f"--source is for drivers; a {role} does not request motion")
+
+
+def _check_source(source: str) -> None:
+    try:
+        msgspec.convert(source, SourceName)
+    except msgspec.ValidationError:
+        raise ConfigError(
+            f"--source {source!r} is not a source name: a small letter, then up to 31 small "
+            "letters, digits, hyphens and underscores, as in safety.sources"
         ) from None
 
 

@@ -14,6 +14,7 @@ from cli.keys.profile import (
     DAY_S,
     EARLY_S,
     EVERY_ROBOT,
+    OPERATORS_SOURCES,
     Profile,
     Span,
     profile,
@@ -38,7 +39,8 @@ def init(options: argparse.Namespace) -> int:
 def issue(options: argparse.Namespace) -> int:
     """Make a certificate for somebody who has none."""
     robots = (*options.robot, *([EVERY_ROBOT] if options.every else []))
-    asked = profile(options.role, options.name, robots, options.address)
+    sources = options.source or (OPERATORS_SOURCES if options.role == "driver" else ())
+    asked = profile(options.role, options.name, robots, options.address, sources)
     with locked(options.folder) as folder:
         roster.check_free(folder.read(), asked.role, asked.name, time.time())
         _hand_out(folder, asked, options, settings=True)
@@ -51,7 +53,7 @@ def renew(options: argparse.Namespace) -> int:
         old = roster.newest(folder.read(), options.role, options.name)
         robots = old.robots if old.role == "driver" else ()
         addresses = options.address or roster.found_at(old)
-        asked = profile(old.role, old.name, robots, addresses)
+        asked = profile(old.role, old.name, robots, addresses, old.sources)
         _hand_out(folder, asked, options, settings=False)
     _say(words.renewed(old.role, old.name, old))
     return 0

@@ -39,6 +39,8 @@ def issued(
         yield f"  found at {', '.join(profile.addresses)}; no other address is believed"
     if profile.role == "driver":
         yield f"  may move {_robots(profile)}"
+    if profile.sources:
+        yield f"  drives as {' or '.join(profile.sources)}; no other source is allowed"
     yield ""
     if profile.listens:
         yield f"1. Copy the folder to the {profile.role}'s computer, and to no other:"

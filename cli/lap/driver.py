@@ -8,6 +8,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.freshness import S
+from common.operator import release_request, reset_request
 from common.source import DriveSource
 
 PERIOD_S = 0.05
@@ -45,7 +46,7 @@ class Driver:
         self._announce()
         self._source.ask(*ask.twist)
         self.asked = ask.twist
-        self._press(ask, now_ns)
+        self._press(ask, self.safety, now_ns)
 
     def _listen(self) -> None:
         def keep(name: str) -> Callable[[Arrival[Any]], None]:
@@ -65,7 +66,7 @@ class Driver:
             if self.lap.step is not None:
                 self._on_step(self.lap.step)
 
-    def _press(self, ask: Ask, now_ns: int) -> None:
+    def _press(self, ask: Ask, seen: m.SafetyState, now_ns: int) -> None:
         if ask.press is None or now_ns - self._pressed_ns < PRESS_NS:
             return
         self._pressed_ns = now_ns
@@ -86,6 +87,7 @@ class Driver:
             answer(False, reason)
 
         if press == "reset":
-            self._bus.ask(keys.RESET, m.ResetRequest(), done, refused)
-        else:
-            self._bus.ask(keys.RELEASE, m.ReleaseRequest(), done, refused)
+            self._bus.ask(keys.RESET, reset_request(seen), done, refused)
+        else:  # the lap hits its box driving forward
+            request = release_request(seen, "backward", held=True)
+            self._bus.ask(keys.RELEASE, request, done, refused)

@@ -11,7 +11,9 @@ import time
 LIMIT_S = 0.05  # up to this the shipped limits hold
 SAMPLES_S = 0.005
 
-AGES = ("bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age")
+AGES = (
+    "bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age", "estop_path_age",
+)  # fmt: skip
 SLOWER = ("switches_age", "driver_age")
 
 
@@ -37,6 +39,7 @@ def settings(holdup_s: float) -> list[str]:
     return [
         "bus.i_accept=lease",
         "bus.lease=10",
+        "bus.probe_deadline=10",
         "bridge.i_accept=lease,silence,heartbeat",
         f"bridge.lease={longer}",
         f"bridge.silence={longer}",

@@ -4,7 +4,7 @@ import contextlib
 import os
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar
 
 import zenoh
@@ -57,12 +57,14 @@ class Bus:
         # Zenoh's while the loop reads them.
         self.counters: Counter[str] = Counter(overrun=0, undecodable=0)
         self.publishers: list[Publisher[Any]] = []
-        self._post = post
+        self.post = post
         self._declarations: list[Callable[[zenoh.Session], Any]] = []
         self._declared: list[Any] = []  # references keep them alive
         self._session: zenoh.Session | None = None
         self._closed = False
-        self._opener = Opener(where, lambda session: post(lambda: self._adopt(session)))
+        self.where = where
+        self.links: list[Bus] = []  # private sessions that open and close with this one
+        self._opener = self.opener(lambda session: post(lambda: self._adopt(session)))
 
     # --- declarations ---------------------------------------------------------------------
 
@@ -81,19 +83,22 @@ class Bus:
         *,
         depth: int = 1,
         refused: Callable[[str, MessageError], None] | None = None,
+        known: Collection[str] = (),
         **names: str,
     ) -> None:
         """Call the handler for each message, at most ``depth`` of which may wait.
 
         A newer one pushes the oldest out. ``refused`` gets the key and the error of what is no such
-        message; it is counted in any case.
+        message; it is counted in any case. Where a name is ``*``, those ``known`` are counted one
+        by one and all others together, because any client can invent names.
         """
         expression = topic.on(self.robot, **names)
         only = "" if "*" in expression else expression  # to ask a sample for its key takes time
+        single = topic.known(self.robot, names, known) | {expression}
 
         def take(sample: zenoh.Sample, received_ns: int) -> None:
             key = only or str(sample.key_expr)
-            self.counts[key] += 1
+            self.counts[key if key in single else expression] += 1
             try:
                 message = codec.decode(sample.payload.to_bytes(), topic.message)
             except MessageError as error:
@@ -121,6 +126,10 @@ class Bus:
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler with the receive time for any PUT or DELETE on a key."""
         self._subscribe(key, lambda _, received_ns: handler(received_ns), depth=1, history=0)
+
+    def announce(self, key: str) -> None:
+        """Declare a subscriber of a key whose samples another subscription hands over."""
+        self._declare(lambda session: session.declare_subscriber(key, lambda _: None))
 
     def serve(self, call: Call[Q, R], handler: Callable[[Q, Caller[R]], None]) -> None:
         """Answer a call: the handler replies or refuses, at once or later."""
@@ -204,9 +213,14 @@ class Bus:
 
     # --- life -----------------------------------------------------------------------------
 
+    def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:
+        """Return what finds the session."""
+        return Opener(self.where, adopt)
+
     def open(self) -> None:
         """Begin to look for a router; returns at once."""
-        self._opener.start()
+        for bus in (self, *self.links):
+            bus._opener.start()
 
     @property
     def connected(self) -> bool:
@@ -222,6 +236,8 @@ class Bus:
             publisher.withdraw()
         self._session = None
         self._opener.close()
+        for link in self.links:
+            link.close()
 
     def _adopt(self, session: zenoh.Session) -> None:
         if self._closed:
@@ -236,7 +252,7 @@ class Bus:
 
     def _hand_over(self, call: Callable[[], None]) -> None:
         """Let the owner's thread make the call, unless the bus has closed by then."""
-        self._post(lambda: None if self._closed else call())
+        self.post(lambda: None if self._closed else call())
 
     def _subscribe(
         self, key: str, take: Callable[[zenoh.Sample, int], None], depth: int, history: int

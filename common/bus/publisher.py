@@ -34,7 +34,7 @@ class Publisher(Generic[M]):
         self._host = host
         self._seq = 0
         self._counts = counts
-        self._declared: Any = None
+        self._declared: list[Any] = []  # on each session, in the order of sending
         self._waiting: deque[tuple[M, bytes | None]] = deque(maxlen=topic.service.history)
 
     @property
@@ -45,9 +45,9 @@ class Publisher(Generic[M]):
     @property
     def passed_on(self) -> bool | None:
         """Whether the router has anybody to pass messages to; None while there is no bus."""
-        if self._declared is None:
+        if not self._declared:
             return None
-        return bool(self._declared.matching_status.matching)
+        return any(bool(each.matching_status.matching) for each in self._declared)
 
     def put(self, message: M, raw: bytes | None = None) -> M:
         """Send the message with a header of its own, ``raw`` beside it; return what was sent."""
@@ -61,7 +61,7 @@ class Publisher(Generic[M]):
             host=self._host,
         )
         self.last = stamped
-        if self._declared is None:
+        if not self._declared:
             self._waiting.append((stamped, raw))
         else:
             self._send(stamped, raw)
@@ -69,25 +69,31 @@ class Publisher(Generic[M]):
 
     def withdraw(self) -> None:
         """Send no more; the bus calls this before it ends its session."""
-        self._declared = None
+        self._declared.clear()
 
-    def declare(self, session: zenoh.Session) -> None:
-        """Make it known; the bus calls this once it has a session."""
+    def declare(self, session: zenoh.Session, *, first: bool = False) -> None:
+        """Declare it; the bus calls this once it has a session.
+
+        With ``first`` each message goes to this session before it goes to any other.
+        """
         service = self.topic.service
         options = qos(service) | {"encoding": codec.encoding(self.topic.message)}
         if service.history:
             cache = zenoh.ext.CacheConfig(max_samples=service.history)
-            self._declared = zenoh.ext.declare_advanced_publisher(
+            declared: Any = zenoh.ext.declare_advanced_publisher(
                 session, self.key, cache=cache, publisher_detection=True, **options
             )
         else:
-            self._declared = session.declare_publisher(self.key, **options)
+            declared = session.declare_publisher(self.key, **options)
+        self._declared.insert(0 if first else len(self._declared), declared)
         while self._waiting:
             self._send(*self._waiting.popleft())
 
     def _send(self, message: M, raw: bytes | None) -> None:
         self._counts[self.key] += 1
-        self._declared.put(codec.encode(message), attachment=raw)
+        payload = codec.encode(message)
+        for declared in self._declared:
+            declared.put(payload, attachment=raw)
 
 
 def qos(service: ClassOfService) -> dict[str, Any]:

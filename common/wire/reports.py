@@ -8,7 +8,7 @@ id     name                        payload
 0x7426 motion                      u16 linear, u16 angular, sign-magnitude
 0x7600 distance and heading        s32 mm, s32 0.1 deg, two's complement
 0x7601 ultrasonic                  u16 x 8 mm
-0x7602 bumper                      u8 0 clear, 1 hit
+0x7602 bumper                      u8 0 clear, anything else hit
 0x7603 ultrasonic emergency brake  u8 0 off, 1 on
 0x7604 bumper emergency brake      u8 0 off, 1 on
 0x7605 motor driver                u8 side, u32 fault bits
@@ -114,9 +114,18 @@ class UltrasonicReport(Frame, frozen=True):
 
 
 class BumperReport(Switch, frozen=True):
-    """Board to PC: on while the bumper is pressed (manual 2.4)."""
+    """Board to PC: on while the bumper is pressed (manual 2.4).
+
+    The manual defines 0 and 1. Any other byte counts as pressed, the safe side.
+    """
 
     ID = 0x7602
+
+    @classmethod
+    def from_wire(cls, values: tuple[int, ...]) -> Self:
+        """Decode it from its byte."""
+        (value,) = values
+        return cls(value != 0)
 
 
 class UltrasonicBrakeReport(Switch, frozen=True):

@@ -7,6 +7,7 @@ if [ ! -d /opt/venv ]; then
   python3 -m venv /opt/pip
   python3 -m venv --without-pip /opt/venv
   mkdir /opt/empty
+  mkdir -p -m 700 /opt/private/t2-drive
 fi
 if ls $wheels/*.whl >/dev/null 2>&1; then
   export PIP_NO_INDEX=1 PIP_FIND_LINKS=$wheels

@@ -4,8 +4,9 @@ import sys
 import time
 from collections.abc import Sequence
 
-from common import log, realtime
+from common import child_process, log, realtime
 from common.config import load
+from common.drive_socket import prepare, socket_path
 from common.errors import ConfigError, LinkError
 from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.settings import Board
@@ -22,6 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if argv is None else argv
     try:
         config = load(BridgeConfig, sources(arguments("bridge").parse_args(given))).config
+        prepare(socket_path(config.bus, config.robot.id))  # the bridge listens there
     except ConfigError as error:
         print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
@@ -38,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except LinkError as error:
         log.Logger().error(str(error))
         return EXIT_LINK
-    return Guard(config, sockets, [sys.executable, "-m", "services.bridge.guarded", *given]).run()
+    return Guard(config, sockets, child_process.command("services.bridge.child", *given)).run()
 
 
 def bound(board: Board) -> Sockets:

@@ -7,6 +7,7 @@ from msgspec import Meta
 from common import settings
 
 Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
+Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
 
 # See ``settings.check_protections``.
@@ -14,9 +15,12 @@ PROTECTIVE: settings.Limits = {
     "lease": (0.0, 0.5),
     "silence": (0.0, 0.5),
     "coast": (0.0, 3.0),
+    "deceleration": (0.1, 10.0),
+    "angular_deceleration": (0.1, 10.0),
     "heartbeat": (0.0, 0.2),
     "max_linear": (0.0, 1.5),
     "max_angular": (0.0, 2.0),
+    "require_switches": (True, True),
     # Asked less often, a short hit, a near wall and a board that has started anew are seen late.
     "bumper_rate": (20.0, 200.0),
     "ultrasonic_rate": (10.0, 200.0),
@@ -33,11 +37,14 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port is taken
     # s without a sign of the bridge's loop after which its guard brakes
     heartbeat: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2
-    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP before it becomes BREAK
+    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP at most before it is BREAK
+    deceleration: Positive = 0.6  # m/s^2 that a STOP must reach, or it becomes BREAK sooner
+    angular_deceleration: Positive = 1.0  # rad/s^2, likewise
     max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
     max_angular: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # rad/s
     answer_timeout: Annotated[float, Meta(ge=0.02, le=1.0)] = 0.1  # s for a query's answer
     echo_timeout: Annotated[float, Meta(ge=0.05, le=2.0)] = 0.5  # s for a switch or lamp's echo
+    require_switches: bool = True  # the board must echo that its emergency brakes are on
     bumper_rate: Rate = 50.0
     ultrasonic_rate: Rate = 20.0
     mileage_rate: Rate = 50.0

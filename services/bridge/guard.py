@@ -11,9 +11,12 @@ starting       until the first heartbeat, that a heartbeat: alive; none in 10 s:
                follows the bridge's first STOP
 alive          from 200 ms without one         five BREAKs without one: killed; the pipe's end
 ending, killed until the child is gone         it is gone: started again, first at once
+not started    until it could be started       started; tried again after 0 to 5 s (no memory)
 ============== =============================== ==============================================
 
-SIGTERM, SIGINT and SIGHUP are passed on; a bridge that comes to rest says the last word itself.
+SIGTERM, SIGINT and SIGHUP are passed on; a bridge that comes to rest sends its last frame itself.
+A signal after the parent has died means that the supervisor was killed: the system sends it then
+(see ``cli.supervisor``), and the bridge brakes at once instead of coasting.
 """
 
 import os
@@ -24,6 +27,7 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
+from common import child_process
 from common.backoff import Backoff
 from common.log import Logger
 from common.options import HOPELESS
@@ -31,13 +35,14 @@ from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.config import BridgeConfig
-from services.bridge.handover import Handover
-from services.bridge.udp import Sockets
+from services.bridge.guard_ipc import Handover
+from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
 HANGS = 5  # BREAKs to a bridge that gives no heartbeat, until it is killed
 HANGS_AT_START = 200
 GOES = 20  # BREAKs to one that has said its last word
+NOT_STARTED = 1  # an exit code for a bridge that could not be started
 GOES_AT_REST_S = 4.0  # for one that was told to come to rest
 
 
@@ -52,6 +57,7 @@ class Guard:
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the one that the bridge uses
         self._stopping = False
+        self._parent = os.getppid()  # the supervisor
         self._child: subprocess.Popen[bytes] | None = None  # the one that signals go to
         self._backoff = Backoff()
         self._log = Logger()
@@ -65,29 +71,44 @@ class Guard:
         while not self._stopping and code not in HOPELESS:
             self.brake()
             started_s = time.monotonic()
-            child, heartbeat = self._start()
-            self._watch(child, heartbeat)
-            os.close(heartbeat)
-            code = self._end(child)
+            code = self._live()
             self._await_restart(code, time.monotonic() - started_s)
         return code
 
     def brake(self) -> None:
         """Send BREAK as the bridge would; a guard that does so works."""
         self._systemd.beat(time.monotonic_ns())
-        self._sockets.send(self._brake, self._port)
+        self._sockets.send(self._brake, self._port, BRAKE_ATTEMPTS)
+
+    def _live(self) -> int:
+        """Start a bridge, watch it to its end, and return its exit code as a shell would."""
+        try:
+            child, heartbeat = self._start()
+        except (OSError, MemoryError, subprocess.SubprocessError) as error:
+            self._log.error("the bridge cannot be started: brakes on", error=str(error))
+            return NOT_STARTED
+        self._watch(child, heartbeat)
+        os.close(heartbeat)
+        return self._end(child)
 
     def _start(self) -> tuple["subprocess.Popen[bytes]", int]:
+        self._child = None
         heartbeat, to_guard = os.pipe()
-        handover = Handover(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
-        # A group of its own: ctrl-c reaches the guard, which passes it on once.
-        self._child = subprocess.Popen(
-            self._command,
-            env=os.environ | handover.environ(),
-            pass_fds=handover.descriptors,
-            process_group=0,
-        )
-        os.close(to_guard)
+        try:
+            handover = Handover(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
+            # A session of its own: ctrl-c reaches the guard, which passes it on once; a kill of the
+            # guard's whole session leaves the bridge, which stops the vehicle.
+            self._child = subprocess.Popen(
+                self._command,
+                env=child_process.environ() | handover.environ(),
+                pass_fds=handover.descriptors,
+                start_new_session=True,
+            )
+        except BaseException:
+            os.close(heartbeat)
+            raise
+        finally:
+            os.close(to_guard)
         if self._stopping:  # told while it started
             self._child.terminate()
         return self._child, heartbeat
@@ -143,5 +164,8 @@ class Guard:
     def _stop(self, number: int, _: FrameType | None) -> None:
         self._stopping = True
         self._systemd.stopping()
-        if self._child is not None:
-            self._child.send_signal(signal.SIGTERM)
+        if self._child is None:
+            return
+        if os.getppid() != self._parent:
+            self._child.send_signal(signal.SIGINT)  # the second signal makes it brake
+        self._child.send_signal(signal.SIGTERM)

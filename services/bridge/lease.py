@@ -13,17 +13,27 @@ neutral    start, not ready, lease over,    a STOP or a RUN of zero from the aut
            a new authority                  ready: nothing moves because something came back
 judged     a bumper hit (the reflex: BREAK  a motion message whose ``judged`` covers that hit:
            at once)                         a RUN that was under way must not undo the BREAK
+still      0.05 m or 0.05 rad away from a   a motion message that says safety has latched this:
+           standstill while the lease was   its ``predecessor`` is the bridge itself
+           over: BREAK at once
 heir       an authority that ended with a   its successor has latched in its place, and says
            latch that nobody has reset      by ``predecessor`` that it knows whose latch it is
 ========== ================================ ==================================================
 
 When the lease is over: STOP at once and at 20 Hz for ever, and BREAK from ``coast_ns`` on while the
-vehicle is not known to stand. The authority is the ``boot`` of the sender; as long as its lease
-lives another is refused.
+vehicle is not known to stand (``standstill`` says how long that is). BREAK goes on if it was the
+authority's last order. The authority is the ``boot``
+of the sender; as long as its lease lives another is refused.
+
+The lease counts from when a motion was received, not from when it is handled: a message that
+waited for longer than the lease renews nothing and is not obeyed, except a BREAK. While the lease
+lives, ``seq`` may rise by 2^20 at most: a copied ``boot`` with a huge ``seq`` must not lock the
+authority out. An authority that was not received for hours is taken again.
 
 A latch must outlive the safety service that holds it: whose it is, is remembered here until the
 same one says that it was reset, or its heir has taken it on. A successor that latches for a reason
-of its own, before it has heard of the latch that is due, takes nothing on.
+of its own, before it has heard of the latch that is due, takes nothing on. A motion without a
+command is such a latch, too, and it is the bridge's own until a safety service has taken it on.
 """
 
 from enum import StrEnum
@@ -36,6 +46,7 @@ from common.messages import Motion
 
 STOP_PERIOD_NS = S // 20
 AT_ONCE = -STOP_PERIOD_NS  # as a send time: so long ago that the next STOP is due
+SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 90 decisions a second
 STANDING_MPS = 0.02
 STANDING_RADPS = 0.05  # 3 deg/s: the board's own resolution is 0.1 deg/s, its sensor is noisier
 
@@ -53,6 +64,8 @@ class Refusal(StrEnum):
 
     SECOND_AUTHORITY = "second_authority"
     OLD = "seq_not_rising"
+    JUMP = "seq_jumps"
+    LATE = "too_late"
     NOT_READY = "not_ready"
     NOT_NEUTRAL = "waiting_for_neutral"
     NOT_JUDGED = "hit_not_judged"
@@ -70,7 +83,14 @@ class Lease(Struct, frozen=True):
     neutral: bool = False
     hit: int | None = None  # ``seq`` of the bumper sample that awaits judgement
     sent_ns: int = 0
-    latched_by: int | None = None  # the authority whose latch nobody has reset
+    latched_by: int | None = None  # the authority whose latch nobody has reset, or the bridge
+    braked: bool = False  # whether the authority's last order was BREAK
+    uncommanded: bool = False  # it moved away from a standstill, which safety has not latched yet
+
+    @property
+    def braking(self) -> bool:
+        """Whether BREAK lasts, whether or not the vehicle stands."""
+        return self.hit is not None or self.uncommanded or self.braked
 
     @property
     def waiting(self) -> str:
@@ -79,6 +99,8 @@ class Lease(Struct, frozen=True):
             return "the board is not ready"
         if self.hit is not None:
             return "safety has not judged the bumper hit"
+        if self.uncommanded:
+            return "the vehicle moved without a command: safety has not latched that yet"
         if self.latched_by not in (None, self.boot):
             return "safety has not taken on the latch of the one before it"
         if not self.neutral:
@@ -87,24 +109,44 @@ class Lease(Struct, frozen=True):
 
 
 def on_motion(
-    lease: Lease, motion: Motion, now_ns: int, lease_ns: int, own_boot: int
+    lease: Lease, motion: Motion, now_ns: int, lease_ns: int, own_boot: int, *, received_ns: int
 ) -> tuple[Lease, Order | None, Refusal | None]:
     """Judge one motion message; return the order to send, if any, and what was refused."""
+    if refusal := _refusal(lease, motion, now_ns, lease_ns):
+        return lease, None, refusal
+    if now_ns - received_ns > lease_ns:
+        brake = motion.command == "brake"
+        lease = replace(lease, braked=True) if brake else lease
+        return lease, Order.BRAKE if brake else None, Refusal.LATE
     if motion.boot != lease.boot:
-        if lease.boot is not None and now_ns - lease.renewed_ns <= lease_ns:
-            return lease, None, Refusal.SECOND_AUTHORITY
         lease = replace(lease, boot=motion.boot)  # the end of the last one's took the neutral
-    elif motion.seq <= lease.seq:
-        return lease, None, Refusal.OLD
     lease = expire(lease, now_ns, lease_ns)
-    lease = replace(lease, seq=motion.seq, renewed_ns=now_ns, over_since_ns=None)
+    lease = replace(lease, seq=motion.seq, renewed_ns=received_ns, over_since_ns=None)
     if motion.judged_boot == own_boot and lease.hit is not None and motion.judged >= lease.hit:
         lease = replace(lease, hit=None)
-    lease = replace(lease, latched_by=_latched_by(lease, motion))
+    latched_by = _latched_by(lease, motion)
+    uncommanded = lease.uncommanded and latched_by == own_boot
+    lease = replace(lease, latched_by=latched_by, uncommanded=uncommanded)
     order, refusal = _order(lease, motion)
     # A RUN that moves is obeyed only when the lease is neutral already.
     neutral = lease.neutral or (lease.ready and refusal is None)
-    return replace(lease, neutral=neutral, sent_ns=now_ns), order, refusal
+    braked = order is Order.BRAKE
+    return replace(lease, neutral=neutral, sent_ns=now_ns, braked=braked), order, refusal
+
+
+def _refusal(lease: Lease, motion: Motion, now_ns: int, lease_ns: int) -> Refusal | None:
+    """Return why a message is not taken at all, by its sender and its number."""
+    lives = lease.boot is not None and now_ns - lease.renewed_ns <= lease_ns
+    if motion.boot != lease.boot:
+        return Refusal.SECOND_AUTHORITY if lives else None
+    if motion.seq <= lease.seq:
+        return Refusal.OLD
+    return Refusal.JUMP if lives and motion.seq - lease.seq > SEQ_STEP_MAX else None
+
+
+def is_neutral(motion: Motion) -> bool:
+    """Return whether a motion moves nothing."""
+    return motion.command != "run" or (motion.linear == 0 and motion.angular == 0)
 
 
 def _latched_by(lease: Lease, motion: Motion) -> int | None:
@@ -116,15 +158,16 @@ def _latched_by(lease: Lease, motion: Motion) -> int | None:
 
 
 def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
-    if lease.hit is not None:
-        return Order.BRAKE, Refusal.NOT_JUDGED if motion.command == "run" else None
+    if lease.hit is not None or lease.uncommanded:
+        refusal = Refusal.NOT_HEIR if lease.hit is None else Refusal.NOT_JUDGED
+        return Order.BRAKE, refusal if motion.command == "run" else None
     if motion.command != "run":
         return Order(motion.command), None
     if lease.latched_by not in (None, motion.boot):
         return Order.STOP, Refusal.NOT_HEIR
     if not lease.ready:
         return Order.STOP, Refusal.NOT_READY
-    if not lease.neutral and (motion.linear != 0 or motion.angular != 0):
+    if not (lease.neutral or is_neutral(motion)):
         return Order.STOP, Refusal.NOT_NEUTRAL
     return Order.RUN, None
 
@@ -132,6 +175,14 @@ def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
 def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
     """Answer the first sample of a bumper hit: the reflex."""
     return replace(lease, hit=seq, sent_ns=now_ns), Order.BRAKE
+
+
+def on_uncommanded(lease: Lease, now_ns: int, own_boot: int) -> tuple[Lease, Order | None]:
+    """Latch that the vehicle moved away from where it stood while the lease is over."""
+    if lease.over_since_ns is None or lease.uncommanded:
+        return lease, None
+    moved = replace(lease, uncommanded=True, latched_by=own_boot, sent_ns=now_ns)
+    return moved, Order.BRAKE
 
 
 def on_ready(lease: Lease, ready: bool) -> Lease:
@@ -159,7 +210,7 @@ def on_tick(
         return lease, None
     since_ns = lease.over_since_ns
     coasted = since_ns is not None and now_ns - since_ns > coast_ns
-    brake = lease.hit is not None or (coasted and not standing)
+    brake = lease.braking or (coasted and not standing)
     return replace(lease, sent_ns=now_ns), Order.BRAKE if brake else Order.STOP
 
 

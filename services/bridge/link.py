@@ -1,8 +1,4 @@
-"""Whether the board is there, and which of our two ports to believe.
-
-The board sends the same to both ports (manual 1). One is active, the first named at the start; what
-comes to the other is dropped, unless the active one has been silent for the failover time: then the
-other takes over. So nothing is taken twice, and one dead port costs no link.
+"""Whether the board is there.
 
 ``never`` --frame--> ``up`` --silence--> ``lost`` --frame--> ``up``
 """
@@ -14,24 +10,17 @@ from common.messages import LinkState
 
 
 class Link(Struct, frozen=True):
-    """What was heard of the board, and where."""
+    """What the board sent, on either of our ports."""
 
     state: LinkState = "never"
     heard_ns: int = 0
     up_ns: int = 0  # when it came up last
-    active: int = 0  # index of the port that is believed
 
 
-def believes(link: Link, port: int, now_ns: int, failover_ns: int) -> bool:
-    """Tell whether a datagram on this port counts."""
-    silent = link.state == "never" or now_ns - link.heard_ns > failover_ns
-    return port == link.active or silent
-
-
-def on_frame(link: Link, port: int, now_ns: int) -> Link:
-    """Take in a valid frame on a port that is believed."""
+def on_frame(link: Link, now_ns: int) -> Link:
+    """Take in a valid frame."""
     up_ns = link.up_ns if link.state == "up" else now_ns
-    return replace(link, state="up", heard_ns=now_ns, up_ns=up_ns, active=port)
+    return replace(link, state="up", heard_ns=now_ns, up_ns=up_ns)
 
 
 def on_tick(link: Link, now_ns: int, silence_ns: int) -> Link:

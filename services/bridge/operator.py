@@ -1,90 +1,92 @@
-"""What an operator may ask of the board: its emergency brakes and its lamps.
+"""What an operator may ask of the board: its emergency brakes and its lamps. Pure.
 
-Both answer with the board's own echo, or with the reason why there is none.
+Both answer with the board's own echo, or with the reason why there is none. The switches need an
+echo of safety's heartbeat too, so that a call that was delayed is refused.
 """
 
-import time
-from collections.abc import Callable
+from typing import Any
 
 from msgspec import Struct
 
-from common import keys
 from common import messages as m
-from common.bus.calls import Caller
 from common.freshness import S
-from common.service import Node
+from common.operator import Echoes
 from common.wire.commands import LedSet
-from common.wire.frame import Frame
-from services.bridge.config import BridgeConfig
+from services.bridge.output import Output
 from services.bridge.readiness import Readiness
 
 
 class Waiting(Struct, frozen=True):
     """A call whose echo is due."""
 
-    caller: Caller[m.Done]
+    caller: Any
     until_ns: int
 
 
 class Operator:
-    """Serves ``srv/bridge/switches`` and ``srv/bridge/led``."""
+    """Answers ``srv/bridge/switches`` and ``srv/bridge/led``; one call of each at a time."""
 
-    def __init__(
-        self, node: Node[BridgeConfig], readiness: Readiness, send: Callable[[Frame], None]
-    ) -> None:
+    def __init__(self, readiness: Readiness, timeout_s: float) -> None:
+        """Take how long the board may take to echo, in seconds."""
         self._readiness = readiness
-        self._send = send
-        self._timeout_s = node.config.bridge.echo_timeout
+        self._timeout_s = timeout_s
         self._lamp: Waiting | None = None
-        self._switching: tuple[Caller[m.Switches], int] | None = None
-        node.bus.serve(keys.SET_SWITCHES, self.on_switches)
-        node.bus.serve(keys.SET_LED, self.on_led)
+        self._switching: Waiting | None = None
+        self._echoes = Echoes()
 
-    def on_switches(self, request: m.SwitchesRequest, caller: Caller[m.Switches]) -> None:
+    def on_safety(self, state: m.SafetyState, received_ns: int) -> None:
+        """Take in a heartbeat of safety."""
+        self._echoes = self._echoes.received(state, received_ns)
+
+    def on_switches(
+        self, request: m.SwitchesRequest, caller: Any, now_ns: int, out: Output
+    ) -> None:
         """Ask the board to set its brakes; the echo answers the caller."""
-        reason = self._refusal(self._switching is not None, "switches")
+        late = self._echoes.refusal(request.echo, now_ns)
+        reason = late or self._refusal(self._switching, "switches")
         if reason:
-            caller.refuse(reason)
+            out.refuse(caller, reason)
             return
-        now_ns = time.monotonic_ns()
         self._readiness.want(request.ultrasonic_brake, request.bumper_brake, now_ns)
-        self._switching = caller, now_ns + round(self._timeout_s * S)
+        self._switching = self._waiting(caller, now_ns)
 
-    def on_led(self, request: m.LedRequest, caller: Caller[m.Done]) -> None:
-        """Ask the board to set a lamp channel; the echo answers the caller."""
-        reason = self._refusal(self._lamp is not None, "lamps")
+    def on_led(self, request: m.LedRequest, caller: Any, now_ns: int, out: Output) -> LedSet | None:
+        """Return the frame that sets a lamp channel; the echo answers the caller."""
+        reason = self._refusal(self._lamp, "lamps")
         if reason:
-            caller.refuse(reason)
-            return
-        self._send(LedSet(**{name: getattr(request, name) for name in request.__struct_fields__}))
-        self._lamp = Waiting(caller, time.monotonic_ns() + round(self._timeout_s * S))
+            out.refuse(caller, reason)
+            return None
+        self._lamp = self._waiting(caller, now_ns)
+        return LedSet(**{name: getattr(request, name) for name in request.__struct_fields__})
 
-    def on_led_echo(self, done: bool) -> None:
-        """Take in what the board says of the lamp."""
+    def on_led_echo(self, done: bool, out: Output) -> None:
+        """Take in the board's answer to a lamp command."""
         if self._lamp is None:
             return
         if done:
-            self._lamp.caller.reply(m.Done(text="the lamp is set"))
+            out.reply(self._lamp.caller, m.Done(text="the lamp is set"))
         else:
-            self._lamp.caller.refuse("the board answers that it failed (0xAA)")
+            out.refuse(self._lamp.caller, "the board answers that it failed (0xAA)")
         self._lamp = None
 
-    def on_tick(self, now_ns: int) -> None:
+    def on_tick(self, now_ns: int, out: Output) -> None:
         """Answer the calls whose echo has come, or is overdue."""
         if self._lamp is not None and now_ns > self._lamp.until_ns:
-            self._lamp.caller.refuse(self._overdue())
+            out.refuse(self._lamp.caller, self._overdue())
             self._lamp = None
         if self._switching is None:
             return
-        caller, until_ns = self._switching
         if self._readiness.switches.settled:
-            caller.reply(self._readiness.message())
+            out.reply(self._switching.caller, self._readiness.message())
             self._switching = None
-        elif now_ns > until_ns:
-            caller.refuse(self._overdue())
+        elif now_ns > self._switching.until_ns:
+            out.refuse(self._switching.caller, self._overdue())
             self._switching = None
 
-    def _refusal(self, busy: bool, what: str) -> str:
+    def _waiting(self, caller: Any, now_ns: int) -> Waiting:
+        return Waiting(caller, now_ns + round(self._timeout_s * S))
+
+    def _refusal(self, busy: Waiting | None, what: str) -> str:
         if self._readiness.link.state != "up":
             return f"the board is absent (link {self._readiness.link.state})"
         return f"another call for the {what} is under way" if busy else ""

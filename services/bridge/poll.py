@@ -1,18 +1,22 @@
 """Which query is due and which answer is overdue.
 
-One query of a kind is open at a time. An answer that does not come within the timeout counts as
-missed and halves that query's rate, down to a quarter; the first answer restores it. A board that
-is busy is so not flooded, and one that recovers is not kept waiting.
+A *steady* query (bumper, mileage) is sent at its rate whether answers come or not; its losses are
+counted in ``losses``. Of any other kind one query is open at a time: an answer that does not come
+within the timeout counts as missed and halves that query's rate, down to a quarter; the first
+answer restores it. So a busy board is not flooded, and one that recovers is not kept
+waiting.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
 from common.freshness import S
 from common.wire.frame import Frame
+from services.bridge.losses import Losses
 
 SLOWEST = 4  # times the period
+WINDOW_NS = S // 5  # of ``lost``
 
 
 class Query(Struct):
@@ -22,21 +26,30 @@ class Query(Struct):
     frame: Frame
     period_ns: int
     due_ns: int = 0
-    sent_ns: int | None = None  # when the open one was sent
+    sent_ns: int | None = None  # send time of the oldest poll that the next answer may belong to
     slowdown: int = 1
     missed: int = 0
     round_trip_ns: int | None = None
+    losses: Losses | None = None  # of a steady one
 
 
 class Poll:
     """The queries of a board, each at its own rate."""
 
-    def __init__(self, queries: Iterable[tuple[str, Frame, float]], timeout_s: float) -> None:
-        """Take name, frame and rate in Hz of each query."""
+    def __init__(
+        self,
+        queries: Iterable[tuple[str, Frame, float]],
+        timeout_s: float,
+        steady: Collection[str] = (),
+    ) -> None:
+        """Take name, frame and rate in Hz of each query, and the names of the steady ones."""
         self.queries = {
             name: Query(name, frame, round(S / rate_hz)) for name, frame, rate_hz in queries
         }
         self._timeout_ns = round(timeout_s * S)
+        for name in steady:
+            query = self.queries[name]
+            query.losses = Losses(query.period_ns, self._timeout_ns, WINDOW_NS)
 
     def due(self, now_ns: int) -> list[Frame]:
         """Return the queries to send now."""
@@ -49,11 +62,18 @@ class Poll:
         """
         query = self.queries[name]
         query.slowdown = 1
+        if query.losses is not None:
+            query.losses.on_answer(now_ns)
         if query.sent_ns is None:
             return now_ns
         asked_ns, query.sent_ns = query.sent_ns, None
         query.round_trip_ns = now_ns - asked_ns
         return asked_ns
+
+    def lost(self, name: str, now_ns: int) -> int:
+        """Return how many polls of a steady query were lost within the last 0.2 s."""
+        losses = self.queries[name].losses
+        return losses.lost(now_ns) if losses is not None else 0
 
     def round_trip_s(self) -> float | None:
         """Return the median of the newest round trip of each query, in seconds."""
@@ -64,10 +84,14 @@ class Poll:
 
     def missed(self) -> dict[str, int]:
         """Return how many answers never came in time, by query."""
-        return {query.name: query.missed for query in self.queries.values() if query.missed}
+        counts = {
+            query.name: query.missed if query.losses is None else query.losses.total
+            for query in self.queries.values()
+        }
+        return {name: count for name, count in counts.items() if count}
 
     def _is_due(self, query: Query, now_ns: int) -> bool:
-        if query.sent_ns is not None:
+        if query.losses is None and query.sent_ns is not None:
             if now_ns - query.sent_ns < self._timeout_ns:
                 return False
             query.sent_ns = None
@@ -79,5 +103,10 @@ class Poll:
         period_ns = query.period_ns * query.slowdown
         late = now_ns - query.due_ns >= period_ns
         query.due_ns = now_ns + period_ns if late else query.due_ns + period_ns
-        query.sent_ns = now_ns
+        if query.sent_ns is None or now_ns - query.sent_ns >= self._timeout_ns:
+            query.sent_ns = now_ns
+        if query.losses is not None:
+            query.losses.on_poll(now_ns)
+            # A late poll must not be followed at once by the next: its answer needs its time.
+            query.due_ns = max(query.due_ns, now_ns + period_ns // 2)
         return True

@@ -3,7 +3,13 @@
 After each return of the board both are asked for again, whatever an operator had set before: a
 board that restarted has forgotten. They are verified once both have echoed "on"; until then they
 are asked for every tenth of a second, and after the echo timeout the bridge counts as inhibited.
-From then on they are asked for once a second, because the wire has no query for them.
+From then on they are sent five times a second, because the wire has no query for them, and at once
+when the board comes back from a gap of some velocity periods: a board that restarted with its
+counters near zero shows nothing else, and its emergency brakes are off. One that does not echo five
+of these in a row is no longer known to be on.
+
+A firmware without echoes cannot verify them. Where the settings accept that, the board may be
+driven as long as both are commanded on and none has echoed "off".
 """
 
 from msgspec import Struct
@@ -14,7 +20,9 @@ from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
 
 ASK_NS = S // 10
-AGAIN_NS = S  # a board that restarted between two frames has forgotten, and nothing else tells
+AGAIN_NS = S // 5
+UNECHOED = 5  # sends in a row, one second: the echo before them no longer counts
+GAP_NS = 60 * S // 1000  # of silence; the velocity comes every 20 ms
 
 
 class Switches(Struct, frozen=True):
@@ -26,11 +34,19 @@ class Switches(Struct, frozen=True):
     bumper: bool | None = None
     since_ns: int = 0  # when they were wanted first
     asked_ns: int | None = None
+    ultrasonic_sent: int = 0  # since its last echo
+    bumper_sent: int = 0
 
     @property
     def verified(self) -> bool:
         """Whether both are on, by the board's own word."""
         return self.ultrasonic is True and self.bumper is True
+
+    @property
+    def unechoed(self) -> bool:
+        """Whether both are commanded on, and the board has echoed no "off"."""
+        wanted = self.want_ultrasonic and self.want_bumper
+        return wanted and self.ultrasonic is not False and self.bumper is not False
 
     @property
     def settled(self) -> bool:
@@ -41,6 +57,11 @@ class Switches(Struct, frozen=True):
 def on_return(now_ns: int) -> Switches:
     """Begin anew: the board is back, or has restarted."""
     return Switches(since_ns=now_ns)
+
+
+def on_gap(switches: Switches) -> Switches:
+    """Send both again at once: the board was silent, and may have restarted meanwhile."""
+    return replace(switches, asked_ns=None)
 
 
 def on_request(
@@ -63,12 +84,27 @@ def on_tick(switches: Switches, now_ns: int) -> tuple[Switches, list[Frame]]:
     asked, wait_ns = switches.asked_ns, AGAIN_NS if switches.settled else ASK_NS
     if asked is not None and now_ns - asked < wait_ns:
         return switches, []
+    switches = _forget(switches)
     frames: list[Frame] = []
+    ultrasonic_sent, bumper_sent = switches.ultrasonic_sent, switches.bumper_sent
     if switches.settled or switches.ultrasonic != switches.want_ultrasonic:
         frames.append(UltrasonicBrakeSet(switches.want_ultrasonic))
+        ultrasonic_sent += 1
     if switches.settled or switches.bumper != switches.want_bumper:
         frames.append(BumperBrakeSet(switches.want_bumper))
-    return replace(switches, asked_ns=now_ns), frames
+        bumper_sent += 1
+    sent = {"ultrasonic_sent": ultrasonic_sent, "bumper_sent": bumper_sent}
+    return replace(switches, asked_ns=now_ns, **sent), frames
+
+
+def _forget(switches: Switches) -> Switches:
+    """Drop an "on" whose echo has not come again; an "off" lasts until an echo of "on"."""
+    ultrasonic, bumper = switches.ultrasonic, switches.bumper
+    if ultrasonic is True and switches.ultrasonic_sent >= UNECHOED:
+        ultrasonic = None
+    if bumper is True and switches.bumper_sent >= UNECHOED:
+        bumper = None
+    return replace(switches, ultrasonic=ultrasonic, bumper=bumper)
 
 
 def on_echo(switches: Switches, ultrasonic: bool | None, bumper: bool | None) -> Switches:
@@ -77,4 +113,6 @@ def on_echo(switches: Switches, ultrasonic: bool | None, bumper: bool | None) ->
         switches,
         ultrasonic=switches.ultrasonic if ultrasonic is None else ultrasonic,
         bumper=switches.bumper if bumper is None else bumper,
+        ultrasonic_sent=switches.ultrasonic_sent if ultrasonic is None else 0,
+        bumper_sent=switches.bumper_sent if bumper is None else 0,
     )

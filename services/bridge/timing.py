@@ -28,7 +28,7 @@ from msgspec import Struct, field
 
 from common.freshness import S
 from common.messages import Durations, Motion, Timing
-from services.bridge.stamp import Receipt
+from services.bridge.rx_timestamp import Receipt
 
 # 10 us to 1 s, a third more each: nothing here is faster, and what is slower has failed.
 BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 8)) for step in range(41))

@@ -23,6 +23,7 @@ from common.wire.reports import (
 from services.bridge.lease import Order
 
 MM = 1000.0
+PER_RADIAN = {"decidegree": 1800.0 / math.pi, "milliradian": 1000.0}
 # No such vehicle drives or turns faster; the frame was damaged in its unprotected header.
 PLAUSIBLE_MPS = 5.0
 PLAUSIBLE_RADPS = 10.0
@@ -35,7 +36,8 @@ class Translator:
     """Translates by the settings of one vehicle."""
 
     def __init__(self, wire: Wire, vehicle: Vehicle, max_linear: float, max_angular: float) -> None:
-        self._per_radian = 1000.0 if wire.angular_unit == "milliradian" else 1800.0 / math.pi
+        self._commanded_per_radian = PER_RADIAN[wire.command_angular_unit]
+        self._measured_per_radian = PER_RADIAN[wire.feedback_angular_unit]
         self._near_mm = vehicle.sonar_min * MM
         self._far_mm = vehicle.sonar_max * MM
         self._max_linear = max_linear
@@ -46,13 +48,13 @@ class Translator:
         if order is not Order.RUN or motion is None:
             return MotionCommand(KINDS[order])
         linear = clamp(motion.linear, self._max_linear) * MM
-        angular = clamp(motion.angular, self._max_angular) * self._per_radian
+        angular = clamp(motion.angular, self._max_angular) * self._commanded_per_radian
         return MotionCommand(MotionKind.RUN, round(linear), round(clamp(angular, MAGNITUDE_MAX)))
 
     def velocity(self, frame: VelocityReport) -> Velocity:
         """Return the measured velocity in m/s and rad/s (manual 2.2)."""
         linear = frame.linear_mmps / MM
-        angular = frame.angular_raw / self._per_radian
+        angular = frame.angular_raw / self._measured_per_radian
         if abs(linear) > PLAUSIBLE_MPS or abs(angular) > PLAUSIBLE_RADPS:
             raise WireError(f"implausible velocity {linear:.1f} m/s, {angular:.1f} rad/s")
         return Velocity(linear=linear, angular=angular)

@@ -9,12 +9,13 @@ from contextlib import suppress
 
 from common.errors import LinkError
 from common.settings import Board
-from services.bridge.stamp import ANCILLARY_MAX, SO_TIMESTAMPNS, Receipt, WallClock, stamp_in
+from services.bridge.rx_timestamp import ANCILLARY_MAX, SO_TIMESTAMPNS, Receipt, WallClock, stamp_in
 
 DATAGRAM_MAX = 2048
 # A flood must not keep the loop from its timers: the rest waits for the next round.
 BURST = 64
 BREATH_S = 20e-6
+BRAKE_ATTEMPTS = 4  # at once, when the system refuses to send a BREAK
 
 Ancillary = list[tuple[int, int, bytes]]
 
@@ -28,6 +29,8 @@ class Sockets:
         Raise ``LinkError`` naming the one that cannot be had.
         """
         self.refused = 0  # datagrams from anybody else
+        self.send_errors = 0  # datagrams that the system refused to send
+        self.last_error = ""  # of those, in words
         self.last_stranger: tuple[str, int] | None = None
         self._board = (board.address, board.port)
         self._any_port = board.any_source_port
@@ -67,10 +70,21 @@ class Sockets:
         kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)
         return Receipt(kernel_ns, read_ns)
 
-    def send(self, datagram: bytes, port: int) -> None:
-        """Send to the board from the port of this index; an absent network loses it."""
-        with suppress(OSError):
-            self.sockets[port].sendto(datagram, self._board)
+    def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
+        """Send to the board from the port of this index; return whether the system took it.
+
+        A refusal (no network, no buffer, no permission) is counted, and the call is repeated at
+        once, ``attempts`` times in total.
+        """
+        for _ in range(attempts):
+            try:
+                self.sockets[port].sendto(datagram, self._board)
+            except OSError as error:
+                self.send_errors += 1
+                self.last_error = error.strerror or str(error)
+            else:
+                return True
+        return False
 
     def close(self) -> None:
         """Give the ports back."""

@@ -14,6 +14,9 @@ GEARS = 5
 class Dashboard(settings.Section, frozen=True, kw_only=True):
     """Where the page is served, and how fast its gears are.
 
+    A reverse proxy and Docker's port forwarding have one address for everybody: give
+    ``connections_per_address`` the value of ``connections`` behind these.
+
     A token stands in a file and not among the settings, because these are answered on the bus.
     """
 
@@ -26,6 +29,11 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a browser's later echo lets go
+    call_round_trip: Annotated[float, Meta(ge=0.2, le=2.0)] = 1.0  # s; of a reset or a switch
+    messages_per_second: Annotated[float, Meta(ge=30.0, le=500.0)] = 60.0  # of one browser
+    connections: Annotated[int, Meta(ge=8, le=512)] = 128
+    connections_per_address: Annotated[int, Meta(ge=8, le=512)] = 32
+    request_timeout: Annotated[float, Meta(ge=1.0, le=30.0)] = 5.0  # s; of header, body and answer
 
     def __post_init__(self) -> None:
         try:

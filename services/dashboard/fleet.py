@@ -5,6 +5,7 @@ see: a picture is encoded once and goes to all who look at that robot.
 """
 
 import re
+import secrets
 import threading
 import time
 from collections.abc import Callable, Collection
@@ -16,7 +17,7 @@ import msgspec
 from common import keys
 from common.bus.bus import Bus
 from common.freshness import S
-from common.messages import Level, ResetRequest
+from common.messages import Level, SafetyState
 from common.service import Node
 from services.dashboard import picture
 from services.dashboard import words as w
@@ -55,7 +56,8 @@ class Fleet:
         self._viewers: dict[str, Viewer] = {}
         self._robots: dict[str, Robot] = {}
         self._alive: dict[str, set[str]] = {node.config.robot.id: set()}
-        self._number = 0
+        # Random start: a message to an earlier dashboard matches no picture of this one.
+        self._number = secrets.randbits(31)
         self._newcomers = 0
         self._leaving = False
         node.bus.watch_live(keys.live_key("*", "*", "*"), self._note_alive)
@@ -81,10 +83,11 @@ class Fleet:
         if isinstance(word, w.Look):
             self._look(viewer, word)
             return
-        robot = self._robot_of(viewer)
         if isinstance(word, w.Estop):
-            robot.estop(self._viewers[viewer].name)
-        elif isinstance(word, w.Take):
+            self._estop(viewer, word.robot or self._viewers[viewer].robot)
+            return
+        robot = self._robot_of(viewer)
+        if isinstance(word, w.Take):
             self._take(viewer, robot, word.force)
         elif robot.wheel.driver == viewer:
             self._drive(viewer, robot, word)
@@ -92,8 +95,16 @@ class Fleet:
             self._tell(viewer, "warning", "take_first")
 
     def estop(self, robot: str, who: str) -> None:
-        """Stop a robot, without a viewer's connection; never one too many."""
+        """Stop a robot that ``knows`` accepts; needs no viewer's connection."""
+        if robot == self._node.config.robot.id:
+            self._node.bus.estop()  # at once: this session is always open
         self._open(robot).estop(who)
+
+    # --- what the server asks, from its own thread ----------------------------------------------
+
+    def knows(self, robot: str) -> bool:
+        """Return whether it is the settings' robot, was seen alive, or is looked at."""
+        return robot in self._alive or robot in self._robots
 
     # --- the loop -------------------------------------------------------------------------------
 
@@ -126,12 +137,14 @@ class Fleet:
             protection=robot.protection,
         )
         robot.wheel.sent(self._number, now_ns)
+        robot.snapshots.sent(self._number, robot.heard.newest(keys.SAFETY, now_ns), now_ns)
         robot.wanted_ns = now_ns
         self._send(here, moving, newer_wins=True)
         if self._number % REST_TICKS == 0:
             robot.heard.count(now_ns)
-            robots = {each: bool(tokens) for each, tokens in sorted(self._alive.items())}
-            still = picture.rest(robot.heard, robots, names, robot.protection, now_ns)
+            robots = sorted({*self._alive, *self._robots})
+            alive = {each: bool(self._alive.get(each)) for each in robots}
+            still = picture.rest(robot.heard, alive, names, robot.protection, now_ns)
             self._send(here, still, newer_wins=True)
         if not robot.said_path:
             robot.said_path = True
@@ -185,24 +198,45 @@ class Fleet:
         elif before not in (None, viewer):
             self._tell(str(before), "warning", "taken_over")
 
+    def _estop(self, viewer: str, robot: str) -> None:
+        if self.knows(robot):
+            self.estop(robot, self._viewers[viewer].name)
+        else:
+            self._tell(viewer, "error", "estop_unknown")
+
     def _drive(self, viewer: str, robot: Robot, word: w.AnyWord) -> None:
-        tell = partial(self._tell, viewer)
         wheel = robot.wheel
         match word:
-            case w.Hold(n, x, y, creep):
-                wheel.hold(viewer, n, Push(x, y, creep), time.monotonic_ns())
+            case w.Hold(n, x, y, release):
+                wheel.hold(viewer, n, Push(x, y, release), time.monotonic_ns())
             case w.Free():
                 wheel.let_go(viewer)
             case w.Leave():
                 wheel.leave(viewer)
             case w.Gear(gear):
                 wheel.shift(viewer, gear)
-            case w.Reset():
-                robot.call(keys.RESET, ResetRequest(), tell)
-            case w.Switch(to):
-                robot.call(keys.SET_SWITCHES, to, tell)
+            case _:
+                self._call(viewer, robot, word)
+
+    def _call(self, viewer: str, robot: Robot, word: w.AnyWord) -> None:
+        tell = partial(self._tell, viewer)
+        match word:
+            case w.Reset(n):
+                if seen := self._seen(viewer, robot, n):
+                    robot.reset(seen, tell)
+            case w.Switch(to, n):
+                if seen := self._seen(viewer, robot, n):
+                    robot.switch(seen, to, tell)
             case w.Lamp(to):
                 robot.call(keys.SET_LED, to, tell)
+
+    def _seen(self, viewer: str, robot: Robot, number: int) -> SafetyState | None:
+        """Return what the viewer saw of safety; refuse a late command, with a message."""
+        limit_s = self._settings.call_round_trip
+        seen = robot.snapshots.seen(number, time.monotonic_ns(), limit_s)
+        if seen is None:
+            self._tell(viewer, "warning", "too_late")
+        return seen
 
     def _tell(self, viewer: str, level: Level, text: str) -> None:
         self._send([viewer], {"k": "told", "level": level, "text": text})
@@ -229,7 +263,6 @@ class Fleet:
             bus = Bus(node.config.bus, name, node.loop.post)
             broadcast = partial(self._broadcast, name)
             self._robots[name] = Robot(bus, self._settings, broadcast, self._tell)
-            self._alive.setdefault(name, set())
             bus.open()
         self._robots[name].wanted_ns = time.monotonic_ns()
         return self._robots[name]
@@ -238,8 +271,6 @@ class Fleet:
         if not robot.bus.connected:
             return  # it may be given its session this moment; no router, no harm
         del self._robots[name]
-        if not self._alive[name] and name != self._node.config.robot.id:
-            del self._alive[name]
         # Aside: to end a session takes its time, and others are being driven.
         threading.Thread(target=robot.bus.close, name=f"close {name}").start()
 

@@ -16,6 +16,10 @@ M = TypeVar("M", bound=Message)
 
 EVENTS_KEPT = 80
 MISSED = 4.0  # samples that may be missing before the last one is too old to show
+# Names of sources and services come from the bus, where any client can invent them.
+MADE_UP_KEPT = 30
+OTHERS = "others"  # the entry of all further ones
+WILD = {"service": "*", "side": "*", "source": "*"}
 COUNTED_S = 3.0  # over which rates are counted: streams of 1 Hz are to stand still
 WORTH_MIN_S, WORTH_MAX_S = 0.5, 3.0
 
@@ -41,12 +45,16 @@ class Heard:
     events: deque[Line] = field(default_factory=lambda: deque(maxlen=EVENTS_KEPT))
     told: int = 0  # events so far
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path, over COUNTED_S
+    _made_up: int = 0  # entries that are not ``FIXED``
     _latest: dict[str, Latest[Message]] = field(default_factory=dict)
     _counts: Counter[str] = field(default_factory=Counter)  # messages so far, by path
     _counted: deque[tuple[int, Counter[str]]] = field(default_factory=deque)  # when, and how many
 
     def hear(self, path: str, message: Message, received_ns: int) -> None:
         """Take a message of the stream with this path below the robot's key."""
+        if path not in self._latest and path not in FIXED:
+            path = OTHERS if self._made_up >= MADE_UP_KEPT else path
+            self._made_up += path is not OTHERS
         self._latest[path] = Latest(message, received_ns)
         self._counts[path] += 1
 
@@ -94,3 +102,6 @@ class Heard:
 def path_of(key: str) -> str:
     """Return what stands behind the robot in a key."""
     return key.removeprefix(f"{keys.ROOT}/").partition("/")[2]
+
+
+FIXED = frozenset(path_of(key) for topic in keys.TOPICS for key in topic.known("", WILD, ()))

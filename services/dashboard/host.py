@@ -29,10 +29,12 @@ class Host:
         settings = loaded.config.dashboard
         self._gate = Gate(token(settings))
         check_certificate(settings)
-        self._socket = listen(settings.host, settings.port)
+        self._socket = listen(settings)
         log.configure(loaded.config.log, "dashboard")
         self._node = node = Node("dashboard", loaded)
-        viewers = Viewers(node.loop.post)
+        # Counted by the server's thread and read by the node's: all names exist from the start.
+        node.counters = self._socket.counters
+        viewers = Viewers(node.loop.post, settings.messages_per_second, node.counters)
         self._fleet = viewers.fleet = Fleet(node, viewers.show)
         node.present()
         self._systemd = Systemd()
@@ -41,7 +43,7 @@ class Host:
             loaded.config.robot.id,
             self._gate,
             viewers,
-            lambda robot, who: node.loop.post(lambda: self._fleet.estop(robot, who)),
+            self._socket,
             alive=self._alive,
         )
         self._error: BaseException | None = None

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from services.dashboard.host import Host
 
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
-EXTRA = {"nicegui", "fastapi", "starlette", "uvicorn"}
+EXTRA = {"h11", "starlette", "uvicorn", "websockets"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from common import keys
 from common.codec import finite
-from common.messages import Cause, Driver, Event, Limits, Link, Switches
+from common.messages import Cause, Driver, Event, Limits, Link, Release, Switches
 from common.settings import Vehicle
 from services.dashboard.heard import Heard
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
@@ -27,6 +27,7 @@ class State(Struct, frozen=True):
     latched: tuple[str, ...]
     causes: tuple[Cause, ...]
     limits: Limits
+    release: Release | None
 
 
 class Hands(Struct, frozen=True):
@@ -187,7 +188,13 @@ def _state(heard: Heard, now_ns: int) -> State | None:
     if safety is None:
         return None
     return State(
-        safety.verdict, safety.text, safety.source, safety.latched, safety.causes, safety.limits
+        safety.verdict,
+        safety.text,
+        safety.source,
+        safety.latched,
+        safety.causes,
+        safety.limits,
+        safety.release,
     )
 
 

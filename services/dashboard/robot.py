@@ -3,7 +3,9 @@
 Each robot has a bus of its own, which opens when the first viewer looks at it.
 """
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import msgspec
@@ -12,13 +14,16 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.codec import finite
+from common.freshness import S
 from common.keys import Call, Topic
 from common.log import Logger
+from common.operator import CONFIRM_S, confirms, release_request, reset_request
 from common.requests import Phase, Requests, Twist
 from common.source import DriveSource
 from services.dashboard.config import Dashboard
 from services.dashboard.heard import Heard, path_of
 from services.dashboard.sectors import Protection
+from services.dashboard.snapshots import Snapshots
 from services.dashboard.trail import Trail
 from services.dashboard.wheel import Wheel
 
@@ -30,9 +35,19 @@ PLAIN: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILD_DEPTH = 16  # of a key that many publish on at the same time
-CREEP_TIMEOUT_S = 0.3
+RELEASE_TIMEOUT_S = 0.3
 ESTOP_TICKS = 60  # an emergency stop is repeated until safety says that it is latched, or 3 s
 PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
+
+
+@dataclass(frozen=True, slots=True)
+class Unconfirmed:
+    """A reset that was answered, and whose effect safety's state has not shown yet."""
+
+    seen: m.SafetyState
+    done: m.ResetDone
+    since_ns: int
+    tell: Tell
 
 
 class Robot:
@@ -50,6 +65,7 @@ class Robot:
         self.trail = Trail()
         self.protection = Protection()
         self.wheel = Wheel(settings.round_trip)
+        self.snapshots = Snapshots()
         self.wanted_ns = 0  # when somebody looked at it or stopped it last
         self.said_path = False  # whether the trail began anew since the viewers got it
         self._settings = settings
@@ -58,8 +74,9 @@ class Robot:
         self._requests = Requests()
         self._source = DriveSource(bus, settings.source)
         self._estops = 0  # ticks for which the emergency stop is still repeated
-        self._creeping = self._creep_pending = False
-        self._creep_answer = ""
+        self._releasing = self._release_pending = False
+        self._release_answer = ""
+        self._resets: list[Unconfirmed] = []
         self._asked_around = False
         self._log = Logger(robot=bus.robot)
         for topic in PLAIN:
@@ -82,16 +99,17 @@ class Robot:
             self._ask_around()
         self._repeat_estop(safety)
         push = self.wheel.held(now_ns)
-        request = self._requests.tick(None if push is None or push.creep else self._twist())
+        request = self._requests.tick(None if push is None or push.release else self._twist())
         if request is not None:
             self._ask(request)
-        self._creep(push is not None and push.creep)
+        self._release(push.release if push else None, now_ns)
+        self._confirm(safety, now_ns)
         self._follow(now_ns)
 
     @property
     def silent(self) -> bool:
         """Whether nothing is being asked."""
-        return self._requests.phase is Phase.SILENT and not self._creeping
+        return self._requests.phase is Phase.SILENT and not self._releasing
 
     def rest(self) -> None:
         """Let go, with zeros."""
@@ -103,8 +121,23 @@ class Robot:
         self.wheel.lapse()
         self._requests.stop()
         self.bus.estop()
+        if not self._estops:
+            self._log.warning("emergency stop", asked_by=who)
         self._estops = ESTOP_TICKS
-        self._log.warning("emergency stop", asked_by=who)
+
+    def reset(self, seen: m.SafetyState, tell: Tell) -> None:
+        """Clear the causes that were latched in this state; report its confirmation later."""
+
+        def answered(done: m.ResetDone) -> None:
+            self._resets.append(Unconfirmed(seen, done, time.monotonic_ns(), tell))
+
+        self.bus.ask(
+            keys.RESET, reset_request(seen), answered, lambda reason: tell("warning", reason)
+        )
+
+    def switch(self, seen: m.SafetyState, to: m.SwitchesRequest, tell: Tell) -> None:
+        """Set the board's emergency brakes, as an operator who saw this state."""
+        self.call(keys.SET_SWITCHES, msgspec.structs.replace(to, echo=seen.heartbeat), tell)
 
     def call(self, call: Call[Any, R], request: msgspec.Struct, tell: Tell) -> None:
         """Ask a service of the robot, and tell what it answers."""
@@ -145,29 +178,45 @@ class Robot:
         if not self._estops:
             self._broadcast("error", "estop_unconfirmed")
 
-    def _creep(self, held: bool) -> None:
-        """Ask again while held, one call at a time; say at once when it ends."""
-        if held and not self._creep_pending:
-            self._creep_pending = self._creeping = True
-            self._ask_release(True)
-        elif not held and self._creeping:
-            self._creeping, self._creep_answer = False, ""
-            self._ask_release(False)
+    def _confirm(self, state: m.SafetyState | None, now_ns: int) -> None:
+        """Report which resets safety's state confirms, and which it did not in time."""
+        waiting, self._resets = self._resets, []
+        for reset in waiting:
+            if state is not None and confirms(reset.seen, reset.done, state):
+                reset.tell("info", reset.done.text)
+            elif now_ns - reset.since_ns > CONFIRM_S * S:
+                reset.tell("error", "reset_unconfirmed")
+            else:
+                self._resets.append(reset)
 
-    def _ask_release(self, held: bool) -> None:
+    def _release(self, direction: m.Direction | None, now_ns: int) -> None:
+        """Repeat the call while held, one at a time; end it at once on release."""
+        if direction is None:
+            if self._releasing:
+                self._releasing, self._release_answer = False, ""
+                newest = self.heard.newest(keys.SAFETY, now_ns)
+                self._ask_release(release_request(newest, None, held=False))
+            return
+        limit_s = self._settings.round_trip
+        seen = self.snapshots.seen(self.wheel.answered, now_ns, limit_s)
+        if seen is not None and not self._release_pending:
+            self._release_pending = self._releasing = True
+            self._ask_release(release_request(seen, direction, held=True))
+
+    def _ask_release(self, request: m.ReleaseRequest) -> None:
         self.bus.ask(
             keys.RELEASE,
-            m.ReleaseRequest(held=held),
-            lambda done: self._creep_answered("info", done.text),
-            lambda reason: self._creep_answered("warning", reason),
-            timeout_s=CREEP_TIMEOUT_S,
+            request,
+            lambda done: self._release_answered("info", done.text),
+            lambda reason: self._release_answered("warning", reason),
+            timeout_s=RELEASE_TIMEOUT_S,
         )
 
-    def _creep_answered(self, level: m.Level, text: str) -> None:
-        self._creep_pending = False
+    def _release_answered(self, level: m.Level, text: str) -> None:
+        self._release_pending = False
         driver = self.wheel.driver
-        if self._creeping and driver is not None and text != self._creep_answer:
-            self._creep_answer = text
+        if self._releasing and driver is not None and text != self._release_answer:
+            self._release_answer = text
             self._tell(driver, level, text)
 
     def _follow(self, now_ns: int) -> None:

@@ -1,28 +1,29 @@
-"""The web server: the page by NiceGUI, the pictures by one web socket, in the main thread."""
+"""The web server: the page, E-STOP and the browsers' WebSocket, in the main thread."""
 
 import re
 import socket
 from collections.abc import Callable
 from ipaddress import ip_address
-from pathlib import Path
 
 import uvicorn
-from fastapi import FastAPI
-from nicegui import app as nicegui_app
-from nicegui import ui
+from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
 
 from common.errors import LinkError
-from services.dashboard import page
+from services.dashboard import assets
 from services.dashboard.config import Dashboard
 from services.dashboard.door import Door
 from services.dashboard.gate import Gate
-from services.dashboard.viewers import Viewers
+from services.dashboard.listener import Listener
+from services.dashboard.viewers import WORD_MAX, Viewers
 from services.dashboard.words import ROBOT
 
-STATIC = Path(__file__).parent / "static"
 END_S = 1  # that browsers get to hang up
+HEADER_MAX = 16_384  # bytes
+BACKLOG = 256  # connections that wait to be accepted
+RECEIVE_BUFFER = 16_384  # bytes in the kernel per connection: bounds the lead of a flood
 # Addresses for documentation (RFC 5737, RFC 3849): nobody has them, the way out leads there.
 ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
 
@@ -32,7 +33,7 @@ def serving(
     robot: str,
     gate: Gate,
     viewers: Viewers,
-    estop: Callable[[str, str], None],
+    listener: Listener,
     *,
     alive: Callable[[], None],
 ) -> uvicorn.Server:
@@ -41,15 +42,23 @@ def serving(
     async def tick() -> None:
         alive()
 
+    secure = bool(settings.certificate)
     return uvicorn.Server(
         uvicorn.Config(
-            Door(_site(robot, viewers, estop), gate, secure=bool(settings.certificate)),
+            Door(_site(robot, viewers), gate, listener.connection, secure),
+            loop="asyncio",  # the listener's limits work with this one
+            http="h11",
+            h11_max_incomplete_event_size=HEADER_MAX,
+            backlog=BACKLOG,
+            lifespan="off",
+            proxy_headers=False,  # limits use the address of the connection, which cannot be forged
+            server_header=False,
             log_level="error",
             access_log=False,
             # Small frames, many of them: deflating costs more than it saves.
             ws_per_message_deflate=False,
             ws="websockets-sansio",
-            ws_max_size=65536,
+            ws_max_size=WORD_MAX,
             ws_ping_interval=5.0,
             ws_ping_timeout=5.0,
             timeout_graceful_shutdown=END_S,
@@ -61,44 +70,45 @@ def serving(
     )
 
 
-def _site(robot: str, viewers: Viewers, estop: Callable[[str, str], None]) -> FastAPI:
+def _site(robot: str, viewers: Viewers) -> Starlette:
     """Return what stands behind the door."""
-    site = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    site.add_api_websocket_route("/live", viewers.serve)
+    page, files = assets.page(robot), assets.files()
 
-    # Beside the socket: one tap must get through when that has just broken.
+    async def index(_: Request) -> Response:
+        return HTMLResponse(page)
+
+    async def file(request: Request) -> Response:
+        if (found := files.get(request.path_params["name"])) is None:
+            return PlainTextResponse("there is no such file\n", status_code=404)
+        return Response(found[0], media_type=found[1])
+
+    # Beside the socket: one tap must get through when that is congested or gone.
     async def stop(request: Request) -> Response:
         host = request.client.host if request.client else "somebody"
         robot = request.path_params["robot"]
-        if not re.match(ROBOT, robot):
-            return PlainTextResponse("no robot has such a name\n", status_code=404)
-        estop(robot, host)
+        if not re.match(ROBOT, robot) or not viewers.estop(robot, host):
+            return PlainTextResponse(
+                f"no robot {robot!r} is known here; nothing was sent\n", status_code=404
+            )
         return PlainTextResponse("asked\n")
 
-    site.add_route("/estop/{robot}", stop, methods=["POST"])
-    nicegui_app.add_static_files("/t2", STATIC, max_cache_age=0)
-
-    @ui.page("/", title="T2", viewport=page.VIEWPORT, dark=None)
-    def index() -> None:
-        page.build(robot)
-
-    ui.run_with(
-        site,
-        title="T2",
-        favicon=STATIC / "icon.svg",
-        binding_refresh_interval=None,  # nothing is bound: our own script draws
-        tailwind=False,
-        show_welcome_message=False,
+    return Starlette(
+        routes=[
+            Route("/", index),
+            Route("/t2/{name}", file),
+            Route("/estop/{robot}", stop, methods=["POST"]),
+            WebSocketRoute("/live", viewers.serve),
+        ]
     )
-    return site
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """Return a listening socket; raise ``LinkError`` when the port is taken."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    sock = socket.socket(family, socket.SOCK_STREAM)
+def listen(settings: Dashboard) -> Listener:
+    """Return a bound socket; raise ``LinkError`` when the port is taken."""
+    host, port = settings.host, settings.port
+    sock = Listener(socket.AF_INET6 if ":" in host else socket.AF_INET, settings)
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         sock.bind((host, port))
     except OSError as error:
         sock.close()

@@ -54,6 +54,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "cause.predecessor": (
         "Safety started anew with a reset still due.", "安全服务已重启，仍需复位。"),
     "cause.runaway": ("The vehicle did not move as commanded.", "车辆未按指令运动。"),
+    "cause.uncommanded_motion": (
+        "The vehicle moved while standstill was commanded.", "停止指令期间车辆发生移动。"),
+    "cause.not_stopping": ("The vehicle does not stop.", "车辆未能停住。"),
+    "cause.bumper_lossy": (
+        "Creeping: bumper polls were lost.", "防撞条查询有丢失，只能低速行驶。"),
     "cause.driver_left": ("The left motor driver reported a fault.", "左侧电机驱动器报告故障。"),
     "cause.driver_right": ("The right motor driver reported a fault.", "右侧电机驱动器报告故障。"),
     "cause.flapping": ("Inputs failed again and again.", "输入信号反复失效。"),
@@ -87,7 +92,36 @@ TEXTS: dict[str, tuple[str, str]] = {
     "take_first": ("Take the wheel first.", "请先点击“开始驾驶”。"),
     "gear": ("Gear", "挡位"),
     "reset": ("Reset", "复位"),
-    "release": ("Hold: creep off", "按住：缓慢脱离"),
+    "release": ("Move off the bumper, while held", "按住：缓慢脱离碰撞"),
+    "release_forward": ("F  forward", "F  前进"),
+    "release_backward": ("B  backward", "B  后退"),
+    "believed_forward": ("Forward is believed free:", "推断前方可脱离："),
+    "believed_backward": ("Backward is believed free:", "推断后方可脱离："),
+    "moved_forward": ("the last motion was forward", "最近一次运动为前进"),
+    "moved_backward": ("the last motion was backward", "最近一次运动为后退"),
+    "ago": ("ago", "前"),
+    "release_unknown": (
+        "No motion is known: look which way is free.", "没有运动记录：请目视确认可脱离的方向。"),
+    "release_left": ("Distance left until a reset", "复位前剩余距离"),
+    "release_no_contact": ("There is no contact to move off.", "当前没有碰撞，无需脱离。"),
+    "release_forbidden_forward": (
+        "Forward is forbidden until a reset: the bumper was pressed that way.",
+        "复位前禁止前进：向前时防撞条再次被压下。",
+    ),
+    "release_forbidden_backward": (
+        "Backward is forbidden until a reset: the bumper was pressed that way.",
+        "复位前禁止后退：向后时防撞条再次被压下。",
+    ),
+    "release_used_up": (
+        "The distance for moving off is used up: reset first.", "脱离距离已用完：请先复位。"),
+    "reset_unconfirmed": (
+        "RESET NOT CONFIRMED: safety's state does not show it. Look, then repeat it.",
+        "复位未被确认：安全服务的状态没有变化。请查看后重试。",
+    ),
+    "too_late": (
+        "Not done: the command answers an old picture of the robot. Look, then repeat it.",
+        "未执行：该指令对应的画面已过期。请查看后重试。",
+    ),
     "hint": (
         "Hold to drive: the stick, W A S D, or a gamepad with its left shoulder. Space stops.",
         "按住才行驶：摇杆、W A S D 键，或按住手柄左肩键。空格键急停。",
@@ -107,6 +141,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "estop_unconfirmed": (
         "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch!",
         "急停未被确认：请使用车身上的急停开关！",
+    ),
+    "estop_unknown": (
+        "EMERGENCY STOP NOT SENT: no robot of this name is known here. Use its own switch!",
+        "急停未发送：此处没有该名称的机器人。请使用车身上的急停开关！",
     ),
     "estop_asked": ("Emergency stop asked.", "已请求急停。"),
     "too_many_robots": ("Too many robots at once.", "同时查看的机器人过多。"),

@@ -1,26 +1,30 @@
 """The browsers' end: a web socket for each, and what waits to be sent to it.
 
 A browser that reads slowly gets fewer pictures, never older ones: a newer picture takes the place
-of the one that still waits. One that does not read at all is let go.
+of the one that still waits. One that does not read at all is closed. One that sends faster than
+its limit has messages dropped, and is closed when it goes on; an emergency stop is never dropped.
 """
 
 import asyncio
 import contextlib
 import itertools
-from collections import deque
-from collections.abc import Callable, Collection
+import time
+from collections import Counter, deque
+from collections.abc import Collection
 from functools import partial
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from services.dashboard.fleet import Fleet
-from services.dashboard.words import AnyWord
+from services.dashboard.inbox import Inbox, Post, Queue
+from services.dashboard.rate_limit import RateLimit, Verdict
+from services.dashboard.words import AnyWord, Estop
 
 WAITING_MAX = 64
 WORD_MAX = 4096  # bytes
-
-Post = Callable[[Callable[[], None]], None]
+BURST_S = 4.0  # of messages at the full rate, after a network delay
+ESTOP = '"estop"'  # in the text of every such message
 
 
 class Outbox:
@@ -51,9 +55,12 @@ class Outbox:
 class Viewers:
     """All browsers; lives in the server's thread and posts to the fleet's."""
 
-    def __init__(self, post: Post) -> None:
+    def __init__(self, post: Post, rate: float, counters: Counter[str]) -> None:
         self.fleet: Fleet | None = None
         self._post = post
+        self._inbox = Inbox(post)
+        self._rate = rate
+        self._counters = counters
         self._outboxes: dict[str, Outbox] = {}
         self._ids = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -65,6 +72,14 @@ class Viewers:
         if loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
                 loop.call_soon_threadsafe(self._put, viewers, text, newer_wins)
+
+    def estop(self, robot: str, who: str) -> bool:
+        """Stop a robot ahead of everything that waits; return whether it is known."""
+        fleet = self.fleet
+        if fleet is None or not fleet.knows(robot):
+            return False
+        self._inbox.stop(robot, lambda: fleet.estop(robot, who))
+        return True
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one browser until it is gone."""
@@ -83,13 +98,31 @@ class Viewers:
             sender.cancel()
 
     async def _receive(self, socket: WebSocket, viewer: str, fleet: Fleet) -> None:
+        limit, queue = RateLimit(self._rate, self._rate * BURST_S), Queue()
         with contextlib.suppress(WebSocketDisconnect, KeyError):  # a binary one has no text
             while True:
-                word = self._read(await socket.receive_text())
-                if word is None:
-                    await socket.close(code=1003, reason="not one of the words")
+                text = await socket.receive_text()
+                verdict = limit.take(time.monotonic_ns())
+                if verdict is Verdict.ACCEPTED or ESTOP in text:
+                    word = self._read(text)
+                    if word is None:
+                        await socket.close(code=1003, reason="not one of the words")
+                        return
+                    self._take_in(viewer, word, queue, fleet)
+                else:
+                    self._counters["messages_dropped"] += 1
+                if verdict is Verdict.ABUSIVE:
+                    self._counters["viewers_closed"] += 1
+                    await socket.close(code=1008, reason="too many messages")
                     return
-                self._post(partial(fleet.take_in, viewer, word))
+
+    def _take_in(self, viewer: str, word: AnyWord, queue: Queue, fleet: Fleet) -> None:
+        if isinstance(word, Estop) and word.robot and self.estop(word.robot, f"viewer {viewer}"):
+            return
+        if queue.is_full and not isinstance(word, Estop):
+            self._counters["messages_dropped"] += 1
+            return
+        self._inbox.put(queue, partial(fleet.take_in, viewer, word))
 
     def _read(self, text: str) -> AnyWord | None:
         if len(text) > WORD_MAX:

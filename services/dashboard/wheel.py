@@ -25,6 +25,7 @@ from enum import Enum
 
 from common.codec import finite
 from common.freshness import S
+from common.messages import Direction
 
 PICTURES = 64  # whose times are kept, 3 s of them; an older one is too old for any setting
 
@@ -43,7 +44,7 @@ class Push:
 
     linear: float = 0.0
     angular: float = 0.0
-    creep: bool = False  # off a pressed bumper, instead of driving
+    release: Direction | None = None  # off a pressed bumper that way, instead of driving
 
 
 @dataclass
@@ -55,6 +56,7 @@ class Wheel:
     grip: Grip = Grip.FREE
     push: Push = field(default_factory=Push)
     gear: int = 1
+    answered: int = 0  # the newest picture that a hold answered to
     _sent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=PICTURES))
     _seen_ns: int = 0  # when the newest picture that was answered had been sent
 
@@ -86,8 +88,8 @@ class Wheel:
             return False
         if self.grip is Grip.HELD and sent_ns < self._seen_ns:
             return False  # overtaken by a newer one
-        self.grip, self._seen_ns = Grip.HELD, sent_ns
-        self.push = Push(clamp(push.linear), clamp(push.angular), push.creep)
+        self.grip, self._seen_ns, self.answered = Grip.HELD, sent_ns, picture
+        self.push = Push(clamp(push.linear), clamp(push.angular), push.release)
         return True
 
     def let_go(self, viewer: str) -> None:

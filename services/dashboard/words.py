@@ -1,16 +1,18 @@
 """What a browser may say, as tagged JSON; what is not one of these is refused.
 
-``n`` is the number of the picture that a hold answers to, see ``wheel.py``.
+``n`` is the number of the picture that a message answers to: of a hold see ``wheel.py``, of a reset
+or a switch ``snapshots.py``.
 """
 
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from common.messages import LedRequest, SwitchesRequest
+from common.messages import Direction, LedRequest, SwitchesRequest
 from services.dashboard.config import GEARS
 
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
+ROBOT_OR_NONE = r"^[A-Za-z0-9_.-]{0,64}\Z"
 
 
 class Word(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_unknown_fields=True):
@@ -35,12 +37,15 @@ class Leave(Word, frozen=True):
 
 
 class Hold(Word, frozen=True):
-    """What the hand does, in answer to picture ``n``; x is forward, y is counter-clockwise."""
+    """The controls that are held, in answer to picture ``n``; x is forward, y counter-clockwise.
+
+    With ``release`` the vehicle moves slowly off a pressed bumper instead, in that direction.
+    """
 
     n: int
     x: float = 0.0
     y: float = 0.0
-    creep: bool = False
+    release: Direction | None = None
 
 
 class Free(Word, frozen=True):
@@ -54,17 +59,22 @@ class Gear(Word, frozen=True):
 
 
 class Estop(Word, frozen=True):
-    """Stop, and latch it; anybody may."""
+    """Stop a robot, and latch it; any viewer may. Without a robot: the one that is looked at."""
+
+    robot: Annotated[str, Meta(pattern=ROBOT_OR_NONE)] = ""
 
 
 class Reset(Word, frozen=True):
-    """Ask safety to clear its latches."""
+    """Request a reset of the causes that are latched in picture ``n``."""
+
+    n: int = 0  # not the number of a picture
 
 
 class Switch(Word, frozen=True):
-    """Set the board's emergency brakes."""
+    """Set the board's emergency brakes, as an operator who saw picture ``n``."""
 
     to: SwitchesRequest
+    n: int = 0
 
 
 class Lamp(Word, frozen=True):

@@ -51,7 +51,7 @@ class Exporter(Collector):
         if node.config.bus.members:
             node.loop.every(LOOK_S, lambda _: self._read(Path(node.config.bus.members)))
         self._server = served(settings, self)
-        node.last_words = self._close
+        node.on_exit = self._close
 
     def _listen(self) -> None:
         bus = self._bus

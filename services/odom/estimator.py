@@ -18,7 +18,8 @@ a pose from an operator      ``lead`` is put there and ``anchor`` moved along, a
 ============================ ===================================================================
 
 Heading is wrapped and distance is an s32 of millimetres: steps are taken modulo both, the turn
-nearest to what the velocities saw.
+nearest to what the velocities saw. While the vehicle stands, the noise of all arcs together is that
+of one step of the counters.
 """
 
 import math
@@ -33,8 +34,8 @@ from services.odom.comparison import COUNTER_STEP_M, COUNTER_STEP_RAD, Compariso
 from services.odom.config import Odom
 from services.odom.legs import Leg, fitted, halved, total
 from services.odom.pose import Belief, Covariance, Pose, Spread
+from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 
-DISTANCE_WRAP_M = 2**32 / 1000
 LEGS_MAX = 512  # about ten seconds of velocities; then the oldest shape gets coarser
 # No such vehicle drives or turns faster; more is a damaged message or a counter that was set.
 PLAUSIBLE_MPS = 5.0
@@ -75,6 +76,7 @@ class Estimator:
         self._counters: m.Mileage | None = None
         self._velocity: Latest[m.Velocity] | None = None
         self._comparison = Comparison(settings)
+        self._standstill = Standstill(settings)
         self._news = False  # counters came since the last estimate
 
     def on_velocity(self, velocity: m.Velocity, now_ns: int) -> Outcome:
@@ -150,8 +152,9 @@ class Estimator:
         distance, turn = step(before, after, integrated)
         outcome = judge(before, after, distance, integrated.time_s)
         if outcome is Outcome.USED:
+            self._standstill.update(after, self._legs)
             for leg in fitted(self._legs, distance, turn):
-                spread = self._spread_of_counters(leg)
+                spread = self._spread_of_counters(self._standstill.noisy(leg))
                 self._anchor = self._anchor.moved(leg.distance, leg.turn, spread)
             counted = replace(integrated, distance=distance, turn=turn)
             self._comparison.add(now_ns, counted, integrated)

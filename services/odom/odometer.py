@@ -10,6 +10,7 @@ from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.codec import finite
 from common.freshness import S
+from common.operator import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
@@ -17,6 +18,7 @@ from services.odom.path import Path
 from services.odom.pose import Pose
 
 SILENT_NS = S // 2  # a pause this long is told; shorter ones are seen by the missing samples
+ECHOES = 64  # queued states of safety; a call that echoes a dropped one would be refused
 
 
 class Odometer:
@@ -30,10 +32,12 @@ class Odometer:
         self._published_ns: int | None = None
         self._silent = True  # nothing was heard yet
         self._slip = False
+        self._echoes = Echoes()
         bus = node.bus
         self._to_odometry = bus.publisher(keys.ODOMETRY)
         bus.subscribe(keys.VELOCITY, self._on_velocity)
         bus.subscribe(keys.MILEAGE, self._on_mileage)
+        bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         bus.serve(keys.SET_POSE, self._on_set_pose)
         path_key = keys.info_key(bus.robot, node.name, "path")
         bus.answer(path_key, self._trajectory, "application/json")
@@ -52,7 +56,14 @@ class Odometer:
             text = f"{outcome}: the pose stays, counting goes on from here"
             self._node.event("reanchored", "warning", text)
 
+    def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
+        self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
+
     def _on_set_pose(self, request: m.PoseRequest, caller: Caller[m.Done]) -> None:
+        late = self._echoes.refusal(request.echo, time.monotonic_ns())
+        if late:
+            caller.refuse(late)
+            return
         if not finite(request.x, request.y, request.heading):
             caller.refuse("x, y and heading must be numbers, not NaN or infinity")
             return
@@ -61,7 +72,7 @@ class Odometer:
         self._path.clear()
         text = f"the pose is x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
         self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
-        caller.reply(m.Done(text=text))
+        caller.reply(m.Done(text=text, boot=self._node.bus.boot))
 
     def _on_tick(self, now_ns: int) -> None:
         odometry = self._estimator.estimate(now_ns)

@@ -17,6 +17,7 @@ class Recorder(settings.Section, frozen=True, kw_only=True):
     roll_size: Annotated[float, Meta(ge=1.0, le=10_000.0)] = 200.0  # MB, then a new file
     roll_time: Annotated[float, Meta(ge=10.0, le=86_400.0)] = 600.0  # s, then a new file
     free: Annotated[float, Meta(ge=1.0, le=1_000_000.0)] = 1000.0  # MB that stay free on the disk
+    make_room: bool = True  # by removing the oldest recordings; see retention.py
     black_box: Annotated[float, Meta(ge=10.0, le=600.0)] = 120.0  # s that are kept in memory
     black_box_size: Annotated[float, Meta(ge=1.0, le=1000.0)] = 64.0  # MB of memory at most
     tail: Annotated[float, Meta(ge=1.0, le=60.0)] = 10.0  # s that are written after a latch

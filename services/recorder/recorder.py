@@ -14,6 +14,7 @@ from services.recorder.blackbox import BlackBox
 from services.recorder.config import MB, RecorderConfig
 from services.recorder.latches import Latches
 from services.recorder.recording import Recording
+from services.recorder.retention import Stored
 from services.recorder.shelf import Shelf
 from services.recorder.tape import Tape
 from services.recorder.translation import Translator
@@ -33,17 +34,18 @@ class Recorder:
         self._translator = Translator(node.config.vehicle)
         self._latches = Latches()
         self._safety = keys.SAFETY.on(node.bus.robot)
-        self._shelf = Shelf(Path(settings.folder), settings.free * MB)
+        robot = node.bus.robot if settings.make_room else None
+        self._shelf = Shelf(Path(settings.folder), settings.free * MB, robot=robot)
         self._tape = Tape(settings, self._begin, self._end) if settings.everything else None
         self._box = BlackBox(settings, self._begin, self._end)
-        node.counters.update(recorded=0, not_recorded=0)
+        node.counters.update(recorded=0, not_recorded=0, removed=0)
         self._look(time.monotonic_ns())
         for each in EVERYTHING:
             node.bus.tap(f"{keys.ROOT}/{node.bus.robot}/{each}", self._on_sample, depth=DEPTH)
         node.loop.every(SLICE_S, lambda now_ns: self._safely(lambda: self._box.write(now_ns)))
         node.loop.every(FLUSH_S, self._flush)
         node.loop.every(LOOK_S, self._look)
-        node.last_words = self._close
+        node.on_exit = self._close
 
     def _on_sample(self, sample: Sample) -> None:
         self._box.keep(sample)
@@ -78,13 +80,21 @@ class Recorder:
             self._safely(lambda: tape.flush(now_ns))
 
     def _look(self, now_ns: int) -> None:
-        """Stop before the disk is full, go on when there is room again."""
+        """Make room, stop before the disk is full, continue when there is room again."""
         had_room = self._shelf.has_room
-        self._shelf.look(now_ns)
+        removed = self._shelf.look(now_ns)
+        if removed:
+            self._report_removed(removed)
         if had_room and not self._shelf.has_room:
             self._stop()
         elif not had_room and self._shelf.has_room:
             self._node.event("disk_room", "info", "there is room again: recording goes on")
+
+    def _report_removed(self, removed: list[Stored]) -> None:
+        self._node.counters["removed"] += len(removed)
+        freed = sum(each.size for each in removed) / MB
+        text = f"{len(removed)} of the oldest recordings removed for {freed:.0f} MB of room"
+        self._node.event("recordings_removed", "warning", text, first=removed[0].name)
 
     def _stop(self) -> None:
         text = f"no room for recordings: {self._shelf.trouble}"

@@ -4,6 +4,8 @@ Messages go into compressed chunks. ``flush`` ends a chunk and hands it to the s
 happens to this process afterwards, all up to there can be read.
 """
 
+import contextlib
+import fcntl
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -27,6 +29,8 @@ class Recording:
         self._ids: dict[Channel, int] = {}
         self._schemas: dict[str, int] = {}
         self._file = path.open("xb")
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # see ``shelf.in_use``
         self._writer = Writer(self._file)
         self._writer.start(library="t2")
         self._writer.add_metadata(ABOUT, dict(about))

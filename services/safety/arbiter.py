@@ -13,7 +13,10 @@ seq_not_rising   a repetition, or older than the one before
 
 A source holds the wheel as long as its last request is younger than its lease; letting go is
 silence. A source may move the vehicle only after a *neutral* request, one of zero: after its
-own start, and after every cause that asks for it.
+own start, after every cause that asks for it, and after a source of higher priority has held the
+wheel.
+
+A lease counts from when a request was received; time in the queue is part of it.
 """
 
 from collections.abc import Mapping
@@ -23,9 +26,9 @@ from msgspec.structs import replace
 
 from common import codec
 from common.freshness import S
+from common.heartbeat import Heartbeat
 from common.messages import Drive
 from services.safety.config import Source
-from services.safety.heartbeat import Heartbeat
 from services.safety.inputs import Ask
 from services.safety.twist import STILL, Twist
 
@@ -41,6 +44,7 @@ class Channel(Struct, frozen=True):
     received_ns: int | None = None  # of the last accepted request
     rival_ns: int | None = None  # when a second publisher was last heard
     neutral: bool = False
+    overruled_by: str = ""  # the source that held the wheel since this one was neutral
 
     def is_fresh(self, now_ns: int, lease_s: float) -> bool:
         """Tell whether the last request still holds."""
@@ -70,19 +74,19 @@ class Arbiter(Struct, frozen=True):
             return self, "not_finite"
         if heartbeat.is_late(drive.echo, now_ns, max_age_ns):
             return self, "late"
-        channel, refused = self._accept(ask.source, drive, now_ns)
+        channel, refused = self._accept(ask.source, drive, ask.received_ns)
         return replace(self, channels={**self.channels, ask.source: channel}), refused
 
-    def _accept(self, name: str, drive: Drive, now_ns: int) -> tuple[Channel, str]:
+    def _accept(self, name: str, drive: Drive, received_ns: int) -> tuple[Channel, str]:
         channel = self.channels.get(name, Channel())
         if drive.boot != channel.boot:
-            if channel.is_fresh(now_ns, self.sources[name].lease):
-                return replace(channel, rival_ns=now_ns), "second_publisher"
+            if channel.is_fresh(received_ns, self.sources[name].lease):
+                return replace(channel, rival_ns=received_ns), "second_publisher"
             channel = Channel(boot=drive.boot, rival_ns=channel.rival_ns)
         elif drive.seq <= channel.seq:
             return channel, "seq_not_rising"
         wish = Twist(drive.linear, drive.angular)
-        return replace(channel, seq=drive.seq, wish=wish, received_ns=now_ns), ""
+        return replace(channel, seq=drive.seq, wish=wish, received_ns=received_ns), ""
 
     def driver(self, now_ns: int) -> str | None:
         """Return the source that holds the wheel."""
@@ -102,14 +106,31 @@ class Arbiter(Struct, frozen=True):
         channels = {name: replace(one, neutral=False) for name, one in self.channels.items()}
         return replace(self, channels=channels)
 
+    def asking_for_zero(self, now_ns: int) -> set[str]:
+        """Return the sources that request zero now."""
+        return {name for name in self._fresh(now_ns) if self.channels[name].wish.is_zero}
+
     def armed(self, now_ns: int) -> "Arbiter":
         """Return it with the sources armed that ask for zero now."""
-        neutral = {name for name in self._fresh(now_ns) if self.channels[name].wish.is_zero}
+        neutral = self.asking_for_zero(now_ns)
         channels = {
-            name: replace(one, neutral=one.neutral or name in neutral)
+            name: replace(one, neutral=True, overruled_by="") if name in neutral else one
             for name, one in self.channels.items()
         }
         return replace(self, channels=channels)
+
+    def overruled(self, now_ns: int) -> "Arbiter":
+        """Return it with a neutral request due on every source below the one at the wheel."""
+        driver = self.driver(now_ns)
+        if driver is None:
+            return self
+        priority = self.sources[driver].priority
+        below = {
+            name: replace(one, neutral=False, overruled_by=driver)
+            for name, one in self.channels.items()
+            if self.sources[name].priority < priority
+        }
+        return replace(self, channels={**self.channels, **below}) if below else self
 
     def _fresh(self, now_ns: int) -> list[str]:
         return [

@@ -49,6 +49,13 @@ RULES = (
     Rule("estop_reader", "brake", Clears.RESET, "The emergency stop could not be heard."),
     Rule("predecessor", "brake", Clears.RESET, "Safety started anew with a reset still due."),
     Rule("runaway", "brake", Clears.RESET, "The vehicle did not move as commanded."),
+    Rule(
+        "uncommanded_motion", "brake", Clears.RESET,
+        "The vehicle moved while standstill was commanded.",
+    ),
+    # the only brake that clears by itself
+    Rule("not_stopping", "brake", Clears.SETTLED, "The vehicle does not stop."),
+    # latched
     Rule("driver_left", "stop", Clears.RESET, "The left motor driver reported a fault."),
     Rule("driver_right", "stop", Clears.RESET, "The right motor driver reported a fault."),
     Rule("flapping", "stop", Clears.RESET, "Inputs failed again and again."),
@@ -69,6 +76,7 @@ RULES = (
     Rule("blocked", "stop", Clears.AT_ONCE, "There is no room that way."),
     Rule("no_request", "stop", Clears.AT_ONCE, "Nobody asks to move."),
     Rule("release", "slow", Clears.AT_ONCE, "Creeping off the bumper."),
+    Rule("bumper_lossy", "slow", Clears.AT_ONCE, "Creeping: bumper polls were lost."),
     Rule("obstacle", "slow", Clears.AT_ONCE, "Slowed by an obstacle."),
     Rule("sonar", "slow", Clears.AT_ONCE, "A sonar cannot be trusted."),
 )  # fmt: skip
@@ -90,3 +98,8 @@ def clears(name: str) -> Clears:
 def wants_neutral(name: str) -> bool:
     """Tell whether a neutral request must follow once the cause is gone."""
     return clears(name) is not Clears.AT_ONCE
+
+
+def bars_motion(name: str) -> bool:
+    """Return whether it bars motion, whatever is requested."""
+    return wants_neutral(name) or name == "two_publishers"

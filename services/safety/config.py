@@ -15,8 +15,8 @@ Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 PROTECTIVE: dict[str, tuple[float, float]] = {
     "margin": (0.05, 10.0),
     "react": (0.1, 10.0),
-    "deceleration": (0.0, 1.0),
-    "angular_deceleration": (0.0, 3.0),
+    "deceleration": (0.1, 1.0),
+    "angular_deceleration": (0.1, 3.0),
     "max_linear": (0.0, 1.5),
     "max_angular": (0.0, 2.0),
     "linear_acceleration": (0.0, 1.5),
@@ -27,8 +27,10 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "link_age": (0.0, 1.5),
     "switches_age": (0.0, 5.0),
     "driver_age": (0.0, 5.0),
+    "estop_path_age": (0.0, 0.5),
     "settle": (0.1, 10.0),
     "max_echo_age": (0.0, 1.0),
+    "max_call_age": (0.0, 1.5),
     "runaway_linear": (0.0, 0.5),
     "runaway_angular": (0.0, 1.0),
     "runaway_time": (0.0, 1.0),
@@ -37,8 +39,12 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "release_lease": (0.0, 0.5),
     "hysteresis": (0.02, 10.0),
     "stuck_travel": (0.0, 1.0),
+    "creep_speed": (0.0, 0.25),
     "require_switches": (True, True),
 }
+# Our programs that stop requesting when a person lets go; ``sources.NAME.operator`` of any other is
+# subject to the same rule.
+HELD = ("teleop", "checkout", "web")
 MAX_LEASE_S = 0.5  # longer leases are subject to the same rule, as ``sources.NAME.lease``
 
 
@@ -47,13 +53,14 @@ class Source(settings.Section, frozen=True, kw_only=True):
 
     priority: Annotated[int, Meta(ge=0, le=1000)]
     lease: Seconds  # s that a request holds
+    operator: bool = False  # a person drives with it, and may creep past a faulty sonar
 
 
 def _sources() -> dict[str, Source]:
     return {
-        "teleop": Source(priority=30, lease=0.3),
-        "checkout": Source(priority=25, lease=0.3),
-        "web": Source(priority=20, lease=0.3),
+        "teleop": Source(priority=30, lease=0.3, operator=True),
+        "checkout": Source(priority=25, lease=0.3, operator=True),
+        "web": Source(priority=20, lease=0.3, operator=True),
         "demo": Source(priority=15, lease=0.3),
         "nav": Source(priority=10, lease=0.2),
     }
@@ -75,7 +82,9 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m that stay free
     react: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25  # s from reading to slowing down
     hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.05  # m until a farther reading counts
-    stuck_travel: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.5  # m without a changed reading
+    # m along a sonar's axis without a changed reading, until it is suspect
+    stuck_travel: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.5
+    creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is in doubt
 
     bumper_age: Seconds = 0.15
     ultrasonic_age: Seconds = 0.3
@@ -83,8 +92,10 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     link_age: Seconds = 0.6
     switches_age: Seconds = 3.0
     driver_age: Seconds = 2.0
+    estop_path_age: Seconds = 0.2  # of our own state, received through the router
     settle: Seconds = 0.5  # s that inputs must be good again
-    max_echo_age: Seconds = 0.4
+    max_echo_age: Seconds = 0.4  # s, of a request to move and of a held release
+    max_call_age: Seconds = 1.0  # s, of a reset
     require_switches: bool = True  # the board's own emergency brakes must be on
 
     runaway_linear: Positive = 0.3  # m/s over the commanded speed
@@ -92,8 +103,13 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     runaway_time: Seconds = 0.3
 
     release_speed: Positive = 0.1  # m/s
-    release_distance: Positive = 0.15  # m in total for each press
+    release_distance: Positive = 0.15  # m in total until a reset
     release_lease: Seconds = 0.3
+
+    @property
+    def operators(self) -> frozenset[str]:
+        """The sources that a person drives with."""
+        return frozenset(name for name, source in self.sources.items() if source.operator)
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in PROTECTIVE}
@@ -101,6 +117,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
         for name, source in self.sources.items():
             given[f"sources.{name}.lease"] = source.lease
             allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
+            given[f"sources.{name}.operator"] = source.operator
+            allowed[f"sources.{name}.operator"] = (False, name in HELD)
         settings.check_protections(given, allowed, self.i_accept)
         priorities = [source.priority for source in self.sources.values()]
         if len(set(priorities)) < len(priorities):

@@ -4,7 +4,19 @@ from msgspec import Struct
 
 from common import codec
 from common.freshness import Latest, fresh
-from common.messages import Bumper, Drive, Driver, Link, Switches, Ultrasonic, Velocity
+from common.messages import (
+    Bumper,
+    Direction,
+    Drive,
+    Driver,
+    Link,
+    Mileage,
+    SafetyState,
+    Switches,
+    Ultrasonic,
+    Velocity,
+)
+from services.safety.trajectory import Counter
 from services.safety.twist import Twist
 
 
@@ -22,13 +34,18 @@ class Estop(Struct, frozen=True):
 
 
 class Reset(Struct, frozen=True):
-    """An operator asks to clear the latches."""
+    """An operator's request to clear the causes with these identities."""
+
+    echo: int | None = None
+    causes: tuple[int, ...] = ()
 
 
 class Hold(Struct, frozen=True):
     """An operator holds the release, or lets go of it."""
 
     held: bool
+    direction: Direction | None = None
+    echo: int | None = None
 
 
 Event = Ask | Estop | Reset | Hold
@@ -38,6 +55,7 @@ class Inputs(Struct, frozen=True):
     """A snapshot; None for a stream of which nothing has come yet."""
 
     velocity: Latest[Velocity] | None = None
+    mileage: Latest[Mileage] | None = None
     ultrasonic: Latest[Ultrasonic] | None = None
     bumper: Latest[Bumper] | None = None
     left: Latest[Driver] | None = None
@@ -45,6 +63,8 @@ class Inputs(Struct, frozen=True):
     switches: Latest[Switches] | None = None
     link: Latest[Link] | None = None
     reader: bool = False  # whether the emergency stop's own session has a router
+    # This service's own state, received back through the router on that session.
+    estop_path: Latest[SafetyState] | None = None
     leaving: bool = False  # whether this service is on its way out
     event: Event | None = None
     boot: int = 0  # this service's own
@@ -62,3 +82,13 @@ class Inputs(Struct, frozen=True):
         if not codec.finite(velocity.linear, velocity.angular):
             return None
         return Twist(velocity.linear, velocity.angular)
+
+    @property
+    def counter(self) -> Counter | None:
+        """The newest reading of the board's counters; None when it is not finite."""
+        if self.mileage is None:
+            return None
+        mileage = self.mileage.value
+        if not codec.finite(mileage.distance, mileage.heading):
+            return None
+        return Counter((mileage.boot, mileage.epoch), mileage.distance, mileage.heading)

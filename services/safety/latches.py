@@ -2,18 +2,23 @@
 
 A cause is observed with a *token*, the identity of the sample that shows it. Good samples are
 counted by tokens, so that looking twice at one sample proves nothing twice.
+
+Each occurrence of a cause has an *identity*, made of the decision in which it began and the cause's
+row. A cause that comes back after ``GOOD_SAMPLES`` without it is a new occurrence. An operator's
+reset names the identities that the operator saw, and clears no others.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from services.safety.causes import BY_NAME, Clears, clears, severity
+from services.safety.causes import BY_NAME, RULES, Clears, clears, severity
 
 Token = tuple[int, int]  # boot and seq of a sample, or (0, time) where there is none
 
 GOOD_SAMPLES = 3  # so many without the cause before a reset may clear it
+_ROW = {rule.name: row for row, rule in enumerate(RULES)}
 
 
 class Observation(Struct, frozen=True):
@@ -28,30 +33,34 @@ class Observation(Struct, frozen=True):
 class Held(Struct, frozen=True):
     """A cause that is in force."""
 
-    since_ns: int
+    since_ns: int  # when this occurrence began
     bad_ns: int  # when it was last seen
     good: int  # samples without it since
     token: Token
     text: str
+    id: int = 0  # of this occurrence
 
 
 Latches = Mapping[str, Held]
 
 
 def observe(
-    held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int = 0
+    held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int = 0, decision: int = 0
 ) -> dict[str, Held]:
     """Return what is held after these observations; causes that were not observed stay.
 
-    ``settle_ns`` is for causes that settle.
+    ``settle_ns`` is for causes that settle. ``decision`` is the number of this decision; it
+    observes each cause once, so that identities are unique.
     """
     result = dict(held)
     for one in seen:
         old = held.get(one.name)
         if one.present:
-            since_ns = old.since_ns if old else now_ns
             text = one.text or BY_NAME[one.name].text
-            result[one.name] = Held(since_ns, now_ns, 0, one.token, text)
+            since_ns, id_ = now_ns, decision * len(RULES) + _ROW[one.name]
+            if old and old.good < GOOD_SAMPLES:
+                since_ns, id_ = old.since_ns, old.id
+            result[one.name] = Held(since_ns, now_ns, 0, one.token, text, id_)
         elif old and _is_over(one.name, old, now_ns, settle_ns):
             del result[one.name]
         elif old:
@@ -80,9 +89,17 @@ def still_there(held: Latches) -> tuple[str, ...]:
     return tuple(name for name in latched(held) if held[name].good < GOOD_SAMPLES)
 
 
-def reset(held: Latches) -> dict[str, Held]:
-    """Return what is held once the latched causes that are gone are cleared."""
-    stays = still_there(held)
-    return {
-        name: one for name, one in held.items() if clears(name) is not Clears.RESET or name in stays
-    }
+def begun(held: Latches, decision: int) -> tuple[str, ...]:
+    """Return the names of the latched causes that began in this decision, the worst first."""
+    return tuple(name for name in latched(held) if held[name].id // len(RULES) == decision)
+
+
+def named(held: Latches, ids: Container[int]) -> tuple[str, ...]:
+    """Return the names of the latched causes with these identities, the worst first."""
+    return tuple(name for name in latched(held) if held[name].id in ids)
+
+
+def reset(held: Latches, ids: Container[int]) -> dict[str, Held]:
+    """Return what is held once the latched causes with these identities are cleared, if gone."""
+    cleared = set(named(held, ids)).difference(still_there(held))
+    return {name: one for name, one in held.items() if name not in cleared}

@@ -3,10 +3,10 @@
 One pass, always in this order, so that a trip wins over whatever comes with it:
 
 1. request   judge a request, if that is the event (``arbiter.py``)
-2. sense     sonars, runaway, the way crept off the bumper
+2. sense     sonars, runaway, standstill, the board's counters, the way moved off the bumper
 3. guard     observe every cause that does not depend on a wish (``conditions.py``)
 4. answer    a reset or a held release, against what is held now
-5. arm       note neutral requests while nothing asks for one
+5. arm       note neutral requests while nothing asks for one, and who was overruled
 6. move      ramp the wish and bend it to the zones (``motion.py``)
 7. judge     the worst action of all that is held (``causes.py``)
 
@@ -18,24 +18,24 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import Latest, S
 from common.messages import Command
 from common.messages import Verdict as VerdictName
 from common.settings import Vehicle
 from services.safety.answers import answer, is_creeping
 from services.safety.arbiter import Arbiter
-from services.safety.causes import BY_NAME, Clears, clears, wants_neutral
+from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
 from services.safety.ears import Ears
 from services.safety.inputs import Ask, Inputs
-from services.safety.latches import GOOD_SAMPLES, Latches, Observation, latched, observe, ordered
+from services.safety.latches import Latches, Observation, latched, observe, ordered
 from services.safety.motion import Plan, Planner, observations
-from services.safety.release import Release
 from services.safety.runaway import Bounds
 from services.safety.sonar import Rules
+from services.safety.standstill import Measured, Standstill, supervisor
 from services.safety.state import RELEASE, State, Verdict
-from services.safety.twist import STILL
+from services.safety.twist import STILL, Twist
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not leap
 AGAINST_MPS = 0.1  # against the command, more than noise and lag
@@ -49,7 +49,10 @@ class Policy:
         self.settings = settings
         self.planner = Planner(settings, vehicle)
         rules = Rules(settings.hysteresis, settings.stuck_travel)
-        self._ears = Ears(self.planner.zones, rules, settings.ultrasonic_age)
+        self._ears = Ears(
+            self.planner.zones, rules, settings.ultrasonic_age, self.planner.creep_room
+        )
+        self._supervisor = supervisor(settings)
         patience_s = settings.runaway_time
         self._linear = Bounds(
             settings.deceleration, settings.runaway_linear, AGAINST_MPS, patience_s
@@ -65,6 +68,7 @@ class Policy:
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, Verdict]:
         """Return the new memory and the verdict; the event in the inputs is taken once."""
         step_s = min((now_ns - (state.decided_ns or now_ns)) / S, LONGEST_STEP_S)
+        state = replace(state, decision=state.decision + 1)
         state, refused = self._request(state, inputs, now_ns)
         state = self._sense(state, inputs, step_s, now_ns)
         state = self._guard(state, inputs, now_ns)
@@ -86,9 +90,14 @@ class Policy:
         known = inputs.known_velocity(now_ns, settings.velocity_age)
         measured = known or STILL
         heard = self._ears.hear(state.heard, inputs.ultrasonic, known, now_ns)
+        trajectory, counter = state.trajectory, inputs.counter
+        if inputs.mileage and counter:
+            trajectory = trajectory.follow(counter, inputs.mileage.received_ns)
         release = state.release
-        if "contact" in state.latches and sent.source == RELEASE:
-            release = release.crept(sent.twist, measured, self.planner.reach, step_s)
+        if "contact" in state.latches:
+            moved = sent.twist if sent.source == RELEASE and sent.command == "run" else None
+            reach = self.planner.reach
+            release = release.moving(moved, known, counter, reach=reach, dt_s=step_s, now_ns=now_ns)
         return replace(
             state,
             heard=heard,
@@ -96,10 +105,20 @@ class Policy:
             angular=state.angular.follow(
                 sent.twist.angular, measured.angular, step_s, self._angular
             ),
+            standstill=self._standstill(state, inputs, known, now_ns),
             release=release,
-            moved=state.moved if measured.is_standing else measured,
+            trajectory=trajectory,
             reader_was_up=state.reader_was_up or inputs.reader,
         )
+
+    def _standstill(
+        self, state: State, inputs: Inputs, known: Twist | None, now_ns: int
+    ) -> Standstill:
+        sent, velocity = state.verdict, inputs.velocity
+        commanded = sent.command != "run" or sent.twist.rounds_to_zero
+        latest = Latest(known, velocity.received_ns) if known and velocity else None
+        seen = Measured(latest, inputs.mileage if inputs.counter else None)
+        return self._supervisor.follow(state.standstill, commanded, seen, now_ns)
 
     def _guard(self, state: State, inputs: Inputs, now_ns: int) -> State:
         settle_ns = round(self.settings.settle * S)
@@ -109,19 +128,33 @@ class Policy:
         seen = [
             *observe_inputs(inputs, self.settings, state, now_ns),
             Observation("runaway", bad_s >= self.settings.runaway_time, tick),
+            Observation("uncommanded_motion", state.standstill.left, tick),
+            Observation(
+                "not_stopping", state.standstill.is_late(now_ns), tick, state.standstill.text
+            ),
             Observation("two_publishers", bool(rivals), tick, f"Two publishers ask on {rivals}."),
         ]
-        held = observe(state.latches, seen, now_ns, settle_ns)
+        held = observe(state.latches, seen, now_ns, settle_ns, state.decision)
         was_good, is_good = not _settling(state.latches), not _settling(held)
         credit = state.credit.after(now_ns, was_good and not is_good, is_good)
-        held = observe(held, [Observation("flapping", credit.is_spent, tick)], now_ns)
-        release = _press(state, inputs)
+        flapping = Observation("flapping", credit.is_spent, tick)
+        held = observe(held, [flapping], now_ns, decision=state.decision)
+        release = state.release
+        if "contact" in held:
+            old = state.latches.get("contact")
+            release = release.after(old, held["contact"], state.trajectory, now_ns)
+            release = replace(release, unknown=release.unknown or "predecessor" in held)
         return replace(state, latches=held, credit=credit, release=release)
 
     def _arm(self, state: State, now_ns: int) -> State:
         arbiter = state.arbiter
+        if state.heard.unseen or state.blind.since:
+            operators = self.settings.operators & arbiter.asking_for_zero(now_ns)
+            blind = state.blind.after(state.heard.unseen, operators, now_ns)
+            state = replace(state, blind=blind)
         disarm = any(wants_neutral(name) for name in state.latches)
-        return replace(state, arbiter=arbiter.disarmed() if disarm else arbiter.armed(now_ns))
+        arbiter = arbiter.disarmed() if disarm else arbiter.armed(now_ns)
+        return replace(state, arbiter=arbiter.overruled(now_ns))
 
     def _judge(
         self, state: State, inputs: Inputs, step_s: float, now_ns: int
@@ -134,8 +167,8 @@ class Policy:
         if wish and not barred:
             measured = inputs.known_velocity(now_ns, self.settings.velocity_age) or STILL
             plan = self.planner.plan(state, measured, wish, step_s)
-        seen = observations(state, wish, plan, barred, now_ns)
-        held = observe(state.latches, seen, now_ns)
+        seen = observations(state, wish, plan, now_ns)
+        held = observe(state.latches, seen, now_ns, decision=state.decision)
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command: Command = "run" if worst in ("run", "slow") else _COMMANDS[worst]
@@ -167,21 +200,11 @@ def _name(worst: VerdictName, held: Latches) -> VerdictName:
 
 def _guards(held: Latches) -> set[str]:
     """Return the causes that bar motion whatever is asked for."""
-    return {name for name in held if wants_neutral(name) or name == "two_publishers"}
+    return {name for name in held if bars_motion(name)}
 
 
 def _settling(held: Latches) -> bool:
     return any(clears(name) is Clears.SETTLED for name in held)
-
-
-def _press(state: State, inputs: Inputs) -> Release:
-    """Return a new release when the bumper is pressed anew, else the one that there is."""
-    if inputs.bumper is None or not inputs.bumper.value.pressed:
-        return state.release
-    old = state.latches.get("contact")
-    if old is not None and old.good < GOOD_SAMPLES:
-        return state.release
-    return Release(before=state.moved)
 
 
 def _judged(inputs: Inputs) -> tuple[int, int]:

@@ -1,46 +1,116 @@
-"""Creeping off a pressed bumper, held by an operator; never by itself.
+"""Motion off a pressed bumper, held by an operator who chose its direction; never by itself.
 
-One bumper bit has no direction, so the only way known to be free is the one it came by: the last
-measured motion before the press, reversed. The fastest point of the body does at most the release
-speed, and the way is counted by the larger of commanded and measured speed, so that slipping
-wheels end it too. A press ends when the bumper was clear for three samples; only a new press has
-its way anew.
+One bumper bit has no direction, so safety does not choose one. The memory here lasts as long as
+``contact`` is latched, over every press: the way that may be travelled in total, and the
+directions in which the bumper was pressed anew. The way counts by the largest of the commanded
+speed, the measured speed and the board's counter, so that neither slipping nor locked wheels hide
+it. What the vehicle travels while it comes to rest counts too. A contact that is latched beside
+``predecessor`` may be an old one, and a restart of safety loses this memory: it gets no release.
+
+"Anew" is the first pressed sample after a clear one. The bridge reports a bumper as clear only
+after three clear answers of the board, so that a short gap in one press is no second press.
 """
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import S
+from common.messages import Direction
+from services.safety.latches import Held
+from services.safety.trajectory import Counter, Trajectory
 from services.safety.twist import STILL, Twist
+
+COAST_NS = S // 2  # after the last motion, a press and the counter still belong to a release
+SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
 
 
 class Release(Struct, frozen=True):
-    """The press that is on, and how far it was crept off."""
+    """One latched contact: how the vehicle came to it, and how far it was moved since."""
 
-    before: Twist | None = None  # the last measured motion before the press
-    travelled: float = 0.0  # m
-    held_ns: int | None = None  # when the operator last asked; None when let go
+    before: Trajectory = Trajectory()  # at the newest contact
+    integrated: float = 0.0  # m, by the larger of commanded and measured speed
+    counted: float = 0.0  # m, by the board's counter
+    counter: Counter | None = None  # the newest reading while a release moves the vehicle
+    direction: Direction | None = None  # of the newest release
+    moved: Direction | None = None  # in which a release last moved the vehicle
+    moved_ns: int | None = None  # when
+    forbidden: frozenset[Direction] = frozenset()
+    unknown: bool = False  # whether releases before a restart of safety may have moved it
+    held_ns: int | None = None  # when the operator last called; None when ended
+    let_go: int = 0  # heartbeat number that a later hold must exceed
+
+    @property
+    def travelled(self) -> float:
+        """The travel of all releases of this contact, in metres."""
+        return max(self.integrated, self.counted)
 
     def is_held(self, now_ns: int, lease_s: float) -> bool:
-        """Tell whether the operator still holds."""
+        """Return whether the operator still holds."""
         return self.held_ns is not None and now_ns - self.held_ns <= lease_s * S
 
     def left(self, distance: float) -> float:
-        """Return how many metres may still be crept, of ``distance`` for each press."""
-        return max(0.0, distance - self.travelled)
+        """Return how many metres may still be travelled, of ``distance`` for each contact."""
+        return 0.0 if self.unknown else max(0.0, distance - self.travelled)
 
-    def away(self, speed: float, reach: float) -> Twist:
-        """Return the motion back: no point within ``reach`` metres exceeds ``speed`` m/s."""
-        if self.before is None:
-            return STILL
-        return self.before.scaled(-speed / sweep(self.before, reach))
+    def away(self, speed: float) -> Twist:
+        """Return the straight motion in the chosen direction."""
+        return STILL if self.direction is None else Twist(speed * SIGN[self.direction])
 
-    def crept(self, commanded: Twist, measured: Twist, reach: float, dt_s: float) -> "Release":
-        """Return it ``dt_s`` seconds of creeping later."""
-        speed = max(sweep(commanded, reach), sweep(measured, reach))
-        return replace(self, travelled=self.travelled + speed * dt_s)
+    def hold(self, direction: Direction, now_ns: int) -> "Release":
+        """Return the release held in this direction."""
+        return replace(self, direction=direction, held_ns=now_ns)
+
+    def end(self, echo: int) -> "Release":
+        """Return the release ended; only a call with a newer echo than this holds it again."""
+        return replace(self, held_ns=None, let_go=max(self.let_go, echo))
+
+    def moving(
+        self, sent: Twist | None, known: Twist | None, counter: Counter | None,
+        *, reach: float, dt_s: float, now_ns: int,
+    ) -> "Release":  # fmt: skip
+        """Return the release ``dt_s`` seconds later.
+
+        ``sent`` is what a release commanded in that time, ``known`` the measured velocity; None
+        where there is none.
+        """
+        if sent is None and not self._is_coasting(now_ns):
+            return replace(self, counter=counter)
+        moves = sent is not None or known is None or not known.is_standing
+        speed = max(sweep(sent or STILL, reach), sweep(known or STILL, reach))
+        return replace(
+            self,
+            integrated=self.integrated + speed * dt_s,
+            counted=self.counted + _between(self.counter, counter),
+            counter=counter or self.counter,
+            moved=self.direction if sent is not None and not sent.is_zero else self.moved,
+            moved_ns=now_ns if moves else self.moved_ns,
+        )
+
+    def after(self, old: Held | None, contact: Held, came: Trajectory, now_ns: int) -> "Release":
+        """Return the release after a bumper sample: ``contact`` as held now, ``old`` before."""
+        if old is None:
+            return Release(before=came, let_go=self.let_go)
+        if contact.good:
+            return replace(self, held_ns=None)  # ends when the bumper is clear
+        if not old.good:
+            return self  # the same press
+        before = self.before if contact.id == old.id else came
+        forbidden = self.forbidden
+        if self.moved is not None and self._is_coasting(now_ns):
+            forbidden = forbidden | {self.moved}
+        return replace(self, before=before, forbidden=forbidden, held_ns=None)
+
+    def _is_coasting(self, now_ns: int) -> bool:
+        return self.moved_ns is not None and now_ns - self.moved_ns <= COAST_NS
 
 
 def sweep(twist: Twist, reach: float) -> float:
     """Return a bound on the speed (m/s) of any point within ``reach`` metres of the middle."""
     return abs(twist.linear) + abs(twist.angular) * reach
+
+
+def _between(old: Counter | None, new: Counter | None) -> float:
+    """Return the travel (m) between two readings; 0 where they cannot be compared."""
+    if old is None or new is None or old.origin != new.origin:
+        return 0.0
+    return abs(new.distance - old.distance)

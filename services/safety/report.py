@@ -6,13 +6,15 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import S
-from common.messages import Cause, Level, Limits, Motion, SafetyState
+from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
+from services.safety.answers import room
 from services.safety.causes import BY_NAME
 from services.safety.inputs import Ask, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
 from services.safety.policy import Policy
 from services.safety.state import State
+from services.safety.trajectory import OPPOSITE
 from services.safety.twist import Twist
 
 MOVING = ("run", "slow")
@@ -66,6 +68,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
             action=BY_NAME[name].action,
             age=(now_ns - state.latches[name].since_ns) / S,
             text=state.latches[name].text,
+            id=state.latches[name].id,
         )
         for name in ordered(state.latches)
     )
@@ -77,6 +80,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         limits=_limits(policy, state),
         heartbeat=state.heartbeat.number,
         text=sentence(state),
+        release=_release(policy, state, now_ns) if "contact" in state.latches else None,
     )
 
 
@@ -97,16 +101,18 @@ def sentence(state: State) -> str:
 
 def signature(state: State) -> tuple[object, ...]:
     """Return what must be told at once when it changes."""
-    return state.verdict.name, ordered(state.latches), state.verdict.source
+    ids = tuple(state.latches[name].id for name in latched(state.latches))
+    forbidden = state.release.forbidden
+    return state.verdict.name, ordered(state.latches), ids, state.verdict.source, forbidden
 
 
 def notes(before: State, after: State, trigger: Trigger | None) -> Iterator[Note]:
     """Yield the transitions of one decision."""
     old, new = before.verdict, after.verdict
     for name in latched(after.latches):
-        if name not in before.latches:
-            text = after.latches[name].text
-            yield Note(EVENT_NAMES.get(name, name), "error", text, {"cause": name})
+        known, one = before.latches.get(name), after.latches[name]
+        if known is None or known.id != one.id:
+            yield Note(EVENT_NAMES.get(name, name), "error", one.text, {"cause": name})
     if old.name in MOVING and new.name not in MOVING:
         worst = ordered(after.latches)[0]
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
@@ -139,15 +145,34 @@ def _handover(source: str | None) -> str:
     return f"{source} drives." if source else "Nobody drives."
 
 
-def _limits(policy: Policy, state: State) -> Limits:
-    linear, angular = policy.settings.max_linear, policy.settings.max_angular
-    distances = state.heard.distances
+def _release(policy: Policy, state: State, now_ns: int) -> Release:
+    """Return what is known about moving off the bumper."""
+    release = state.release
+    came, free = release.before, None
+    if came.direction is not None and OPPOSITE[came.direction] not in release.forbidden:
+        free = OPPOSITE[came.direction]
+    return Release(
+        believed_free=free,
+        travelled=came.net,
+        age=None if came.ended_ns is None else (now_ns - came.ended_ns) / S,
+        forbidden=tuple(sorted(release.forbidden)),
+        left=room(state, policy.settings),
+    )
 
-    def most(twist: Twist) -> float:
-        return policy.planner.zones.limit(twist, distances).factor
+
+def _limits(policy: Policy, state: State) -> Limits:
+    planner, settings = policy.planner, policy.settings
+    distances = planner.past(state.heard.cautious, state, state.verdict.source)
+
+    def most(asked: Twist) -> Twist:
+        twist = planner.bounded(asked, state.latches)
+        return twist.scaled(planner.zones.limit(twist, distances).factor)
 
     return Limits(
-        forward=linear * most(Twist(linear)),
-        backward=linear * most(Twist(-linear)),
-        angular=angular * min(most(Twist(0.0, angular)), most(Twist(0.0, -angular))),
+        forward=most(Twist(settings.max_linear)).linear,
+        backward=-most(Twist(-settings.max_linear)).linear,
+        angular=min(
+            most(Twist(0.0, settings.max_angular)).angular,
+            -most(Twist(0.0, -settings.max_angular)).angular,
+        ),
     )

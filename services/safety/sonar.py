@@ -1,12 +1,19 @@
-"""What each sonar may be trusted with: a distance, or nothing at all.
+"""Plausibility of each sonar: a distance, a distance in doubt, or no reading.
 
 A nearer reading counts at once. A farther one counts after three samples in a row that are farther
-by the hysteresis, and then the nearest of the three. A sample that is faulty, too near to measure,
-stuck or not a number counts as distance zero, so the same rule lets a sonar back in after three
+by the hysteresis, and then the nearest of the three. A sample that is faulty, too near to measure
+or not a number counts as distance zero, so the same rule accepts a sonar again after three
 good samples. ``no_echo`` is free space, at infinity.
 
-Stuck is a reading that stays the same to the millimetre while the vehicle has travelled along the
-sonar's axis: echoes of a real wall vary.
+A reading that stays the same to the millimetre is not a fault by itself: a wall alongside, or a
+surface beyond the sensor's range, gives just that. It disagrees with odometry where the vehicle
+moved along the sonar's axis, or turned, and nothing else explains it (``ears.py``):
+
+- from the first metre on, the reading is shortened by the way that the vehicle came nearer
+- after ``stuck_travel`` along the axis, or half a radian of turning, the sonar is *suspect*
+- three samples in a row with another reading end the suspicion
+
+Suspicion never blocks. It limits the speed toward what the sonar sees (``Sonar.cautious``).
 """
 
 import math
@@ -17,44 +24,60 @@ from msgspec.structs import replace
 from common.messages import RangeStatus
 
 FARTHER_SAMPLES = 3
+CHANGED_SAMPLES = 3
 SAME_M = 0.0015  # the board counts millimetres
+STUCK_TURN = 0.5  # rad; over a turn like this no flat surface keeps its distance
+UNSEEN = ("faulty", "silent")  # faults of the sonar; too near to measure is an obstacle
 
 
 class Sonar(Struct, frozen=True):
-    """One sonar; ``fault`` is empty when its distance can be trusted."""
+    """One sonar; ``fault`` is empty when it shows a distance."""
 
     distance: float = 0.0  # m; 0 while it has a fault, infinity for no echo
     fault: str = "silent"
     farther: tuple[float, ...] = ()  # readings that wait to count
     same: float = math.inf  # m, the reading that has not changed
-    travel: float = 0.0  # m along the axis since it changed
+    nearer: float = 0.0  # m that the vehicle came nearer since, from where it was farthest
+    travel: float = 0.0  # m along the axis since, between the two ends of the way
+    turned: float = 0.0  # rad since
+    suspect: bool = False
+    changed: int = 0  # samples in a row that contradict the suspicion
+
+    @property
+    def is_unseen(self) -> bool:
+        """Whether it has no reading."""
+        return self.fault in UNSEEN
+
+    def cautious(self, creep_room: float) -> float:
+        """Return the distance to plan with; ``creep_room`` is what the creep speed needs."""
+        doubted = 0.0 if self.suspect else self.same - self.nearer
+        return min(self.distance, max(doubted, creep_room))
 
 
-def read(
-    sonar: Sonar, reading: float | None, status: RangeStatus, moved: float, rules: "Rules"
-) -> Sonar:
-    """Take one sample, ``moved`` metres along the axis after the one before."""
-    distance, fault = _trust(reading, status)
-    sonar = _watch_change(sonar, distance, moved)
-    if not fault and sonar.travel >= rules.stuck_travel:
-        fault = "stuck"
-    if fault:
-        return replace(sonar, distance=0.0, fault=fault, farther=())
-    if distance <= sonar.distance:
-        return replace(sonar, distance=distance, farther=())
-    if distance < sonar.distance + rules.hysteresis:
-        return replace(sonar, farther=())
-    farther = (*sonar.farther, distance)
-    if len(farther) < FARTHER_SAMPLES:
-        return replace(sonar, farther=farther)
-    return replace(sonar, distance=min(farther), fault="", farther=())
+class Moved(Struct, frozen=True):
+    """How the vehicle moved since the last sample, and what constancy proves."""
+
+    along: float = 0.0  # m along the axis, toward what the sonar sees
+    turn: float = 0.0  # rad
+    beyond: bool = False  # whether the reading is the sensor's greatest
+    alongside: bool = False  # whether a surface alongside explains it
 
 
 class Rules(Struct, frozen=True):
     """When a reading is believed; metres."""
 
     hysteresis: float
-    stuck_travel: float
+    stuck_travel: float  # along the axis without a change, until the sonar is suspect
+
+
+def read(
+    sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved, rules: Rules
+) -> Sonar:
+    """Take one sample."""
+    distance, fault = _trust(reading, status)
+    if fault:
+        return Sonar(fault=fault)
+    return _accept(_watch(sonar, distance, moved, rules.stuck_travel), distance, rules.hysteresis)
 
 
 def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
@@ -68,7 +91,39 @@ def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
     return reading, ""
 
 
-def _watch_change(sonar: Sonar, distance: float, moved: float) -> Sonar:
-    if math.isfinite(distance) and abs(distance - sonar.same) < SAME_M:
-        return replace(sonar, travel=sonar.travel + abs(moved))
-    return replace(sonar, same=distance, travel=0.0)
+def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
+    if distance <= sonar.distance:
+        return replace(sonar, distance=distance, farther=())
+    if distance < sonar.distance + hysteresis:
+        return replace(sonar, farther=())
+    farther = (*sonar.farther, distance)
+    if len(farther) < FARTHER_SAMPLES:
+        return replace(sonar, farther=farther)
+    return replace(sonar, distance=min(farther), fault="", farther=())
+
+
+def _watch(sonar: Sonar, distance: float, moved: Moved, stuck_travel: float) -> Sonar:
+    """Compare the reading with the one before and with the motion."""
+    if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
+        changed = sonar.changed + 1
+        if sonar.suspect and changed < CHANGED_SAMPLES:
+            return replace(sonar, changed=changed)
+        return _begin(sonar, distance)
+    if moved.beyond:
+        return _begin(sonar, sonar.same)
+    turned = sonar.turned + moved.turn
+    nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
+    against = travel >= stuck_travel or abs(turned) >= STUCK_TURN
+    suspect = against or (sonar.suspect and not moved.alongside)
+    return replace(sonar, nearer=nearer, travel=travel, turned=turned, suspect=suspect, changed=0)
+
+
+def _begin(sonar: Sonar, same: float) -> Sonar:
+    return replace(sonar, same=same, nearer=0.0, travel=0.0, turned=0.0, suspect=False, changed=0)
+
+
+def _span(sonar: Sonar, along: float) -> tuple[float, float]:
+    """Return how near the vehicle came, and how long its way along the axis was."""
+    nearer = sonar.nearer + along
+    farther = max(0.0, -nearer)  # beyond the farther end of the way so far
+    return nearer + farther, max(sonar.travel + farther, nearer + farther)

@@ -2,15 +2,18 @@
 
 from msgspec import Struct
 
+from common.heartbeat import Heartbeat
 from common.messages import Command
 from common.messages import Verdict as VerdictName
 from services.safety.arbiter import Arbiter
+from services.safety.blind import Blind
 from services.safety.ears import Heard
 from services.safety.flapping import Credit
-from services.safety.heartbeat import Heartbeat
 from services.safety.latches import Latches, Token
 from services.safety.release import Release
 from services.safety.runaway import Axis
+from services.safety.standstill import Standstill
+from services.safety.trajectory import Trajectory
 from services.safety.twist import STILL, Twist
 
 RELEASE = "release"  # stands where a source stands while the vehicle creeps off its bumper
@@ -21,6 +24,7 @@ class Reply(Struct, frozen=True):
 
     done: bool
     text: str
+    cleared: tuple[int, ...] = ()  # identities of the causes that a reset cleared
 
 
 class Verdict(Struct, frozen=True):
@@ -42,11 +46,14 @@ class State(Struct, frozen=True):
     heartbeat: Heartbeat = Heartbeat()
     latches: Latches = {}
     heard: Heard = Heard()
+    blind: Blind = Blind()
     linear: Axis = Axis()
     angular: Axis = Axis()
+    standstill: Standstill = Standstill()
     credit: Credit = Credit()
     release: Release = Release()
-    moved: Twist | None = None  # the last measured velocity that was a motion
+    trajectory: Trajectory = Trajectory()
+    decision: int = 0  # the number of the newest one; starts at random, see ``Held.id``
     reader_was_up: bool = False
     decided_ns: int | None = None
     verdict: Verdict = Verdict()

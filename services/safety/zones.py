@@ -55,11 +55,19 @@ class Zones(Struct, frozen=True):
         lag = self.deceleration * self.react
         return math.sqrt(lag * lag + 2 * self.deceleration * room) - lag
 
+    def room(self, speed: float) -> float:
+        """Return the distance (m) at which this speed is allowed."""
+        return self.margin + speed * self.react + speed * speed / (2 * self.deceleration)
+
+    def along(self, sonar: int, twist: Twist) -> float:
+        """Return how fast (m/s) this sonar itself moves along its axis."""
+        axis = self.axes[sonar]
+        return twist.linear * axis.linear + twist.angular * axis.angular
+
     def approach(self, sonar: int, twist: Twist) -> float:
         """Return how fast (m/s) the vehicle closes in on what this sonar sees."""
-        axis = self.axes[sonar]
-        along = twist.linear * axis.linear + twist.angular * axis.angular
-        return max(along, abs(twist.angular) * axis.swing) if axis.swing else along
+        along, swing = self.along(sonar, twist), self.axes[sonar].swing
+        return max(along, abs(twist.angular) * swing) if swing else along
 
     def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
         """Return how far the twist must be slowed; a factor of 0 is a blocked way."""

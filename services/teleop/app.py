@@ -15,11 +15,16 @@ from textual.containers import Horizontal
 from textual.widgets import Static
 
 from common.bus.bus import Post
+from common.freshness import S
 from services.teleop import panels, table
 from services.teleop.config import Teleop
 from services.teleop.desk import Desk
 from services.teleop.drawing import around
+from services.teleop.hold import Press
+from services.teleop.round_trip import NUMBERS, PROBE_S
 
+QUESTION = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, ask for it, move it back
+UNANSWERED = 10  # questions; after that many only every tenth is asked
 REFRESH_S = 0.2  # a picture costs Textual tens of milliseconds, and keys wait for it
 
 
@@ -48,8 +53,13 @@ class TeleopApp(App[None]):
     #motion { width: 44; height: 100%; border: round $primary; padding: 0 1; }
     #events { height: 1fr; min-height: 3; border: round $primary; padding: 0 1; }
     #hints { height: 2; padding: 0 1; }
+    .contact #safety { height: 6; }
+    .contact #middle { height: 12; }
+    .contact #hints { height: 1; }
     Screen.tall #safety { height: 7; }
     Screen.tall #middle { height: 15; }
+    .contact Screen.tall #safety { height: 9; }
+    .contact Screen.tall #hints { height: 2; }
     """
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -71,7 +81,10 @@ class TeleopApp(App[None]):
         self._ended = ended
         self._hold = hold
         self._leaving = False
-        self._header = Panel(id="header")
+        self._view = desk.view  # as drawn last
+        self._asked = 0  # questions to the terminal
+        self._unanswered = 0  # in a row
+        self._header, self._hints = Panel(id="header"), Panel(id="hints")
         self._safety, self._around = titled("safety"), titled("around")
         self._motion, self._events = titled("motion"), titled("events")
 
@@ -83,11 +96,12 @@ class TeleopApp(App[None]):
             yield self._around
             yield self._motion
         yield self._events
-        yield Panel(panels.hints(self._hold.hold_first, self._hold.hold), id="hints")
+        yield self._hints
 
     def on_mount(self) -> None:
         """Begin to draw."""
         self.set_interval(REFRESH_S, self.draw)
+        self.set_interval(PROBE_S, self.probe)
 
     def on_resize(self, event: events.Resize) -> None:
         """Give a tall terminal more room around the vehicle."""
@@ -98,18 +112,51 @@ class TeleopApp(App[None]):
         if self._ended():
             self.exit()
             return
-        self._post(lambda: self._desk.watch(self._clock()))
-        view, size = self._desk.view, self._around.content_size
+        now_ns = self._clock()
+        self._post(lambda: self._desk.watch(now_ns))
+        self._view = view = self._desk.view
+        size = self._around.content_size
         self._header.show(panels.header(view))
+        self.set_class(panels.release(view) is not None, "contact")
         self._safety.show(panels.safety(view, self._safety.content_size.height))
         self._around.show(around(view.ultrasonic, view.bumper, size.width, size.height))
         self._motion.show(table.motion(view))
-        self._events.show(panels.events(view, self._events.content_size.height))
+        size = self._events.content_size
+        self._events.show(panels.events(view, size.height, size.width))
+        self._hints.show(panels.hints(view, self._hold.hold_first, self._hold.hold))
+
+    def probe(self) -> None:
+        """Query the terminal's cursor, at a column that is this query's number."""
+        if self._leaving:
+            return  # the shell would read the answer as input
+        self._asked += 1
+        if self._unanswered >= UNANSWERED and self._asked % UNANSWERED:
+            return  # a terminal that does not read: its queue must not fill up
+        self._unanswered += 1
+        number, now_ns = self._asked % max(1, min(NUMBERS, self.size.width)), self._clock()
+        self._post(lambda: self._desk.terminal.sent(number, now_ns))
+        self.query_terminal(QUESTION.format(column=number + 1))
+
+    def query_terminal(self, question: str) -> None:
+        """Write to the terminal after what was drawn so far."""
+        if self._driver is not None:
+            self._driver.write(question)
+
+    def on_cursor_position(self, event: events.CursorPosition) -> None:
+        """Pass an answer on."""
+        self._unanswered = 0
+        number, at_ns = event.x, self._came_ns(event)
+        self._post(lambda: self._desk.terminal.answered(number, at_ns))
 
     def on_key(self, event: events.Key) -> None:
         """Hand a key over; CapsLock and shift make no difference."""
-        key, now_ns = event.key.removeprefix("shift+").lower(), self._clock()
-        self._post(lambda: self._desk.press(key, now_ns))
+        key = event.key.removeprefix("shift+").lower()
+        press = Press(key, self._came_ns(event), self._view.safety)
+        self._post(lambda: self._desk.press(press, self._clock()))
+
+    def _came_ns(self, event: events.Event) -> int:
+        """Return when an event was read from the terminal."""
+        return self._clock() - round((time.monotonic() - event.time) * S)
 
     def on_app_blur(self) -> None:
         """Let go when the terminal loses the focus: the repeats go elsewhere."""

@@ -11,10 +11,14 @@ Hold = Annotated[float, Meta(ge=0.1, le=1.0)]  # s
 Index = Annotated[int, Meta(ge=0, le=31)]  # of an axis or a button, as SDL counts them
 GEARS = 5
 
+# See ``settings.check_protections``.
+PROTECTIVE: settings.Limits = {"round_trip": (0.02, 0.3), "gamepad_silence": (0.5, 3.0)}
+
 
 class Teleop(settings.Section, frozen=True, kw_only=True):
     """How an operator's keys and sticks become requests; slow by default."""
 
+    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "teleop"
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
@@ -22,7 +26,9 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
     turbo_angular: Speed = 1.0  # rad/s
     hold_first: Hold = 0.6  # s that a tap drives: a terminal's first repeat comes after ~0.5 s
     hold: Hold = 0.3  # s that a repeat drives
+    round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; keys of slower ones do not drive
     gamepad: bool = True
+    gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s that it drives without event
     deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's way
     expo: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5  # 0 is straight, 1 is cubic
     linear_axis: Index = 1  # left stick, up and down
@@ -31,6 +37,8 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
     turbo_button: Index = 5  # right shoulder
 
     def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in PROTECTIVE}
+        settings.check_protections(given, PROTECTIVE, self.i_accept)
         for name in ("gears_linear", "gears_angular"):
             gears = getattr(self, name)
             if len(gears) != GEARS or list(gears) != sorted(gears):

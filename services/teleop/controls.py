@@ -1,16 +1,18 @@
-"""What the operator's hands say: keys and a gamepad, a gear, turbo, and creeping off a bumper.
+"""The operator's input: keys and a gamepad, a gear, turbo, and the release off a pressed bumper.
 
-Keys win over the gamepad. ``f`` held means "creep off the bumper" and excludes driving; the last
-of the two that was pressed counts. Turbo is armed by ``t`` and good for one hold, so that nobody
-drives off fast by a key of ten minutes ago; CapsLock changes nothing.
+Keys win over the gamepad. ``f`` or ``b`` held asks for a release forward or backward and excludes
+driving; the last one that was pressed counts. Turbo is armed by ``t`` and good for one hold, so
+that nobody drives off fast by a key of ten minutes ago; CapsLock changes nothing.
 """
 
+from common.messages import Direction
 from common.requests import Phase, Requests, Twist
 from services.teleop.config import Teleop
+from services.teleop.gamepad_watchdog import GamepadWatchdog
 from services.teleop.hold import Deadman, Keys
-from services.teleop.mapping import DIRECTIONS, Stick, deflection, shaped, twist
+from services.teleop.mapping import DIRECTIONS, Deflection, Stick, deflection, shaped, twist
 
-CREEP = "f"
+RELEASE: dict[str, Direction] = {"f": "forward", "b": "backward"}
 TURBO = "t"
 STOP = "space"
 
@@ -23,8 +25,11 @@ class Controls:
         self.turbo = False
         self._settings = settings
         self._keys = Keys(settings.hold_first, settings.hold)
-        self._creep = Keys(settings.hold_first, settings.hold)
+        self._release = Keys(settings.hold_first, settings.hold)
         self._deadman = Deadman()
+        self._watchdog = GamepadWatchdog(settings.gamepad_silence)
+        self._by_gamepad = False
+        self.gamepad_expired = False  # it was deflected and silent; until it drives again
         self._requests = Requests()
 
     @property
@@ -35,11 +40,11 @@ class Controls:
     def press(self, key: str, now_ns: int) -> None:
         """Take a key press or its repeat; a key that means nothing is ignored."""
         if key in DIRECTIONS:
-            self._creep.clear()
+            self._release.clear()
             self._keys.press(key, now_ns)
-        elif key == CREEP:
+        elif key in RELEASE:
             self.let_go()
-            self._creep.press(key, now_ns)
+            self._release.press_alone(key, now_ns)
         elif key == STOP:
             self.stop()
         elif key == TURBO:
@@ -54,20 +59,32 @@ class Controls:
 
     def cut(self, now_ns: int) -> None:
         """Let go of everything, and want it let go by hand, too, before it counts again."""
-        self._keys.mute(now_ns)
-        self._creep.mute(now_ns)
+        self.mute_keys(now_ns)
         self._deadman.drop()
+
+    def mute_keys(self, now_ns: int) -> None:
+        """Release the keys; they count again once none has come for a while."""
+        self._keys.mute(now_ns)
+        self._release.mute(now_ns)
 
     def stop(self) -> None:
         """Let go of everything and send zeros even if nothing was sent before."""
         self.let_go()
-        self._creep.clear()
+        self._release.clear()
         self.turbo = False
         self._requests.stop()
 
-    def creeping(self, now_ns: int) -> bool:
-        """Tell whether the operator holds the key that creeps off a bumper."""
-        return bool(self._creep.held(now_ns))
+    def released(self, now_ns: int) -> Direction | None:
+        """Return the direction of the release that the operator holds; None if neither."""
+        return next((RELEASE[key] for key in self._release.held(now_ns)), None)
+
+    def holds_keys(self, now_ns: int) -> bool:
+        """Return whether a key is held that moves the vehicle."""
+        return bool(self._keys.held(now_ns) or self._release.held(now_ns))
+
+    def gamepad_is_due(self, now_ns: int) -> bool:
+        """Return whether the gamepad drives and should be moved to keep driving."""
+        return self._by_gamepad and self._watchdog.is_due(now_ns)
 
     def tick(self, stick: Stick | None, now_ns: int) -> Twist | None:
         """Return the request to send now, None for silence; ``stick`` is None without gamepad."""
@@ -78,13 +95,25 @@ class Controls:
         return request
 
     def _held(self, stick: Stick | None, now_ns: int) -> Twist | None:
+        self._watchdog.update(stick.events if stick else None, now_ns)
+        self._by_gamepad = False
         gripped = self._grip(stick)
         if keys := self._keys.held(now_ns):
             return twist(deflection(keys), self.gear, self.turbo, self._settings)
-        if gripped is None or self.creeping(now_ns):
+        if gripped is None or self.released(now_ns):
             return None
-        push = shaped(gripped.push, self._settings.deadzone, self._settings.expo)
-        return twist(push, self.gear, self.turbo or gripped.turbo, self._settings)
+        return self._pushed(gripped, now_ns)
+
+    def _pushed(self, stick: Stick, now_ns: int) -> Twist | None:
+        """Return the request of a gamepad whose deadman counts."""
+        push = shaped(stick.push, self._settings.deadzone, self._settings.expo)
+        self._by_gamepad = push != Deflection()
+        self.gamepad_expired = self._by_gamepad and self._watchdog.is_expired(now_ns)
+        if self.gamepad_expired:
+            self._by_gamepad = False
+            self._deadman.drop()
+            return None
+        return twist(push, self.gear, self.turbo or stick.turbo, self._settings)
 
     def _grip(self, stick: Stick | None) -> Stick | None:
         """Return the gamepad while its deadman counts."""

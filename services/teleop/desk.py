@@ -5,35 +5,39 @@ therefore delay a key, but never a zero.
 """
 
 import time
-from collections.abc import Callable
 
 from common import keys
 from common.bus.bus import Arrival
 from common.freshness import S
-from common.messages import Done, Event, ReleaseRequest, ResetRequest
+from common.messages import Event
 from common.requests import Twist
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.controls import Controls
+from services.teleop.controls import RELEASE, STOP, Controls
 from services.teleop.gamepad import Gamepad, NoGamepad
+from services.teleop.hold import Press
 from services.teleop.logbook import Logbook
-from services.teleop.mapping import Deflection, Stick, twist
+from services.teleop.mapping import DIRECTIONS, Deflection, Stick, twist
+from services.teleop.operator_calls import OperatorCalls
+from services.teleop.round_trip import ADVICE, RoundTrip
 from services.teleop.view import Ear, View
 
 PERIOD_S = 0.05  # 20 Hz, as safety's lease of 0.3 s wants it
 WATCHED_S = 1.0  # a screen that stands still for longer is a lost terminal: no gamepad then
-CREEP_TIMEOUT_S = 0.3
+WAIT_S = 0.5  # a press that waited longer is ignored, except a stop
 LINES = 40
 UNHEARD_TICKS = 10  # without a fresh word of safety: with its own 0.5 s, the bus is lost after 1 s
 ESTOP_TICKS = 60  # an emergency stop is repeated until safety says that it is latched, or 3 s
+ESTOP, RESET = "e", "r"
+BY_TERMINAL = {*DIRECTIONS, *RELEASE, RESET}  # the keys that need a fast terminal
 FAST_S, LINK_S, SLOW_S = 0.5, 1.0, 2.0  # how long a stream's last value is worth showing
 
 
 class Desk:
     """Presses in, requests out, and a picture of it all; every method in the loop's thread."""
 
-    def __init__(self, node: Node[TeleopConfig], logbook: Logbook) -> None:
+    def __init__(self, node: Node[TeleopConfig], logbook: Logbook, unmeasurable: str = "") -> None:
         self._node = node
         self._bus = bus = node.bus
         self._settings = node.config.teleop
@@ -42,9 +46,11 @@ class Desk:
         self._gamepad: Gamepad = NoGamepad("looking")
         self._watched_ns = 0
         self._asked: Twist | None = None
-        self._creep_asked = self._creep_pending = False
-        self._creep_answer = ""
+        self._calls = OperatorCalls(node, logbook)
         self._leaving = False
+        self.terminal = RoundTrip(self._settings.round_trip, unmeasurable)
+        self._slow = False  # a warning that the keys do not count was shown
+        self._dropped_ns: int | None = None  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before safety was heard at all
         self._estops = 0  # ticks for which the emergency stop is still repeated
         self._source = DriveSource(bus, self._settings.source)
@@ -70,16 +76,32 @@ class Desk:
         """Note that the screen is alive."""
         self._watched_ns = now_ns
 
-    def press(self, key: str, now_ns: int) -> None:
-        """Take a key press or its repeat."""
+    def press(self, press: Press, now_ns: int) -> None:
+        """Take a key press or its repeat; one that comes late stops the vehicle, or does nothing.
+
+        ========== ========================= ======================== ===============
+        key        waited over ``WAIT_S``    terminal refused         else
+        ========== ========================= ======================== ===============
+        E, space   counts                    counts                   counts
+        R          ignored, with a line      ignored, with an event   counts
+        motion     ignored, with a line      muted, with an event     counts
+        others     ignored, with a line      counts                   counts
+        ========== ========================= ======================== ===============
+        """
         if self._leaving:
             return
-        if key == "e":
+        if press.key == ESTOP:
             self._estop()
-        elif key == "r":
-            self._ask_reset()
+        elif press.key == STOP:
+            self._controls.press(STOP, now_ns)
+        elif press.age_s(now_ns) > WAIT_S:
+            self._drop(press, now_ns)
+        elif press.key in BY_TERMINAL and (reason := self.terminal.refusal(press.at_ns)):
+            self._refuse(reason, now_ns)
+        elif press.key == RESET:
+            self._calls.reset(press.shown, self._safety.at(now_ns))
         else:
-            self._controls.press(key, now_ns)
+            self._controls.press(press.key, press.at_ns)
 
     def let_go(self) -> None:
         """Release keys and gamepad, as when the terminal loses the focus."""
@@ -99,12 +121,24 @@ class Desk:
             self._node.loop.stop()
             return
         self._notice_silence(now_ns)
+        self._notice_slow_terminal(now_ns)
         self._repeat_estop(now_ns)
+        self._drive(now_ns)
+        self._calls.release(self._controls.released(now_ns), self._safety.at(now_ns))
+        self._calls.check_reset(self._safety.at(now_ns), now_ns)
+        self.view = self._picture(now_ns)
+
+    def _drive(self, now_ns: int) -> None:
+        had_expired = self._controls.gamepad_expired
         self._asked = self._controls.tick(self._read_stick(now_ns), now_ns)
         if self._asked is not None:
             self._ask(self._asked)
-        self._creep(self._controls.creeping(now_ns))
-        self.view = self._picture(now_ns)
+        if self._controls.gamepad_expired and not had_expired:
+            text = (
+                f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "
+                "s; release the deadman, then press it again"
+            )
+            self._node.event("gamepad_silent", "warning", text)
 
     def _ask(self, request: Twist) -> None:
         was_barred = self._source.barred
@@ -152,43 +186,25 @@ class Desk:
             text = "EMERGENCY STOP NOT CONFIRMED by safety: use the vehicle's own switch"
             self._node.event("estop_unconfirmed", "error", text)
 
-    def _ask_reset(self) -> None:
-        self._bus.ask(
-            keys.RESET, ResetRequest(), self._told("reset"), self._refused("reset refused")
-        )
+    def _notice_slow_terminal(self, now_ns: int) -> None:
+        """Release the keys of a terminal that has become slow: buffered presses are old."""
+        reason = self.terminal.refusal(now_ns)
+        if not reason:
+            self._slow = False
+        elif self._controls.holds_keys(now_ns):
+            self._refuse(reason, now_ns)
 
-    def _told(self, what: str) -> Callable[[Done], None]:
-        return lambda done: self._logbook.add("safety", "info", f"{what}: {done.text}")
+    def _refuse(self, reason: str, now_ns: int) -> None:
+        self._controls.mute_keys(now_ns)
+        if not self._slow:
+            self._slow = True
+            self._node.event("terminal_slow", "warning", f"keys ignored: {reason}; {ADVICE}")
 
-    def _refused(self, what: str) -> Callable[[str], None]:
-        return lambda reason: self._logbook.add("safety", "warning", f"{what}: {reason}")
-
-    # --- creeping off the bumper --------------------------------------------------------------
-
-    def _creep(self, held: bool) -> None:
-        """Ask again while held, one call at a time; say at once when it ends."""
-        if held and not self._creep_pending:
-            self._creep_pending = self._creep_asked = True
-            self._ask_release(True)
-        elif not held and self._creep_asked:
-            self._creep_asked = False
-            self._creep_answer = ""
-            self._ask_release(False)
-
-    def _ask_release(self, held: bool) -> None:
-        self._bus.ask(
-            keys.RELEASE,
-            ReleaseRequest(held=held),
-            lambda done: self._creep_answered(f"release: {done.text}"),
-            lambda reason: self._creep_answered(f"release refused: {reason}"),
-            timeout_s=CREEP_TIMEOUT_S,
-        )
-
-    def _creep_answered(self, text: str) -> None:
-        self._creep_pending = False
-        if self._creep_asked and text != self._creep_answer:
-            self._creep_answer = text
-            self._logbook.add("safety", "info", text)
+    def _drop(self, press: Press, now_ns: int) -> None:
+        if self._dropped_ns is None or now_ns - self._dropped_ns > S:  # a held key repeats
+            self._dropped_ns = now_ns
+            text = f"key {press.key.upper()} ignored: it waited {press.age_s(now_ns):.1f} s"
+            self._logbook.add("teleop", "warning", text)
 
     # --- the picture --------------------------------------------------------------------------
 
@@ -208,8 +224,10 @@ class Desk:
             turbo=controls.turbo,
             top=twist(Deflection(1, 1), controls.gear, controls.turbo, self._settings),
             asked=self._asked,
-            creeping=controls.creeping(now_ns),
+            release=controls.released(now_ns),
+            keys_refused=self.terminal.refusal(now_ns),
             gamepad=self._gamepad.words,
+            move_stick=controls.gamepad_is_due(now_ns),
             safety=self._safety.at(now_ns),
             velocity=self._velocity.at(now_ns),
             odometry=self._odometry.at(now_ns),

@@ -49,6 +49,11 @@ class SdlGamepad:
         self._pygame: Any = pygame
         self._settings = settings
         self._joystick: Any = None
+        self._events = 0  # axis and button events
+        self._by_hand = {
+            pygame.JOYAXISMOTION, pygame.JOYBALLMOTION, pygame.JOYHATMOTION,
+            pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP,
+        }  # fmt: skip
         pygame.display.init()
         pygame.joystick.init()
 
@@ -67,9 +72,14 @@ class SdlGamepad:
         return self._stick() if self._joystick else None
 
     def _take(self, event: Any) -> None:
-        gone = event.type == self._pygame.JOYDEVICEREMOVED
-        if gone and self._joystick and event.instance_id == self._joystick.get_instance_id():
+        if not self._joystick:
+            return
+        if getattr(event, "instance_id", None) != self._joystick.get_instance_id():
+            return
+        if event.type == self._pygame.JOYDEVICEREMOVED:
             self._joystick = None
+        elif event.type in self._by_hand:
+            self._events += 1
 
     def _stick(self) -> Stick:
         joystick, settings = self._joystick, self._settings
@@ -81,7 +91,7 @@ class SdlGamepad:
             bool(self._part(joystick.get_button, index, joystick.get_numbuttons()))
             for index in (settings.deadman_button, settings.turbo_button)
         )
-        return Stick(push, deadman, turbo)
+        return Stick(push, deadman, turbo, self._events)
 
     @staticmethod
     def _part(read: Any, index: int, count: int) -> float:

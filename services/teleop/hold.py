@@ -11,8 +11,23 @@ is down when the gamepad is found, or after a stop, must be let go first.
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from common.freshness import S
+from common.messages import SafetyState
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """A key press or its repeat, as the screen took it from the terminal."""
+
+    key: str
+    at_ns: int  # when it was read
+    shown: SafetyState | None = None  # what the screen showed then
+
+    def age_s(self, now_ns: int) -> float:
+        """Return how long it has waited."""
+        return (now_ns - self.at_ns) / S
 
 
 class Keys:
@@ -31,6 +46,11 @@ class Keys:
             return
         hold_ns = self._repeat_ns if key in self.held(now_ns) else self._first_ns
         self._until_ns[key] = now_ns + hold_ns
+
+    def press_alone(self, key: str, now_ns: int) -> None:
+        """Take a key press or its repeat, and release every other key."""
+        self._until_ns = {held: at for held, at in self._until_ns.items() if held == key}
+        self.press(key, now_ns)
 
     def held(self, now_ns: int) -> Iterable[str]:
         """Return the keys that are held."""

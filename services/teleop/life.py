@@ -7,11 +7,13 @@ terminal may hang. With no terminal to give back, the process then simply ends.
 """
 
 import argparse
+import contextlib
 import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -24,6 +26,7 @@ from services.teleop.config import TeleopConfig
 from services.teleop.desk import Desk
 from services.teleop.gamepad import find
 from services.teleop.logbook import Logbook
+from services.teleop.round_trip import multiplexer
 
 if TYPE_CHECKING:
     from services.teleop.app import TeleopApp
@@ -63,7 +66,7 @@ class Life:
         logbook.take_log(loaded.config.log)
         self._settings = loaded.config
         self._node = node = Node("teleop", loaded)
-        self._desk = desk = Desk(node, logbook)
+        self._desk = desk = Desk(node, logbook, multiplexer(os.environ, ancestors()))
         node.present()
         node.loop.every(LOOK_S, self._look)
         node.loop.post(lambda: desk.plug(find(self._settings.teleop)))
@@ -115,6 +118,18 @@ class Life:
 def terminal_is_there() -> bool:
     """Tell whether both ends of the terminal still answer."""
     return os.isatty(0) and os.isatty(1)
+
+
+def ancestors() -> list[str]:
+    """Return the names of the processes that this one descends from; empty without /proc."""
+    names, pid = [], os.getppid()
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        while pid:
+            status = Path(f"/proc/{pid}/stat").read_text(errors="replace")
+            name, _, rest = status.partition("(")[2].rpartition(")")
+            names.append(name)
+            pid = int(rest.split()[1])
+    return names
 
 
 def main(argv: Sequence[str] | None = None) -> int:

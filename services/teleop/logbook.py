@@ -6,6 +6,7 @@ While the screen is up, standard error is the operator's picture, so the log mus
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 
 from common import log
 from common.messages import Level
@@ -23,9 +24,11 @@ class Logbook:
         self._lock = threading.Lock()
 
     def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
-        """Append a line, of now unless its wall clock time is given."""
+        """Append a line, of now unless its wall clock time is given; a repeated one only moves."""
         line = Line(time.time_ns() if t_ns is None else t_ns, service, level, text)
         with self._lock:
+            if self._lines and replace(self._lines[-1], t_ns=line.t_ns) == line:
+                self._lines.pop()
             self._lines.append(line)
 
     def last(self, count: int) -> tuple[Line, ...]:

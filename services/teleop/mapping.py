@@ -27,6 +27,7 @@ class Stick:
     push: Deflection
     deadman: bool  # held down; without it the sticks mean nothing
     turbo: bool
+    events: int = 0  # how many the gamepad has sent since it was found
 
 
 # The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal

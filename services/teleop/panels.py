@@ -4,14 +4,20 @@ The table of the motion panel is in ``table.py``.
 """
 
 from datetime import datetime
+from textwrap import wrap
 
 from rich.text import Text
 
-from common.messages import Cause, SafetyState, Verdict
+from common.messages import Cause, Direction, Release, SafetyState, Verdict
+from services.teleop.round_trip import ADVICE
 from services.teleop.table import BAD, DIM, GOOD, WARN, Part
-from services.teleop.view import View
+from services.teleop.view import Line, View
 
 KEY = "bold black on cyan"
+HELD = "bold black on yellow"
+DIRECTIONS: dict[Direction, tuple[str, Direction]] = {  # its key, and the opposite
+    "forward": ("F", "backward"), "backward": ("B", "forward"),
+}  # fmt: skip
 BADGES: dict[Verdict, str] = {
     "run": "bold black on green",
     "slow": "bold black on yellow",
@@ -19,11 +25,13 @@ BADGES: dict[Verdict, str] = {
     "brake": "bold white on red",
     "inhibited": "bold white on grey35",
 }
+PREFIX, MIN_WORDS = len("00:00:00 safety  "), 20  # columns of an event's line
 LEVELS = {"info": "", "warning": WARN, "error": BAD}
 KEYS = (
     ("WASD", "drive"), ("ZC", "arc"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"),
-    ("E", "ESTOP"), ("R", "reset"), ("F", "creep"), ("Q", "quit"),
+    ("E", "ESTOP"), ("R", "reset"), ("FB", "release"), ("Q", "quit"),
 )  # fmt: skip
+STILL = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # what counts on a slow terminal
 
 
 def header(view: View) -> Text:
@@ -57,13 +65,45 @@ def safety(view: View, rows: int) -> Text:
     if state is None:
         return Text.assemble((" NO SAFETY ", BADGES["inhibited"]), "  its service is not heard")
     text = Text.assemble((f" {state.verdict.upper()} ", BADGES[state.verdict]), f"  {state.text}")
+    if (ways := release(view)) is not None:
+        return Text("\n").join([text, *ways, *_causes(state, rows - 1 - len(ways))])
+    return Text("\n").join([text, *_causes(state, rows - 1)])
+
+
+def release(view: View) -> tuple[Text, Text] | None:
+    """How to move off a pressed bumper, in two rows; None without a contact."""
+    known = view.safety.release if view.safety else None
+    if known is None:
+        return None
+    ways = Text("   ").join(_way(known, direction, view.release) for direction in DIRECTIONS)
+    return _believed(known), ways.append(f"   {known.left:.2f} m left until reset", style="bold")
+
+
+def _believed(known: Release) -> Text:
+    if known.believed_free is None:
+        return Text.assemble("RELEASE  free direction ", ("unknown: look at the vehicle", BAD))
+    came = DIRECTIONS[known.believed_free][1]
+    age = "" if known.age is None else f", {_age(known.age)} ago"
+    return Text.assemble(
+        "RELEASE  believed free: ", (known.believed_free.upper(), GOOD),
+        f" (moved {came}{age}; net {known.travelled:+.2f} m)",
+    )  # fmt: skip
+
+
+def _way(known: Release, direction: Direction, held: Direction | None) -> Text:
+    key = (f" {DIRECTIONS[direction][0]} ", HELD if held == direction else KEY)
+    if direction in known.forbidden:
+        return Text.assemble(key, f" {direction} ", ("FORBIDDEN", BAD))
+    return Text.assemble(key, f" {direction}", (", held" if held == direction else "", WARN))
+
+
+def _causes(state: SafetyState, rows: int) -> list[Text]:
+    """One row for each cause; by name in one row if there are more than rows."""
     causes = [cause for cause in state.causes if cause.name != "no_request"]
     causes.sort(key=lambda cause: cause.name not in state.latched)
-    if len(causes) < rows:
-        parts = [_cause(cause, cause.text, state) for cause in causes]
-        return Text("\n").join([text, *parts])
-    names = Text("  ").join(_cause(cause, cause.name, state) for cause in causes)
-    return Text("\n").join([text, names])
+    if len(causes) <= rows:
+        return [_cause(cause, cause.text, state) for cause in causes]
+    return [Text("  ").join(_cause(cause, cause.name, state) for cause in causes)]
 
 
 def _cause(cause: Cause, words: str, state: SafetyState) -> Text:
@@ -72,22 +112,34 @@ def _cause(cause: Cause, words: str, state: SafetyState) -> Text:
     return Text.assemble(tag, words, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
 
 
-def events(view: View, rows: int) -> Text:
-    """The newest lines, the newest last."""
-    text = Text("\n", no_wrap=True)
-    return text.join(
-        Text.assemble(
-            (f"{datetime.fromtimestamp(line.t_ns / 1e9):%H:%M:%S} ", DIM),
-            (f"{line.service:<7} ", "cyan"),
-            (line.text, LEVELS[line.level]),
-        )
-        for line in view.lines[max(0, len(view.lines) - rows) :]
+def events(view: View, rows: int, width: int = 200) -> Text:
+    """The newest lines, the newest last; a line that is too long goes on in the next row."""
+    shown: list[Text] = []
+    for line in reversed(view.lines):
+        room = rows - len(shown)
+        if room <= 0:
+            break
+        shown = [*_wrapped(line, max(MIN_WORDS, width - PREFIX))[:room], *shown]
+    return Text("\n", no_wrap=True).join(shown)
+
+
+def _wrapped(line: Line, width: int) -> list[Text]:
+    first, *rest = wrap(line.text, width) or [""]
+    style = LEVELS[line.level]
+    head = Text.assemble(
+        (f"{datetime.fromtimestamp(line.t_ns / 1e9):%H:%M:%S} ", DIM),
+        (f"{line.service:<7} ", "cyan"),
+        (first, style),
     )
+    return [head, *(Text(" " * PREFIX + more, style=style) for more in rest)]
 
 
-def hints(hold_first_s: float, hold_s: float) -> Text:
-    """The keys, and what a terminal cannot tell."""
-    row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in KEYS)
+def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
+    """The keys, and what a terminal cannot report or why its keys do not count."""
+    keys = [hint for hint in KEYS if hint in STILL or not view.keys_refused]
+    row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in keys)
+    if view.keys_refused:
+        return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
     limit = (
         f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
         f"a hold {hold_s:g} s past the last repeat"

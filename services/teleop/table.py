@@ -14,14 +14,15 @@ Part = tuple[str, str]  # words and their style
 
 
 def motion(view: View) -> Text:
-    """Return the whole table, eleven rows."""
+    """Return the whole table, eleven rows; ten during a contact, which needs room elsewhere."""
     rows = [*_speeds(view), ("pose", _pose(view)), ("odom", _odom(view)), ("board", _link(view))]
+    if not (view.safety and view.safety.release):
+        rows.append(("rates", _rates(view)))
     rows += [
-        ("rates", _rates(view)),
         ("motor L", Text(*_faults(view.left))),
         ("motor R", Text(*_faults(view.right))),
         ("driver", _who(view)),
-        ("gamepad", Text(view.gamepad)),
+        ("gamepad", _gamepad(view)),
     ]
     return Text("\n", no_wrap=True).join(
         Text.assemble((f"{name:<8}", DIM), value) for name, value in rows
@@ -97,12 +98,18 @@ def _faults(driver: Driver | None) -> Part:
 
 
 def _who(view: View) -> Text:
-    if view.creeping:
-        return Text("you, creeping off the bumper", style=WARN)
+    if view.release:
+        return Text(f"you, release {view.release}", style=WARN)
     driving = view.safety.source if view.safety else None
     if driving is None:
         return Text("nobody", style=DIM)
     return Text(f"{driving} (you)" if driving == view.source else driving, style="bold")
+
+
+def _gamepad(view: View) -> Text:
+    if view.move_stick:
+        return Text("no event: MOVE THE STICK", style=WARN)
+    return Text(view.gamepad)
 
 
 def _signed(value: float | None) -> str:

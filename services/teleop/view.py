@@ -8,6 +8,7 @@ from common.freshness import Latest, fresh
 from common.keys import Topic
 from common.messages import (
     Bumper,
+    Direction,
     Driver,
     Level,
     Link,
@@ -60,8 +61,10 @@ class View:
     turbo: bool
     top: Twist  # what full deflection asks in this gear
     asked: Twist | None = None  # None: silent
-    creeping: bool = False
+    release: Direction | None = None  # direction of the release that the operator holds
+    keys_refused: str = ""  # why the keys do not count
     gamepad: str = ""  # in words
+    move_stick: bool = False  # the gamepad drives and has sent nothing for a while
     safety: SafetyState | None = None
     velocity: Velocity | None = None
     odometry: Odometry | None = None

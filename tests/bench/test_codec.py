@@ -103,14 +103,13 @@ def test_a_frame_that_is_spoiled_is_refused(frames: Candidate, name: str) -> Non
         assert frames.refuses(name, bad), what
 
 
-@pytest.mark.parametrize(
-    ("name", "raw"),
-    [("run command", framed(0x7426, b"\x03\0\0\0\0")), ("bumper report", framed(0x7602, b"\x02"))],
-)
-def test_a_frame_of_a_value_that_there_is_not_is_refused(
-    frames: Candidate, name: str, raw: bytes
-) -> None:
-    assert frames.refuses(name, raw)
+def test_a_command_of_an_unknown_kind_is_refused(frames: Candidate) -> None:
+    assert frames.refuses("run command", framed(0x7426, b"\x03\0\0\0\0"))
+
+
+def test_every_byte_of_the_bumper_but_zero_is_pressed(frames: Candidate) -> None:
+    raw = framed(0x7602, b"\x80")
+    assert frames.plain("bumper report", frames.decode["bumper report"](raw)) == (True,)
 
 
 @pytest.mark.parametrize(

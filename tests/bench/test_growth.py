@@ -9,7 +9,7 @@ import pytest
 from bench.growth import curves, page
 from bench.growth.bend import Point, bend
 from bench.load.board import compiled
-from bench.series import Series
+from tests.bench.growth_series import made_up
 from tests.fleet.part import Part
 from tests.support import free_port, router_process
 
@@ -73,19 +73,6 @@ def test_robots_are_measured_at_a_real_router() -> None:
     made = {one.name: one for one in curves.robots((2,), 1.0)}
     assert len(made[page.ROBOTS, "2", "delay"].samples_ns) > 10
     assert {name[2] for name in made} == {"delay", "router", "machine"}
-
-
-def made_up() -> list[Series]:
-    """Return curves that bend at 10; nothing has come from the robots."""
-    made = []
-    for name in page.CURVES:
-        for number, ns in ((1, 1000), (10, 2000), (100, 90_000)):
-            note = "7% arrived" if number == 100 else ""
-            point = curves.point((name, str(number)), {"router": ns}, [ns] * 5, 1.0, note)
-            made += [one for one in point if name != page.ROBOTS or one.name[2] == "router"]
-            if name == page.ROBOTS:
-                made.append(Series(name=(name, str(number), "delay"), calls=1, samples_ns=[]))
-    return made
 
 
 def test_a_table_says_where_it_bends() -> None:

@@ -18,18 +18,13 @@ from bench.load.board import ANSWERS, FRAMING, STANDS, board, compiled
 from bench.load.gauges import Shares, drops, memory
 from bench.load.loss import Passage
 from bench.load.stack import Ports
-from bench.series import Series
 from common.wire import commands
 from common.wire.framing import Received
-from services.bridge.bridge import queries
 from services.bridge.config import Bridge
+from services.bridge.schedule import queries
+from tests.bench.load_series import made_up
 from tests.support import free_port, wait_until
 
-PROCESSES = {
-    page.CHAIN: ("router", "bridge"),
-    page.BARE: ("at the board", "decides"),
-    page.BUS: ("router", "decides"),
-}
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
 
@@ -186,28 +181,6 @@ def test_the_highest_rate_is_found(most: int) -> None:
 
     assert loss.highest(rates, holds) == max((hz for hz in rates if hz <= most), default=0)
     assert len(tried) <= 3
-
-
-def made_up() -> list[Series]:
-    """Return a bridge that bears 6,000 to one consumer and 1,000 to five, and what it costs."""
-    tried = {("1", 6000): "", ("1", 8000): "9 in the socket", ("1", 10_000): ""}
-    tried |= {("5", 1000): "", ("5", 2000): "7 in the socket", ("20", 500): "much"}
-    made = []
-    for (count, hz), note in tried.items():
-        name = "frames", count, str(hz)
-        made.append(Series(name=(*name, "delay"), calls=1, samples_ns=[400_000] * 9, note=note))
-        for who in ("router", "bridge", "machine"):
-            made.append(Series(name=(*name, who), calls=1, samples_ns=[250_000_000]))
-    for who, each in ((page.CHAIN, 30), (page.BARE, 20), (page.BUS, 25)):
-        for what, value in (("shipped", 1e6), ("tenfold", 1e7), ("rss", 3e6), ("pss", 1e6)):
-            for name_of in PROCESSES[who]:
-                made.append(sample(who, what, name_of, each * value))
-            made.append(sample(who, what, page.TOGETHER, 2 * each * value))
-    return made
-
-
-def sample(who: str, what: str, process: str, value: float) -> Series:
-    return Series(name=(who, what, process), calls=1, samples_ns=[round(value)] * 3)
 
 
 def test_a_rate_counts_when_none_below_it_lost_anything() -> None:

@@ -15,7 +15,7 @@ from bench.reaction.page import LOADS
 from bench.reaction.responders import FIFO, JUDGED, LOOP, REFLEX, ZENOH
 from bench.series import Measured, Series, store
 from bench.telemetry.page import AGE, STREAMS
-from tests.bench import test_growth, test_load, test_start
+from tests.bench import growth_series, load_series, start_series
 
 BY_FRAME = {"T2": 2000, "struct": 1000, "ctypes": 3000}
 BY_MESSAGE = {"T2": 1000, "msgpack by hand": 1000, "protobuf": 500}
@@ -56,12 +56,12 @@ def telemetry() -> list[Series]:
 
 SERIES: dict[str, Callable[[], list[Series]]] = {
     "reaction": reaction,
-    "start": partial(test_start.made_up, 200),
+    "start": partial(start_series.made_up, 200),
     "command": path,
     "telemetry": telemetry,
     "codec": made_up,
-    "load": test_load.made_up,
-    "growth": test_growth.made_up,
+    "load": load_series.made_up,
+    "growth": growth_series.made_up,
 }
 
 

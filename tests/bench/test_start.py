@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from bench.reaction.board import STOP
-from bench.series import Series
 from bench.start.memory import held
-from bench.start.page import ENOUGH, MEMORY, blocks
+from bench.start.page import ENOUGH, blocks
 from bench.start.processes import children, started
 from bench.start.rows import (
     BARE,
@@ -24,6 +23,7 @@ from bench.start.rows import (
     WORDS,
     site,
 )  # fmt: skip
+from tests.bench.start_series import made_up
 from tests.support import wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -68,18 +68,6 @@ def test_the_memory_of_each_is_told() -> None:
     sizes = held(settled_s=0.0)
     assert len(sizes) == 5
     assert all(0 < pss <= rss for rss, pss in sizes.values())
-
-
-def made_up(stop_ms: int, samples: int = 10) -> list[Series]:
-    times = {NOTHING: 10, BARE: 40, (BRIDGE, FIRST_BREAK): 100, (BRIDGE, FIRST_STOP): stop_ms}
-    return [
-        *(
-            Series(name=name, calls=1, samples_ns=[ms * 1_000_000] * samples)
-            for name, ms in times.items()
-        ),
-        Series(name=(MEMORY, "guard"), calls=1, samples_ns=(), note="20000000 10000000"),
-        Series(name=(MEMORY, "bridge"), calls=1, samples_ns=(), note="160000000 90000000"),
-    ]
 
 
 def test_the_table_is_in_the_order_of_the_starts() -> None:

@@ -2,6 +2,7 @@
 
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -22,10 +23,15 @@ class Board:
         self.address: tuple[str, int] = self.sock.getsockname()
         self.ports = [free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)]
         self.motions: list[MotionCommand] = []
-        self.sources: list[tuple[str, int]] = []  # of the frames that came, of any kind
+        self.sources: list[tuple[str, int]] = []  # where each of ``motions`` came from
         self.leds: list[commands.LedSet] = []
         self.silent = False
         self.to_ports = [0, 1]  # indices of the ports that it sends to
+        self.answers_to: list[int] | None = None  # of those for answers; None: the same
+        self.hits_to: list[int] | None = None  # of those for a pressed bumper; None: as answers
+        self.lose_every = 0  # n-th bumper answer; 0 for none
+        self.bumper_asks = 0
+        self.times: list[float] = []  # when each of ``motions`` came
         self.pressed = False
         self.distance_mm = 1000
         self.speed_mmps: int | None = 0  # None: its velocity is not told
@@ -46,8 +52,7 @@ class Board:
                 continue
             for part in self._framing.read(datagram, TO_BOARD):
                 assert isinstance(part, Received), part
-                self._take(part.frame)
-                self.sources.append(source)
+                self._take(part.frame, source)
 
     def end(self) -> None:
         """Let ``run`` return."""
@@ -57,11 +62,13 @@ class Board:
         """Send a frame to our ports, as the board or from another socket."""
         self.say_bytes(self._framing.pack(frame), sock)
 
-    def say_bytes(self, datagram: bytes, sock: socket.socket | None = None) -> None:
+    def say_bytes(
+        self, datagram: bytes, sock: socket.socket | None = None, ports: list[int] | None = None
+    ) -> None:
         """Send any bytes to our ports."""
         if self.silent:
             return
-        for port in self.to_ports:
+        for port in self.to_ports if ports is None else ports:
             (sock or self.sock).sendto(datagram, ("127.0.0.1", self.ports[port]))
 
     def last(self) -> MotionCommand | None:
@@ -77,16 +84,27 @@ class Board:
 
         wait_until(holds, f"{kind.name} {linear_mmps} mm/s at the board, it has {self.last()}")
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame, source: tuple[str, int]) -> None:
         if isinstance(frame, MotionCommand):
+            self.times.append(time.monotonic())
+            self.sources.append(source)
             self.motions.append(frame)
         elif isinstance(frame, commands.LedSet):
             self.leds.append(frame)
             if self.led_done is not None:
                 self.say(reports.LedReport(self.led_done))
         else:
-            for answer in self._answers(frame):
-                self.say(answer)
+            for answer in () if self._is_lost(frame) else self._answers(frame):
+                hit = answer == reports.BumperReport(True) and self.hits_to is not None
+                self.say_bytes(
+                    self._framing.pack(answer), ports=self.hits_to if hit else self.answers_to
+                )
+
+    def _is_lost(self, frame: Frame) -> bool:
+        if not isinstance(frame, commands.BumperQuery):
+            return False
+        self.bumper_asks += 1
+        return self.lose_every > 0 and self.bumper_asks % self.lose_every == 0
 
     def _answers(self, frame: Frame) -> Iterator[Frame]:
         if isinstance(frame, commands.BumperQuery):

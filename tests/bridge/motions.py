@@ -15,6 +15,7 @@ NOW = 100 * S
 
 ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
 HIT = replace(ARMED, hit=5)
+MOVED = replace(ARMED, uncommanded=True, latched_by=OWN_BOOT)
 OWED = replace(ARMED, latched_by=3)  # by one that has ended
 
 
@@ -52,4 +53,4 @@ def taking_on(motion: Motion, predecessor: int | None) -> Motion:
 
 
 def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order | None, object]:
-    return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT)
+    return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT, received_ns=now_ns)

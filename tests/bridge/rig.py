@@ -10,11 +10,12 @@ from typing import Any
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.wire.commands import MotionKind
 from tests.bridge.board import Board
-from tests.support import wait_until
+from tests.support import safety_state, wait_until
 
 
 @dataclass
@@ -27,14 +28,17 @@ class Rig:
     process: "subprocess.Popen[bytes]"
     bus: Bus = field(init=False)
     motion: Publisher[m.Motion] = field(init=False)
+    safety: Publisher[m.SafetyState] = field(init=False)
     seen: dict[str, list[Any]] = field(default_factory=dict)
     raw: dict[str, bytes] = field(default_factory=dict)
     driving: m.Motion | None = None
-    rearms: bool = True  # say STOP until the bridge is armed, as safety does
+    heartbeat: int = 1000
+    rearms: bool = True  # say STOP until the bridge is armed, and latch for it, as safety does
 
     def declare(self, bus: Bus) -> None:
         self.bus = bus
-        self.motion = bus.publisher(keys.MOTION)
+        self.motion = DriveLink(bus, listens=False).publisher(keys.MOTION)
+        self.safety = bus.publisher(keys.SAFETY)
         for topic in (keys.LINK, keys.BUMPER, keys.MILEAGE, keys.ULTRASONIC, keys.VELOCITY):
             bus.subscribe(topic, self._take, depth=64)
         bus.subscribe(keys.SWITCHES, self._take, depth=64)
@@ -49,12 +53,16 @@ class Rig:
             self.raw[name] = arrival.raw
 
     def _beat(self, _: int) -> None:
+        self.heartbeat += 1
+        self.safety.put(safety_state(self.heartbeat))
         if self.driving is not None:
             bumpers = self.seen.get("tel/bridge/bumper", [m.Bumper(pressed=False)])
             judged = {"judged": bumpers[-1].seq, "judged_boot": bumpers[-1].boot}
             link = self.link()
             waits = self.rearms and link is not None and not link.armed
             fields = {"command": "stop"} if waits else _fields(self.driving)
+            if waits and link is not None and link.latched_by == link.boot:
+                fields = {"command": "brake", "latched": True, "predecessor": link.boot}
             self.motion.put(m.Motion(**{**fields, **judged}))
 
     def command(self, command: m.Command, linear: float = 0.0) -> None:
@@ -87,8 +95,8 @@ def _fields(message: m.Motion) -> dict[str, Any]:
     return {name: getattr(message, name) for name in ("command", "linear", "angular", "source")}
 
 
-@contextmanager
-def bridge_process(made: Board, endpoint: str, *sets: str) -> Iterator["subprocess.Popen[bytes]"]:
+def bridge_command(made: Board, endpoint: str, *sets: str) -> list[str]:
+    """Return what starts a bridge for this board."""
     settings = [
         f"board.port={made.address[1]}",
         f"board.listen_ports={made.ports}",
@@ -101,7 +109,13 @@ def bridge_process(made: Board, endpoint: str, *sets: str) -> Iterator["subproce
         *sets,
     ]
     words = [word for setting in settings for word in ("--set", setting)]
-    command = [sys.executable, "-m", "services.bridge", *words]
+    return [sys.executable, "-m", "services.bridge", *words]
+
+
+@contextmanager
+def bridge_process(made: Board, endpoint: str, *sets: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run a bridge, and its guard, while the context lasts."""
+    command = bridge_command(made, endpoint, *sets)
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
         try:
             yield process

@@ -1,12 +1,15 @@
 """The bridge as a process: real UDP on one side, a real router on the other."""
 
 import socket
+import time
 
 import msgpack
 import pytest
 
-from common import keys
+from common import codec, keys
 from common import messages as m
+from common.bus.bus import Bus
+from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.wire import reports
@@ -83,6 +86,41 @@ def test_stop_becomes_break_unless_the_vehicle_is_known_to_stand(
     rig.board.wait_for(MotionKind.STOP)
 
 
+@pytest.mark.parametrize("by", ["counters", "velocities"])
+def test_leaving_a_standstill_without_a_command_breaks_until_safety_latches_it(
+    rig: Rig, by: str
+) -> None:
+    rig.drive()
+    rig.board.speed_mmps = 0
+    rig.silence()
+    rig.board.wait_for(MotionKind.STOP)
+    wait_until(lambda: [motion.kind for motion in rig.board.motions[-10:]] == STOPS, "STOPs")
+    if by == "counters":
+        rig.board.distance_mm += 60
+    else:
+        rig.board.speed_mmps = 100
+        wait_until(lambda: "uncommanded_motion" in rig.events(), "the event")
+        rig.board.speed_mmps = 0
+    rig.board.wait_for(MotionKind.BREAK)
+    wait_until(lambda: "uncommanded_motion" in rig.events(), "the event")
+    wait_until(lambda: breaks(rig) == 20, "BREAK for a second")
+    rig.rearms = False
+    rig.command("run", 0.5)
+    wait_until(lambda: (link := rig.link()) and "without a command" in link.waiting, "waits")
+    wait_until(lambda: breaks(rig) == 20, "BREAK although a RUN is asked for")
+    rig.command("stop")
+    seen = len(rig.board.motions)
+    wait_until(lambda: len(rig.board.motions) > seen + 40, "two seconds of STOP asked for")
+    assert breaks(rig) == 20
+    rig.rearms = True
+    rig.drive()
+
+
+def breaks(rig: Rig) -> int:
+    """Return how many of the last 20 commands were BREAK."""
+    return sum(motion.kind is MotionKind.BREAK for motion in rig.board.motions[-20:])
+
+
 def test_the_reflex_breaks_and_only_a_judging_motion_ends_it(rig: Rig) -> None:
     rig.drive()
     rig.silence()
@@ -101,7 +139,11 @@ def test_a_second_authority_is_refused_and_reported(rig: Rig) -> None:
     rig.drive()
     with running(Loop()) as loop:
         other: list[Publisher[m.Motion]] = []
-        with bus_on(rig.endpoint, loop, lambda bus: other.append(bus.publisher(keys.MOTION))):
+
+        def declare(bus: Bus) -> None:
+            other.append(DriveLink(bus, listens=False).publisher(keys.MOTION))
+
+        with bus_on(rig.endpoint, loop, declare):
             motion = m.Motion(command="run", linear=0.9)
 
             def beat(_: int) -> None:
@@ -121,7 +163,7 @@ def test_what_is_not_finite_never_reaches_the_board(rig: Rig, hostile: float) ->
 
 def test_wrong_types_and_garbage_on_motion_are_dropped(rig: Rig) -> None:
     rig.drive()
-    session = rig.bus._session
+    session = rig.bus.links[0]._session  # the drive link's
     assert session is not None
     for payload in (b"", b"\xc1", msgpack.packb({"command": "fly"}), msgpack.packb([1] * 1000)):
         session.put("t2/v1/001/@cmd/motion", payload)
@@ -154,7 +196,8 @@ def test_a_board_that_does_not_echo_is_not_driven(rig: Rig) -> None:
     rig.board.silent = False
     wait_until(lambda: "switches_unverified" in rig.events(), "the event")
     rig.command("stop")
-    wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "says what it waits for")
+    hint = "both on and echoed; a firmware without echoes needs bridge.require_switches = false"
+    wait_until(lambda: (link := rig.link()) and hint in link.waiting, "says what it waits for")
     rig.board.echo = True
     rig.drive()
 
@@ -222,3 +265,17 @@ def test_bad_settings_end_it_before_anything_opens() -> None:
     assert "bridge.lease" in text
     assert "0.05..10.0" in text
     assert made.motions == []
+
+
+def test_a_motion_from_the_router_is_not_even_read(rig: Rig) -> None:
+    rig.drive()
+    rejected = m.Motion(command="run", linear=0.9, boot=rig.bus.boot, seq=2**62)
+    with running(Loop()) as loop, bus_on(rig.endpoint, loop, lambda _: None) as stranger:
+        session = stranger._session
+        assert session is not None
+        for _ in range(50):
+            session.put(keys.MOTION.on("001"), codec.encode(rejected))
+            time.sleep(0.02)
+    assert not any(motion.linear_mmps == 900 for motion in rig.board.motions)
+    assert "second_authority" not in rig.events()
+    assert rig.board.last().kind is MotionKind.RUN  # type: ignore[union-attr]

@@ -1,12 +1,19 @@
 """What a running bridge is asked, and what it answers: switches and lamps."""
 
 import threading
+import time
 from typing import Any
 
 from common import keys
 from common import messages as m
+from common.freshness import S
 from tests.bridge.rig import Rig
 from tests.support import wait_until
+
+
+def switches(rig: Rig, **brakes: bool) -> m.SwitchesRequest:
+    """Return the request of an operator who sees the newest state of safety."""
+    return m.SwitchesRequest(**brakes, echo=rig.heartbeat)
 
 
 def ask(rig: Rig, call: Any, request: Any) -> Any:
@@ -22,28 +29,49 @@ def ask(rig: Rig, call: Any, request: Any) -> Any:
     return answers[0]
 
 
-def test_switches_and_lamps_answer_with_the_boards_own_echo(rig: Rig) -> None:
+def ready(rig: Rig) -> None:
+    """Wait until the bridge has its board and receives safety's state."""
     wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
-    answer = ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))
+    wait_until(
+        lambda: isinstance(ask(rig, keys.SET_SWITCHES, switches(rig)), m.Switches),
+        "a call that is in time",
+    )
+
+
+def test_switches_and_lamps_answer_with_the_boards_own_echo(rig: Rig) -> None:
+    ready(rig)
+    answer = ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=False))
     assert answer.bumper_brake is False
     rig.command("stop")
     wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "not ready")
-    assert ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=True)).bumper_brake is True
+    assert ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=True)).bumper_brake is True
     lamp = m.LedRequest(channel=3, mode=1)
     assert isinstance(ask(rig, keys.SET_LED, lamp), m.Done)
     assert rig.board.leds[0].channel == 3
 
 
 def test_refusals_name_the_reason(rig: Rig) -> None:
-    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    ready(rig)
     lamp = m.LedRequest(channel=3, mode=1)
     rig.board.led_done = False
     assert "0xAA" in ask(rig, keys.SET_LED, lamp)
     rig.board.led_done = None
     assert "did not echo" in ask(rig, keys.SET_LED, lamp)
     rig.board.echo = False
-    request = m.SwitchesRequest(ultrasonic_brake=False)
+    request = switches(rig, ultrasonic_brake=False)
     assert "did not echo" in ask(rig, keys.SET_SWITCHES, request)
     rig.board.silent = True
     wait_until(lambda: (link := rig.link()) and link.state == "lost", "link lost")
     assert "absent" in ask(rig, keys.SET_LED, lamp)
+
+
+def test_switches_that_were_asked_late_are_refused(rig: Rig) -> None:
+    ready(rig)
+    late = switches(rig, bumper_brake=False)
+    due_ns = time.monotonic_ns() + round(1.1 * S)
+    wait_until(lambda: time.monotonic_ns() > due_ns, "a late call")
+    assert "allowed is 1 s" in ask(rig, keys.SET_SWITCHES, late)
+    assert "no echo" in ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))
+    unknown = m.SwitchesRequest(bumper_brake=False, echo=1)
+    assert "unknown heartbeat" in ask(rig, keys.SET_SWITCHES, unknown)
+    assert ask(rig, keys.SET_SWITCHES, switches(rig)).bumper_brake is True

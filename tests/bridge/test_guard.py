@@ -1,14 +1,18 @@
 """The guard with real processes: whatever becomes of the bridge, the board is told BREAK."""
 
+import errno
+import itertools
 import os
 import signal
 import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,26 +21,14 @@ from common.options import EXIT_CONFIG, EXIT_LINK
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
-from services.bridge import guarded
+from services.bridge import child
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
 from tests.bridge.board import Board, board
+from tests.bridge.guarding import PROC, breaks_since, bridge_pid
 from tests.bridge.rig import Rig, bridge_process
 from tests.support import wait_until
-
-PROC = Path("/proc")
-
-
-def bridge_pid(guard: "subprocess.Popen[bytes]") -> int:
-    """Return the process that the guard watches, once there is one."""
-    children = PROC / f"{guard.pid}/task/{guard.pid}/children"
-    return int(wait_until(lambda: children.read_text().split(), "a bridge under the guard")[0])
-
-
-def breaks_since(made: Board, count: int) -> int:
-    """Return how many BREAKs the board got after that many commands."""
-    return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)
 
 
 def test_break_goes_first_then_the_bridges_stop() -> None:
@@ -227,6 +219,31 @@ def test_a_crash_is_waited_for_longer_each_time(
     assert waits == [0.0, 0.5, 1.0]
 
 
+@pytest.mark.parametrize("what", ["pipe", "Popen"])
+def test_a_bridge_that_cannot_be_started_is_braked_for_and_tried_again(
+    made: Board, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    guard = guard_of(made, f"raise SystemExit({EXIT_LINK})")
+    tries: list[float] = []
+    owner: Any = os if what == "pipe" else subprocess
+    real = getattr(owner, what)
+
+    def fail_first(*given: Any, **more: Any) -> Any:
+        tries.append(time.monotonic())
+        if len(tries) < 4:
+            raise OSError(errno.ENOMEM, "Cannot allocate memory")
+        return real(*given, **more)
+
+    monkeypatch.setattr(owner, what, fail_first)
+    descriptors = len(list(Path("/proc/self/fd").iterdir()))
+    assert run(guard) == EXIT_LINK
+    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors - 2, "less the sockets"
+    assert tries[3] - tries[0] > 1.4
+    breaks = [at for at in made.times if tries[0] < at < tries[3]]
+    assert len(breaks) > 20
+    assert max(b - a for a, b in itertools.pairwise(breaks)) < 0.3
+
+
 def test_it_brakes_while_it_waits(made: Board) -> None:
     guard = guard_of(made, "")
     guard._backoff.after(0.0)
@@ -249,7 +266,7 @@ def test_the_bridge_alone_says_how_it_is_started(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("T2_BRIDGE_HANDOVER", raising=False)
-    assert guarded.main() == 2
+    assert child.main() == 2
     assert "python -m services.bridge" in capsys.readouterr().err
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from common.wire.commands import MotionKind
 from tests.bridge.board import board
-from tests.common.test_realtime import needs_right
+from tests.common.rights import needs_right
 from tests.support import wait_until
 
 SPIN = """
 import os
 from common import realtime
-from services.bridge.handover import received
+from services.bridge.guard_ipc import received
 realtime.ask(realtime.BRIDGE)
 realtime.limit()
 os.write(received(os.environ).heartbeat, b"\\0")

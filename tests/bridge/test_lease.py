@@ -4,16 +4,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
+from msgspec.structs import replace as replace_message
 
 from common.freshness import S
 from common.messages import Motion
 from services.bridge import lease as leases
-from services.bridge.lease import Lease, Order, Refusal, on_hit, on_motion, on_ready, on_tick
+from services.bridge.lease import (
+    SEQ_STEP_MAX,
+    Lease,
+    Order,
+    Refusal,
+    on_hit,
+    on_motion,
+    on_ready,
+    on_tick,
+    on_uncommanded,
+)
 from tests.bridge.motions import (
     ARMED,
     COAST,
     HIT,
     LEASE,
+    MOVED,
     MS,
     NOW,
     OWED,
@@ -22,6 +34,7 @@ from tests.bridge.motions import (
     obey,
     run,
     stop,
+    taking_on,
 )
 
 
@@ -36,6 +49,8 @@ def test_at_first_nobody_may_drive() -> None:
         hit=None,
         sent_ns=0,
         latched_by=None,
+        braked=False,
+        uncommanded=False,
     )
 
 
@@ -75,6 +90,24 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (ARMED, run(seq=10), None, Refusal.OLD),
         (ARMED, run(seq=9), None, Refusal.OLD),
         (ARMED, run(seq=12), Order.RUN, None),
+        # and not by more than a sender can
+        (ARMED, run(seq=10 + SEQ_STEP_MAX), Order.RUN, None),
+        (ARMED, run(seq=11 + SEQ_STEP_MAX), None, Refusal.JUMP),
+        (ARMED, brake(seq=2**62), None, Refusal.JUMP),
+        # the vehicle moved without a command: BREAK until safety has latched that
+        (MOVED, run(), Order.BRAKE, Refusal.NOT_HEIR),
+        (MOVED, run(0.0, 0.0), Order.BRAKE, Refusal.NOT_HEIR),
+        (MOVED, stop(), Order.BRAKE, None),
+        (MOVED, brake(), Order.BRAKE, None),
+        (MOVED, taking_on(brake(), None), Order.BRAKE, None),
+        (MOVED, taking_on(stop(), None), Order.BRAKE, None),
+        (MOVED, taking_on(stop(), 1), Order.BRAKE, None),
+        (MOVED, replace_message(stop(), predecessor=OWN_BOOT), Order.BRAKE, None),
+        (MOVED, taking_on(stop(), OWN_BOOT), Order.STOP, None),
+        (MOVED, taking_on(brake(), OWN_BOOT), Order.BRAKE, None),
+        (MOVED, taking_on(run(), OWN_BOOT), Order.RUN, None),
+        (replace(MOVED, hit=5), run(), Order.BRAKE, Refusal.NOT_JUDGED),
+        (replace(MOVED, hit=5), stop(), Order.BRAKE, None),
         # a second authority
         (ARMED, run(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
         (ARMED, brake(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
@@ -82,6 +115,117 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
 )
 def test_order(state: Lease, motion: Motion, order: Order | None, refusal: Refusal | None) -> None:
     assert obey(state, motion)[1:] == (order, refusal)
+
+
+def test_a_copied_authority_with_a_huge_seq_locks_nobody_out() -> None:
+    after, _, refusal = obey(ARMED, run(seq=2**62))
+    assert (after, refusal) == (ARMED, Refusal.JUMP)
+    assert obey(after, run(seq=11))[1] is Order.RUN
+    assert SEQ_STEP_MAX == 2**20
+
+
+@pytest.mark.parametrize("age", [LEASE, LEASE + 1])
+def test_an_authority_that_was_not_received_for_hours_is_taken_again(age: int) -> None:
+    after, order, refusal = obey(ARMED, stop(seq=11 + SEQ_STEP_MAX), NOW + age)
+    if age > LEASE:
+        assert (after.seq, order, refusal) == (11 + SEQ_STEP_MAX, Order.STOP, None)
+    else:
+        assert (after, order, refusal) == (ARMED, None, Refusal.JUMP)
+    assert obey(ARMED, stop(seq=10), NOW + age)[2] is Refusal.OLD
+
+
+def test_an_authority_may_begin_at_any_seq() -> None:
+    assert obey(Lease(ready=True), stop(seq=2**40))[0].seq == 2**40
+
+
+def late(lease: Lease, motion: Motion, waited: int) -> tuple[Lease, Order | None, object]:
+    """Handle a motion so long after it was received."""
+    now = NOW + waited
+    return on_motion(lease, motion, now, LEASE, OWN_BOOT, received_ns=NOW)
+
+
+@pytest.mark.parametrize("waited", [0, LEASE])
+def test_the_lease_counts_from_when_a_motion_was_received(waited: int) -> None:
+    state = replace(ARMED, renewed_ns=NOW + waited)
+    after, order, refusal = late(state, run(), waited)
+    assert (order, refusal) == (Order.RUN, None)
+    assert (after.renewed_ns, after.sent_ns) == (NOW, NOW + waited)
+    assert on_tick(after, NOW + LEASE, LEASE, COAST, True)[1] is None
+    assert on_tick(after, NOW + LEASE + 1, LEASE, COAST, True)[1] is Order.STOP
+
+
+@pytest.mark.parametrize(
+    ("motion", "order"), [(run(), None), (run(0.0), None), (stop(), None), (brake(), Order.BRAKE)]
+)
+def test_what_waited_for_longer_than_the_lease_renews_nothing(
+    motion: Motion, order: Order | None
+) -> None:
+    state = replace(ARMED, renewed_ns=NOW + LEASE, neutral=False)
+    after = replace(state, braked=order is Order.BRAKE)
+    assert late(state, motion, LEASE + 1) == (after, order, Refusal.LATE)
+
+
+@pytest.mark.parametrize("waited", [0, LEASE + 1])
+def test_a_brake_goes_on_when_the_lease_ends(waited: int) -> None:
+    state, order, _ = late(ARMED, brake(), waited)
+    assert (order, state.braked) == (Order.BRAKE, True)
+    now = NOW + LEASE + 1
+    over, order = on_tick(state, now, LEASE, COAST, True)
+    assert order is Order.BRAKE
+    assert on_tick(over, now + 3600 * S, LEASE, COAST, True)[1] is Order.BRAKE
+
+
+@pytest.mark.parametrize("motion", [stop(12), run(seq=12), run(0.0, seq=12)])
+def test_a_brake_lasts_until_the_next_order(motion: Motion) -> None:
+    state, _, _ = obey(ARMED, brake())
+    lost = on_ready(state, False)
+    assert on_tick(lost, NOW + 60 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+    state, _, _ = obey(state, motion)
+    assert not state.braked
+    assert on_tick(state, NOW + LEASE + 1, LEASE, COAST, True)[1] is Order.STOP
+
+
+def test_what_brakes_whether_it_stands_or_not() -> None:
+    assert not ARMED.braking
+    assert [lease.braking for lease in (HIT, MOVED, replace(ARMED, braked=True))] == [True] * 3
+
+
+def test_an_old_run_behind_an_old_zero_is_not_obeyed() -> None:
+    after, _, _ = late(replace(ARMED, renewed_ns=NOW - S), run(0.0, seq=11), 3 * S)
+    after, order, refusal = late(after, run(seq=12), 3 * S)
+    assert (order, refusal) == (None, Refusal.LATE)
+    assert on_tick(after, NOW + 3 * S, LEASE, COAST, True)[1] is Order.STOP
+
+
+def test_a_late_message_of_a_second_authority_is_that_of_a_second_authority() -> None:
+    state = replace(ARMED, renewed_ns=NOW + LEASE)
+    assert late(state, brake(boot=2), LEASE + 1) == (state, None, Refusal.SECOND_AUTHORITY)
+
+
+def test_moving_without_a_command_breaks_at_once_and_holds() -> None:
+    over = replace(ARMED, over_since_ns=NOW - S, neutral=False)
+    moved, order = on_uncommanded(over, NOW, OWN_BOOT)
+    held = replace(over, uncommanded=True, latched_by=OWN_BOOT, sent_ns=NOW)
+    assert (order, moved) == (Order.BRAKE, held)
+    assert on_uncommanded(moved, NOW + 1, OWN_BOOT) == (moved, None)
+    assert on_tick(moved, NOW + 50 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+
+
+@pytest.mark.parametrize("owed", [None, 1, 3])
+def test_moving_without_a_command_wants_a_reset_of_safety(owed: int | None) -> None:
+    over = replace(ARMED, over_since_ns=NOW - S, neutral=False, latched_by=owed)
+    moved, _ = on_uncommanded(over, NOW, OWN_BOOT)
+    back, order, _ = obey(moved, stop(seq=11))  # it has not heard of it yet
+    assert (order, back.uncommanded, back.latched_by) == (Order.BRAKE, True, OWN_BOOT)
+    latched, order, _ = obey(back, taking_on(brake(seq=12), OWN_BOOT))
+    assert (order, latched.uncommanded, latched.latched_by) == (Order.BRAKE, False, 1)
+    reset, order, _ = obey(latched, stop(seq=13))
+    assert (order, reset.latched_by) == (Order.STOP, None)
+    assert obey(reset, run(seq=14))[1] is Order.RUN
+
+
+def test_while_the_lease_lives_safety_judges_what_moves() -> None:
+    assert on_uncommanded(ARMED, NOW, OWN_BOOT) == (ARMED, None)
 
 
 @pytest.mark.parametrize(("age", "obeyed"), [(LEASE - 1, True), (LEASE, True), (LEASE + 1, False)])
@@ -199,9 +343,10 @@ def test_it_says_what_it_waits_for() -> None:
         HIT.waiting,
         replace(ARMED, neutral=False).waiting,
         OWED.waiting,
+        replace(MOVED, neutral=False).waiting,
     ]
     assert all(texts)
-    assert len(set(texts)) == 4
+    assert len(set(texts)) == 5
     assert replace(ARMED, latched_by=1).waiting == ""
 
 
@@ -225,10 +370,11 @@ motions = st.builds(
     judged=st.integers(0, 20),
     judged_boot=st.sampled_from([OWN_BOOT, 8]),
     latched=st.booleans(),
-    predecessor=st.sampled_from([None, 1, 2]),
+    predecessor=st.sampled_from([None, 1, 2, OWN_BOOT]),
 )
 events = st.lists(
-    st.one_of(motions, st.booleans(), st.integers(1, 20), st.just("tick")), max_size=40
+    st.one_of(motions, st.booleans(), st.integers(1, 20), st.sampled_from(["tick", "moved"])),
+    max_size=40,
 )
 
 
@@ -240,11 +386,12 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
         now += wait * MS
         order: Order | None
         if isinstance(event, Motion):
-            lease, order, _ = on_motion(lease, event, now, LEASE, OWN_BOOT)
+            lease, order, _ = on_motion(lease, event, now, LEASE, OWN_BOOT, received_ns=now)
             if order is Order.RUN and event.linear:
                 assert lease.ready
                 assert lease.neutral
                 assert lease.hit is None
+                assert not lease.uncommanded
                 assert event.boot == lease.boot
                 assert lease.latched_by in (None, event.boot)
         elif isinstance(event, bool):
@@ -252,7 +399,11 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
         elif isinstance(event, int):
             lease, order = on_hit(lease, event, now)
             assert order is Order.BRAKE
+        elif event == "moved":
+            lease, order = on_uncommanded(lease, now, OWN_BOOT)
+            assert order in (None, Order.BRAKE)
         else:
             lease, order = on_tick(lease, now, LEASE, COAST, False)
             assert order is not Order.RUN
         assert lease.over_since_ns is None or not lease.neutral
+        assert not lease.uncommanded or lease.latched_by == OWN_BOOT

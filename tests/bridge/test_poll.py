@@ -100,3 +100,77 @@ def test_a_pause_is_not_caught_up_in_a_burst() -> None:
         polled.due(tick * MS)
         polled.answered("bumper", tick * MS)
     assert polled.queries["bumper"].due_ns == 5040 * MS
+
+
+# --- steady queries -----------------------------------------------------------------------------
+
+
+def steady() -> Poll:
+    queries = [("bumper", BumperQuery(), 50.0), ("mileage", DistanceQuery(), 50.0)]
+    return Poll(queries, 0.1, ("bumper",))
+
+
+def test_a_steady_query_keeps_its_rate_without_any_answer() -> None:
+    polled = steady()
+    times = [tick for tick in range(1000, 2000, 10) if BumperQuery() in polled.due(tick * MS)]
+    assert times == list(range(1000, 2000, 20))
+    assert polled.queries["bumper"].slowdown == 1
+    assert (polled.lost("bumper", 1980 * MS), polled.missed()["bumper"]) == (11, 49)
+    assert polled.queries["mileage"].losses is None
+    assert polled.lost("mileage", 2 * S) == 0
+
+
+def test_every_third_answer_lost_keeps_the_rate_and_shows() -> None:
+    polled = steady()
+    asked, seen = 0, []
+    for tick in range(1000, 2000, 10):
+        if BumperQuery() in polled.due(tick * MS):
+            asked += 1
+            if asked % 3:
+                polled.answered("bumper", (tick + 2) * MS)
+                seen.append(polled.lost("bumper", (tick + 2) * MS))
+    assert asked == 50
+    assert set(seen[10:]) == {3, 4}
+
+
+def test_a_process_that_is_held_up_loses_nothing() -> None:
+    polled = steady()
+    for tick in (1000, 1020, 1340, 1350, 1370, 1900):
+        if BumperQuery() in polled.due(tick * MS):
+            polled.answered("bumper", (tick + 5) * MS)
+    assert polled.lost("bumper", 1900 * MS) == 0
+    assert polled.missed() == {"mileage": 2}
+
+
+def test_a_late_poll_is_not_followed_at_once_by_the_next() -> None:
+    polled = steady()
+    query = polled.queries["bumper"]
+    for tick, next_tick in ((1000, 1020), (1025, 1040), (1045, 1060), (1075, 1085), (1105, 1125)):
+        polled.due(tick * MS)
+        assert query.due_ns == next_tick * MS
+
+
+def test_an_answer_after_a_loss_may_be_that_of_the_poll_before() -> None:
+    polled = steady()
+    polled.due(S)
+    polled.due(S + 20 * MS)
+    assert polled.answered("bumper", S + 22 * MS) == S
+    polled.due(S + 40 * MS)
+    assert polled.answered("bumper", S + 42 * MS) == S + 40 * MS
+    for tick in range(1060, 1180, 20):
+        polled.due(tick * MS)
+    assert polled.answered("bumper", S + 162 * MS) == S + 160 * MS, "not beyond the timeout"
+
+
+def test_a_steady_query_counts_lost_polls_and_takes_a_late_answer_back() -> None:
+    polled = Poll([("bumper", BumperQuery(), 50.0)], 0.1, ("bumper",))
+    for tick in (1000, 1020, 1040):
+        assert polled.due(tick * MS) == [BumperQuery()]
+    assert polled.lost("bumper", 1040 * MS) == 2
+    for tick in (1045, 1055):
+        polled.answered("bumper", tick * MS)
+    assert polled.lost("bumper", 1055 * MS) == 1
+    polled.due(1075 * MS)  # late
+    assert polled.due(1080 * MS) == []
+    assert polled.queries["bumper"].due_ns == 1085 * MS
+    assert isinstance(polled.queries["bumper"].due_ns, int)

@@ -4,6 +4,8 @@ import contextlib
 import os
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +13,8 @@ import pytest
 
 from common.wire.commands import MotionKind
 from tests.bridge.board import Board, board
-from tests.bridge.rig import Rig, bridge_process
-from tests.bridge.test_guard import breaks_since, bridge_pid
+from tests.bridge.guarding import breaks_since, bridge_pid
+from tests.bridge.rig import Rig, bridge_command, bridge_process
 from tests.common.manager import PATIENCE_US, Manager
 from tests.support import wait_until
 
@@ -56,6 +58,35 @@ def test_the_guard_beats_though_the_bridge_hangs_and_not_when_it_hangs(watched: 
         wait_until(lambda: manager.beats() > heard + 1, "a beat of nobody's", patience_s=0.6)
     process.send_signal(signal.SIGCONT)
     wait_until(lambda: manager.beats() > heard + 1, "beats again")
+
+
+SUPERVISOR = """
+import sys
+from cli.supervisor import Supervisor
+Supervisor([("bridge", sys.argv[1:])]).run()
+"""
+
+
+def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
+    with board() as made:
+        command = bridge_command(made, "tcp/127.0.0.1:1")
+        supervisor = subprocess.Popen([sys.executable, "-c", SUPERVISOR, *command])
+        made.wait_for(MotionKind.STOP)
+        time.sleep(0.5)  # STOP continues
+        count, killed_s = len(made.motions), time.monotonic()
+        supervisor.kill()
+        supervisor.wait()
+        wait_until(lambda: breaks_since(made, count), "BREAK, not the STOP of a normal end")
+        wait_until(lambda: is_quiet(made), "the end of guard and bridge")
+        made.wait_for(MotionKind.BREAK)
+        assert made.times[-1] - killed_s < 5.0
+
+
+def is_quiet(made: Board) -> bool:
+    """Return whether no frames are sent any more."""
+    count = len(made.motions)
+    time.sleep(0.3)
+    return len(made.motions) == count
 
 
 def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(rig: Rig) -> None:

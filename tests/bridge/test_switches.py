@@ -7,6 +7,7 @@ from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from services.bridge.switches import (
     AGAIN_NS,
     ASK_NS,
+    UNECHOED,
     Switches,
     on_echo,
     on_request,
@@ -67,3 +68,39 @@ def test_a_board_that_echoes_the_other_position_is_asked_again() -> None:
     switches = on_echo(switches, False, False)
     assert not switches.settled
     assert len(on_tick(switches, S + ASK_NS)[1]) == 2
+
+
+def sends(switches: Switches, count: int, now_ns: int = S) -> Switches:
+    """Let so many sends go out."""
+    for number in range(count):
+        switches, frames = on_tick(switches, now_ns + number * AGAIN_NS)
+        assert frames
+    return switches
+
+
+@pytest.mark.parametrize("echoes", [(None, None), (True, None), (None, True)])
+def test_an_on_that_is_no_longer_echoed_is_not_verified(
+    echoes: tuple[bool | None, bool | None],
+) -> None:
+    switches = sends(BOTH_ON, UNECHOED)
+    assert switches.verified
+    switches = sends(on_echo(switches, *echoes), 1, 9 * S)
+    assert (switches.ultrasonic, switches.bumper) == echoes
+    assert not switches.verified
+    assert switches.unechoed, "enough where the settings accept that"
+    assert on_echo(switches, True, True).verified
+
+
+def test_an_echo_counts_for_the_next_sends() -> None:
+    switches = BOTH_ON
+    for second in range(1, 9):
+        switches = sends(on_echo(switches, True, True), UNECHOED, second * S)
+    assert switches.verified
+
+
+def test_an_off_lasts_until_an_on_is_echoed() -> None:
+    for switches in (
+        Switches(ultrasonic=False, bumper=True),
+        Switches(ultrasonic=True, bumper=False),
+    ):
+        assert not sends(switches, 3 * UNECHOED).unechoed

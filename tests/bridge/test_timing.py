@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.freshness import S
 from common.messages import Durations, Motion
-from services.bridge.stamp import Receipt
+from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import BOUNDS_NS, LONGEST_NS, Histogram, Timings, quantile
 
 MS = 1_000_000

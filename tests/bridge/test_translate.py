@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.errors import MessageError, WireError
 from common.messages import Bumper, Motion
-from common.settings import Vehicle, Wire
+from common.settings import AngularUnit, Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.reports import DistanceReport, DriverReport, UltrasonicReport, VelocityReport
@@ -23,7 +23,12 @@ def by_manual() -> Translator:
 
 @pytest.fixture
 def by_driver() -> Translator:
-    return Translator(Wire(angular_unit="milliradian"), Vehicle(), 1.0, 1.0)
+    return Translator(
+        Wire(command_angular_unit="milliradian", feedback_angular_unit="milliradian"),
+        Vehicle(),
+        1.0,
+        1.0,
+    )
 
 
 def run(linear: float, angular: float) -> Motion:
@@ -58,8 +63,26 @@ def test_the_angular_unit_is_a_setting_both_ways(
     assert by_manual.velocity(VelocityReport(0, 300)).angular == pytest.approx(math.radians(30))
 
 
+@pytest.mark.parametrize(
+    ("command", "feedback", "raw", "angular"),
+    [("milliradian", "decidegree", 300, math.radians(30)), ("decidegree", "milliradian", 172, 0.3)],
+)
+def test_each_way_has_a_unit_of_its_own(
+    command: AngularUnit, feedback: AngularUnit, raw: int, angular: float
+) -> None:
+    wire = Wire(command_angular_unit=command, feedback_angular_unit=feedback)
+    mixed = Translator(wire, Vehicle(), 1.0, 1.0)
+    assert mixed.command(Order.RUN, run(0.0, 0.3)).angular_raw == raw
+    assert mixed.velocity(VelocityReport(0, 300)).angular == pytest.approx(angular)
+
+
 def test_the_widest_settings_still_fit_fifteen_bits() -> None:
-    wide = Translator(Wire(angular_unit="milliradian"), Vehicle(), 100.0, 100.0)
+    wide = Translator(
+        Wire(command_angular_unit="milliradian", feedback_angular_unit="milliradian"),
+        Vehicle(),
+        100.0,
+        100.0,
+    )
     frame = wide.command(Order.RUN, run(32.0, 99.0))
     assert (frame.linear_mmps, frame.angular_raw) == (32000, 32767)
 

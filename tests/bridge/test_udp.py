@@ -10,7 +10,7 @@ import pytest
 
 from common.freshness import S
 from common.settings import Board
-from services.bridge.stamp import Receipt
+from services.bridge.rx_timestamp import Receipt
 from services.bridge.udp import BREATH_S, BURST, Sockets, want_stamps
 from tests.support import free_port, wait_until
 

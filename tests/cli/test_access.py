@@ -4,8 +4,9 @@ from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
-from cli.access import VERBS, access_control, driver, rights
+from cli.access import VERBS, Verb, access_control, driver, rights
 from cli.rights import CLASSES, MINE, OTHER, ROLES, may
 from common import keys
 from common.members import Member, Role
@@ -47,6 +48,18 @@ def test_a_driver_has_the_robots_that_its_certificate_names() -> None:
         assert all(may(given, "ask", call.on(robot)) is wanted for call in keys.CALLS)
 
 
+def test_a_driver_drives_as_the_sources_that_its_certificate_names() -> None:
+    for sources, may_use in (
+        (("teleop", "web"), {"teleop": True, "web": True, "nav": False, "*": False}),
+        (("nav",), {"teleop": False, "nav": True, "*": False}),
+        ((), {"teleop": True, "nav": True, "*": True}),  # a list without sources
+    ):
+        bo = replace(member("driver", "bo", (MINE,)), sources=sources)
+        for source, wanted in may_use.items():
+            assert may(rights(bo), "write", keys.DRIVE.on(MINE, source=source)) is wanted
+        assert may(rights(bo), "write", keys.estop_key(MINE)), "a driver can stop"
+
+
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
 @pytest.mark.parametrize("service", ON_BOARD)
 def test_a_member_never_speaks_for_a_service_on_board(role: str, service: str) -> None:
@@ -55,6 +68,25 @@ def test_a_member_never_speaks_for_a_service_on_board(role: str, service: str) -
     assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
     assert not may(given, "serve", keys.info_key(MINE, service, "config"))
     assert not may(given, "live", keys.live_key(MINE, service, "1"))
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("verb", ["write", "serve", "live"])
+def test_what_a_member_says_has_keys_of_a_known_length(role: str, verb: Verb) -> None:
+    said = ROLES[role].get(verb, ())
+    assert said
+    assert not [expression for expression in said if "**" in expression]
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+def test_what_advanced_publishers_keep_is_asked_and_answered_where_it_is(role: str) -> None:
+    given, kept = ROLES[role], f"{keys.EVENTS.on(MINE, service='dashboard')}/@adv"
+    assert may(given, "read", f"{kept}/pub/**")  # as zenoh-ext subscribes
+    assert may(given, "ask", f"{kept}/**")
+    assert may(given, "recall", f"{kept}/**")
+    assert may(given, "serve", f"{kept}/pub/1f/uhlc/_")
+    assert not may(given, "serve", f"{kept}/pub/1f/uhlc/_/a")
+    assert not may(given, "read", f"{keys.VELOCITY.on(MINE)}/@adv/**"), "events alone are kept"
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])

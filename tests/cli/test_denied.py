@@ -11,7 +11,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from common.messages import Done, Drive, ResetRequest
+from common.messages import Drive, ResetDone, ResetRequest
 from common.settings import Bus as Where
 from common.source import DriveSource
 from tests.cli.site import Site, dialling
@@ -26,17 +26,19 @@ class OnBoard:
         self.heard: list[Arrival[Drive]] = []
         self.estops: list[int] = []
         bus.subscribe(keys.DRIVE, self.heard.append, source="*")
+        for source in ("teleop", "web", "nav"):  # as safety does for each configured source
+            bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
-        bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="reset")))
+        bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="reset")))
         self.state = bus.publisher(keys.SAFETY)
 
 
 class Member:
     """A member's own program."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, source: str) -> None:
         self.bus = bus
-        self.source = DriveSource(bus, "teleop")
+        self.source = DriveSource(bus, source)
         self.told: list[str] = []
 
     def reset(self) -> str:
@@ -56,6 +58,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Site:
         made.member("robot", robot, "--address", "127.0.0.1")
     made.member("site", "berlin", "--address", "127.0.0.1")
     made.member("driver", "anna", "--robot", "001")
+    made.member("driver", "planner", "--robot", "001", "--source", "nav")
     made.member("viewer", "hall")
     made.member("fleet", "room")
     return made
@@ -82,9 +85,11 @@ def on_board(join: Callable[..., Bus], endpoint: str, robot: str = "001") -> OnB
     return made[0]
 
 
-def member(join: Callable[..., Bus], where: Where, robot: str = "001") -> Member:
+def member(
+    join: Callable[..., Bus], where: Where, robot: str = "001", source: str = "teleop"
+) -> Member:
     made: list[Member] = []
-    join(where, robot, lambda bus: made.append(Member(bus)))
+    join(where, robot, lambda bus: made.append(Member(bus, source)))
     return made[0]
 
 
@@ -119,6 +124,21 @@ def test_a_driver_drives_and_a_viewer_is_told_that_it_may_not(
         anna.bus.estop()
         wait_until(lambda: robot.estops, "Anna's stop")
         assert len(robot.estops) == 1
+
+
+def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
+    site: Site, join: Callable[..., Bus]
+) -> None:
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        robot = on_board(join, onboard)
+        planner = member(join, dialling(site.settings("driver", "planner"), secured), source="nav")
+        assert drives(planner, robot)
+        stolen = member(join, dialling(site.settings("driver", "planner"), secured))
+        anna = member(join, dialling(site.settings("driver", "anna"), secured), source="nav")
+        assert not drives(stolen, robot), "it took teleop's priority"
+        assert not drives(anna, robot)
+        assert stolen.source.barred
+        assert anna.source.barred
 
 
 def test_through_the_sites_router_each_reaches_its_own(

@@ -36,7 +36,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def as_json(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, dict[str, Any]]:
-    code = main(["info", str(path)])
+    code = main(["info", "-o", "json", str(path)])
     told: dict[str, Any] = json.loads(capsys.readouterr().out)
     return code, told
 

@@ -116,11 +116,11 @@ def test_an_older_unit_is_replaced_and_what_cannot_run_is_removed(
 ) -> None:
     t2_install(tmp_path)
     (tmp_path / UNITS / "t2-odom.service").write_text("older\n")
-    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "nicegui" else True)
+    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "uvicorn" else True)
     capsys.readouterr()
     t2_install(tmp_path)
     said = capsys.readouterr().out
-    assert "without t2-dashboard.service: nicegui is not installed" in said
+    assert "without t2-dashboard.service: uvicorn is not installed" in said
     assert f"remove  /{UNITS}/t2-dashboard.service" in said
     assert f"replace /{UNITS}/t2-odom.service" in said
     assert f"{UNITS}/t2-dashboard.service" not in files(tmp_path)
@@ -263,3 +263,11 @@ def test_the_common_part_overrides_nothing_of_a_services_own() -> None:
     common = unit(install.template("t2-.service.d/10-t2.conf"))["Service"]
     for name in SERVICES:
         assert not common.keys() & unit(install.template(name))["Service"].keys(), name
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_the_drive_link_is_open_to_bridge_and_safety_alone(name: str) -> None:
+    service = unit(install.template(name))["Service"]
+    hidden = service.get("InaccessiblePaths") == "/run/t2-drive"
+    assert hidden == (name not in ("t2-bridge.service", "t2-safety.service"))
+    assert (service.get("ReadWritePaths") == "/run/t2-drive") == (name == "t2-bridge.service")

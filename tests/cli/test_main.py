@@ -5,6 +5,7 @@ import subprocess
 import sys
 from argparse import Namespace
 from collections.abc import Callable
+from importlib.metadata import metadata
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,24 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert end.value.code == 0
     shown = capsys.readouterr().out
     for name in COMMANDS:
-        assert re.search(rf"^    {name}\s", shown, re.MULTILINE), name
+        assert re.search(rf"^  {name}\s", shown, re.MULTILINE), name
+    titles = re.findall(r"^([A-Z]\w+):$", shown, re.MULTILINE)
+    assert titles == ["Run", "Inspect", "Record", "Commission", "Administer", "Develop"]
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_no_word_at_all_shows_help(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.startswith("usage: t2 COMMAND")
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"t2 {metadata('t2')['Version']}\n"
 
 
 @pytest.mark.parametrize(
@@ -72,10 +90,12 @@ def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "required: COMMAND"),
-        (["fly"], "invalid choice: 'fly'"),
-        (["up", "--nonsense"], "unrecognized arguments: --nonsense"),
-        (["--set", "board.port=1", "up"], "invalid choice"),
+        (["fly"], "unknown command 'fly'; \"t2 --help\" lists the commands"),
+        (["eco", "safety/state"], "unknown command 'eco'; did you mean \"t2 echo\"?"),
+        (["up", "--nonsense"], "t2 up: error: unrecognized arguments: --nonsense"),
+        (["up", "--nonsense"], "usage: t2 up [-h] [--no-sim]"),
+        (["keys", "list", "--nonsense"], "usage: t2 keys"),
+        (["--set", "board.port=1", "up"], "options follow the command, as in: t2 COMMAND --set"),
     ],
 )
 def test_what_is_no_command_is_said(

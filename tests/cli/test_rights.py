@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import zenoh
+import zenoh.ext
 
 from cli.access import Verb
 from cli.rights import CLASSES, MINE, ROLES, may
@@ -24,6 +25,7 @@ PLAIN = tuple(key for key in KEYS if "*" not in key)  # that can be served, or h
 SURE = keys.VELOCITY.on(MINE)  # every role may read it
 BLOCK = zenoh.CongestionControl.BLOCK  # a trial must not be lost for want of room
 TIMEOUT_S = 2.0
+EVERY = ("**", "**/@cmd/**", "**/@adv/**")  # what begins with @ is matched by itself alone
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
     def hear(sample: zenoh.Sample) -> None:
         came.append((str(sample.key_expr), sample.payload.to_string()))
 
-    ears = [sessions["on board"].declare_subscriber(key, hear) for key in ("**", "**/@cmd/**")]
+    ears = [sessions["on board"].declare_subscriber(key, hear) for key in EVERY]
     mine, marker = sessions[role], next(iter(sorted(granted(role, "write"))))
 
     def passed() -> bool:
@@ -162,5 +164,36 @@ def asked(session: zenoh.Session, tried: tuple[str, ...]) -> set[str]:
 
 def alive(session: zenoh.Session) -> set[str]:
     """Return the tokens that a session sees."""
-    return {str(reply.ok.key_expr) for key in ("**", "**/@cmd/**")
+    return {str(reply.ok.key_expr) for key in EVERY
             for reply in session.liveliness().get(key, timeout=TIMEOUT_S) if reply.ok}  # fmt: skip
+
+
+@pytest.mark.parametrize(("speaker", "hearer"), [("on board", "viewer"), ("viewer", "on board")])
+def test_who_comes_late_gets_the_events_that_are_kept(
+    sessions: Mapping[str, zenoh.Session], speaker: str, hearer: str
+) -> None:
+    key = keys.EVENTS.on(MINE, service="dashboard")
+    cache = zenoh.ext.CacheConfig(max_samples=10)
+    published = zenoh.ext.declare_advanced_publisher(
+        sessions[speaker], key, cache=cache, publisher_detection=True
+    )
+    published.put("kept")
+    came: list[str] = []
+    history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+    for _ in range(5):  # a query may be ahead of the declarations
+        heard = zenoh.ext.declare_advanced_subscriber(
+            sessions[hearer],
+            key,
+            lambda s: came.append(s.payload.to_string()),
+            history=history,
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        )
+        try:
+            wait_until(lambda: came, "the event that is kept", TIMEOUT_S)
+        except AssertionError:
+            continue
+        finally:
+            heard.undeclare()
+        break
+    assert came[0] == "kept"
+    published.undeclare()

@@ -102,7 +102,7 @@ def scene() -> Scene:
 def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(scene: Scene) -> None:
     assert not scene.drives()
     assert scene.vehicle.done == [Place(x=0.0, y=0.0)]
-    assert scene.desk.asked == [m.PoseRequest()]
+    assert scene.desk.asked == [m.PoseRequest(echo=1)]
     assert not scene.drives()
     scene.ready()
     assert scene.drives()

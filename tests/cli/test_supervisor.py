@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -134,6 +135,13 @@ def test_a_child_is_in_a_group_of_its_own(supervised: list[Supervisor]) -> None:
     supervisor.look(0.0)
     assert child.process is not None
     assert os.getpgid(child.process.pid) == child.process.pid != os.getpgid(0)
+    assert os.getsid(child.process.pid) == child.process.pid  # not in our session
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
+def test_a_child_whose_parent_died_before_it_could_say_so_does_not_run() -> None:
+    made = subprocess.Popen(SLEEP, preexec_fn=partial(module._die_with_parent, 1))
+    assert made.wait(5.0) == 1
 
 
 def test_output_goes_to_the_file(tmp_path: Path, supervised: list[Supervisor]) -> None:

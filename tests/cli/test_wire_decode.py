@@ -2,6 +2,7 @@
 
 import json
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -50,9 +51,15 @@ def test_a_frame_in_words(frame: Frame, text: str) -> None:
 
 
 def test_the_other_angular_unit() -> None:
-    raw = framing.pack(r.VelocityReport(0, 1500))
-    (line,) = lines(raw, wire=Wire(angular_unit="milliradian"))
-    assert line.endswith("angular 1.500 rad/s")
+    frames: tuple[Frame, ...] = (
+        r.VelocityReport(0, 1500),
+        c.MotionCommand(c.MotionKind.RUN, 0, 1500),
+    )
+    for number, setting in enumerate(("feedback_angular_unit", "command_angular_unit")):
+        wire = msgspec.convert({setting: "milliradian"}, Wire)
+        texts = [lines(framing.pack(frame), wire=wire)[0] for frame in frames]
+        assert texts[number].endswith("angular 1.500 rad/s")
+        assert texts[1 - number].endswith("angular 150.0 deg/s")
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def build(node: Node[Shared]) -> None:
     node.loop.every(0.05, tick)
     if kind == "hanging":
         node.loop.every(0.01, hang(node))
-    node.at_rest = lambda: kind != "restless"
+    node.is_stopped = lambda: kind != "restless"
     node.counters["resets"] += 1
     node.event("built", "info", "all is built", count=3)
 

@@ -40,7 +40,7 @@ def test_plain_msgpack_reads_our_bytes() -> None:
     assert plain["boot"] == 2**63 - 1
     assert plain["source"] is None
     assert plain["causes"] == [
-        {"name": "zone", "action": "slow", "age": 0.5, "text": "etwas ist nah: 近"}
+        {"name": "zone", "action": "slow", "age": 0.5, "text": "etwas ist nah: 近", "id": 0}
     ]
     assert plain["limits"] == {"forward": 0.1, "backward": 1.0, "angular": 0.5}
 

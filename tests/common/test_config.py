@@ -148,6 +148,11 @@ def test_an_empty_table_takes_nothing_away(desk: Desk, empty: str) -> None:
     [
         ("[bord]\nport = 1", "over0.toml: bord.port: no section 'bord'; did you mean 'board'?"),
         ("[bord]", "over0.toml: bord: no section 'bord'; did you mean 'board'?"),
+        (
+            "[wire]\nangular_unit = 'milliradian'",
+            "over0.toml: wire.angular_unit: was replaced by wire.command_angular_unit and "
+            "wire.feedback_angular_unit",
+        ),
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
         ("[sim.drive]\nzzz = 1", "over0.toml: sim.drive.zzz: unknown; there are acceleration"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),

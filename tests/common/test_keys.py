@@ -93,3 +93,11 @@ def test_nothing_is_ahead_of_the_emergency_stop() -> None:
 def test_events_alone_have_a_history() -> None:
     """A motion that is replayed would move the robot on its own."""
     assert {topic.path for topic in TOPICS if topic.service.history} == {"evt/{service}"}
+
+
+def test_known_names_of_an_expression_are_whole_keys() -> None:
+    events = keys.EVENTS.known("001", {"service": "*"}, ())
+    assert events == {f"t2/v1/001/evt/{service}" for service in keys.SERVICES}
+    assert keys.DRIVE.known("001", {"source": "*"}, ["nav"]) == {"t2/v1/001/@cmd/drive/nav"}
+    assert keys.DRIVE.known("001", {"source": "*"}, ()) == frozenset()
+    assert keys.DRIVE.known("001", {"source": "nav"}, ()) == frozenset()

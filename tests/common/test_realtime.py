@@ -4,33 +4,12 @@ import os
 import signal
 import subprocess
 import sys
-from functools import cache
 
 import pytest
 
 from common import realtime
 from common.realtime import BOARD, BRIDGE, GUARD, ROUTER, SAFETY
-
-PATIENCE_S = 60
-TELL = "from common import realtime as r; import os, threading, resource; "
-LIMITS = "print(resource.getrlimit(resource.RLIMIT_RTTIME)[0])"
-
-
-def said(script: str) -> list[str]:
-    """Run a script in an ordinary process; return its words."""
-    command = [sys.executable, "-c", TELL + script]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
-    return done.stdout.split()
-
-
-@cache
-def granted() -> bool:
-    return said("r.ask(r.BOARD); print(r.priority())") == [str(BOARD)]
-
-
-needs_right = pytest.mark.skipif(
-    not granted(), reason="needs the right to SCHED_FIFO: root, or `ulimit -r 55`"
-)
+from tests.common.rights import LIMITS, PATIENCE_S, TELL, needs_right, said
 
 
 def test_who_is_nearer_to_the_wheels_is_ahead() -> None:

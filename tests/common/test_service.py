@@ -18,15 +18,8 @@ from common.settings import Shared
 from common.version import VERSION
 from tests.common.program import Program, program
 from tests.common.rig import Rig
+from tests.common.specimens import SPECIMEN, on
 from tests.support import free_port, listening, wait_until
-
-SPECIMEN = "tests.common.specimen"
-
-
-def on(endpoint: str, robot: str) -> list[str]:
-    """Return the options that put a service on a router."""
-    return ["--set", f"bus.connect={endpoint}", "--set", f"robot.id={robot}"]
-
 
 # --- settings -----------------------------------------------------------------------------------
 

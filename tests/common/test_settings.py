@@ -154,8 +154,10 @@ def test_a_robots_id_is_one_plain_chunk_of_a_key(name: str) -> None:
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"address": "robot"}, "address is 'robot', allowed is an IP address"),
-        ({"listen_address": ""}, "listen_address is '', allowed is an IP address"),
+        ({"address": "robot"}, "address is 'robot', allowed is an IPv4 address"),
+        ({"listen_address": ""}, "listen_address is '', allowed is an IPv4 address"),
+        ({"address": "::1"}, "address is '::1': the board needs IPv4, allowed is an IPv4 address"),
+        ({"listen_address": "fe80::1"}, "listen_address is 'fe80::1': the board needs IPv4"),
         ({"listen_ports": (4002, 4002)}, "names a port twice"),
         ({"port": 4001}, "port 4001 of 127.0.0.1 is both the board's and in listen_ports"),
     ],

@@ -12,7 +12,7 @@ from common.freshness import S
 from common.systemd import BEATS, Systemd
 from tests.common.manager import PATIENCE_US, Manager
 from tests.common.program import program
-from tests.common.test_service import SPECIMEN, on
+from tests.common.specimens import SPECIMEN, on
 from tests.support import free_port, wait_until
 
 PERIOD_NS = PATIENCE_US * 1000 // BEATS

@@ -33,7 +33,7 @@ LOOKS: Sequence[tuple[str, Look]] = (
     ("a laptop's container", drives.laptop_comes_in),
     ("settings for zenohd", drives.settings_of_the_router_are_made),
     ("cost of a health check", drives.health_is_cheap),
-    ("bridge process killed", partial(crashes.is_killed_alone, "services.bridge.guarded")),
+    ("bridge process killed", partial(crashes.is_killed_alone, "services.bridge.child")),
     ("guard killed", partial(crashes.is_killed_alone, "services.bridge")),
     ("bridge container killed", partial(crashes.is_killed, "bridge")),
     ("safety container killed", partial(crashes.is_killed, "safety")),

@@ -10,6 +10,7 @@ from common import keys, settings
 from common import messages as m
 from common.bus.bus import Bus
 from common.loop import Loop
+from common.operator import reset_request
 from common.source import DriveSource
 from tests.support import running, wait_until
 
@@ -77,7 +78,9 @@ class Wheel:
 
     def _reset(self) -> None:
         # Refused or not, safety's state tells.
-        self.bus.ask(keys.RESET, m.ResetRequest(), lambda _: None, lambda _: None)
+        if self.safety is not None:
+            request = reset_request(self.safety)
+            self.bus.ask(keys.RESET, request, lambda _: None, lambda _: None)
 
 
 @contextmanager

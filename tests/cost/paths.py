@@ -23,7 +23,7 @@ from common.wire.framing import Framing
 from services.bridge import udp
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.handover import Handover
+from services.bridge.guard_ipc import Handover
 from services.bridge.translate import BumperFilter
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
@@ -73,7 +73,8 @@ class BridgePaths:
         self._guard, heartbeat = os.pipe()
         with patch.object(udp, "_bind", Mock(side_effect=self._cables)):
             self._bridge = Bridge(self._node, Handover((), heartbeat))
-        self._session = Session(self._node.bus, self._node.loop)
+        Session(self._node.bus, self._node.loop)
+        self._session = Session(self._node.drive, self._node.loop)
         self._seq = 0
         self._frames = {
             name: framing.pack(frame)
@@ -107,14 +108,14 @@ class BridgePaths:
 
     def hit(self) -> None:
         """The first sample of a hit: the reflex, the message, the event, the log."""
-        self._bridge._bumper = BumperFilter()
+        self._bridge._core._bumper = BumperFilter()
         self._take("hit")
 
     def judge(self) -> None:
         """Safety has judged the hit."""
         self._expect(MotionKind.BREAK)
-        self._bridge._bumper = BumperFilter()
-        self._move("run", judged=self._bridge._to_bumper.next_seq)
+        self._bridge._core._bumper = BumperFilter()
+        self._move("run", judged=self._bridge._publishers["bumper"].next_seq)
         self._expect(MotionKind.RUN, 300)
 
     def motion(self) -> None:
@@ -157,6 +158,7 @@ class SafetyPaths:
         reader = self._node.open_bus()
         Ports(self._node, reader)
         self._session = Session(self._node.bus, self._node.loop)
+        self._link = Session(self._node.drive, self._node.loop)
         Session(reader, self._node.loop)
         self._seq: Counter[str] = Counter()
         for linear in (0.0, 0.3):
@@ -207,7 +209,8 @@ class SafetyPaths:
         self._seq[key] += 1
         one = stamped(message, self._seq[key], self.clock.now_ns)
         subscription = topic.on(ROBOT, source="*") if topic is keys.DRIVE else key
-        self._session.deliver(key, one, subscription)
+        session = self._link if topic.publisher == "bridge" else self._session
+        session.deliver(key, one, subscription)
 
     def _motion(self) -> m.Motion:
         return msgspec.msgpack.decode(self._session.sent[keys.MOTION.on(ROBOT)], type=m.Motion)

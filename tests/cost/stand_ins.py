@@ -19,7 +19,7 @@ from common.bus.bus import Bus
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Message
-from services.bridge.stamp import SO_TIMESTAMPNS, TIMESPEC
+from services.bridge.rx_timestamp import SO_TIMESTAMPNS, TIMESPEC
 
 START_NS = 1_000 * S
 WALL_NS = 1_700_000_000 * S  # ahead of the monotonic clock
@@ -62,6 +62,10 @@ class Session:
     def routers_zid(self) -> list[str]:
         """Name the router."""
         return ["router"]
+
+    def peers_zid(self) -> list[str]:
+        """Name the other end of the drive link."""
+        return ["peer"]
 
     def declare_publisher(self, key: str, **_: object) -> "Sink":
         """Return where a publisher puts."""

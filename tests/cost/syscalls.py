@@ -25,7 +25,7 @@ from common.loop import Loop
 from common.settings import Board
 from common.wire.framing import Framing
 from common.wire.reports import VelocityReport
-from services.bridge.handover import Handover
+from services.bridge.guard_ipc import Handover
 from services.bridge.udp import Sockets
 from tests.cost.uncountable import Uncountable
 from tests.support import bus_on, free_port, router_process, running
@@ -96,7 +96,7 @@ def traced(made: tuple[str, int], ours: int, endpoint: str, log: Path) -> Iterat
     guard, heartbeat = os.pipe()
     handover = Handover(tuple(s.fileno() for s in sockets.sockets), heartbeat)
     sets = (f"board.port={made[1]}", f"board.listen_ports={ours}", f"bus.connect={endpoint}")
-    command = ["strace", "-o", str(log), sys.executable, "-m", "services.bridge.guarded",
+    command = ["strace", "-o", str(log), sys.executable, "-m", "services.bridge.child",
                *(word for one in sets for word in ("--set", one))]  # fmt: skip
     process = subprocess.Popen(
         command,

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import ssl
 import subprocess
 import sys
 import urllib.error
@@ -25,10 +26,11 @@ class Site:
     port: int
     log: Path
     process: "subprocess.Popen[bytes]"
+    tls: ssl.SSLContext | None = None
 
     @property
     def url(self) -> str:
-        return f"http://127.0.0.1:{self.port}/"
+        return f"{'https' if self.tls else 'http'}://127.0.0.1:{self.port}/"
 
     def start(self) -> None:
         """Start it, and wait until it serves."""
@@ -39,7 +41,7 @@ class Site:
     def serves(self) -> bool:
         assert self.process.poll() is None, self.log.read_text()
         try:
-            with urllib.request.urlopen(self.url, timeout=5) as answer:
+            with urllib.request.urlopen(self.url, timeout=5, context=self.tls) as answer:
                 return bool(answer.status == 200)
         except urllib.error.HTTPError as error:
             return error.code == 401  # it asks for a token
@@ -60,13 +62,15 @@ class Site:
 
 
 @contextlib.contextmanager
-def dashboard(endpoint: str, folder: Path, *sets: str) -> Iterator[Site]:
+def dashboard(
+    endpoint: str, folder: Path, *sets: str, tls: ssl.SSLContext | None = None
+) -> Iterator[Site]:
     """Run a dashboard on a free port while the context lasts."""
     port = free_port()
     given = [f"bus.connect={endpoint}", f"dashboard.port={port}", "log.format=json", *sets]
     words = [word for one in given for word in ("--set", one)]
     command = [sys.executable, "-m", "services.dashboard", *words]
-    site = Site(command, port, folder / "dashboard.log", None)  # type: ignore[arg-type]
+    site = Site(command, port, folder / "dashboard.log", None, tls)  # type: ignore[arg-type]
     site.start()
     try:
         yield site

@@ -1,6 +1,5 @@
 """The page in a real browser, before the whole stack and the simulated vehicle."""
 
-import shutil
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -10,6 +9,7 @@ from sim.requests import Driver
 from tests.chain import Chain, chain
 from tests.dashboard.rig import Site, dashboard
 from tests.dashboard.window import (
+    CHROMIUM,
     drives,
     middle,
     opened,
@@ -20,8 +20,6 @@ from tests.dashboard.window import (
     takes,
     text,
 )
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 # Alone: a browser that shares the machine answers so late that the hand lapses.
 pytestmark = [
@@ -59,6 +57,10 @@ def page(browser: Browser, site: Site) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")
     problems: list[str] = []
     page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on(
+        "console",
+        lambda it: problems.append(it.text) if "Content Security Policy" in it.text else None,
+    )
     # The robot has no internet: everything has to come from here.
     here = (site.url, site.url.replace("http", "ws"), "data:", "blob:")
     page.on("request", lambda it: None if it.url.startswith(here) else problems.append(it.url))

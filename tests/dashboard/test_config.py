@@ -20,6 +20,11 @@ from services.dashboard.config import Dashboard
         (["--set", "dashboard.gears_linear=0.1,0.2"], "should be 5 rising speeds"),
         (["--set", "dashboard.gears_angular=0.5,0.4,0.3,0.2,0.1"], "should be 5 rising speeds"),
         (["--set", "dashboard.round_trip=0"], "dashboard.round_trip"),
+        (["--set", "dashboard.call_round_trip=0"], "dashboard.call_round_trip"),
+        (["--set", "dashboard.messages_per_second=0"], "dashboard.messages_per_second"),
+        (["--set", "dashboard.connections=0"], "dashboard.connections"),
+        (["--set", "dashboard.connections_per_address=1000"], "connections_per_address"),
+        (["--set", "dashboard.request_timeout=0"], "dashboard.request_timeout"),
         (["--set", "dashboard.certificate=a.pem"], "belong together"),
         (["--set", "dashboard.source=No"], "dashboard.source"),
         (["--set", "dashboard.token_file=/no/such"], "/no/such"),
@@ -53,7 +58,7 @@ def test_a_missing_extra_is_named(
 ) -> None:
     monkeypatch.delitem(sys.modules, "services.dashboard.host", raising=False)
     monkeypatch.delitem(sys.modules, "services.dashboard.server", raising=False)
-    monkeypatch.setitem(sys.modules, "nicegui", None)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
     assert life.main([]) == 1
     assert "install the extra `dashboard`" in capsys.readouterr().err
 

@@ -1,6 +1,7 @@
 """Who may come in to the dashboard, and who may not."""
 
 import json
+import re
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -36,6 +37,44 @@ def test_a_bent_name_is_shown_the_right_one(site: Site) -> None:
     with pytest.raises(urllib.error.HTTPError, match="403") as refused:
         urllib.request.urlopen(request)
     assert b"localhost" in refused.value.read()
+
+
+@pytest.mark.parametrize("path", ["", "t2/dashboard.js", "t2/none.js", "nowhere", "estop/001"])
+def test_every_answer_keeps_other_pages_out(site: Site, path: str) -> None:
+    request = urllib.request.Request(site.url + path, headers={"Origin": "http://evil.example"})
+    try:
+        answer = urllib.request.urlopen(request)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "script-src 'self';" in policy
+        assert "unsafe" not in policy
+        assert "frame-ancestors 'none'" in policy
+        assert answer.headers["x-frame-options"] == "DENY"
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert answer.headers["referrer-policy"] == "same-origin"
+        assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_a_preflight_is_refused(site: Site) -> None:
+    request = urllib.request.Request(
+        f"{site.url}estop/001",
+        method="OPTIONS",
+        headers={"Origin": "http://evil.example", "Access-Control-Request-Method": "POST"},
+    )
+    with pytest.raises(urllib.error.HTTPError, match="403") as refused:
+        urllib.request.urlopen(request)
+    with refused.value as answer:
+        assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_the_page_has_no_inline_code(site: Site) -> None:
+    with urllib.request.urlopen(site.url) as answer:
+        page = answer.read().decode()
+    assert re.findall(r"<script(?![^>]*(?:src=|application/json))", page) == []
+    assert re.findall(r"\s(?:on\w+|style)=", page) == []
 
 
 def browser() -> urllib.request.OpenerDirector:

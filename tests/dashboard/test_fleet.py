@@ -33,6 +33,34 @@ def fleet() -> Fleet:
     return Fleet(Mock(config=DashboardConfig()), Mock())
 
 
+def test_a_robot_that_nobody_knows_is_not_stopped(fleet: Fleet, buses: dict[str, Mock]) -> None:
+    fleet.join("1")
+    assert fleet.knows("001")  # by the settings, alive or not
+    assert not fleet.knows("made-up")
+    fleet.take_in("1", w.Estop("made-up"))
+    assert buses == {}
+    fleet.take_in("1", w.Estop("001"))
+    assert buses["001"].estop.called
+    assert fleet._node.bus.estop.called  # type: ignore[attr-defined]
+
+
+def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
+    fleet: Fleet, buses: dict[str, Mock]
+) -> None:
+    _, note_alive = fleet._node.bus.watch_live.call_args.args  # type: ignore[attr-defined]
+    token = keys.live_key("002", "safety", "1")
+    note_alive(token, True)
+    note_alive(token, False)
+    assert fleet.knows("002")
+    fleet.join("1")
+    fleet.take_in("1", w.Look("003"))
+    assert fleet.knows("003")
+    fleet.take_in("1", w.Look("002"))
+    fleet.tick(time.monotonic_ns() + round((UNWANTED_S + 1) * S))
+    assert not fleet.knows("003")
+    assert fleet.knows("002")
+
+
 def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
     fleet.take_in("1", w.Look("002"))

@@ -4,10 +4,13 @@ import pytest
 
 from common import keys
 from common.freshness import S
-from common.messages import Bumper, Event, Health, Velocity
-from services.dashboard.heard import EVENTS_KEPT, Heard, path_of, worth_s
+from common.messages import Bumper, Drive, Driver, Event, Health, Velocity
+from services.dashboard.heard import EVENTS_KEPT, MADE_UP_KEPT, OTHERS, Heard, path_of, worth_s
 
 BUMPER = "tel/bridge/bumper"
+HEALTH = Health(
+    service="safety", version="", uptime=1.0, rates={}, counters={}, lateness=0.0, rss=0
+)
 
 
 def event(number: int) -> Event:
@@ -27,6 +30,18 @@ def test_the_newest_until_it_is_too_old() -> None:
     assert heard.newest(keys.BUMPER, S + S // 2) == Bumper(pressed=True)
     assert heard.newest(keys.BUMPER, S + S // 2 + 1) is None
     assert heard.ages_s(2 * S) == {BUMPER: 1.0}
+
+
+def test_names_that_anybody_makes_up_share_an_entry_and_push_nothing_out() -> None:
+    heard = Heard()
+    for number in range(1000):
+        heard.hear(f"@cmd/drive/{number}", Drive(linear=0.0, angular=0.0, echo=0), number)
+    heard.hear("tel/bridge/driver/left", Driver(faults=("under_voltage",), bits=8), S)
+    heard.hear("tel/safety/health", HEALTH, S)
+    assert len(heard.ages_s(S)) == MADE_UP_KEPT + 3
+    assert heard.ages_s(1999)[OTHERS] == 1000 / S
+    assert heard.newest(keys.DRIVER, S, side="left") is not None
+    assert heard.services() == ["safety"]
 
 
 def test_slow_streams_are_worth_more() -> None:

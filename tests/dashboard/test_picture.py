@@ -20,6 +20,7 @@ from common.messages import (
     Link,
     Motion,
     Odometry,
+    Release,
     SafetyState,
     Switches,
     Ultrasonic,
@@ -32,6 +33,9 @@ from services.dashboard.sectors import Protection
 from services.dashboard.wheel import Grip, Wheel
 
 AT = 100 * S
+RELEASE = Release(
+    believed_free="backward", travelled=0.41, age=2.0, forbidden=("forward",), left=0.1
+)
 
 
 def full() -> Heard:
@@ -55,6 +59,7 @@ def full() -> Heard:
         "tel/safety/state": SafetyState(
             verdict="brake", latched=("contact",), causes=causes, source="nav",
             limits=Limits(forward=0.0, backward=0.4, angular=0.2), heartbeat=1, text="Hit.",
+            release=RELEASE,
         ),
         "@cmd/drive/nav": Drive(linear=0.7, angular=0.2, echo=1),
         "@cmd/drive/web": Drive(linear=0.1, angular=0.0, echo=1),
@@ -91,6 +96,7 @@ def test_what_moves() -> None:
     assert seen.wheels[0] > 0
     assert seen.safety is not None
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
+    assert seen.safety.release == RELEASE
     assert seen.hands == picture.Hands(None, "", Grip.FREE, 1)
 
 

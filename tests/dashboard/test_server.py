@@ -135,7 +135,7 @@ def taps(site: Site, robot: str) -> None:
 
 def test_a_refusal_is_told(ada: Eye) -> None:
     ada.takes()
-    ada.say("reset")
+    ada.say("reset", n=ada.look()["n"])
     assert "safety does not answer" in ada.waits("told")["text"]
 
 
@@ -165,6 +165,18 @@ def test_no_robot_is_called_so(site: Site) -> None:
     )
     with pytest.raises(urllib.error.HTTPError, match="404"):
         urllib.request.urlopen(request)
+
+
+def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Eye) -> None:
+    request = urllib.request.Request(
+        f"{site.url}estop/made-up", method="POST", headers={"Origin": site.url.rstrip("/")}
+    )
+    with pytest.raises(urllib.error.HTTPError, match="404") as refused:
+        urllib.request.urlopen(request)
+    assert b"no robot 'made-up' is known here" in refused.value.read()
+    ada.say("estop", robot="made-up")
+    assert ada.waits("told")["text"] == "estop_unknown"
+    assert "made-up" not in ada.waits("rest")["robots"]
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])

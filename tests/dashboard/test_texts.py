@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from common.messages import FaultName, LinkState, Verdict
+from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
 from services.dashboard.door import asking
 from services.dashboard.texts import LANGUAGES, TEXTS, table
@@ -19,20 +19,29 @@ HAN = re.compile("[\u4e00-\u9fff]")
 
 def asked_for() -> set[str]:
     """Return every key that the page or a script names as it stands."""
-    page = (CODE / "page.py").read_text(encoding="utf-8")
+    page = (CODE / "static" / "index.html").read_text(encoding="utf-8")
     found = set(re.findall(r'data-t(?:-\w+)?="(\w+)"', page))
-    found |= set(re.findall(r'(?:word|button|panel)\("([\w-]+)"', page))
     for script in (CODE / "static").glob("*.js"):
         text = script.read_text(encoding="utf-8")
         found |= set(re.findall(r'\bt\("([\w.]+)"\)', text))
         found |= set(re.findall(r'toast\("(\w+)"', text))
+        found |= set(re.findall(r'"(release_\w+|moved_\w+|believed_\w+)"', text))
     fleet = (CODE / "fleet.py").read_text(encoding="utf-8")
     found |= set(re.findall(r'_tell\([^)]*"(\w+)"\)', fleet))
-    return found - {"question-yes", "question-no"}
+    robot = (CODE / "robot.py").read_text(encoding="utf-8")
+    return found | set(re.findall(r'tell\("error", "(\w+)"\)', robot))
 
 
 def test_the_search_finds_some() -> None:
-    assert {"estop", "follow", "text.lost", "take_first", "theme"} <= asked_for()
+    assert {
+        "estop",
+        "follow",
+        "text.lost",
+        "take_first",
+        "theme",
+        "too_late",
+        "reset_unconfirmed",
+    } <= asked_for()
 
 
 def test_every_text_that_is_asked_for_is_there() -> None:
@@ -52,6 +61,12 @@ def test_every_text_that_is_asked_for_is_there() -> None:
 )
 def test_every_name_of_the_contract_has_its_text(prefix: str, names: list[str]) -> None:
     assert {f"{prefix}.{getattr(name, 'value', name)}" for name in names} <= set(TEXTS)
+
+
+@pytest.mark.parametrize("direction", get_args(Direction))
+def test_every_direction_has_its_texts(direction: str) -> None:
+    for prefix in ("release", "release_forbidden", "believed", "moved"):
+        assert f"{prefix}_{direction}" in TEXTS
 
 
 def test_english_causes_are_safetys_own() -> None:

@@ -111,6 +111,7 @@ def test_what_was_overtaken_changes_nothing(wheel: Wheel) -> None:
     assert wheel.hold("a", 2, AHEAD, at(10.1))
     assert not wheel.hold("a", 1, Push(-1.0), at(10.1))
     assert wheel.held(at(10.1)) == AHEAD
+    assert wheel.answered == 2
 
 
 def test_after_a_lapse_the_hand_must_come_off(wheel: Wheel) -> None:
@@ -135,8 +136,8 @@ def test_no_number_is_refused(wheel: Wheel, wrong: float) -> None:
 
 
 def test_more_than_full_is_full(wheel: Wheel) -> None:
-    wheel.hold("a", 1, Push(7.0, -7.0, creep=True), at(10))
-    assert wheel.held(at(10)) == Push(1.0, -1.0, creep=True)
+    wheel.hold("a", 1, Push(7.0, -7.0, release="backward"), at(10))
+    assert wheel.held(at(10)) == Push(1.0, -1.0, release="backward")
 
 
 STEPS = st.lists(

@@ -1,5 +1,6 @@
 """What somebody does with the page in a browser, and waits to see."""
 
+import shutil
 from collections.abc import Callable
 
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
@@ -8,6 +9,7 @@ from tests.chain import Chain
 from tests.dashboard.rig import Site
 from tests.support import wait_until
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PHONE: ViewportSize = {"width": 390, "height": 844}
 STILL_MPS = 0.005
 

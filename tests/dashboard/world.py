@@ -6,7 +6,7 @@ from common import keys
 from common.bus.bus import Bus
 from common.freshness import S
 from common.loop import Loop
-from common.messages import Drive
+from common.messages import Cause, Drive, Release
 from tests.dashboard.rig import Eye
 from tests.support import PATIENCE_S, wait_until
 from tests.teleop.support import safety_state
@@ -24,9 +24,13 @@ class World:
         self.alive: list[str] = []
         self.safe = True
         self.latched: tuple[str, ...] = ()
+        self.causes: tuple[Cause, ...] = ()
+        self.release: Release | None = None
+        self.boot = 0  # of safety
         self._loop = loop
 
     def declare(self, bus: Bus) -> None:
+        self.boot = bus.boot
         state = bus.publisher(keys.SAFETY)
         bus.subscribe(
             keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
@@ -38,10 +42,18 @@ class World:
         )
         bus.live(keys.live_key("two words", "bridge", "x"))
         bus.live(keys.live_key("002", "bridge", "x"))
+        bus.live(keys.live_key("one-more", "bridge", "x"))
 
         def tell(now_ns: int) -> None:
             if self.safe:
-                state.put(safety_state(heartbeat=now_ns, latched=self.latched))
+                state.put(
+                    safety_state(
+                        heartbeat=now_ns,
+                        latched=self.latched,
+                        causes=self.causes,
+                        release=self.release,
+                    )
+                )
 
         self._loop.post(lambda: self._loop.every(0.05, tell))
 

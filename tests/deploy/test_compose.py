@@ -62,3 +62,14 @@ def test_nobody_is_sent_to_the_boards_cable() -> None:
     """SECURITY.md wants nobody there, and deploy/nftables/t2.nft drops whoever is."""
     for file in (ROOT / "compose.yaml", *(ROOT / "deploy" / "compose").iterdir()):
         assert "10.7.5." not in file.read_text(encoding="utf-8"), file
+
+
+@pytest.mark.parametrize("over", [(TLS,), (OWN_ROUTER, TLS, REALTIME)])
+def test_bridge_and_safety_alone_have_the_drive_link(over: tuple[str, ...]) -> None:
+    services = config(*over)
+    mounted = {name for name, text in services.items() if "target: /run/t2-drive" in text}
+    short = {name for name, text in services.items() if "drive:/run/t2-drive" in text}
+    assert mounted | short == {"bridge", "safety"}
+    for name in ("bridge", "safety"):
+        wanted = "T2__BUS__DRIVE: unixsock-stream//run/t2-drive/drive.sock"
+        assert wanted in services[name], name

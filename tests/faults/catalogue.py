@@ -12,8 +12,19 @@ from typing import Literal, get_args
 from zenoh import CongestionControl
 
 from cli.settings import Everything
-from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar, SonarName, Wire
-from tests.faults import deeds
+from sim.requests import (
+    Driver,
+    Firmware,
+    Flood,
+    Freeze,
+    Lose,
+    Mute,
+    PowerCycle,
+    Sonar,
+    SonarName,
+    Wire,
+)
+from tests.faults import browser, deeds, forgery
 from tests.faults.deeds import do, kill, second
 from tests.faults.enclosure import Need
 from tests.faults.lane import Lane
@@ -47,6 +58,7 @@ class Fault:
     hold_s: float = 0.5  # how long the stick is held on after the fault
     harmless: bool = False  # no process may end by it
     needs: Need = "nothing"
+    stops: tuple[str, ...] = ("stop", "break")  # commands that end the fault's danger
 
 
 def by_limit(limit: Callable[[Everything], float]) -> Budget:
@@ -204,9 +216,9 @@ BOARD = [
               deeds.sonar_well(name))
         for name in FORWARD
     ),
-    # Noticed after 0.5 m without a change.
+    # Suspect after 0.5 m without a change: slower from then on.
     *(
-        Fault(f"{name} sonar stuck", do(Sonar(name=name, range=3.0)), ITSELF, within(1.0),
+        Fault(f"{name} sonar stuck", do(Sonar(name=name, range=3.0)), ON, None,
               deeds.sonar_well(name), hold_s=1.3)
         for name in FORWARD
     ),
@@ -223,6 +235,24 @@ BOARD = [
     Fault("velocity silent", do(Mute(reports=("velocity",))), NEUTRAL, VELOCITY_AGE),
     # Long enough to drive further than a step of the counters may be.
     Fault("mileage silent for 4 s", deeds.silent("mileage", 4.0), ON, None, hold_s=4.8),
+]  # fmt: skip
+
+# What a board may do otherwise than the simulated one does.
+FIRMWARE = [
+    Fault("contact while every third answer is lost",
+          deeds.then(do(Lose(reports=("bumper",))), deeds.hit(0.06)), RESET, within(0.02)),
+    Fault("contact reported on the other port",
+          deeds.then(do(Firmware(hits="second")), deeds.hit(0.3)), RESET, within(0.02)),
+    # The other port is taken after a tenth of a second without an answer.
+    Fault("board answers on the other port", do(Firmware(answers="second")),
+          (*ON, *ITSELF, *NEUTRAL), None),
+    Fault("board restart in 0.12 s", do(PowerCycle(seconds=0.12)), (*NEUTRAL, *RESET),
+          within(0.12 + 0.1), hold_s=HOLD_S),
+    # While safety is dead nobody but the bridge sees that STOP does not stop it.
+    Fault("safety SIGKILL, the board ignores STOP",
+          deeds.then(do(Firmware(ignores=("stop",))), kill("safety", signal.SIGKILL)),
+          (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
+          hold_s=2.0, stops=("break",)),
 ]  # fmt: skip
 
 # These take the machine's time as well.
@@ -253,6 +283,48 @@ HOSTILE = [
     for what, saying in deeds.HOSTILE.items()
 ]  # fmt: skip
 
+# The web server and what abuses it take the machine's time as well.
+DASHBOARD = [
+    Fault("browser's estop while a viewer sends 50 000 messages/s",
+          browser.estop_while(browser.flood), RESET, within(0.3)),
+    Fault("browser's estop while 500 requests do not end",
+          browser.estop_while(browser.unfinished), RESET, within(0.3)),
+]  # fmt: skip
+
+# What a network held back has no effect: no frame moves the vehicle, and the latch stays.
+OPERATORS = [
+    Fault("contact, then 20 resets 1.3 s late", deeds.late_resets, RESET, within(0.02)),
+    Fault("contact, then 20 releases 1.3 s late", deeds.late_releases, RESET, within(0.02)),
+]
+
+# Keys that a terminal delivers late move nothing: the hold of the last one in time ends, and that
+# one may be a first press, if the one before it was refused.
+TERMINAL = [
+    Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
+          deeds.stall_terminal(seconds), NEUTRAL,
+          by_limit(lambda config: config.teleop.hold_first + 0.15
+                   + config.safety.sources["teleop"].lease),
+          hold_s=seconds + 1.0, needs="a teleop")
+    for seconds in (0.8, 3.0)
+]  # fmt: skip
+
+DRIVE_LINK = [
+    Fault("safety hangs, then contact", forgery.hit_while_safety_hangs, RESET, within(0.02),
+          deeds.go_on("safety")),
+    *(
+        Fault(what, forgery.forged(forge), ON, None, harmless=True)
+        for what, forge in {
+            "safety's authority copied": forgery.authority,
+            "safety's number overtaken": forgery.lock_out,
+            "bridge's measurements copied": forgery.measurements,
+        }.items()
+    ),
+]  # fmt: skip
+
 # What is tried beside each other, the most delicate first.
-PARTS = [[*MILLISECONDS, *CLOCKS], GREEDY, [*PROCESSES, *NETWORK, *BOARD, *HOSTILE]]
+PARTS = [
+    [*MILLISECONDS, *CLOCKS],
+    [*GREEDY, *DASHBOARD],
+    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *TERMINAL, *DRIVE_LINK, *OPERATORS],
+]
 FAULTS = [fault for part in PARTS for fault in part]

@@ -16,10 +16,12 @@ import zenoh
 from common import keys
 from common.bus.session import client_config
 from common.freshness import S
+from common.operator import release_request, reset_request
 from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
 from tests.faults.lane import Lane, until
 from tests.support import at, wait_until
 
+LATE_S = 1.3  # a reset may be 1.0 s old, a held release 0.4 s
 DEATH_S = 1.0  # longer than a kernel needs to end a process
 
 
@@ -75,6 +77,15 @@ def do(*requests: Asked) -> Callable[[Lane], int]:
     return inject
 
 
+def then(*deeds: Callable[[Lane], int]) -> Callable[[Lane], int]:
+    """Do one after the other; the last one is the fault."""
+
+    def inject(lane: Lane) -> int:
+        return [deed(lane) for deed in deeds][-1]
+
+    return inject
+
+
 def silent(report: ReportName, seconds: float) -> Callable[[Lane], int]:
     """Let the board leave out a report for a while; what comes of its return is seen, too."""
 
@@ -99,6 +110,38 @@ def hit(held_s: float) -> Callable[[Lane], int]:
         return lane.frames.hits[0].mono_ns
 
     return inject
+
+
+def late_resets(lane: Lane) -> int:
+    """Hit something, and let 20 resets that the operator made then arrive too late."""
+    at_ns = hit(0.1)(lane)
+    until(lane.latched, 2.0)
+    assert lane.state is not None
+    late = reset_request(lane.state)
+    lane.ask(0.0)  # or the stick that is held would refuse it
+    time.sleep(LATE_S)
+    for _ in range(20):
+        lane.bus.ask(keys.RESET, late, ignored, ignored, 1.0)
+    time.sleep(0.3)
+    return at_ns
+
+
+def late_releases(lane: Lane) -> int:
+    """Hit something and stay on it, and let 20 calls of a held release arrive too late."""
+    lane.frames.hits.clear()
+    lane.stack.control.do(Bumper(pressed=True))
+    until(lambda: lane.frames.follow().hits and lane.latched(), 2.0)
+    late = release_request(lane.state, "backward", held=True)
+    time.sleep(LATE_S)
+    for _ in range(20):
+        lane.bus.ask(keys.RELEASE, late, ignored, ignored, 1.0)
+        time.sleep(0.02)
+    lane.stack.control.do(Bumper(pressed=False))
+    return lane.frames.hits[0].mono_ns
+
+
+def ignored(_: object) -> None:
+    """Take an answer that the frames at the board judge better."""
 
 
 def estop(lane: Lane) -> int:
@@ -221,3 +264,16 @@ HOSTILE = {
         msgpack.packb(MOTION), "x" * 200
     ),  # more, and Zenoh cannot send it
 }
+
+
+def stall_terminal(seconds: float, held_s: float = 0.3) -> Callable[[Lane], int]:
+    """Hold up the operator's terminal; the key is let go meanwhile, and its repeats come after."""
+
+    def inject(lane: Lane) -> int:
+        at_ns = time.monotonic_ns()
+        lane.tell(b"stall %f" % seconds)
+        time.sleep(held_s)
+        lane.ask(0.0)
+        return at_ns
+
+    return inject

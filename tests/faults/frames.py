@@ -1,6 +1,6 @@
 """What the simulated board received, read while it is still being written."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -55,9 +55,11 @@ def strayed(commands: Sequence[Command]) -> bool:
     )
 
 
-def first_stop_s(commands: Sequence[Command], fault_ns: int) -> float | None:
+def first_stop_s(
+    commands: Sequence[Command], fault_ns: int, kinds: Collection[str] = ("stop", "break")
+) -> float | None:
     """Return how long after the fault the first STOP or BREAK came; None if none came."""
-    stops = [c.mono_ns for c in commands if c.kind != "run" and c.mono_ns >= fault_ns]
+    stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= fault_ns]
     return (stops[0] - fault_ns) / S if stops else None
 
 

@@ -1,15 +1,16 @@
 """``python -m tests.faults.keyboard ENDPOINT``: teleop in a terminal, a finger on its keys.
 
-Reads speeds from standard input, one a line: while it is over zero, W is held in the fifth gear.
-Ends with teleop, or with its input.
+Reads lines from standard input: a speed, and while the last one is over zero, W is held in the
+fifth gear; ``stall SECONDS`` holds up all that the terminal sends and gets. Ends with teleop, or
+with its input.
 """
 
-import contextlib
 import os
 import select
 import sys
+import time
 
-from tests.teleop.terminal import terminal
+from tests.teleop.terminal import STRICT, Terminal, terminal
 
 REPEAT_S = 0.03  # of a held key
 FIFTH_GEAR = "5"
@@ -17,9 +18,9 @@ FIFTH_GEAR = "5"
 
 def main() -> None:
     held, said = False, b""
-    with terminal(sys.argv[1]) as teleop:
+    with terminal(sys.argv[1], *STRICT) as teleop:
         while not teleop.shows(b"ESTOP") and not teleop.ends():
-            select.select([teleop.fd], [], [], 1.0)
+            time.sleep(REPEAT_S)
         teleop.type(FIFTH_GEAR)
         while not teleop.ends():
             if select.select([sys.stdin], [], [], REPEAT_S)[0]:
@@ -27,10 +28,18 @@ def main() -> None:
                 if not new:
                     return
                 *lines, said = (said + new).split(b"\n")
-                held = float(lines[-1]) > 0 if lines else held
+                for line in lines:
+                    held = take(line, teleop, held)
             if held:
-                with contextlib.suppress(BlockingIOError):  # nobody reads what is typed
-                    teleop.type("w")
+                teleop.type("w")
+
+
+def take(line: bytes, teleop: Terminal, held: bool) -> bool:
+    """Execute a line; return whether the key is held after it."""
+    if line.startswith(b"stall "):
+        teleop.stall(float(line.removeprefix(b"stall ")))
+        return held
+    return float(line) > 0
 
 
 if __name__ == "__main__":

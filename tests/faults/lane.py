@@ -14,8 +14,9 @@ import msgspec
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
-from common.messages import Done, ResetRequest, SafetyState
-from sim.requests import Bumper, Driver, Mute, Place, Wire
+from common.messages import Done, SafetyState
+from common.operator import reset_request
+from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Wire
 from tests.chain import Chain, chain
 from tests.faults.enclosure import Need, clock, small_disk
 from tests.faults.frames import SPEED, Frames, moves
@@ -117,7 +118,9 @@ class Lane:
     def reset(self) -> None:
         """Ask safety for a reset, as the operator does."""
         done: list[Done | str] = []
-        self.bus.ask(keys.RESET, ResetRequest(), done.append, done.append, 1.0)
+        if self.state is None:
+            return
+        self.bus.ask(keys.RESET, reset_request(self.state), done.append, done.append, 1.0)
         until(lambda: done, 1.5)
 
     def rearm(self, patience_s: float) -> bool:
@@ -150,6 +153,8 @@ class Lane:
         """Undo whatever was done to the simulated board, and put the vehicle back in its room."""
         self.stack.control.do(Wire())
         self.stack.control.do(Mute())
+        self.stack.control.do(Firmware())
+        self.stack.control.do(Lose())
         self.stack.control.do(Bumper(pressed=False))
         for side in ("left", "right"):
             self.stack.control.do(Driver(side=side, bits=0))

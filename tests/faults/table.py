@@ -77,6 +77,9 @@ def renewed(document: str, rows: Sequence[Row], date: str) -> str:
     """Return a document with some of its rows measured again; it says which."""
     anew = {row.name: _line(row) for row in rows}
     lines = [anew.get(_name(line), line) for line in document.splitlines()]
+    known = {_name(line) for line in lines}
+    end = max(number for number, line in enumerate(lines) if line.startswith("| ")) + 1
+    lines[end:end] = [line for name, line in anew.items() if name not in known]
     wrong = [_name(line) for line in lines if line.endswith("| WRONG |")]
     again = f"Measured again by themselves on {date}: {', '.join(anew)}."
     return "\n".join([*lines[:-1], again, "", verdict(wrong), ""])

@@ -103,3 +103,10 @@ def test_rows_that_are_measured_again_take_their_places_and_it_is_said() -> None
     )
     still = renewed(before, [good], "2026-01-02")
     assert still.endswith("2026-01-02: a.\n\nNot as it should be: b.\n")
+
+
+def test_a_row_that_the_document_does_not_have_is_added_to_its_table() -> None:
+    good = replace(row(sample()), name="a")
+    before = f"# Faults\n\n{markdown([good])}\n{verdict([])}\n"
+    after = renewed(before, [replace(good, name="b")], "2026-01-02")
+    assert markdown([good, replace(good, name="b")]) in after

@@ -39,7 +39,7 @@ def tried(lane: Lane, fault: Fault) -> Sample:
     moving = lane.moving()
     died = lane.dead() if fault.harmless else ()
     fault.mend(lane)
-    stopped = first_stop_s(commands, fault_ns)
+    stopped = first_stop_s(commands, fault_ns, fault.stops)
     outcome = "drives on" if moving and stopped is None else _outcome(lane)
     moved_s = last_move_s(commands, fault_ns)
     return Sample(

@@ -8,7 +8,8 @@ import sys
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
-from common.messages import ResetRequest, SafetyState
+from common.messages import SafetyState
+from common.operator import reset_request
 from common.source import DriveSource
 from tests.fleet.figures import Asked
 from tests.fleet.part import obey
@@ -43,7 +44,8 @@ class Hand:
         if self._state is None or self._state.verdict not in ("run", "slow"):
             self._refused += 1
             if self._state is not None and self._state.latched and self._refused % 10 == 0:
-                self._bus.ask(keys.RESET, ResetRequest(), lambda _: None, lambda _: None)
+                request = reset_request(self._state)
+                self._bus.ask(keys.RESET, request, lambda _: None, lambda _: None)
             self._source.ask(0.0, 0.0)
             return
         self._number += 1

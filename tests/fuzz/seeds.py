@@ -55,6 +55,7 @@ EXAMPLES: tuple[Struct, ...] = (
     m.ReleaseRequest(held=False),
     m.PoseRequest(x=1.0, y=2.0, heading=-0.5),
     m.Done(text="done"),
+    m.ResetDone(text="done", boot=7, heartbeat=9, cleared=(41, 42)),
 )  # fmt: skip
 HOSTILE: tuple[object, ...] = (
     [1, 2],

@@ -11,11 +11,14 @@ from common import keys
 from common import messages as m
 from common.freshness import S
 from common.wire.frame import Side
+from common.wire.framing import Framing
+from common.wire.reports import BumperReport
 from services.bridge import lease as leases
 from services.bridge import link as links
+from services.bridge.core import Core
 from services.bridge.lease import Lease, Order
+from services.bridge.output import Send
 from services.bridge.readiness import Readiness
-from services.bridge.wheels import Wheels
 from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
@@ -24,8 +27,11 @@ from services.safety.twist import Twist
 from services.safety.zones import Zones
 from sim.vehicle import Twist as Rolling
 from tests.invariants.net import Letter, Weather
-from tests.invariants.process import ROBOT
+from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
+
+# What is taken out, by what; the scenario in which that matters; the judge's objection.
+Breakage = tuple[object, str, object, Callable[[Stack], None], str]
 
 
 def driving(linear: float = 0.5) -> Stack:
@@ -40,10 +46,10 @@ def driving(linear: float = 0.5) -> Stack:
     return stack
 
 
-def hold(stack: Stack) -> None:
+def hold(stack: Stack, direction: m.Direction = "backward") -> None:
     """Hold the release for a while."""
     for _ in range(10):
-        stack.hold(True)
+        stack.hold(True, direction)
         stack.run(60)
 
 
@@ -92,9 +98,15 @@ def brakes_go_off_and_on(stack: Stack) -> None:
     stack.net.weather["streams"] = Weather(late_ms=120)
     stack.run(300)
     for on, ms in ((False, 60), (True, 60)):
-        with stack.time():
-            stack.bridge.call(keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=on))
+        assert stack.switches(on=on)
         stack.run(ms)
+
+
+HIT = Framing().pack(BumperReport(True))
+
+
+def claims_to_brake(core: Core, datagram: bytes) -> Send | None:
+    return Send(b"", core.port) if HIT in datagram else None
 
 
 def still_armed(lease: Lease, ready: bool) -> Lease:
@@ -213,8 +225,8 @@ def whoever(lease: Lease, motion: m.Motion) -> Any:
     return order, refusal
 
 
-def untold(lease: Lease, motion: m.Motion, *rest: Any) -> Any:
-    return ON_MOTION(lease, replace(motion, latched=False), *rest)
+def untold(lease: Lease, motion: m.Motion, *rest: Any, **more: Any) -> Any:
+    return ON_MOTION(lease, replace(motion, latched=False), *rest, **more)
 
 
 def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
@@ -225,10 +237,22 @@ def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
     return replace(lease, sent_ns=now_ns), Order.BRAKE
 
 
+def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
+    """Take what comes through the router, too."""
+    link._process.subscribe(topic, handler, **names)
+
+
+def authority_is_copied(stack: Stack) -> None:
+    hand = stack.hand
+    copy = m.Motion(command="run", linear=0.9, seq=2**19, boot=stack.safety.boot)
+    hand.send(Letter(keys.MOTION.on(ROBOT), copy, hand.boot, stack.net.now_ns))
+
+
 ORDER = leases._order
 EXPIRE, ON_MOTION, KEEP = leases.expire, leases.on_motion, Ports._keep
 
-BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] = {
+
+BREAKAGES: dict[str, Breakage] = {
     "the bridge's lease never ends": (
         leases, "expire", lambda lease, *_: lease, safety_dies, "a RUN is held",
     ),
@@ -279,7 +303,10 @@ BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] =
     "a hit needs no judgement": (
         leases, "on_hit", unjudged, hit_while_a_run_is_under_way, "bridge knows of contact",
     ),
+    "the drive link takes messages of the router": (
+        DriveEnd, "subscribe", from_anybody, authority_is_copied, "a RUN that no safety sent",
+    ),
     "the reflex does not brake": (
-        Wheels, "brake", lambda _: 1, hit_while_a_run_is_under_way, "without a BREAK",
+        Core, "reflex", claims_to_brake, hit_while_a_run_is_under_way, "without a BREAK",
     ),
 }  # fmt: skip

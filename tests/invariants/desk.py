@@ -21,14 +21,19 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
+from tests.invariants.operators import Operators
+from tests.invariants.rest import Rest
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES = 3
-ECHO_AGE_S, SETTLE_S, RIVAL_S, HOLD_S = 0.4, 0.5, 0.5, 0.3
+ECHO_AGE_S, SETTLE_S, RIVAL_S = 0.4, 0.5, 0.5
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
-MOST_MPS, MOST_RADPS, CREEP_MPS = 1.0, 1.0, 0.1
+# After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
+OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
+LOST_POLLS = 3  # of the bumper
+MOST_MPS, MOST_RADPS = 1.0, 1.0
 RAMP_S = 2.5  # from the highest speed to standstill, and some
 FAST_MPS, FAST_S = 1.35, 0.4  # measured: no command allows it, so it is a runaway
 STEP_S = 0.03  # decisions are that far apart at most, while nothing hangs
@@ -69,18 +74,20 @@ class Desk:
     ranges: deque[tuple[int, Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
     bumpers: deque[Bumper] = field(default_factory=lambda: deque(maxlen=3))
     wishes: dict[str, Wish] = field(default_factory=dict)
+    zeros: dict[str, int] = field(default_factory=dict)  # source: its last request of zero
+    unseen: dict[int, int] = field(default_factory=dict)  # sonar: since when it shows nothing
     rivals: dict[str, int] = field(default_factory=dict)
-    beats: dict[int, int] = field(default_factory=dict)  # heartbeat: when it was sent
+    operators: Operators = field(default_factory=Operators)
     bad_ns: int = 0  # when inputs were last seen to be bad
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
-    held_ns: int | None = None  # when a release was last granted
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     reader_was_up: bool = False
+    rest: Rest = field(default_factory=Rest)
     well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
 
     def on_drive(self, source: str, drive: Drive, now_ns: int) -> None:
         """Take a request in, if it is a good one."""
-        sent_ns = self.beats.get(drive.echo)
+        sent_ns = self.operators.beats.get(drive.echo)
         finite = math.isfinite(drive.linear) and math.isfinite(drive.angular)
         if source not in LEASES_S or not finite or sent_ns is None:
             return
@@ -92,6 +99,8 @@ class Desk:
             return
         if old is not None and old.boot == drive.boot and drive.seq <= old.seq:
             return
+        if drive.linear == 0 == drive.angular:
+            self.zeros[source] = now_ns
         since_ns = old.still_ns if old is not None and old.still else now_ns
         self.wishes[source] = Wish(
             drive.boot, drive.seq, now_ns, drive.linear, drive.angular, since_ns
@@ -104,11 +113,34 @@ class Desk:
         if isinstance(message, Velocity):
             too_fast = abs(message.linear) > FAST_MPS
             self.fast_ns = (self.fast_ns or now_ns) if too_fast else None
+            self.rest.on_velocity(message, now_ns)
         if isinstance(message, Driver):
             self._on_driver(name, message)
         if isinstance(message, Ultrasonic):
+            silent_ns = self._silent_since(now_ns)
             self.ranges.append((now_ns, message))
+            self._note_unseen(message, silent_ns, now_ns)
         self.samples[name] = now_ns, message
+
+    def _silent_since(self, now_ns: int) -> int | None:
+        """Return since when all sonars are silent, None while they are not."""
+        last_ns = self.ranges[-1][0] if self.ranges else 0
+        over_ns = last_ns + round(RANGES_AGE_S * S)
+        return over_ns if now_ns > over_ns else None
+
+    def _note_unseen(self, message: Ultrasonic, silent_ns: int | None, now_ns: int) -> None:
+        for sonar in range(len(SONARS)):
+            if silent_ns is not None or message.status[sonar] == "fault":
+                self.unseen.setdefault(sonar, silent_ns or now_ns)
+            elif not any(one.status[sonar] == "fault" for _, one in self.ranges):
+                self.unseen.pop(sonar, None)
+
+    def _may_creep(self, sonar: int, source: str | None, now_ns: int) -> bool:
+        """Return whether an operator has acknowledged the fault of this sonar."""
+        since_ns = self.unseen.get(sonar)
+        if source not in OPERATORS or since_ns is None or self._silent_since(now_ns) is not None:
+            return False
+        return self.zeros.get(source, 0) - since_ns >= (SHOWN_S - STEP_S) * S
 
     def _on_driver(self, side: str, message: Driver) -> None:
         _, before = self.samples.get(side, (0, None))
@@ -124,11 +156,15 @@ class Desk:
         if before.boot != message.boot:
             self.bad_ns = now_ns
             self.neutral.clear()
-        if before.seq != message.seq or not self.bumpers or before.boot != message.boot:
+        is_new = before.seq != message.seq or not self.bumpers or before.boot != message.boot
+        self.operators.on_bumper(message, is_new, now_ns)
+        if is_new:
             self.bumpers.append(message)
 
     def look(self, now_ns: int, reader: bool, tripped: bool) -> None:
         """Note, at the time of a decision, whether anything wants a neutral request."""
+        if "old velocity" in self._what_is_bad(now_ns):
+            self.fast_ns = None  # what is not measured is no runaway
         if self._what_is_bad(now_ns) or not reader:
             self.bad_ns = now_ns
         if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * S or tripped:
@@ -137,6 +173,13 @@ class Desk:
         for source, wish in self.wishes.items():
             if wish.still and self.is_fresh(source, now_ns):
                 self.neutral[source] = wish.at_ns
+        for source in [source for source in self.neutral if self._better(source, now_ns)]:
+            del self.neutral[source]  # overruled
+
+    def _better(self, source: str, now_ns: int) -> list[str]:
+        """Return the sources above this one that hold the wheel."""
+        higher = (one for one in self.wishes if PRIORITIES[one] > PRIORITIES[source])
+        return [one for one in higher if self.is_fresh(one, now_ns)]
 
     def is_fresh(self, source: str, now_ns: int) -> bool:
         """Tell whether the newest request of a source still holds."""
@@ -189,6 +232,8 @@ class Desk:
         for _, message in self.samples.values():
             if isinstance(message, Link) and (message.state != "up" or not message.armed):
                 bad.append(f"link {message.state}, armed {message.armed}")
+            if isinstance(message, Bumper) and message.lost > LOST_POLLS:
+                bad.append(f"{message.lost} bumper polls lost")
             if isinstance(message, Switches) and not (
                 message.ultrasonic_brake is True and message.bumper_brake is True
             ):
@@ -202,11 +247,7 @@ class Desk:
         wish = self.wishes[source]
         if wish.still and now_ns - wish.still_ns > RAMP_S * S:
             yield "nobody asks for motion"
-        better = [
-            other for other in self.wishes
-            if self.is_fresh(other, now_ns) and PRIORITIES[other] > PRIORITIES[source]
-        ]  # fmt: skip
-        if better:
+        if better := self._better(source, now_ns):
             yield f"{better} go before {source}"
         if source not in self.neutral:
             yield f"{source} was not neutral since the last cause"
@@ -214,17 +255,16 @@ class Desk:
             yield "two publishers on one source"
 
     def _of_release(self, motion: Motion, now_ns: int) -> Iterator[str]:
-        if self.held_ns is None or now_ns - self.held_ns > HOLD_S * S:
-            yield "nobody holds the release"
+        yield from self.operators.complaints(motion, now_ns)
         if not self.bumpers or not self.bumpers[-1].pressed:
             yield "a release without a pressed bumper"
-        if abs(motion.linear) > CREEP_MPS + ROUNDING:
-            yield "a release that does not creep"
 
     def _of_zones(self, motion: Motion, now_ns: int) -> Iterator[str]:
         measured = self.samples.get("velocity")
         for sonar in range(len(SONARS)):
             room = max(0.0, self._distance(sonar, now_ns) - MARGIN_M)
+            if self._may_creep(sonar, motion.source, now_ns):
+                room = max(room, stopping_way(BLIND_MPS))
             speed = approach(sonar, motion.linear, motion.angular)
             if speed > ROUNDING and stopping_way(speed - ROUNDING) > room:
                 yield f"{speed:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"

@@ -18,6 +18,7 @@ from common.wire.framing import Framing, Received
 from tests.invariants.desk import FAST_S, Desk
 from tests.invariants.gate import Gate
 from tests.invariants.net import MS, Letter
+from tests.invariants.operators import Hold
 from tests.invariants.process import Process, Watch
 
 # The bridge's lease and tick; the guard needs less.
@@ -67,7 +68,7 @@ class Judge(Watch):
         message = letter.message
         desk, gate = self.desks.get(process.boot), self.gates.get(process.boot)
         if desk is not None and isinstance(message, m.SafetyState):
-            desk.beats[message.heartbeat] = self.now_ns
+            desk.operators.on_state(message, self.now_ns)
         if desk is not None and isinstance(message, m.Motion):
             self._on_verdict(desk, message)
         if gate is not None and isinstance(message, m.Bumper):
@@ -99,7 +100,10 @@ class Judge(Watch):
         if isinstance(message, m.Driver) and message.bits:
             self.trip("driver", desk.boot)
         if isinstance(message, m.Link):
-            self._tell(self._links.get((message.boot, message.seq), ()), desk.boot)
+            trips = self._links.get((message.boot, message.seq), ())
+            if message.latched_by not in (None, desk.boot):
+                desk.operators.on_trip("predecessor", self.now_ns)
+            self._tell(trips, desk.boot)
 
     def _on_pressed(self, desk: Desk, message: m.Bumper) -> None:
         for trip in self.trips:
@@ -115,21 +119,36 @@ class Judge(Watch):
             if gate.on_report(frame, self.now_ns):
                 self.trip("contact", gate.boot, (gate.boot, gate.published + 1))
 
-    def on_reset(self, process: Process, done: bool) -> None:
+    def on_reset(self, process: Process, request: m.ResetRequest) -> None:
         """Note that an operator's reset was granted; what it must not clear stays."""
         desk = self.desks.get(process.boot)
-        if done and self.reader_up and desk is not None and desk.may_reset(self.now_ns):
-            self.trips = [
-                trip
-                for trip in self.trips
-                if desk.boot not in trip.holders or not desk.is_gone(trip.name)
-            ]
+        if desk is None or not self.reader_up or not desk.may_reset(self.now_ns):
+            return
+        cleared = [
+            trip
+            for trip in self._held_by(desk.boot)
+            if desk.is_gone(trip.name) and desk.operators.may_clear(request, trip.name, self.now_ns)
+        ]
+        self.trips = [trip for trip in self.trips if trip not in cleared]
+        if any(trip.name == "contact" for trip in cleared):
+            desk.operators.on_cleared()
 
-    def on_hold(self, process: Process, done: bool) -> None:
-        """Note that an operator holds the release, or was refused."""
+    def on_hold(self, process: Process, request: m.ReleaseRequest) -> None:
+        """Note that an operator holds or ends the release."""
         desk = self.desks.get(process.boot)
         if desk is not None:
-            desk.held_ns = self.now_ns if done else None
+            desk.operators.on_hold(request, self.now_ns)
+
+    def holds(self, process: Process) -> Hold | None:
+        """Return which release was granted last."""
+        desk = self.desks.get(process.boot)
+        return desk.operators.hold if desk is not None else None
+
+    def on_refusal(self, process: Process, before: Hold | None) -> None:
+        """Note that a call was refused: what was granted before may go on."""
+        desk = self.desks.get(process.boot)
+        if desk is not None:
+            desk.operators.hold = before
 
     def on_start(self, process: Process) -> None:
         """Open a book for a process that has started."""
@@ -150,6 +169,8 @@ class Judge(Watch):
     def trip(self, name: str, holder: int, bridge: tuple[int, int] | None = None) -> None:
         """Something latches; ``holder`` knows of it."""
         self.trips.append(Trip(name, {holder}, bridge))
+        if holder in self.desks and name != "contact":
+            self.desks[holder].operators.on_trip(name, self.now_ns)
 
     def _held_by(self, boot: int) -> list[Trip]:
         return [trip for trip in self.trips if boot in trip.holders]
@@ -158,13 +179,6 @@ class Judge(Watch):
         for trip in trips:
             if trip in self.trips:
                 trip.holders.add(boot)
-
-    def has_authority(self) -> bool:
-        """Tell whether each bridge has a sender whose lease is far from over."""
-        return all(
-            gate.authority is not None and self.now_ns - gate.renewed_ns < 100 * MS
-            for gate in self.gates.values()
-        )
 
     # --- what is done -----------------------------------------------------------------------
 
@@ -176,7 +190,10 @@ class Judge(Watch):
             self.trip("runaway", desk.boot)
         known = frozenset(self._held_by(desk.boot))
         desk.look(self.now_ns, self.reader_up, bool(known))
+        rolls = desk.rest.complaint(motion, moves(motion), self.now_ns)
+        self.violations += [rolls] if rolls else []
         complaints: tuple[str, ...] = ()
+        desk.operators.on_verdict(motion, self.now_ns)
         if moves(motion):
             complaints = tuple(self._of_verdict(desk, motion, known))
         self._records[motion.boot, motion.seq] = Record(complaints, known)

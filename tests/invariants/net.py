@@ -57,6 +57,7 @@ class Letter:
     message: Message
     sender: int  # ``boot`` of the process that sent it
     sent_ns: int
+    private: bool = False  # it travels on the drive link, too
 
 
 @dataclass(slots=True)
@@ -67,6 +68,7 @@ class Ear:
     key: str
     take: Callable[[Letter], None]
     depth: int
+    private: bool = False  # it takes what comes by the drive link, and nothing else
     waiting: deque[Letter] = field(default_factory=deque)
 
     def hears(self, key: str) -> bool:
@@ -105,7 +107,7 @@ def route(key: str) -> str:
 
 
 class Net:
-    """Carries letters to ears; while it is down nothing arrives and nothing waits."""
+    """Carries letters to ears; while it is down nothing arrives but by the drive link."""
 
     def __init__(self, now_ns: int) -> None:
         self.now_ns = now_ns
@@ -118,10 +120,9 @@ class Net:
 
     def put(self, letter: Letter) -> None:
         """Send one to all who listen."""
-        if not self.up:
-            return
         for ear in self.ears:
-            if ear.owner.alive and ear.hears(letter.key):
+            reached = letter.private if ear.private else self.up
+            if reached and ear.owner.alive and ear.hears(letter.key):
                 self.later(route(letter.key), lambda ear=ear: ear.hand_over(letter), ear)  # type: ignore[misc]
 
     def later(
@@ -138,7 +139,7 @@ class Net:
         """Hand over what has arrived by now."""
         while self._under_way and self._under_way[0][0] <= self.now_ns:
             _, _, ear, arrive = heapq.heappop(self._under_way)
-            if self.up or ear is None:
+            if self.up or ear is None or ear.private:
                 arrive()
 
     def wake(self, owner: Owner) -> None:

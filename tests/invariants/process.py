@@ -30,10 +30,11 @@ class Watch:
 class Publisher:
     """Stamps messages as the real one does."""
 
-    def __init__(self, process: "Process", topic: Topic[Any], key: str) -> None:
+    def __init__(self, process: "Process", topic: Topic[Any], key: str, private: bool) -> None:
         self.key = key
         self.last: Any = None
         self._process = process
+        self._private = private
         self._seq = 0
 
     @property
@@ -46,8 +47,23 @@ class Publisher:
         self._seq += 1
         now_ns, boot = self._process.net.now_ns, self._process.boot
         self.last = msgspec.structs.replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
-        self._process.send(Letter(self.key, self.last, boot, now_ns))
+        self._process.send(Letter(self.key, self.last, boot, now_ns, self._private))
         return self.last  # type: ignore[no-any-return]
+
+
+class DriveEnd:
+    """One end of the drive link: it takes nothing from the router, and does not need one."""
+
+    def __init__(self, process: "Process") -> None:
+        self._process = process
+
+    def publisher(self, topic: Topic[Any], **names: str) -> Publisher:
+        """Return a publisher for the link and the bus."""
+        return Publisher(self._process, topic, topic.on(ROBOT, **names), private=True)
+
+    def subscribe(self, topic: Topic[Any], handler: Any, *, depth: int = 1, **names: str) -> None:
+        """Call the handler for each message of the other end."""
+        self._process.subscribe(topic, handler, depth=depth, private=True, **names)
 
 
 class Loop:
@@ -98,12 +114,13 @@ class Process:
         self.hung_until_ns = 0
         self.taking: Letter | None = None  # what its code is dealing with right now
         self.bus = self
+        self.drive = DriveEnd(self)
         self.loop = Loop(net)
         self.log = Silent()
         self.counters: Counter[str] = Counter()
         self.calls: dict[str, Callable[[Any, Any], None]] = {}
-        self.at_rest: Callable[[], bool] = lambda: True
-        self.last_words: Callable[[], None] = lambda: None
+        self.is_stopped: Callable[[], bool] = lambda: True
+        self.on_exit: Callable[[], None] = lambda: None
         self.timing: Callable[[], object] = lambda: None
         self._watch = watch
 
@@ -125,9 +142,13 @@ class Process:
         """Return a bus; one will do."""
         return self
 
+    def open_drive(self, *, listens: bool) -> DriveEnd:
+        """Return the drive link's end."""
+        return self.drive
+
     def publisher(self, topic: Topic[Any], **names: str) -> Publisher:
         """Return a publisher for a topic."""
-        return Publisher(self, topic, topic.on(ROBOT, **names))
+        return Publisher(self, topic, topic.on(ROBOT, **names), private=False)
 
     def send(self, letter: Letter) -> None:
         """Put a letter, stamped or forged."""
@@ -141,6 +162,8 @@ class Process:
         *,
         depth: int = 1,
         refused: object = None,
+        known: object = (),
+        private: bool = False,
         **names: str,
     ) -> None:
         """Call the handler for each message."""
@@ -149,7 +172,7 @@ class Process:
             with self.dealing_with(letter):
                 handler(Arrival(letter.message, letter.key, self.net.now_ns, None))
 
-        self.net.ears.append(Ear(self, topic.on(ROBOT, **names), take, depth))
+        self.net.ears.append(Ear(self, topic.on(ROBOT, **names), take, depth, private))
 
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler for anything on a key."""
@@ -159,6 +182,9 @@ class Process:
                 handler(self.net.now_ns)
 
         self.net.ears.append(Ear(self, key, take, 1))
+
+    def announce(self, key: str) -> None:
+        """Declare nothing: every key reaches every reader here."""
 
     def serve(self, call: Call[Any, Any], handler: Callable[[Any, Any], None]) -> None:
         """Answer a call."""

@@ -12,12 +12,13 @@ import msgspec
 from common import keys
 from common import messages as m
 from common.freshness import S
+from common.operator import release_request, reset_request
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.stamp import Receipt, WallClock
+from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
 from services.safety.ports import Ports
@@ -42,7 +43,7 @@ TIMED = [
 class Sockets:
     """The bridge's end of the cable; one port is enough here."""
 
-    refused = 0
+    refused = send_errors = 0
     last_stranger = None
 
     def __init__(self, stack: "Stack", process: Process) -> None:
@@ -66,10 +67,11 @@ class Sockets:
         """Return when a datagram was read; nobody has stamped it."""
         return Receipt(None, read_ns)
 
-    def send(self, datagram: bytes, port: int) -> None:
+    def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
         """Send to the board, with the judge's complaints."""
         complaints = self._stack.judge.on_leaving(self._process, datagram)
         self._stack.vehicle.hear(datagram, complaints)
+        return True
 
 
 class Stick:
@@ -118,6 +120,8 @@ class Stack:
             name: Stick(name, self._process("stick", None)) for name in ("teleop", "nav")
         }
         self.hand = self._process("hand", None)
+        self.seen: m.SafetyState | None = None  # the newest state that operators see
+        self.hand.subscribe(keys.SAFETY, self._look)
 
     def run(self, duration_ms: int) -> None:
         """Let time pass."""
@@ -205,22 +209,45 @@ class Stack:
         self.hand.send(Letter(keys.estop_key(ROBOT), m.Message(), self.hand.boot, self.net.now_ns))
         self.run(5)
 
-    def reset(self) -> bool:
-        """Ask for a reset."""
+    def _look(self, arrival: Any) -> None:
+        self.seen = arrival.message
+
+    def reset(self, seen: m.SafetyState | None = None) -> bool:
+        """Ask for a reset of what is latched, as it is seen now or as it was seen earlier."""
+        seen = seen or self.seen
+        request = reset_request(seen) if seen else m.ResetRequest()
         with self.time():
-            caller = self.safety.call(keys.RESET, m.ResetRequest())
-        self.judge.on_reset(self.safety, caller.done is True)
+            caller = self.safety.call(keys.RESET, request)
+        if caller.done:
+            self.judge.on_reset(self.safety, request)
         self.run(5)
         return caller.done is True
 
-    def hold(self, held: bool) -> bool:
-        """Hold the release, or let it go."""
-        self.judge.on_hold(self.safety, held)
+    def hold(
+        self,
+        held: bool,
+        direction: m.Direction = "backward",
+        seen: m.SafetyState | None = None,
+    ) -> bool:
+        """Hold the release, or let it go, by what is seen now or was seen earlier."""
+        request = release_request(seen or self.seen, direction, held=held)
+        before = self.judge.holds(self.safety)
+        self.judge.on_hold(self.safety, request)  # a verdict comes along with the answer
         with self.time():
-            caller = self.safety.call(keys.RELEASE, m.ReleaseRequest(held=held))
-        self.judge.on_hold(self.safety, held and caller.done is True)
+            caller = self.safety.call(keys.RELEASE, request)
+        if caller.done is not True:
+            self.judge.on_refusal(self.safety, before)
         self.run(5)
         return caller.done is True
+
+    def switches(self, *, on: bool) -> bool:
+        """Ask the bridge to set the board's bumper brake."""
+        echo = self.seen.heartbeat if self.seen else None
+        with self.time():
+            caller = self.bridge.call(
+                keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=on, echo=echo)
+            )
+        return caller.done is not False
 
     @contextmanager
     def time(self) -> Iterator[None]:

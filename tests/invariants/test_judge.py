@@ -2,8 +2,14 @@
 
 import pytest
 
+from common.messages import Direction
+from sim.vehicle import Twist as Rolling
 from tests.invariants.breakages import BREAKAGES, driver_blinks, driving, hold
+from tests.invariants.breakages_safety import SAFETY_BREAKAGES
+from tests.invariants.operator_breakages import OPERATOR_BREAKAGES
 from tests.invariants.stack import Stack
+
+ALL = BREAKAGES | OPERATOR_BREAKAGES | SAFETY_BREAKAGES
 
 
 def test_a_drive_is_seen_and_found_good() -> None:
@@ -53,6 +59,58 @@ def test_who_stands_on_the_bumper_gets_off_after_a_reset_and_not_before() -> Non
     assert stack.judge.violations == []
 
 
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+def test_the_operator_chooses_the_direction(direction: Direction) -> None:
+    stack = stuck()
+    stack.reset()
+    runs = stack.judge.runs
+    hold(stack, direction)
+    assert stack.judge.runs > runs
+    # The board's own brake lets no RUN pass toward what was hit.
+    assert (stack.vehicle.twist.linear < 0) == (direction == "backward")
+    assert stack.judge.violations == []
+
+
+def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
+    stack = driving()
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(1500)
+    stack.kill("safety", 3000)
+    stack.run(1000)
+    stack.vehicle.measured = Rolling(0.3)
+    stack.run(600)
+    stack.vehicle.measured = None
+    stack.run(3000)
+    assert stack.seen is not None
+    assert "predecessor" in [cause.name for cause in stack.seen.causes]
+    runs = stack.judge.runs
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.run(1000)
+    assert stack.judge.runs == runs
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(700)
+    assert stack.reset()
+    stack.run(700)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.run(500)
+    assert stack.judge.runs > runs
+    assert stack.judge.violations == []
+
+
+@pytest.mark.parametrize("late_ms", [450, 2000, 4000])
+def test_twenty_late_holds_give_no_run(late_ms: int) -> None:
+    stack = stuck()
+    stack.reset()
+    runs, made = stack.judge.runs, []
+    for _ in range(20):
+        made.append(stack.seen)
+        stack.run(late_ms // 20)
+    stack.run(late_ms)
+    assert [stack.hold(True, "backward", seen) for seen in made[:20]] == [False] * 20
+    assert stack.judge.runs == runs
+    assert stack.hold(True)
+
+
 @pytest.mark.parametrize("hung_ms", [0, 60])
 def test_a_fault_that_is_over_at_once_latches_however_late_it_is_read(hung_ms: int) -> None:
     stack = driving()
@@ -83,7 +141,7 @@ def test_what_came_back_drives_after_a_neutral_request_and_not_before(name: str)
     assert stack.judge.runs == runs
     stack.sticks["teleop"].asks = (0.0, 0.0)
     stack.run(700)
-    assert stack.reset()
+    assert stack.reset() == (name == "router")
     stack.run(700)
     stack.sticks["teleop"].asks = (0.5, 0.0)
     stack.run(500)
@@ -91,11 +149,11 @@ def test_what_came_back_drives_after_a_neutral_request_and_not_before(name: str)
     assert stack.judge.violations == []
 
 
-@pytest.mark.parametrize("name", BREAKAGES)
+@pytest.mark.parametrize("name", ALL)
 def test_a_protection_that_is_missing_is_objected_to(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    owner, attribute, broken, scenario, objection = BREAKAGES[name]
+    owner, attribute, broken, scenario, objection = ALL[name]
     monkeypatch.setattr(owner, attribute, broken)
     stack = driving()
     assert stack.judge.violations == []
@@ -104,9 +162,9 @@ def test_a_protection_that_is_missing_is_objected_to(
     assert any(objection in one for one in stack.judge.violations), stack.judge.violations[:5]
 
 
-@pytest.mark.parametrize("name", BREAKAGES)
+@pytest.mark.parametrize("name", ALL)
 def test_the_same_scenario_is_harmless_as_shipped(name: str) -> None:
     stack = driving()
-    BREAKAGES[name][3](stack)
+    ALL[name][3](stack)
     stack.run(2000)
     assert stack.judge.violations == []

@@ -18,6 +18,7 @@ from tests.invariants.judge import STEP_NS
 from tests.invariants.net import ECHO_MS, HOLD_MS, MS, Weather
 from tests.invariants.strategies import (
     BUS,
+    DIRECTIONS,
     FAST,
     HASTY,
     KINDS,
@@ -74,8 +75,8 @@ class Anything(Troubles):
         for side in Side:
             vehicle.fault(side, 0)
         self.stack.net.weather.clear()
-        self.brakes(on=True)
         self.wait(1000)
+        self.brakes(on=True)
         self.reset(lets_go=True)
         self.off_we_go("teleop", -1.0 if self.cured % 2 else 1.0, 0.0, 700)
         self.cured += 1
@@ -98,6 +99,41 @@ class Anything(Troubles):
         self.stack.reset()
         self.off_we_go("teleop", 1.0, 0.0, 400)
 
+    @rule(first=KINDS, then=KINDS, ms=st.sampled_from([20, 210, 700, 1200]))
+    def late_reset(self, first: str, then: str, ms: int) -> None:
+        """Trip something, trip more, and let the reset of the first arrive after that."""
+        self.trip(first)
+        self.let_go("teleop", 400)
+        seen = self.stack.seen
+        self.trip(then)
+        self.stack.run(ms)
+        self.stack.reset(seen)
+        self.off_we_go("teleop", 1.0, 0.0, 400)
+
+    @rule(direction=DIRECTIONS, ms=SHORT | LONG, times=st.integers(1, 8))
+    def late_release(self, direction: m.Direction, ms: int, times: int) -> None:
+        """Let calls that hold the release arrive late, all at once, and perhaps after its end."""
+        seen = self.stack.seen
+        self.release(times // 2, direction)
+        self.stack.hold(False)
+        self.stack.run(ms)
+        for _ in range(times):
+            self.stack.hold(True, direction, seen)
+            self.stack.run(20)
+
+    @rule(direction=DIRECTIONS, other=DIRECTIONS, ms=st.sampled_from([20, 60, 150, 700]))
+    def pressed_again(self, direction: m.Direction, other: m.Direction, ms: int) -> None:
+        """Drive into something, get off it, and touch something again on the way."""
+        self.off_we_go("teleop", 1.0, 0.0, 400)
+        self.stack.vehicle.pressed = True
+        self.let_go("teleop", 1200)
+        self.release(6, direction)
+        self.bumper(pressed=False, ms=ms)
+        self.bumper(pressed=True, ms=ms)
+        self.release(6, direction)
+        self.release(12, other)
+        self.bumper(pressed=False, ms=320)
+
     @rule(kind=KINDS, resets=st.booleans(), dies=st.booleans())
     def stuck(self, kind: str, resets: bool, dies: bool) -> None:
         """Drive into something, with more amiss, and creep off with or without a reset."""
@@ -107,10 +143,10 @@ class Anything(Troubles):
         if dies:
             self.stack.kill("safety", 20)
         self.let_go("teleop", 1200)
-        self.release(2)
+        self.release(2, "backward")
         if resets:
             self.stack.reset()
-        self.release(6)
+        self.release(6, "backward")
         self.bumper(pressed=False, ms=320)
 
     @rule(linear=FAST, route=BUS, weather=ON_BUS, hits=st.booleans())
@@ -171,11 +207,11 @@ class Anything(Troubles):
             self.stack.run(500)
         self.stack.reset()
 
-    @rule(times=st.integers(1, 8))
-    def release(self, times: int) -> None:
+    @rule(times=st.integers(1, 8), direction=DIRECTIONS)
+    def release(self, times: int, direction: m.Direction) -> None:
         """Hold the release for a while."""
         for _ in range(times):
-            self.stack.hold(True)
+            self.stack.hold(True, direction)
             self.stack.run(60)
 
     # --- the end ----------------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """What may go wrong around the stack, as rules; what people do is in ``test_machine.py``."""
 
+from typing import Any
+
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from msgspec.structs import replace
@@ -74,8 +76,7 @@ class Troubles(RuleBasedStateMachine):
     @rule(on=st.booleans())
     def brakes(self, on: bool) -> None:
         """Switch one of the board's own brakes by the bridge's call."""
-        with self.stack.time():
-            self.stack.bridge.call(keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=on))
+        self.stack.switches(on=on)
         self.stack.run(60)
 
     def trip(self, kind: str) -> None:
@@ -183,14 +184,23 @@ class Troubles(RuleBasedStateMachine):
         stick.put(replace(bad, echo=echo, seq=stick.seq), source)
         self.stack.run(5)
 
-    @precondition(
-        lambda self: self.judge.has_authority() and "motion" not in self.stack.net.weather
-    )
-    @rule(forged=st.sampled_from(FORGED), seq=st.integers(1, 2**40))
-    def forged_motion(self, forged: list[m.Motion], seq: int) -> None:
-        """Let somebody else publish motions while safety lives."""
-        hand = self.stack.hand
+    @rule(forged=st.sampled_from(FORGED), seq=st.integers(1, 2**62), copies=st.booleans())
+    def forged_motion(self, forged: list[m.Motion], seq: int, copies: bool) -> None:
+        """Let a client of the router publish motions, under safety's boot or another."""
+        boot = self.stack.safety.boot if copies else 1
         for step, motion in enumerate(forged):
-            message = replace(motion, seq=seq + step)
-            hand.send(Letter(keys.MOTION.on(ROBOT), message, hand.boot, hand.net.now_ns))
+            self.forge(keys.MOTION, replace(motion, seq=seq + step, boot=boot))
         self.stack.run(5)
+
+    @rule(pressed=st.booleans(), linear=st.sampled_from([0.0, 3.0]), seq=st.integers(1, 2**62))
+    def forged_samples(self, pressed: bool, linear: float, seq: int) -> None:
+        """Let a client of the router publish measurements under the bridge's boot."""
+        boot = self.stack.bridge.boot
+        self.forge(keys.BUMPER, m.Bumper(pressed=pressed, seq=seq, boot=boot))
+        self.forge(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0, seq=seq, boot=boot))
+        self.stack.run(60)
+
+    def forge(self, topic: keys.Topic[Any], message: m.Message) -> None:
+        """Put a message as a client without a drive link."""
+        hand = self.stack.hand
+        hand.send(Letter(topic.on(ROBOT), message, hand.boot, hand.net.now_ns))

@@ -3,13 +3,13 @@
 from itertools import pairwise
 
 import pytest
-from prometheus_client.core import Metric
 
 from common.freshness import Latest, S
 from common.messages import Durations, Timing
 from services.metrics.robot import WORTH_S, Robot
 from services.metrics.samples import FAMILIES, sheet
 from tests.metrics.heard import NOW_NS, event, health, link, odometry, safety, whole
+from tests.metrics.values import Values, flat, names
 
 LATE_NS = NOW_NS + round(WORTH_S * S) + 1
 # What is told of a robot of which nothing is fresh.
@@ -18,28 +18,14 @@ ALWAYS = {
     "t2_service_health_age_seconds", "t2_events_total",
 }  # fmt: skip
 
-Values = dict[tuple[str, frozenset[tuple[str, str]]], float]
-
 
 def values(robot: Robot, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
     """Return every sample's value by its name and labels."""
     return flat(sheet({"007": robot}, now_ns, connected=connected, certificates={}))
 
 
-def flat(families: list[Metric]) -> Values:
-    return {
-        (sample.name, frozenset(sample.labels.items())): sample.value
-        for family in families
-        for sample in family.samples
-    }
-
-
 def value(found: Values, name: str, **labels: str) -> float:
     return found[name, frozenset({"robot": "007", **labels}.items())]
-
-
-def names(found: Values) -> set[str]:
-    return {name for name, _ in found}
 
 
 def test_a_robot_that_fares_well() -> None:

@@ -14,9 +14,9 @@ from common.loop import Loop
 from common.messages import Message
 from tests.cli.site import Site
 from tests.metrics.heard import health, link, odometry, safety
-from tests.metrics.test_exporter import running as exporting
-from tests.metrics.test_exporter import scraped, value
-from tests.metrics.test_samples import names
+from tests.metrics.scraping import running as exporting
+from tests.metrics.scraping import scraped, value
+from tests.metrics.values import names
 from tests.support import at, joined, running, wait_until
 
 ROBOT = "001"

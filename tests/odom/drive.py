@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from common.freshness import S
 from common.messages import Mileage, Odometry, Velocity
 from services.odom.config import Odom
-from services.odom.estimator import DISTANCE_WRAP_M, Estimator, Outcome
+from services.odom.estimator import Estimator, Outcome
 from services.odom.pose import Pose
+from services.odom.standstill import DISTANCE_WRAP_M
 
 TICK_NS = S // 50
 EXACT = pytest.approx((0.0, 0.0), abs=1e-6)

@@ -6,8 +6,9 @@ import pytest
 
 from common.messages import Mileage, Velocity
 from services.odom.config import Odom
-from services.odom.estimator import DISTANCE_WRAP_M, Estimator, Outcome, judge, step
+from services.odom.estimator import Estimator, Outcome, judge, step
 from services.odom.legs import Leg
+from services.odom.standstill import DISTANCE_WRAP_M
 
 UP = math.inf
 

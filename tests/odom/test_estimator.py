@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from common.freshness import S
 from common.messages import Velocity
-from services.odom.estimator import DISTANCE_WRAP_M, LEGS_MAX
+from services.odom.estimator import LEGS_MAX
 from services.odom.pose import Pose
+from services.odom.standstill import DISTANCE_WRAP_M
 from tests.odom.drive import (
     EXACT,
     TICK_NS,

@@ -17,7 +17,7 @@ from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from tests.support import PATIENCE_S, at, bus_on, running, wait_until
+from tests.support import PATIENCE_S, at, bus_on, running, safety_state, wait_until
 
 SPEED, TURNING = 0.5, 0.25
 PERIOD_S = 0.02
@@ -32,6 +32,7 @@ class World:
         self.speaking = True
         self.velocity: m.Velocity = m.Velocity(linear=SPEED, angular=TURNING)
         self.epoch = 0
+        self.heartbeat = 500  # of the safety service that is played here, too
         self.origin = 100.0  # where the counters stand at first
         self.ticks = 0
 
@@ -39,6 +40,7 @@ class World:
         self.bus = bus
         self.to_velocity = bus.publisher(keys.VELOCITY)
         self.to_mileage = bus.publisher(keys.MILEAGE)
+        self.to_safety = bus.publisher(keys.SAFETY)
         bus.subscribe(keys.ODOMETRY, self._on_odometry, depth=100)
         bus.subscribe(keys.EVENTS, self._on_event, depth=100, service="odom")
 
@@ -49,6 +51,8 @@ class World:
         self.events.append(arrival.message.name)
 
     def tick(self, _: int) -> None:
+        self.heartbeat += 1
+        self.to_safety.put(safety_state(self.heartbeat))
         if not self.speaking:
             return
         self.ticks += 1
@@ -121,13 +125,31 @@ def test_the_drive_is_followed(endpoint: str, world: World) -> None:
 
 
 def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: World) -> None:
-    assert "NaN" in world.ask(m.PoseRequest(x=float("nan")))
-    assert "x 10.000 m" in world.ask(m.PoseRequest(x=10.0, y=-5.0, heading=3.0))
+    bad = float("nan")
+    wait_until(
+        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)), "heard safety"
+    )
+    pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.heartbeat)
+    assert "x 10.000 m" in world.ask(pose)
     wait_until(lambda: world.heard[-1].epoch == 1, "the new pose")
     first = next(odometry for odometry in world.heard if odometry.epoch == 1)
     assert first.x == pytest.approx(10.0, abs=2.0)
     assert first.y == pytest.approx(-5.0, abs=2.0)
     assert all(point[0] > 5 for point in trajectory(endpoint)["points"])
+
+
+def test_a_pose_that_was_asked_late_is_refused(world: World) -> None:
+    bad = float("nan")
+    wait_until(
+        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)), "heard safety"
+    )
+    late = m.PoseRequest(x=10.0, echo=world.heartbeat)
+    due_s = time.monotonic() + 1.1
+    wait_until(lambda: time.monotonic() > due_s, "a late call")
+    assert "allowed is 1 s" in world.ask(late)
+    assert "no echo" in world.ask(m.PoseRequest(x=10.0))
+    assert "unknown heartbeat" in world.ask(m.PoseRequest(x=10.0, echo=1))
+    assert world.heard[-1].epoch == 0
 
 
 def test_silence_is_told_and_nothing_old_is_published_again(world: World) -> None:
@@ -149,7 +171,7 @@ def test_restart_slip_and_refusal_are_told(world: World) -> None:
     assert abs(world.heard[-1].x) < 30
     world.velocity = m.Velocity(linear=-SPEED, angular=TURNING)
     wait_until(lambda: "slip" in world.events, "word of the slip")
-    assert any(odometry.slip for odometry in world.heard)
+    wait_until(lambda: any(odometry.slip for odometry in world.heard), "odometry that slips")
     world.velocity = m.Velocity(linear=float("nan"), angular=0.0)
     wait_until(lambda: "slip_over" in world.events, "the counters alone")
 

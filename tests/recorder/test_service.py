@@ -1,6 +1,7 @@
 """The recorder on a real bus: what it writes, when it stops, and what kill -9 leaves."""
 
 import errno
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,7 +20,7 @@ from common.config import Sources, load
 from common.freshness import S
 from common.messages import Event
 from common.service import Node
-from services.recorder.config import RecorderConfig
+from services.recorder.config import MB, RecorderConfig
 from services.recorder.reading import Reader, Recorded
 from services.recorder.recorder import Recorder
 from services.recorder.recording import Recording
@@ -48,7 +50,7 @@ def recorder(rig: Rig, folder: Path, *more: str) -> Iterator[None]:
     with running(node.loop):
         wait_until(lambda: node.bus.connected, "the recorder's session")
         yield
-    node.last_words()
+    node.on_exit()
     node.bus.close()
 
 
@@ -149,6 +151,39 @@ def test_no_room_is_told_and_nothing_is_written(rig: Rig, tmp_path: Path) -> Non
     (full,) = (each for each in events if each.name == "disk_full")
     assert full.level == "error"
     assert "recorder.free is 1e+06" in full.text
+
+
+def test_an_incident_is_written_though_old_recordings_fill_the_disk(
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stem = f"{rig.robot}-2026"
+    old = [f"{stem}0101-00000{n}{why}.mcap" for why in ("", "-latch-contact") for n in range(3)]
+    for name in old:
+        (tmp_path / name).write_bytes(bytes(MB))
+    (tmp_path / f"{old[3]}.keep").touch()
+
+    def usage(folder: Path) -> SimpleNamespace:
+        used = sum(each.stat().st_size for each in folder.iterdir())
+        return SimpleNamespace(free=15.5 * MB - used)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    events = told(rig)
+    latched: list[str] = []
+    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    with recorder(rig, tmp_path, "recorder.free=12", "recorder.tail=1"):
+        heard: list[m.SafetyState] = []
+        rig.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: heard.append(a.message)))
+        wait_until(lambda: len(heard) > 10, "safety's state")
+        latched.append("estop")
+        wait_until(lambda: "black_box" in [each.name for each in events], "the incident")
+    (path,) = tmp_path.glob("*-latch-estop.mcap")
+    assert is_whole(path)
+    left = {each.name for each in tmp_path.glob("*.mcap")} - {path.name}
+    assert left == {old[2], old[3], old[5]}
+    (removed,) = (each for each in events if each.name == "recordings_removed")
+    assert removed.text == "3 of the oldest recordings removed for 3 MB of room"
+    assert removed.about == {"first": old[0]}
+    assert not {"disk_full", "black_box_lost"} & {each.name for each in events}
 
 
 def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from common.messages import Drive
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.desk import Desk
+from services.teleop.hold import Press
 from services.teleop.logbook import Logbook
 from tests.faults.far import AHEAD_S, OFFSETS, die_with_parent
 from tests.roaming.notes import Notebook
@@ -49,20 +50,25 @@ class Operator:
         self._notebook.listen(node.bus, keys.SAFETY)
         self._notebook.listen(node.bus, keys.ODOMETRY)
         self._notebook.listen(node.bus, keys.BUMPER)
-        self._desk.press(FIFTH_GEAR, time.monotonic_ns())
-        node.loop.every(REPEAT_S, self._press)
+        self._press(FIFTH_GEAR, time.monotonic_ns())
+        node.loop.every(REPEAT_S, self._hold)
         node.loop.every(LOOK_S, self._look)
 
     def take(self, line: str) -> None:
         """Do what is said."""
         if line == "e":
-            self._desk.press("e", time.monotonic_ns())
+            self._press("e", time.monotonic_ns())
         else:
             self.held = float(line) > 0
 
-    def _press(self, now_ns: int) -> None:
+    def _hold(self, now_ns: int) -> None:
+        self._desk.terminal.sent(0, now_ns)  # its terminal is near, and answers at once
+        self._desk.terminal.answered(0, now_ns)
         if self.held:
-            self._desk.press("w", now_ns)
+            self._press("w", now_ns)
+
+    def _press(self, key: str, now_ns: int) -> None:
+        self._desk.press(Press(key, now_ns), now_ns)
 
     def _look(self, _: int) -> None:
         asked = self._asked.last

@@ -1,5 +1,7 @@
 """A bridge, a driver and a clock for the policy, without a bus: time passes only here."""
 
+import math
+
 import msgspec
 from msgspec.structs import replace
 
@@ -7,11 +9,14 @@ from common.freshness import Latest, S
 from common.messages import (
     SONAR_NAMES,
     Bumper,
+    Direction,
     Drive,
     Driver,
     Link,
     Message,
+    Mileage,
     RangeStatus,
+    SafetyState,
     Switches,
     Ultrasonic,
     Velocity,
@@ -19,11 +24,17 @@ from common.messages import (
 from common.settings import Vehicle
 from services.safety.config import Safety
 from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.latches import latched
 from services.safety.policy import Policy
+from services.safety.report import state_message
 from services.safety.state import Verdict
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
+NO_ECHO_TEXT = (
+    "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat as "
+    "`echo`."
+)
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
 
 
@@ -52,10 +63,13 @@ class Scene:
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
-        self.pressed = False
+        self.pressed, self.lost = False, 0
         self.ranges, self.status = FREE, NO_ECHO
         self.linear: float | None = None  # measured; None follows the command
         self.angular: float | None = None
+        self.distance = 100.0  # by the counters, which follow what is measured
+        self.heading = 0.0
+        self.epoch = 0
         self.left_bits, self.right_bits = 0, 0
         self.switches = Switches(ultrasonic_brake=True, bumper_brake=True)
         self.link = link()
@@ -73,10 +87,14 @@ class Scene:
         sent = self.verdict.twist
         linear = sent.linear if self.linear is None else self.linear
         angular = sent.angular if self.angular is None else self.angular
+        if math.isfinite(linear) and math.isfinite(angular):
+            self.distance += linear * TICK_S
+            self.heading = math.remainder(self.heading + angular * TICK_S, math.tau)
         samples: dict[str, Message] = {
             "velocity": Velocity(linear=linear, angular=angular),
+            "mileage": Mileage(distance=self.distance, heading=self.heading, epoch=self.epoch),
             "ultrasonic": Ultrasonic(ranges=self.ranges, status=self.status),
-            "bumper": Bumper(pressed=self.pressed),
+            "bumper": Bumper(pressed=self.pressed, lost=self.lost),
             "left": Driver(faults=(), bits=self.left_bits),
             "right": Driver(faults=(), bits=self.right_bits),
             "switches": self.switches,
@@ -110,7 +128,7 @@ class Scene:
             seq=self.driver_seq,
             boot=self.driver_boot,
         )
-        return self.decide(Ask(source, drive))
+        return self.decide(Ask(source, drive, self.now_ns))
 
     def drive(
         self,
@@ -138,17 +156,35 @@ class Scene:
         assert self.verdict.command == "run", self.state.latches
         return self
 
-    def reset(self) -> str:
-        """Ask for a reset; return the reason of its refusal."""
-        reply = self.decide(Reset()).reply
+    @property
+    def echo(self) -> int:
+        """The newest heartbeat."""
+        return self.state.heartbeat.number
+
+    def latched(self) -> tuple[int, ...]:
+        """Return the identities of all latched causes, as an operator sees them now."""
+        return tuple(self.state.latches[name].id for name in latched(self.state.latches))
+
+    def reset(self, *causes: int, echo: int | None = None) -> str:
+        """Ask to reset these causes, all by default; return the reason of a refusal."""
+        reply = self.decide(Reset(echo or self.echo, causes or self.latched())).reply
         assert reply
         return "" if reply.done else reply.text
 
-    def hold(self, held: bool = True) -> str:
+    def hold(
+        self,
+        held: bool = True,
+        direction: Direction | None = "backward",
+        echo: int | None = None,
+    ) -> str:
         """Hold the release; return the reason of its refusal."""
-        reply = self.decide(Hold(held)).reply
+        reply = self.decide(Hold(held, direction if held else None, echo or self.echo)).reply
         assert reply
         return "" if reply.done else reply.text
+
+    def tell(self) -> SafetyState:
+        """Return the published state."""
+        return state_message(self.policy, self.state, self.now_ns)
 
     def estop(self) -> Verdict:
         return self.decide(Estop())

@@ -5,12 +5,13 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from common.freshness import S
+from common.heartbeat import Heartbeat
 from common.messages import Drive
 from services.safety.arbiter import RIVAL_NS, Arbiter, Channel
 from services.safety.config import Safety
-from services.safety.heartbeat import Heartbeat
 from services.safety.inputs import Ask
 from services.safety.twist import Twist
 
@@ -30,7 +31,7 @@ def ask(
     echo: int = 41,
 ) -> tuple[Arbiter, str]:
     drive = Drive(linear=linear, angular=0.0, echo=echo, seq=seq, boot=boot)
-    return arbiter.take(Ask(source, drive), BEAT, AGE_NS, now_ns)
+    return arbiter.take(Ask(source, drive, now_ns), BEAT, AGE_NS, now_ns)
 
 
 def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: float = 0.0) -> Arbiter:
@@ -116,7 +117,7 @@ def test_all_rivals_are_named() -> None:
 
 
 def test_a_source_is_at_first_unheard() -> None:
-    assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False)
+    assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False, "")
     assert RIVAL_NS == 500_000_000
 
 
@@ -137,6 +138,45 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
     assert not arbiter.asks_to_move(S)
 
 
+def test_a_lease_counts_from_the_reception() -> None:
+    drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
+    lease_ns, late_ns = round(SOURCES["teleop"].lease * S), 100_000_000
+    arbiter, _ = Arbiter(SOURCES).take(Ask("teleop", drive, 5), BEAT, AGE_NS, late_ns)
+    assert arbiter.driver(5 + lease_ns) == "teleop"
+    assert arbiter.driver(5 + lease_ns + 1) is None
+    assert not arbiter.armed(5 + lease_ns + 1).channels["teleop"].neutral
+    # As does the time of a second publisher.
+    other = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=2)
+    arbiter, refused = arbiter.take(Ask("teleop", other, 6), BEAT, AGE_NS, late_ns)
+    assert (refused, arbiter.rivals(6 + RIVAL_NS)) == ("second_publisher", "")
+    _, refused = arbiter.take(Ask("teleop", other, 6 + lease_ns), BEAT, AGE_NS, 7)
+    assert refused == ""
+
+
+def test_who_held_the_wheel_overrules_who_is_below_and_only_them() -> None:
+    arbiter = Arbiter(SOURCES)
+    lowest = accepted(arbiter, 0, "nav")
+    for nobody_below in (arbiter, lowest):
+        assert nobody_below.overruled(0) is nobody_below
+    for source in ("teleop", "web", "nav"):
+        arbiter = accepted(arbiter, 0, source)
+    arbiter = accepted(arbiter, 0, "demo", 0.3).armed(0)
+    neutral = replace(
+        arbiter, channels={n: c for n, c in arbiter.channels.items() if n != "teleop"}
+    )
+    neutral = neutral.overruled(0)
+    assert {name: one.neutral for name, one in neutral.channels.items()} == {
+        "web": True, "demo": False, "nav": False
+    }  # fmt: skip
+    assert {one.overruled_by for one in arbiter.channels.values()} == {""}
+    assert neutral.channels["nav"].overruled_by == "web"
+    assert arbiter.overruled(S).channels == arbiter.channels  # nobody holds it
+    again = neutral.armed(0)
+    assert again.channels["nav"].neutral
+    assert again.channels["nav"].overruled_by == ""
+    assert again.channels["demo"].overruled_by == "web"  # it asks for motion
+
+
 @given(
     st.lists(
         st.tuples(st.sampled_from([*SOURCES, "nobody"]), st.integers(0, 400), st.floats(-1, 1)),
@@ -152,7 +192,7 @@ def test_the_best_fresh_source_drives_whatever_comes(
         now_ns += pause_ms * 1_000_000
         beat = beat.beat(now_ns)
         drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
-        arbiter, refused = arbiter.take(Ask(source, drive), beat, AGE_NS, now_ns)
+        arbiter, refused = arbiter.take(Ask(source, drive, now_ns), beat, AGE_NS, now_ns)
         assert refused == ("" if source in SOURCES else "unknown_source")
         if not refused:
             last[source] = (now_ns, linear)

@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Action
-from services.safety.causes import RULES, Clears, severity, wants_neutral
+from services.safety.causes import RULES, Clears, bars_motion, severity, wants_neutral
 
 RESET, SETTLED, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.AT_ONCE
 TABLE: list[tuple[str, Action, Clears]] = [
@@ -12,6 +12,8 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("estop_reader", "brake", RESET),
     ("predecessor", "brake", RESET),
     ("runaway", "brake", RESET),
+    ("uncommanded_motion", "brake", RESET),
+    ("not_stopping", "brake", SETTLED),
     ("driver_left", "stop", RESET),
     ("driver_right", "stop", RESET),
     ("flapping", "stop", RESET),
@@ -27,6 +29,7 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("blocked", "stop", AT_ONCE),
     ("no_request", "stop", AT_ONCE),
     ("release", "slow", AT_ONCE),
+    ("bumper_lossy", "slow", AT_ONCE),
     ("obstacle", "slow", AT_ONCE),
     ("sonar", "slow", AT_ONCE),
 ]
@@ -46,3 +49,9 @@ def test_a_brake_is_worse_than_a_stop_and_a_stop_than_slow() -> None:
 @pytest.mark.parametrize(("name", "clears"), [(name, clears) for name, _, clears in TABLE])
 def test_only_passing_causes_go_without_a_neutral_request(name: str, clears: Clears) -> None:
     assert wants_neutral(name) == (clears is not AT_ONCE)
+
+
+def test_causes_that_settle_or_want_a_reset_and_two_publishers_bar_motion() -> None:
+    bars = {rule.name for rule in RULES if bars_motion(rule.name)}
+    passing = {rule.name for rule in RULES if rule.clears is Clears.AT_ONCE}
+    assert bars == {rule.name for rule in RULES} - passing | {"two_publishers"}

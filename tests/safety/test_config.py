@@ -22,14 +22,18 @@ def test_the_file_holds_the_defaults() -> None:
         ("margin", 0.04),
         ("margin", 0.0),
         ("react", 0.09),
+        ("angular_deceleration", 0.09),
         ("hysteresis", 0.019),
         ("max_linear", 1.51),
         ("bumper_age", 0.26),
         ("settle", 0.09),
+        ("max_call_age", 1.51),
         ("release_speed", 0.2),
         ("runaway_time", 2.0),
         ("require_switches", False),
         ("sources.nav.lease", 0.51),
+        ("sources.nav.operator", True),
+        ("creep_speed", 0.26),
     ],
 )
 def test_what_takes_a_protection_away_must_be_owned_up_to(name: str, value: object) -> None:
@@ -37,6 +41,13 @@ def test_what_takes_a_protection_away_must_be_owned_up_to(name: str, value: obje
     with pytest.raises(ConfigError, match=f"{name} = .* or name it in i_accept"):
         read(given)
     assert read(given, f"safety.i_accept={name}").i_accept == (name,)
+
+
+def test_a_deceleration_near_zero_must_be_owned_up_to() -> None:
+    given = ("safety.deceleration=0.09", "safety.max_linear=0.5")
+    with pytest.raises(ConfigError, match=r"deceleration = 0\.09 .* or name it in i_accept"):
+        read(*given)
+    assert read(*given, "safety.i_accept=deceleration").deceleration == 0.09
 
 
 @pytest.mark.parametrize("name", ["bumper_age", "settle", "max_linear", "sources.teleop.lease"])
@@ -53,7 +64,9 @@ def test_only_protections_can_be_given_up() -> None:
 def test_priorities_are_unique() -> None:
     with pytest.raises(ConfigError, match="different priorities"):
         read("safety.sources.web.priority=30")
-    assert read("safety.sources.web.priority=5").sources["web"] == Source(priority=5, lease=0.3)
+    assert read("safety.sources.web.priority=5").sources["web"] == Source(
+        priority=5, lease=0.3, operator=True
+    )
 
 
 def test_it_must_see_as_far_as_it_takes_to_stop() -> None:

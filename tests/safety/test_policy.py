@@ -6,8 +6,8 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import S
-from common.messages import Switches
+from common.freshness import Latest, S
+from common.messages import Limits, SafetyState, Switches
 from services.safety.causes import BY_NAME, Clears
 from services.safety.config import Safety
 from services.safety.flapping import FAILURES
@@ -274,3 +274,19 @@ def test_every_cause_of_the_table_can_be_told() -> None:
     for rule in BY_NAME.values():
         assert rule.text.endswith(".")
         assert rule.action != "slow" or rule.clears is Clears.AT_ONCE
+
+
+def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_request() -> None:
+    scene = Scene().running(0.3)
+    state = SafetyState(
+        verdict="run", latched=(), causes=(), source=None, heartbeat=1, text="",
+        limits=Limits(forward=1.0, backward=1.0, angular=1.0),
+    )  # fmt: skip
+    scene.inputs = replace(scene.inputs, estop_path=Latest(state, scene.now_ns))
+    assert scene.drive(0.3, seconds=0.18).command == "run"
+    assert scene.drive(0.3, seconds=0.08).command == "stop"
+    assert "the emergency stop passes" in scene.state.latches["silent"].text
+    scene.inputs = replace(scene.inputs, estop_path=Latest(state, scene.now_ns + 2 * S))
+    assert scene.drive(0.3, seconds=1.0).command == "stop"
+    scene.drive()
+    assert scene.drive(0.3).command == "run"

@@ -5,6 +5,7 @@ from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import SONAR_NAMES
+from services.safety.causes import RULES
 from services.safety.config import Safety
 from services.safety.flapping import FAILURES
 from services.safety.latches import Held
@@ -27,12 +28,13 @@ def test_an_old_velocity_is_no_runaway() -> None:
     assert "runaway" not in scene.state.latches
 
 
-def test_a_reading_that_stays_the_same_while_driving_is_not_believed() -> None:
+def test_a_reading_that_stays_the_same_while_driving_limits_to_the_creep_speed() -> None:
     scene = Scene()
     scene.sonar(front=3.0)
-    assert scene.ready().drive(0.3, seconds=1.0).command == "run"
-    assert scene.drive(0.3, seconds=1.5).command == "stop"
-    assert scene.state.heard.sonars[SONAR_NAMES.index("front")].fault == "stuck"
+    assert scene.ready().drive(0.3, seconds=1.0).name == "run"
+    assert scene.drive(0.3, seconds=1.5).name == "slow"
+    assert scene.state.heard.sonars[SONAR_NAMES.index("front")].suspect
+    assert scene.verdict.twist.linear == pytest.approx(0.15)
 
 
 def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
@@ -116,8 +118,8 @@ def test_what_is_held_knows_since_when() -> None:
     since_ns = scene.now_ns
     scene.tick(3)
     now_ns = scene.now_ns
-    expected = Held(since_ns, now_ns, 0, (0, now_ns), "Nobody asks to move.")
-    assert scene.state.latches["no_request"] == expected
+    held = scene.state.latches["no_request"]
+    assert held == Held(since_ns, now_ns, 0, (0, now_ns), "Nobody asks to move.", held.id)
 
 
 def test_flapping_knows_since_when() -> None:
@@ -130,6 +132,22 @@ def test_flapping_knows_since_when() -> None:
     held = scene.state.latches["flapping"]
     assert scene.now_ns - S // 10 < held.since_ns < held.bad_ns == scene.now_ns
     assert held.token == (0, scene.now_ns)
+
+
+def test_a_cause_is_identified_by_the_decision_in_which_it_began() -> None:
+    scene = Scene().ready()
+    for _ in range(int(FAILURES)):
+        scene.tick(40)
+        scene.muted = {"bumper"}
+        for _ in range(9):
+            scene.tick()
+            if "flapping" in scene.state.latches:
+                break
+        else:
+            scene.muted = set()
+    for name in ("flapping", "no_request"):
+        assert scene.state.latches[name].id // len(RULES) > 0
+    assert scene.state.latches["flapping"].id // len(RULES) == scene.state.decision
 
 
 def test_room_is_not_looked_for_while_motion_is_barred() -> None:
@@ -158,5 +176,5 @@ def test_nothing_creeps_while_two_publishers_ask() -> None:
     assert "release" in scene.state.latches
     scene.driver_boot, scene.driver_seq = 100, 0
     assert scene.ask(0.0).refused == "second_publisher"
-    assert scene.verdict.command == "stop"
+    assert scene.verdict.command == "brake"  # the release ends, and the bumper is still pressed
     assert "release" not in scene.state.latches

@@ -10,6 +10,7 @@ import zenoh
 
 from common import codec, keys, realtime
 from common.bus.bus import Arrival, Bus
+from common.bus.drive import DriveLink
 from common.bus.session import client_config
 from common.config import Sources, load
 from common.loop import Loop
@@ -18,10 +19,10 @@ from common.messages import (
     Drive,
     Motion,
     ReleaseRequest,
-    ResetRequest,
     SafetyState,
     Velocity,
 )
+from common.operator import reset_request
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
@@ -60,8 +61,10 @@ class Seen:
     motions: list[Motion] = field(default_factory=list)
     states: list[SafetyState] = field(default_factory=list)
     answers: list[str] = field(default_factory=list)
+    drive: DriveLink = field(init=False)
 
     def watch(self, bus: Bus) -> None:
+        self.drive = DriveLink(bus, listens=True)
         bus.subscribe(keys.MOTION, self._motion, depth=64)
         bus.subscribe(keys.SAFETY, self._state, depth=64)
 
@@ -99,7 +102,7 @@ def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> Non
         safety_on(endpoint) as node,
         bus_on(endpoint, loop, seen.watch) as bus,
     ):
-        bumper, velocity = bus.publisher(keys.BUMPER), bus.publisher(keys.VELOCITY)
+        bumper, velocity = (seen.drive.publisher(each) for each in (keys.BUMPER, keys.VELOCITY))
         repeat_until(
             lambda: (
                 velocity.put(Velocity(linear=0.0, angular=0.0)),
@@ -109,23 +112,24 @@ def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> Non
             "the brake",
         )
         assert seen.motions[-1].judged_boot == bus.boot
+        wait_until(lambda: seen.states and seen.states[-1].release, "a latched contact")
         for held in (True, False):
             bus.ask(
                 keys.RELEASE,
-                ReleaseRequest(held=held),
+                ReleaseRequest(held=held, direction="backward", echo=seen.states[-1].heartbeat),
                 lambda done: seen.answers.append(done.text),
                 seen.answers.append,
             )
         bus.ask(
             keys.RESET,
-            ResetRequest(),
+            reset_request(seen.states[-1]),
             lambda done: seen.answers.append(done.text),
             seen.answers.append,
         )
         wait_until(lambda: len(seen.answers) == 3, "three answers")
         assert "Let go." in seen.answers
         assert any("Not gone yet" in text for text in seen.answers)
-        wait_until(node.at_rest, "rest")
+        wait_until(node.is_stopped, "rest")
         wait_until(
             lambda: any(c.name == "leaving" for state in seen.states[-1:] for c in state.causes),
             "leaving",
@@ -153,6 +157,27 @@ def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
             lambda: wanted <= set(node.counters),
             "every reason",
         )
+
+
+def test_a_request_is_posted_to_the_loop_once(endpoint: str) -> None:
+    loop, posts = Loop(), 0
+    with running(loop), safety_on(endpoint) as node, bus_on(endpoint, loop, lambda _: None) as bus:
+        drive = bus.publisher(keys.DRIVE, source="demo")
+        post = node.bus.post
+
+        def counted(call: Callable[[], None]) -> None:
+            nonlocal posts
+            posts += 1
+            post(call)
+
+        node.bus.post = counted
+        repeat_until(
+            lambda: drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+            lambda: node.counters["refused_late"] >= 30,
+            "requests",
+        )
+        assert posts <= node.counters["refused_late"] + 5  # others on the bus, and what waits
+        assert node.bus.counters["overrun"] == 0
 
 
 def test_an_estop_by_delete_latches(endpoint: str) -> None:
@@ -220,3 +245,30 @@ def test_the_program_opens_a_reader_and_closes_it(
     monkeypatch.setattr(program, "run", run)
     assert program.main([]) == 5
     assert not opened[0].connected
+
+
+def test_what_the_bridge_measures_is_not_taken_from_the_router(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch),
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        measured = [topic for topic in keys.TOPICS if topic.publisher == "bridge"]
+        repeat_until(
+            lambda: [
+                session.put(topic.on("001", side=side), b"\xc1")
+                for topic in measured
+                for side in ("left", "right")
+            ],
+            lambda: node.bus.counts[keys.MOTION.on("001")] > 50,
+            "a second",
+        )
+        assert node.bus.counters["undecodable"] == 0
+        bumper = seen.drive.publisher(keys.BUMPER)
+        repeat_until(
+            lambda: bumper.put(Bumper(pressed=True)),
+            lambda: seen.motions and seen.motions[-1].command == "brake",
+            "what comes by the drive link",
+        )

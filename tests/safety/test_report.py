@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from common.messages import Drive
+from common.messages import Direction, Drive
 from services.safety.inputs import Ask, Estop, Event, Hold, Reset
 from services.safety.report import (
     motion_message,
@@ -31,6 +31,7 @@ def ticked(scene: Scene) -> list[str]:
 def test_the_state_tells_verdict_causes_and_limits() -> None:
     scene = Scene().running()
     scene.sonar(front=1.0)
+    scene.linear = 0.0
     scene.drive(1.0)
     state = state_message(scene.policy, scene.state, scene.now_ns + 500_000_000)
     assert (state.verdict, state.source, state.latched) == ("slow", "teleop", ())
@@ -118,8 +119,12 @@ def test_transitions_are_told_once() -> None:
     assert noted(scene, Hold(True)) == ["release_refused"]
     scene.pressed, scene.left_bits = False, 0
     scene.tick(30)
-    assert noted(scene, Reset()) == ["reset"]
-    assert noted(scene, Reset()) == ["reset"]
+    scene.pressed = True
+    assert ticked(scene) == ["contact"]  # another press, although the first is still latched
+    scene.pressed = False
+    scene.tick(30)
+    assert noted(scene, Reset(scene.echo, scene.latched())) == ["reset"]
+    assert noted(scene, Reset(scene.echo, (1,))) == ["reset_refused"]
 
 
 def test_a_change_of_source_is_told() -> None:
@@ -131,8 +136,9 @@ def test_a_change_of_source_is_told() -> None:
 
 def test_a_release_is_told_when_it_begins_and_ends() -> None:
     scene = hit()
-    assert noted(scene, Hold(True)) == ["source", "release"]
-    assert noted(scene, Hold(True)) == []
+    held = Hold(True, "backward", scene.echo)
+    assert noted(scene, held) == ["source", "release"]
+    assert noted(scene, held) == []
     assert noted(scene, Hold(False)) == ["stop", "source", "release_end"]
 
 
@@ -146,3 +152,37 @@ def test_what_changes_is_told_at_once_and_distances_are_not_a_change() -> None:
     assert signature(scene.state) == before
     scene.estop()
     assert signature(scene.state) != before
+    before = signature(scene.state)
+    held = dict(scene.state.latches)
+    held["estop"] = replace(held["estop"], id=1)
+    assert signature(replace(scene.state, latches=held)) != before
+    release = replace(scene.state.release, forbidden=frozenset({"forward"}))
+    assert signature(replace(scene.state, release=release)) != before
+
+
+def test_causes_are_told_with_their_identities() -> None:
+    scene = hit()
+    scene.estop()
+    told = scene.tell()
+    assert {cause.name: cause.id for cause in told.causes} == {
+        name: one.id for name, one in scene.state.latches.items()
+    }
+    assert len({cause.id for cause in told.causes}) == len(told.causes)
+
+
+def test_what_is_known_of_a_way_off_is_told_while_a_contact_is_latched() -> None:
+    assert Scene().ready().tell().release is None
+    scene = hit()
+    first = scene.tell().release
+    assert first is not None
+    assert (first.believed_free, first.forbidden) == ("backward", ())
+    scene.tick(50)
+    later = scene.tell().release
+    assert later is not None
+    assert first.age is not None
+    assert later.age == pytest.approx(first.age + 1.0)
+    forbid: frozenset[Direction] = frozenset({"backward", "forward"})
+    scene.state = replace(scene.state, release=replace(scene.state.release, forbidden=forbid))
+    told = scene.tell().release
+    assert told is not None
+    assert (told.believed_free, told.forbidden) == (None, ("backward", "forward"))

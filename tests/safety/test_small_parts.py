@@ -1,4 +1,4 @@
-"""The parts of a few lines: twist, ramp, heartbeat, runaway, flapping, release."""
+"""The parts of a few lines: twist, ramp, heartbeat, runaway, flapping."""
 
 import math
 
@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import Latest, S
-from common.messages import Velocity
+from common.heartbeat import CAPACITY, Heartbeat
+from common.messages import Mileage, Velocity
 from services.safety.flapping import FAILURES, Credit
-from services.safety.heartbeat import CAPACITY, Heartbeat
 from services.safety.inputs import Inputs
 from services.safety.ramp import ramp, start
-from services.safety.release import Release, sweep
 from services.safety.runaway import Axis, Bounds
+from services.safety.trajectory import Counter
 from services.safety.twist import STILL, Twist
 
 UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
@@ -146,29 +146,21 @@ def test_credit_drains_faster_than_it_refills() -> None:
     assert Credit().after(99 * S, failed=False, good=True).left == FAILURES
 
 
-def test_the_way_back_is_the_last_motion_reversed() -> None:
-    assert Release().away(0.1, 0.65) == STILL
-    assert Release(Twist(0.5)).away(0.1, 0.65).linear == pytest.approx(-0.1)
-    turned = Release(Twist(0.5, -1.0)).away(0.1, 0.65)
-    assert sweep(turned, 0.65) == pytest.approx(0.1)
-    assert turned.linear < 0 < turned.angular
-
-
-def test_the_way_is_counted_by_the_larger_speed() -> None:
-    release = Release(Twist(0.5)).crept(Twist(-0.1), STILL, 0.65, 0.5)
-    assert release.left(0.15) == pytest.approx(0.1)
-    assert release.crept(STILL, Twist(0.4), 0.65, 0.5).left(0.15) == 0.0
-
-
-def test_a_hold_is_a_lease() -> None:
-    assert not Release().is_held(0, 0.3)
-    held = Release(held_ns=0)
-    assert held.is_held(round(0.3 * S), 0.3)
-    assert not held.is_held(round(0.3 * S) + 1, 0.3)
-
-
 def test_a_velocity_is_unknown_until_it_is_a_number() -> None:
     assert Inputs().measured is None
     for linear, known in ((math.nan, None), (0.5, Twist(0.5, 0.0))):
         velocity = Latest(Velocity(linear=linear, angular=0.0), 0)
         assert Inputs(velocity=velocity).measured == known
+
+
+@pytest.mark.parametrize(
+    ("distance", "heading", "known"),
+    [(1.0, 2.0, True), (math.nan, 0.0, False), (0.0, math.inf, False), (-math.inf, 0.0, False)],
+)
+def test_counters_are_unknown_until_they_are_numbers(
+    distance: float, heading: float, known: bool
+) -> None:
+    assert Inputs().counter is None
+    mileage = Mileage(distance=distance, heading=heading, epoch=3, boot=9)
+    counter = Inputs(mileage=Latest(mileage, 0)).counter
+    assert counter == (Counter((9, 3), distance, heading) if known else None)

@@ -68,6 +68,23 @@ def test_reacting_and_stopping_takes_the_room_there_is(field: Zones, distance: f
     assert speed * 0.25 + speed**2 / (2 * 0.6) == pytest.approx(distance - 0.2, abs=1e-9)
 
 
+@pytest.mark.parametrize(("speed", "room"), [(0.0, 0.2), (0.15, 0.25625), (1.0, 1.2833333)])
+def test_the_room_of_a_speed_is_where_it_is_allowed(
+    field: Zones, speed: float, room: float
+) -> None:
+    assert field.room(speed) == pytest.approx(room)
+    assert field.allowed(field.room(speed)) == pytest.approx(speed)
+    assert replace(field, react=0.5, deceleration=0.4).room(0.2) == pytest.approx(0.35)
+
+
+@pytest.mark.parametrize(
+    ("name", "along"),
+    [("left", 0.0), ("front", 0.3), ("front_left", 0.54 * math.sqrt(0.5)), ("rear", -0.3)],
+)
+def test_a_flank_does_not_move_along_its_axis(field: Zones, name: str, along: float) -> None:
+    assert field.along(SONAR_NAMES.index(name), Twist(0.3, 1.2)) == pytest.approx(along, abs=1e-12)
+
+
 @given(st.floats(0.0, 6.0), st.floats(0.0, 6.0))
 def test_nearer_is_never_faster(field: Zones, one: float, other: float) -> None:
     near, far = sorted((one, other))

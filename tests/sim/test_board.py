@@ -20,8 +20,9 @@ BACKWARD = c.MotionCommand(c.MotionKind.RUN, -100)
 TURN = c.MotionCommand(c.MotionKind.RUN, 0, 300)
 
 
-def board(unit: str = "decidegree", **settings: Any) -> Board:
-    wire = msgspec.convert({"angular_unit": unit}, Wire)
+def board(unit: str = "decidegree", feedback: str = "", **settings: Any) -> Board:
+    units = {"command_angular_unit": unit, "feedback_angular_unit": feedback or unit}
+    wire = msgspec.convert(units, Wire)
     return Board(wire, Sim(**settings), CLEAR)
 
 
@@ -84,6 +85,10 @@ def test_the_angular_unit_is_a_setting_both_ways() -> None:
     some.sense(Twist(0.0, -0.25), CLEAR, pressed=False)
     assert some.velocity() == r.VelocityReport(0, -250)
     assert board().target(TURN).angular == pytest.approx(math.radians(30))
+    mixed = board("milliradian", "decidegree")
+    assert mixed.target(c.MotionCommand(c.MotionKind.RUN, 0, 500)) == Twist(0.0, 0.5)
+    mixed.sense(Twist(0.0, math.radians(30)), CLEAR, pressed=False)
+    assert mixed.velocity() == r.VelocityReport(0, 300)
 
 
 def test_counters_add_up_with_their_signs() -> None:

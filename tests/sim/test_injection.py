@@ -139,3 +139,56 @@ def test_a_script_is_in_time_though_the_tick_is_late() -> None:
     assert rig.simulation.now_ns == START_NS + S // 2
     frozen = 4  # at 0.12, 0.14, 0.16 and 0.18 s
     assert len(rig.simulation.take_sent(rig.now_ns + S)) == 2 * (25 - frozen)
+
+
+@pytest.mark.parametrize(
+    ("where", "ports"),
+    [("asked", [4001]), ("first", [4002]), ("second", [4001]), ("both", [4002, 4001])],
+)
+def test_answers_go_where_the_firmware_sends_them(where: q.Where, ports: list[int]) -> None:
+    rig = Rig()
+    rig.do(q.Firmware(answers=where))
+    before = len(rig.datagrams)
+    rig.say(c.BumperQuery(), port=4001)
+    assert [datagram.port for datagram in rig.datagrams[before:]] == ports
+
+
+def test_hits_may_be_reported_on_the_other_port() -> None:
+    rig = Rig()
+    rig.do(q.Firmware(hits="second"))
+    for pressed, port in ((False, 4002), (True, 4001)):
+        rig.do(q.Bumper(pressed=pressed))
+        before = len(rig.datagrams)
+        assert rig.say(c.BumperQuery()) == [r.BumperReport(pressed)]
+        assert [datagram.port for datagram in rig.datagrams[before:]] == [port]
+
+
+def test_a_firmware_without_echoes_sets_its_brakes_and_says_nothing() -> None:
+    rig = Rig()
+    rig.do(q.Firmware(echoes=False))
+    assert rig.say(c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)) == []
+    assert (rig.truth.bumper_brake, rig.truth.ultrasonic_brake) == (True, True)
+
+
+def test_a_board_that_ignores_stop_drives_on_and_obeys_break() -> None:
+    rig = Rig()
+    rig.run(0.3)
+    rig.after(1.0)
+    rig.do(q.Firmware(ignores=("stop",)))
+    rig.stop()
+    rig.after(1.0)
+    assert rig.truth.linear == pytest.approx(0.3)
+    assert rig.truth.command.kind == "stop"
+    rig.say(c.MotionCommand(c.MotionKind.BREAK))
+    rig.after(0.1)
+    assert rig.truth.linear == 0.0
+
+
+def test_every_third_report_of_a_kind_is_lost() -> None:
+    rig = Rig()
+    rig.do(q.Lose(reports=("bumper",), every=3))
+    counts = [len(rig.say(c.BumperQuery())) for _ in range(9)]
+    assert counts == [1, 1, 0] * 3
+    assert [len(rig.say(c.DistanceQuery())) for _ in range(3)] == [1, 1, 1]
+    rig.do(q.Lose())
+    assert [len(rig.say(c.BumperQuery())) for _ in range(3)] == [1, 1, 1]

@@ -25,7 +25,7 @@ from sim.control import Control
 from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
 from sim.trace import read
 from sim.world import Box
-from tests.common.test_realtime import needs_right
+from tests.common.rights import needs_right
 from tests.support import PATIENCE_S, free_port, wait_until
 
 FRAMING = Framing()

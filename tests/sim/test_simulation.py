@@ -123,7 +123,12 @@ def test_a_hole_is_left_out() -> None:
 
 
 def test_the_angular_unit_of_the_wire_is_obeyed() -> None:
-    rig = Rig(EMPTY, config(wire={"angular_unit": "milliradian"}))
+    rig = Rig(
+        EMPTY,
+        config(
+            wire={"command_angular_unit": "milliradian", "feedback_angular_unit": "milliradian"}
+        ),
+    )
     rig.say(c.MotionCommand(c.MotionKind.RUN, 0, 500))
     said = rig.after(1.0)
     assert rig.truth.angular == pytest.approx(0.5)

@@ -62,13 +62,10 @@ def test_it_sends_from_its_own_address_or_from_a_foreign_one(pc: socket.socket) 
     assert sender[0] not in ("127.0.0.1", "0.0.0.0")
 
 
-@pytest.mark.parametrize("address", ["127.0.0.2", "::1"])
+@pytest.mark.parametrize("address", ["127.0.0.2", "0.0.0.0"])
 def test_the_foreign_address_is_always_another(address: str) -> None:
     port = free_port(socket.SOCK_DGRAM)
-    try:
-        board = BoardSocket(Board(address=address, listen_address=address, port=port))
-    except LinkError as error:
-        pytest.skip(str(error))
+    board = BoardSocket(Board(address=address, listen_address=address, port=port))
     with closing(board):
         board.send(Datagram(b"nobody listens", 4001, foreign=True))
         assert board._foreign.getsockname()[:2] != board.sock.getsockname()[:2]

@@ -92,6 +92,18 @@ def shuts_out(m: Machine) -> str:
     return f"{seen[0]}, {seen[1]}: the group comes in, others do not; `t2 health` is content"
 
 
+def keeps_apart(m: Machine) -> str:
+    """Check that only bridge and safety can connect to the drive link."""
+    socket = "/run/t2-drive/drive.sock"
+    seen = m.said("stat", "-c", "%A %U %G", "/run/t2-drive", socket).split("\n")
+    assert seen[:2] == ["drwx------ t2 t2", "srw------- t2 t2"], seen
+    for name in UNITS:
+        enter = ("nsenter", "-m", "-t", m.unit(name)["MainPID"])
+        inside = m.tried(*enter, "stat", socket).returncode == 0
+        assert inside == (name in ("t2-bridge.service", "t2-safety.service")), name
+    return "bridge and safety see their socket, the others do not, and it is the user's alone"
+
+
 def watched(m: Machine) -> str:
     """Stop each process as a debugger would: systemd kills it and starts it again."""
     took = []
@@ -210,8 +222,8 @@ def upgrades(m: Machine) -> str:
 
 
 CHECKS: list[Callable[[Machine], str]] = [
-    installs, verifies, starts, shuts_out, watched, killed, stops_in_order, lets_in, refuses,
-    upgrades,
+    installs, verifies, starts, shuts_out, keeps_apart, watched, killed, stops_in_order, lets_in,
+    refuses, upgrades,
 ]  # fmt: skip
 
 

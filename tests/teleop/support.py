@@ -9,11 +9,13 @@ from msgspec import Struct
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.config import Loaded
+from common.freshness import S
 from common.keys import Call, Topic
-from common.messages import Drive, Limits, Link, Message, Odometry, SafetyState
+from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Release, SafetyState
 from common.requests import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
+from services.teleop.desk import Desk
 from services.teleop.logbook import Logbook
 from services.teleop.view import View
 from tests.support import at
@@ -96,6 +98,32 @@ def safety_state(**fields: Any) -> SafetyState:
     return SafetyState(**usual | fields)
 
 
+def release(**fields: Any) -> Release:
+    """Return a contact after a motion forward, but for the given fields."""
+    usual: dict[str, Any] = {
+        "believed_free": "backward",
+        "travelled": 0.43,
+        "age": 12.0,
+        "forbidden": (),
+        "left": 0.12,
+    }
+    return Release(**usual | fields)
+
+
+def contact_state(**fields: Any) -> SafetyState:
+    """Return a state of safety with a pressed bumper, but for the given fields."""
+    pressed = Cause(name="contact", action="brake", age=12.0, text="The bumper was hit.", id=42)
+    usual: dict[str, Any] = {
+        "verdict": "brake",
+        "latched": ("contact",),
+        "causes": (pressed,),
+        "source": None,
+        "text": "The bumper is pressed.",
+        "release": release(),
+    }
+    return safety_state(**usual | fields)
+
+
 def link(**fields: Any) -> Link:
     """Return a link that is up, but for the given fields."""
     usual: dict[str, Any] = {
@@ -139,3 +167,9 @@ def view(**fields: Any) -> View:
         "top": Twist(0.2, 0.3),
     }
     return View(**usual | fields)
+
+
+def answer(desk: Desk, now_ns: int) -> None:
+    """Let a desk know a terminal that answers at once."""
+    desk.terminal.sent(0, now_ns - S // 1000)
+    desk.terminal.answered(0, now_ns)

@@ -3,76 +3,144 @@
 import contextlib
 import fcntl
 import os
+import re
+import select
 import struct
 import subprocess
 import sys
 import termios
+import threading
+import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-TELEOP = ("services.teleop", "--no-gamepad")
+# A machine that runs tests holds up terminals, too, for longer than a vehicle may accept.
+PATIENT = (
+    "--set", 'teleop.i_accept=["round_trip"]', "--set", "teleop.round_trip=2.0",
+)  # fmt: skip
+STRICT = ("services.teleop", "--no-gamepad")
+TELEOP = (*STRICT, *PATIENT)
+
+# What teleop asks a terminal: where is the cursor, after it was moved there?
+QUESTION = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
+POLL_S = 0.005
+MULTIPLEXERS = ("TMUX", "STY", "ZELLIJ")  # what the tests run in is not what teleop runs in
+
+
+class Line:
+    """One direction of the way to a terminal: first in, first out, after a delay."""
+
+    def __init__(self, delay_s: float) -> None:
+        self.delay_s = delay_s
+        self.held_until = 0.0
+        self._parts: deque[tuple[float, bytes]] = deque()
+
+    def put(self, part: bytes) -> None:
+        self._parts.append((time.monotonic() + self.delay_s, part))
+
+    def take(self) -> bytes:
+        """Return what has arrived."""
+        now, arrived = time.monotonic(), b""
+        while self._parts and max(self._parts[0][0], self.held_until) <= now:
+            arrived += self._parts.popleft()[1]
+        return arrived
 
 
 class Terminal:
-    """A pseudo terminal with a program in it."""
+    """A pseudo terminal with a program in it, and an emulator that answers it, far away or not."""
 
     def __init__(
         self,
         command: Sequence[str],
         folder: Path | None = None,
         env: Mapping[str, str] = os.environ,
+        *,
+        delay_s: float = 0.0,
+        answers: bool = True,
     ) -> None:
         self.fd, inner = os.openpty()
         fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        usual = {name: value for name, value in env.items() if name not in MULTIPLEXERS}
         self.process = subprocess.Popen(
             command,
             stdin=inner,
             stdout=inner,
             stderr=inner,
             cwd=folder,
-            env={**env, "TERM": "xterm-256color"},
+            env={**usual, "TERM": "xterm-256color"},
             start_new_session=True,
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
         )
         os.close(inner)
         os.set_blocking(self.fd, False)
         self.shown = b""
+        self._answers = answers
+        self._keys, self._picture = Line(delay_s), Line(delay_s)
+        self._seen = 0  # bytes of ``shown`` that were looked through for questions
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
 
     def type(self, keys_: str) -> None:
-        os.write(self.fd, keys_.encode())
+        self._keys.put(keys_.encode())
+
+    def stall(self, seconds: float) -> None:
+        """Hold everything up, both ways, and let it arrive all at once after that."""
+        self._keys.held_until = self._picture.held_until = time.monotonic() + seconds
 
     def read(self) -> None:
-        """Take what was drawn since the last look; the program stalls if nobody does."""
-        with contextlib.suppress(OSError):
-            while part := os.read(self.fd, 65536):
-                self.shown += part
+        """Wait until what was drawn and typed so far has been passed on, if there is no delay."""
+        time.sleep(2 * POLL_S)
 
     def reading(self) -> bool:
         """Read on beside another condition; always true."""
-        self.read()
         return True
 
     def shows(self, words: bytes) -> bool:
         """Tell whether the words have been drawn."""
-        self.read()
         return words in self.shown
 
     def hang_up(self) -> None:
         if self.fd >= 0:
+            self._closed.set()
+            self._thread.join()
             os.close(self.fd)
             self.fd = -1
 
     def ends(self) -> bool:
         """Tell whether the program has ended."""
-        self.read()
         return self.process.poll() is not None
+
+    def _serve(self) -> None:
+        """Read all the time: the program stalls otherwise."""
+        while not self._closed.is_set():
+            with contextlib.suppress(OSError):  # the program has ended, or reads no more
+                if select.select([self.fd], [], [], POLL_S)[0]:
+                    self._picture.put(os.read(self.fd, 65536))
+            self._draw(self._picture.take())
+            with contextlib.suppress(OSError):
+                if typed := self._keys.take():
+                    os.write(self.fd, typed)
+            if self.process.poll() is not None:
+                time.sleep(POLL_S)  # select returns at once from now on
+
+    def _draw(self, part: bytes) -> None:
+        self.shown += part
+        for question in QUESTION.finditer(self.shown, self._seen):
+            self._seen = question.end()
+            if self._answers:
+                row, column = question.groups()
+                self._keys.put(b"\x1b[%s;%sR" % (row, column))
 
 
 @contextlib.contextmanager
-def terminal(endpoint: str, *program: str) -> Iterator[Terminal]:
+def terminal(
+    endpoint: str, *program: str, delay_s: float = 0.0, answers: bool = True
+) -> Iterator[Terminal]:
     """Run a module with its arguments on the bus at an endpoint while the context lasts."""
-    module = [sys.executable, "-m", *(program or TELEOP)]
-    with at_terminal(Terminal([*module, "--set", f"bus.connect={endpoint}"])) as it:
+    module = [sys.executable, "-m", *(program or TELEOP), "--set", f"bus.connect={endpoint}"]
+    with at_terminal(Terminal(module, delay_s=delay_s, answers=answers)) as it:
         yield it
 
 

@@ -4,20 +4,22 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
-from textual.events import AppBlur
+from textual.events import AppBlur, Key
 from textual.pilot import Pilot
 
 from common import keys
 from common.bus.bus import Post
 from common.freshness import S
-from common.messages import ReleaseRequest, ResetRequest, Ultrasonic
-from services.teleop.app import Panel, TeleopApp
+from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
+from services.teleop.app import Panel
 from services.teleop.config import Teleop
 from services.teleop.desk import Desk
 from tests.support import PATIENCE_S
-from tests.teleop.support import FakeNode, link, safety_state
+from tests.teleop.near import NearApp
+from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
 
 
 class Bench:
@@ -29,19 +31,27 @@ class Bench:
         self.ended = False
         self.now_ns = 100 * S
         post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
-        self.app = TeleopApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
+        self.app = NearApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
+        # However long this machine takes to hand a key over.
+        self.app._came_ns = lambda event: self.now_ns  # type: ignore[method-assign]
 
     def speeds(self, count: int) -> list[float]:
         """Let the desk's clock tick, and return the speeds asked for, in order."""
         sent = []
         for _ in range(count):
             before, _ = self.node.requests
+            self.answer()
             self.desk.tick(self.now_ns)
             self.now_ns += S // 20
             after, last = self.node.requests
             if after > before and last is not None:
                 sent.append(last.linear)
         return sent
+
+    def answer(self) -> None:
+        """Let the terminal have been near, so that a key counts that the machine held up."""
+        for ago in range(10, 0, -1):
+            answer(self.desk, self.now_ns - ago * S // 20)
 
     def words(self, name: str) -> str:
         """Return what a panel shows; nothing before it is there."""
@@ -51,6 +61,7 @@ class Bench:
     @asynccontextmanager
     async def shown(self, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[None]]:
         async with self.app.run_test(size=size) as pilot:
+            self.answer()
             yield pilot
 
 
@@ -97,13 +108,121 @@ def test_calls_are_made_by_their_keys(bench: Bench) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("e")
         assert bench.node.fake.estops == 1
+        tell_contact(bench)
+        await until(lambda: "pressed" in bench.words("safety"), "the contact on the screen")
         await pilot.press("r")
-        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest())]
+        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=7, causes=(42,)))]
         await pilot.press("f")
         bench.speeds(1)
-        assert bench.node.fake.asked[-1] == (keys.RELEASE.path, ReleaseRequest())
+        held = ReleaseRequest(direction="forward", echo=7)
+        assert bench.node.fake.asked[-1] == (keys.RELEASE.path, held)
 
     play(bench, act)
+
+
+def tell_contact(bench: Bench) -> None:
+    """Let safety report a pressed bumper."""
+    bench.node.fake.tell(keys.SAFETY, contact_state(), bench.now_ns)
+    bench.desk.tick(bench.now_ns)
+
+
+def test_a_reset_clears_what_the_screen_showed(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        tell_contact(bench)
+        await until(lambda: "pressed" in bench.words("safety"), "the contact on the screen")
+        later = Cause(name="estop", action="brake", age=0.0, text="Stopped.", id=43)
+        newest = contact_state(heartbeat=9)
+        newest = contact_state(
+            heartbeat=9, latched=("contact", "estop"), causes=(*newest.causes, later)
+        )
+        bench.node.fake.tell(keys.SAFETY, newest, bench.now_ns)  # not drawn yet
+        await pilot.press("r")
+        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=9, causes=(42,)))]
+
+    play(bench, act)
+
+
+def test_a_key_carries_the_time_when_it_came(bench: Bench) -> None:
+    key = Key("w", "w")
+    key.time = time.monotonic() - 3.0
+    came_ns = NearApp._came_ns(bench.app, key)
+    assert (bench.now_ns - came_ns) / S == pytest.approx(3.0, abs=0.5)
+
+
+def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
+    posted: list[Callable[[], object]] = []
+
+    async def act(_: Pilot[None]) -> None:
+        bench.app._post = posted.append
+        bench.app.draw()
+        drawn_ns = bench.now_ns
+        bench.now_ns += 10 * S
+        posted[0]()  # late
+        assert bench.desk._watched_ns == drawn_ns
+
+    play(bench, act)
+
+
+def test_the_terminal_is_asked_and_its_answer_counts(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        bench.now_ns += 10 * S  # what was answered so far is old
+        await until(lambda: not bench.desk.terminal.refusal(bench.now_ns), "an answer")
+
+    play(bench, act)
+
+
+def test_a_terminal_that_does_not_answer_is_asked_less_often(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(NearApp, "query_terminal", lambda _, question: asked.append(question))
+
+    async def act(pilot: Pilot[None]) -> None:
+        before = len(asked)
+        for _ in range(60):
+            bench.app.probe()
+        assert len(asked) - before in (14, 15, 16)  # ten, then every tenth
+        assert asked[-1].startswith("\x1b7\x1b[2;")
+
+    play(bench, act)
+
+
+def test_keys_that_do_not_count_are_said_to(bench: Bench) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        bench.now_ns += 10 * S
+        bench.desk.tick(bench.now_ns)
+        await until(lambda: "KEYS OFF" in bench.words("hints"), "the refusal")
+
+    play(bench, act)
+
+
+def fits(bench: Bench, name: str) -> bool:
+    """Return whether nothing of a panel is cut off."""
+    panel, lines = bench.app.query_one(f"#{name}", Panel), bench.words(name).split("\n")
+    room = panel.content_size
+    return (
+        bench.app.screen.region.contains_region(panel.region)
+        and len(lines) <= room.height
+        and max(map(len, lines)) <= room.width
+    )
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+def test_a_contact_makes_room_for_its_release(bench: Bench, size: tuple[int, int]) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        tell_contact(bench)
+        await until(lambda: "LATCHED" in bench.words("safety"), "the cause")
+        for name in ("safety", "motion", "around"):
+            await until(partial(fits, bench, name), f"{name} to fit")
+        assert "0.12 m left" in bench.words("safety")
+        refusal = "release refused: " + "the vehicle needs two rows to say why it may not. " * 2
+        bench.node.logbook.add("safety", "warning", refusal.strip())
+        bench.desk.tick(bench.now_ns)
+        await until(
+            lambda: " ".join(bench.words("events").split())[16:] == refusal.strip(), "all of it"
+        )
+
+    play(bench, act, *size)
 
 
 def test_the_focus_is_the_hold(bench: Bench) -> None:

@@ -26,6 +26,14 @@ def test_the_shipped_file_says_the_defaults() -> None:
         {"hold": 2.0},
         {"linear_axis": 3},
         {"turbo_button": 4},
+        {"round_trip": 0.0},
+        {"round_trip": 0.31},
+        {"round_trip": float("nan")},
+        {"round_trip": float("inf"), "i_accept": ["round_trip"]},
+        {"gamepad_silence": 0.0},
+        {"gamepad_silence": 3.5},
+        {"gamepad_silence": 3.5, "i_accept": ["round_trip"]},
+        {"i_accept": ["hold"]},
     ],
 )
 def test_a_bad_setting_is_refused(settings: dict[str, Any]) -> None:
@@ -40,3 +48,13 @@ def test_a_slower_terminal_is_allowed() -> None:
 def test_a_refusal_names_the_field() -> None:
     with pytest.raises(ConfigError, match=r"hold 0\.9 s must not exceed hold_first"):
         load(TeleopConfig, Sources(environ={}, sets=["teleop.hold=0.9"]))
+
+
+def test_a_refused_protection_says_what_is_allowed() -> None:
+    with pytest.raises(ConfigError, match=r"gamepad_silence = 9\.0 .*allowed is 0\.5\.\.3\.0"):
+        load(TeleopConfig, Sources(environ={}, sets=["teleop.gamepad_silence=9.0"]))
+
+
+def test_a_protection_may_be_given_up_by_name() -> None:
+    settings = {"round_trip": 2.0, "i_accept": ["round_trip"]}
+    assert msgspec.convert(settings, Teleop).round_trip == 2.0

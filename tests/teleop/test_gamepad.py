@@ -1,16 +1,22 @@
 """The gamepad, with a fake in SDL's place and, where pygame is installed, with SDL itself."""
 
+import ctypes
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from services.teleop.config import Teleop
+from services.teleop.controls import Controls
 from services.teleop.gamepad import NoGamepad, SdlGamepad, find
 from services.teleop.mapping import Deflection, Stick
 
+MAPS = Path("/proc/self/maps")
 REMOVED = 1542
+AXIS, BALL, HAT, DOWN, UP = range(1536, 1541)
 
 
 class FakeJoystick:
@@ -44,6 +50,8 @@ class FakePygame:
     """As much of pygame as is used."""
 
     JOYDEVICEREMOVED = REMOVED
+    JOYAXISMOTION, JOYBALLMOTION, JOYHATMOTION = AXIS, BALL, HAT
+    JOYBUTTONDOWN, JOYBUTTONUP = DOWN, UP
     error = RuntimeError
 
     def __init__(self) -> None:
@@ -99,6 +107,27 @@ def test_another_ones_loss_is_nothing() -> None:
     assert pad.read() is not None
 
 
+def test_what_a_hand_does_is_counted() -> None:
+    pygame = FakePygame()
+    pad = gamepad(pygame)
+    pygame.events = [SimpleNamespace(type=AXIS, instance_id=3)]  # of one that is not ours yet
+    counts = []
+    for events in (
+        [],
+        [SimpleNamespace(type=AXIS, instance_id=3)],
+        [SimpleNamespace(type=each, instance_id=3) for each in (BALL, HAT, DOWN, UP)],
+        [SimpleNamespace(type=AXIS, instance_id=4)],  # another one's
+        [SimpleNamespace(type=1541, guid="")],  # a gamepad was added
+        [SimpleNamespace(type=1616, instance_id=3)],  # its battery
+        [],
+    ):
+        stick = pad.read()
+        assert stick is not None
+        counts.append(stick.events)
+        pygame.events = list(events)
+    assert counts == [0, 0, 1, 5, 5, 5, 5]
+
+
 def test_one_that_is_gone_before_it_opens_is_none() -> None:
     def gone(index: int) -> FakeJoystick:
         raise RuntimeError("Invalid joystick device number")
@@ -138,3 +167,78 @@ def test_sdl_itself_starts_without_display_and_in_silence(
     assert isinstance(pad, SdlGamepad)
     pad.read()
     assert capfd.readouterr() == ("", "")
+
+
+class VirtualGamepad:
+    """A gamepad that SDL makes up: six axes, eleven buttons."""
+
+    def __init__(self) -> None:
+        library = next(
+            line.split()[-1] for line in MAPS.read_text().splitlines() if "libSDL2-" in line
+        )
+        self._sdl = ctypes.CDLL(library)
+        self._sdl.SDL_JoystickOpen.restype = ctypes.c_void_p
+        self.index = self._sdl.SDL_JoystickAttachVirtual(1, 6, 11, 0)
+        self._handle = ctypes.c_void_p(self._sdl.SDL_JoystickOpen(self.index))
+
+    def push(self, axis: int, value: int) -> None:
+        self._sdl.SDL_JoystickSetVirtualAxis(self._handle, axis, ctypes.c_int16(value))
+
+    def press(self, button: int) -> None:
+        self._sdl.SDL_JoystickSetVirtualButton(self._handle, button, 1)
+
+    def unplug(self) -> None:
+        self._sdl.SDL_JoystickClose(self._handle)
+        self._sdl.SDL_JoystickDetachVirtual(self.index)
+
+
+@pytest.fixture
+def virtual() -> Iterator[tuple[SdlGamepad, VirtualGamepad]]:
+    pytest.importorskip("pygame")
+    pad = find(Teleop())
+    if not (isinstance(pad, SdlGamepad) and MAPS.exists() and "libSDL2-" in MAPS.read_text()):
+        pytest.skip("SDL 2 is not at hand")
+    gamepad = VirtualGamepad()
+    yield pad, gamepad
+    gamepad.unplug()
+    assert pad.read() is None
+
+
+def test_sdl_itself_reports_every_change_and_no_more(
+    virtual: tuple[SdlGamepad, VirtualGamepad],
+) -> None:
+    pad, gamepad = virtual
+
+    def events() -> int:
+        stick = pad.read()
+        assert stick is not None
+        return stick.events
+
+    assert events() == 0
+    gamepad.press(4)
+    gamepad.push(1, -20_000)
+    assert events() == 2
+    gamepad.push(1, -20_000)  # still, or frozen
+    assert events() == 2
+    gamepad.push(1, -20_001)  # the smallest tremor
+    assert events() == 3
+    gamepad.push(1, -32_768)  # at its end
+    gamepad.push(0, 300)  # the cross axis
+    assert events() == 5
+
+
+def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
+    virtual: tuple[SdlGamepad, VirtualGamepad],
+) -> None:
+    pad, gamepad = virtual
+    controls, now_ns = Controls(Teleop()), 0
+    moved = []
+    for tick in range(120):
+        if tick == 1:
+            gamepad.press(4)
+        if 1 <= tick < 40:
+            gamepad.push(1, -20_000 - tick)
+        request = controls.tick(pad.read(), now_ns)
+        moved.append(bool(request and request.linear))
+        now_ns += 50_000_000
+    assert moved == [False] * 2 + [True] * (38 + 40) + [False] * 40  # 2 s after its last event

@@ -41,6 +41,15 @@ def test_each_key_has_its_own_deadline(keys: Keys) -> None:
     assert keys.held(at(10.7)) == ["a"]
 
 
+def test_a_key_pressed_alone_lets_the_others_go_and_repeats(keys: Keys) -> None:
+    keys.press("f", at(10))
+    keys.press_alone("b", at(10.1))
+    assert keys.held(at(10.15)) == ["b"]
+    keys.press_alone("b", at(10.5))
+    assert keys.held(at(10.799)) == ["b"]
+    assert keys.held(at(10.8)) == []
+
+
 def test_clear_lets_all_go(keys: Keys) -> None:
     keys.press("w", at(10))
     keys.clear()

@@ -1,8 +1,10 @@
 """The whole program in a terminal of its own, on a real bus."""
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -146,3 +148,15 @@ def test_a_missing_extra_is_named(
     monkeypatch.setitem(sys.modules, "textual", None)
     assert life.main(["--no-gamepad"]) == 1
     assert "install the extra `teleop`" in capsys.readouterr().err
+
+
+def test_the_ancestors_are_named() -> None:
+    parent = Path(f"/proc/{os.getppid()}/comm")
+    if not parent.exists():
+        pytest.skip("there is no /proc")
+    assert life.ancestors()[0] == parent.read_text().strip()
+
+
+def test_without_proc_there_are_no_ancestors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "getppid", lambda: -5)
+    assert life.ancestors() == []

@@ -34,3 +34,14 @@ def test_log_lines_come_here_and_not_to_the_terminal(capfd: pytest.CaptureFixtur
     ]
     assert logbook.last(1)[0].t_ns > 0
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_line_that_repeats_is_kept_once_with_its_last_time() -> None:
+    logbook = Logbook()
+    for t_ns, text in ((1, "stop"), (2, "refused"), (3, "refused"), (4, "stop")):
+        logbook.add("safety", "info", text, t_ns)
+    assert [(line.t_ns, line.text) for line in logbook.last(9)] == [
+        (1, "stop"),
+        (3, "refused"),
+        (4, "stop"),
+    ]

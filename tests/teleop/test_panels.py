@@ -2,11 +2,12 @@
 
 import pytest
 
-from common.messages import Bumper, Cause
+from common.messages import Bumper, Cause, Direction
 from common.requests import Twist
 from services.teleop import panels
+from services.teleop.round_trip import UNKNOWN, multiplexer
 from services.teleop.view import Line
-from tests.teleop.support import link, safety_state, view
+from tests.teleop.support import contact_state, link, release, safety_state, view
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
@@ -69,8 +70,72 @@ def test_the_newest_events_are_shown() -> None:
     assert panels.events(view(lines=lines), 9).plain.count("event") == 5
 
 
+def test_a_long_line_goes_on_in_the_next_row() -> None:
+    lines = (Line(0, "bridge", "info", "short"), Line(0, "safety", "error", "word " * 30))
+    shown = panels.events(view(lines=lines), 5, 76).plain.split("\n")
+    assert [len(row) for row in shown] == [22, 76, 76, 46]
+    assert shown[2].startswith(" " * 17 + "word")
+    cut = panels.events(view(lines=lines), 2, 76).plain.split("\n")
+    assert cut == shown[1:3]  # its beginning says most
+    assert panels.events(view(lines=(Line(0, "safety", "info", ""),)), 2, 10).plain.strip()
+
+
 def test_the_hints_say_what_the_key_repeat_means_and_fit() -> None:
-    keys, limit = panels.hints(0.6, 0.3).plain.split("\n")
+    keys, limit = panels.hints(view(), 0.6, 0.3).plain.split("\n")
     assert "E ESTOP" in keys
+    assert "FB release" in keys
     assert "a tap drives 0.6 s, a hold 0.3 s past the last repeat" in limit
     assert max(len(keys), len(limit)) <= 78
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        "terminal too slow: 10.42 s, allowed 0.15 s",
+        UNKNOWN,
+        multiplexer({"ZELLIJ": "0", "SSH_TTY": "/dev/pts/0"}, ()),
+        multiplexer({}, ["mosh-server"]),
+    ],
+)
+def test_on_a_slow_terminal_the_hints_say_why_and_what_counts(reason: str) -> None:
+    keys, advice = panels.hints(view(keys_refused=reason), 0.6, 0.3).plain.split("\n")
+    assert keys == f"␣ stop E ESTOP Q quit  KEYS OFF: {reason}"
+    assert "dashboard" in advice
+    assert max(len(keys), len(advice)) <= 78
+
+
+def contact_rows(rows: int = 4, held: Direction | None = None, **fields: object) -> list[str]:
+    state = contact_state(release=release(**fields))
+    return panels.safety(view(safety=state, release=held), rows).plain.split("\n")
+
+
+def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
+    assert contact_rows() == [
+        " BRAKE   The bumper is pressed.",
+        "RELEASE  believed free: BACKWARD (moved forward, 12 s ago; net +0.43 m)",
+        " F  forward    B  backward   0.12 m left until reset",
+        "LATCHED The bumper was hit. 12 s, R resets",
+    ]
+
+
+def test_the_other_way_and_an_unknown_age() -> None:
+    row = contact_rows(believed_free="forward", travelled=-0.2, age=None)[1]
+    assert row == "RELEASE  believed free: FORWARD (moved backward; net -0.20 m)"
+
+
+def test_without_a_belief_the_operator_looks() -> None:
+    row = contact_rows(believed_free=None, age=None)[1]
+    assert row == "RELEASE  free direction unknown: look at the vehicle"
+
+
+def test_a_forbidden_direction_and_the_held_one_are_shown() -> None:
+    row = contact_rows(held="backward", forbidden=("forward",), left=0.0)[2]
+    assert row == " F  forward FORBIDDEN    B  backward, held   0.00 m left until reset"
+
+
+def test_the_release_fits() -> None:
+    rows = contact_rows(
+        believed_free="forward", age=7000.0, travelled=-0.999, forbidden=("forward", "backward")
+    )
+    assert len(rows) == 4
+    assert max(map(len, rows)) <= 76

@@ -2,11 +2,11 @@
 
 import pytest
 
-from common.messages import Driver, Limits, Velocity
+from common.messages import Direction, Driver, Limits, Velocity
 from common.requests import Twist
 from services.teleop.table import motion
 from services.teleop.view import View
-from tests.teleop.support import link, odometry, safety_state, view
+from tests.teleop.support import contact_state, link, odometry, safety_state, view
 
 
 def rows(of: View) -> dict[str, str]:
@@ -81,14 +81,25 @@ def test_driver_faults_are_named_by_side() -> None:
 
 
 @pytest.mark.parametrize(
-    ("creeping", "source", "words"),
+    ("held", "source", "words"),
     [
-        (False, None, "nobody"),
-        (False, "teleop", "teleop (you)"),
-        (False, "nav", "nav"),
-        (True, None, "you, creeping off the bumper"),
+        (None, None, "nobody"),
+        (None, "teleop", "teleop (you)"),
+        (None, "nav", "nav"),
+        ("forward", None, "you, release forward"),
+        ("backward", None, "you, release backward"),
     ],
 )
-def test_who_drives(creeping: bool, source: str | None, words: str) -> None:
-    of = view(creeping=creeping, safety=safety_state(source=source))
+def test_who_drives(held: Direction | None, source: str | None, words: str) -> None:
+    of = view(release=held, safety=safety_state(source=source))
     assert rows(of)["driver"] == words
+
+
+def test_a_silent_gamepad_asks_to_be_moved() -> None:
+    table = rows(view(gamepad="Fake Pad", move_stick=True))
+    assert table["gamepad"] == "no event: MOVE THE STICK"
+
+
+def test_a_contact_takes_the_row_of_the_rates() -> None:
+    assert "rates" not in rows(view(link=link(), safety=contact_state()))
+    assert len(rows(view(link=link(), safety=contact_state()))) == 10

@@ -33,6 +33,11 @@ def test_payloads_both_ways(frame: Frame, payload: str) -> None:
     assert made(type(frame), raw) == frame
 
 
+@pytest.mark.parametrize(("byte", "pressed"), [(0, False), *((b, True) for b in range(1, 256))])
+def test_every_bumper_byte_but_zero_is_pressed(byte: int, pressed: bool) -> None:
+    assert made(r.BumperReport, bytes((byte,))) == r.BumperReport(pressed)
+
+
 def test_a_faulty_sonar_shows_all_ones() -> None:
     assert r.SONAR_FAULT_MM == 0xFFFF
 
@@ -121,8 +126,8 @@ def test_a_lamp_answer_is_done_or_failed(value: int) -> None:
             "motor driver is 2, allowed is 0 left, 1 right",
         ),
         (
-            lambda: made(r.BumperReport, b"\x02"),
-            "BumperReport is 2, allowed is 0 or 1",
+            lambda: made(r.BumperBrakeReport, b"\x02"),
+            "BumperBrakeReport is 2, allowed is 0 or 1",
         ),
         (
             lambda: made(r.LedReport, b"\x56"),

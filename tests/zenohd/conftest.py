@@ -8,8 +8,8 @@ import pytest
 
 from common.loop import Loop
 from tests.chain import Chain, chain
+from tests.stick import Stick
 from tests.support import bus_on, running
-from tests.test_chain import Stick
 from tests.zenohd.router import command, found
 
 

@@ -8,11 +8,11 @@ from common import keys
 from common.bus.bus import Bus
 from common.bus.probe import probe
 from common.loop import Loop
-from common.messages import Done, Event, ResetRequest
+from common.messages import Event, ResetRequest
 from tests.chain import Chain
 from tests.cli.processes import ran, sets
+from tests.stick import Stick, moves_since, push
 from tests.support import bus_on, running, wait_until
-from tests.test_chain import Stick, moves_since, push
 
 pytestmark = pytest.mark.alone
 
@@ -89,13 +89,13 @@ def test_a_killed_service_takes_its_token_along(stack: Chain) -> None:
 
 def test_who_comes_late_is_told_what_happened_before(stack: Chain) -> None:
     heard: list[Event] = []
-    done: list[Done] = []
+    refusals: list[str] = []
 
     def declare(bus: Bus) -> None:
         bus.subscribe(keys.EVENTS, lambda a: heard.append(a.message), depth=99, service="*")
 
     with running(Loop()) as loop, bus_on(stack.endpoint, loop, declare) as bus:
         wait_until(lambda: "link_up" in [each.name for each in heard], "the bridge's first event")
-        bus.ask(keys.RESET, ResetRequest(), done.append, print)
-        wait_until(lambda: done, "a reply")
-        wait_until(lambda: "reset" in [each.name for each in heard], "a new event")
+        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names nothing
+        wait_until(lambda: refusals, "a reply")
+        wait_until(lambda: "reset_refused" in [each.name for each in heard], "a new event")

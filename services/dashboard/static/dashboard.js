@@ -8,6 +8,7 @@ import * as trail from "./trail.js";
 
 const LOST_MS = 1000; // without a picture
 const RETRY_MS = 700;
+const CONGESTED = 2048; // bytes that wait in the browser
 const NOT_A_WORD = 1003; // with which the server closes
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
 const QUIET = ["no_request", "neutral"]; // causes of a vehicle that is merely parked
@@ -29,8 +30,9 @@ const t = (key) => texts[language][key] ?? key;
 const lost = () => performance.now() - nowAt > LOST_MS;
 const mine = () => !!now && !!hello && now.hands.id === hello.id && !lost();
 const shown = () => hello?.robot ?? robot ?? $("page").dataset.robot;
+// What is held is sent only while the socket takes it: a burst of old answers is useless.
 const send = (word) => {
-  const open = socket?.readyState === WebSocket.OPEN;
+  const open = socket?.readyState === WebSocket.OPEN && (word.k !== "hold" || socket.bufferedAmount < CONGESTED);
   if (open) socket.send(JSON.stringify(word));
   return open;
 };
@@ -91,7 +93,7 @@ const TAKERS = {
     if (!hello) return;
     now = word;
     nowAt = performance.now();
-    hands.answer(word.n, mine(), word.hands.grip);
+    hands.answer(word.n, mine(), word.hands.grip, word.safety);
     stop.saw(word.safety);
     charts.add(word, nowAt);
     trail.add(word);
@@ -153,7 +155,8 @@ function showState() {
 function sentence(safety, worst) {
   if (language === "en") return safety.text;
   if (!worst) return t("text.run");
-  return t(`cause.${worst.name}`) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
+  const key = `cause.${worst.name}`;
+  return (t(key) === key ? worst.text : t(key)) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
 }
 
 function showHead() {
@@ -237,6 +240,9 @@ function estop() {
   stop.ask();
 }
 
+// The picture on the screen: each command names the picture that the operator saw.
+const seen = () => (typeof drawn === "number" && drawn >= 0 ? drawn : 0);
+
 function lamp() {
   const value = (name) => Number($(`lamp-${name}`).value);
   send({ k: "lamp", to: {
@@ -247,23 +253,19 @@ function lamp() {
 
 function toggle(name) {
   const on = rest?.switches?.[name] === true;
-  const ask = () => send({ k: "switch", to: { [name]: !on } });
+  const ask = () => send({ k: "switch", to: { [name]: !on }, n: seen() });
   if (on) confirm(name, t("switch_off"), ask);
   else ask();
 }
 
 function begin() {
-  if (!$("toasts") || !$("estop") || !$("stick")) {
-    requestAnimationFrame(begin); // NiceGUI is still building
-    return;
-  }
   texts = JSON.parse($("texts").textContent);
-  window.t2 = {
-    estop, lamp, toggle,
-    take: () => send({ k: "take", force: false }),
-    leave: () => { hands.letGo(); send({ k: "leave" }); },
-    reset: () => send({ k: "reset" }),
-  };
+  const on = (id, call) => { $(id).onclick = call; };
+  on("estop", estop);
+  on("lamp", lamp);
+  on("take", () => send({ k: "take", force: false }));
+  on("leave", () => { hands.letGo(); send({ k: "leave" }); });
+  on("reset", () => send({ k: "reset", n: seen() }));
   const light = matchMedia("(prefers-color-scheme: light)").matches;
   theme(stored("theme", light ? "light" : "dark"));
   $("theme").onclick = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");

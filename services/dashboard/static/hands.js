@@ -8,12 +8,14 @@ const KEYS = {
   KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
   KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
 };
+const RELEASE_KEYS = { KeyF: "forward", KeyB: "backward" };
 const $ = (id) => document.getElementById(id);
 const down = new Set();
 const seenUp = new Set(); // pads whose shoulder was seen up
 let page = null;
 let stick = null; // { pointer, push }
-let creeping = false;
+let releasing = null; // "forward" or "backward": off a pressed bumper
+let release = null; // safety's report on it, while there is a contact
 let driving = false; // whether the wheel is ours
 let sent = false; // whether the server believes that something is held
 
@@ -24,7 +26,7 @@ const shaped = (way) => {
 const clamped = (value) => Math.max(-1, Math.min(1, value));
 
 function held() {
-  if (creeping) return { x: 0, y: 0, creep: true };
+  if (releasing) return { x: 0, y: 0, release: releasing };
   if (stick) return { x: stick.push[0], y: stick.push[1] };
   if (down.size) {
     const pushes = [...down].map((code) => KEYS[code]);
@@ -50,8 +52,10 @@ function gamepad() {
   return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
 }
 
-export function answer(n, isMine, grip) {
-  if (driving && !isMine) letGo();
+export function answer(n, isMine, grip, safety) {
+  release = safety?.release ?? null;
+  // The bumper was pressed during the release: this direction is forbidden.
+  if ((driving && !isMine) || (releasing && refusal(releasing))) letGo();
   driving = isMine;
   if (!driving) return;
   const now = held();
@@ -68,7 +72,7 @@ function free() {
 export function letGo() {
   down.clear();
   stick = null;
-  creeping = false;
+  releasing = null;
   seenUp.clear();
   if (driving) free();
   knob(0, 0);
@@ -84,9 +88,49 @@ export function show(isMine, grip) {
   panel.classList.toggle("mine", isMine);
   panel.dataset.grip = grip;
   $("hold").textContent = isMine ? page.t(`hold.${grip}`) : "";
-  for (const name of ["leave", "reset", "release", "lamp"]) off($(name), !isMine);
+  for (const name of ["leave", "reset", "lamp"]) off($(name), !isMine);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) off($(name), !isMine);
   off($("take"), isMine);
+  showRelease(isMine);
+}
+
+// Why safety would not release in this direction now; empty if it would.
+function refusal(direction) {
+  if (!release) return "release_no_contact";
+  if (release.forbidden.includes(direction)) return `release_forbidden_${direction}`;
+  return release.left > 0 ? "" : "release_used_up";
+}
+
+function showRelease(isMine) {
+  $("release").hidden = !release;
+  const why = new Set();
+  for (const direction of ["forward", "backward"]) {
+    const refused = refusal(direction);
+    if (refused) why.add(page.t(refused));
+    const it = $(`release-${direction}`);
+    off(it, !isMine || !!refused);
+    it.title = refused ? page.t(refused) : "";
+    it.classList.toggle("free", release?.believed_free === direction);
+  }
+  if (!release) return;
+  write("release-free", believed());
+  write("release-left", `${page.t("release_left")}: ${metres(release.left)}`);
+  write("release-forbidden", [...why].join(" "));
+}
+
+// What safety believes, and from what: the last motion, how far it went, how long ago.
+function believed() {
+  const { believed_free: free, travelled, age } = release;
+  if (!free) return page.t("release_unknown");
+  const motion = page.t(free === "forward" ? "moved_backward" : "moved_forward");
+  const ago = age == null ? "–" : `${age.toFixed(age < 10 ? 1 : 0)} s`;
+  return `${page.t(`believed_${free}`)} ${motion} ${metres(Math.abs(travelled))}, ${ago} ${page.t("ago")}`;
+}
+
+const metres = (value) => (Number.isFinite(value) ? `${value.toFixed(2)} m` : "– m");
+
+function write(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
 }
 
 function off(button, disabled) {
@@ -137,15 +181,24 @@ function listenToStick() {
   it.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-function listenToRelease() {
-  const it = $("release");
+// Two directions at once count as none.
+function hold(direction) {
+  if (!ready()) return;
+  const refused = refusal(direction);
+  if (refused) page.toast(refused, "warning");
+  else if (releasing && releasing !== direction) letGo();
+  else releasing = direction;
+}
+
+function listenToRelease(direction) {
+  const it = $(`release-${direction}`);
   it.addEventListener("pointerdown", (event) => {
-    if (event.button > 0 || !ready()) return;
+    if (event.button > 0) return;
     it.setPointerCapture(event.pointerId);
-    creeping = true;
+    hold(direction);
   });
   for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-    it.addEventListener(end, () => { if (creeping) letGo(); });
+    it.addEventListener(end, () => { if (releasing === direction) letGo(); });
   }
   it.addEventListener("contextmenu", (event) => event.preventDefault());
 }
@@ -170,7 +223,7 @@ function keyDown(event) {
     event.preventDefault();
     // A repeat is no press: after a release the key has to come up first.
     if (!event.repeat && ready()) down.add(event.code);
-  } else if (event.code === "KeyF" && !event.repeat && ready()) creeping = true;
+  } else if (RELEASE_KEYS[event.code] && !event.repeat) hold(RELEASE_KEYS[event.code]);
   else if (/^Digit[1-5]$/.test(event.code)) page.send({ k: "gear", gear: Number(event.code.at(-1)) });
 }
 
@@ -180,7 +233,7 @@ function keyUp(event) {
     event.stopPropagation();
   }
   if (modified(event)) letGo();
-  if (event.code === "KeyF" && creeping) letGo();
+  if (releasing && RELEASE_KEYS[event.code] === releasing) letGo();
   if (down.delete(event.code) && !down.size) letGo();
 }
 
@@ -193,7 +246,7 @@ export function begin(given) {
   page = given;
   listenToStop();
   listenToStick();
-  listenToRelease();
+  for (const direction of Object.values(RELEASE_KEYS)) listenToRelease(direction);
   addEventListener("keydown", keyDown, true);
   addEventListener("keyup", keyUp, true);
   for (const name of ["blur", "pagehide", "gamepaddisconnected", "dragstart"]) addEventListener(name, letGo);

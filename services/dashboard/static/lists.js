@@ -31,9 +31,10 @@ export function showWhy(safety, t) {
   if (!causes.length) {
     fill($("causes"), stamp, () => [made("li", t(safety ? "no_causes" : "unknown"))]);
   } else fill($("causes"), stamp, () => shown.map(([it]) => {
-    const line = made("li", t(`cause.${it.name}`), { "data-action": it.action, "data-cause": it.name });
+    const known = t(`cause.${it.name}`) !== `cause.${it.name}`; // a newer safety may have more
+    const line = made("li", known ? t(`cause.${it.name}`) : it.text, { "data-action": it.action, "data-cause": it.name });
     const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
-    const more = it.text === t(`cause.${it.name}`) ? "" : `${it.text} · `;
+    const more = !known || it.text === t(`cause.${it.name}`) ? "" : `${it.text} · `;
     line.append(made("small", `${more}${t("since")} ${lasting(it.age)}${latched}`));
     return line;
   }));

@@ -33,8 +33,12 @@ function again() {
 }
 
 function insist() {
-  if (wish.robot === page.robot()) page.send({ k: "estop" });
+  page.send({ k: "estop", robot: wish.robot });
   const failed = () => { if (page.lost()) page.toast("estop_unconfirmed", "error"); };
-  fetch(`/estop/${encodeURIComponent(wish.robot)}`, { method: "POST", signal: AbortSignal.timeout(POST_MS) })
-    .then((answer) => { if (!answer.ok) failed(); }, failed);
+  // With keepalive it goes out even if the page is closed this moment.
+  fetch(`/estop/${encodeURIComponent(wish.robot)}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
+    .then((answer) => {
+      if (answer.status === 404) page.toast("estop_unknown", "error");
+      else if (!answer.ok) failed();
+    }, failed);
 }

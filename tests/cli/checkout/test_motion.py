@@ -39,7 +39,7 @@ class Vehicle:
     starts_at: float = 3.1  # heading, rad: it wraps on the way
     stands_after_s: float = 0.2
 
-    def run(self, asked: Twist, unit: str = "decidegree") -> Run:
+    def run(self, asked: Twist, unit: str = "decidegree", feedback: str = "decidegree") -> Run:
         end_ns = round(self.driven_s * S)
         times = range(0, end_ns + S, PERIOD_NS)
         released = [t <= end_ns for t in times]
@@ -53,6 +53,7 @@ class Vehicle:
         return Run(
             asked=asked,
             unit=unit,
+            feedback=feedback,
             released_ns=end_ns,
             motions=[
                 Latest(Motion(command="run", linear=linear * on, angular=angular * on), t)
@@ -127,9 +128,13 @@ def test_a_quarter_off_is_too_much(off: float) -> None:
         (FORWARD, Vehicle(counted=-1.0, measured=-1.0), "it goes backward."),
         (LEFT, Vehicle(counted=-1.0, measured=-1.0), "it goes clockwise."),
         (FORWARD, Vehicle(measured=-1.0), "The measured velocity has the wrong sign"),
-        (LEFT, Vehicle(counted=-MRAD, measured=-MRAD), 'set wire.angular_unit = "milliradian".'),
+        (
+            LEFT,
+            Vehicle(counted=-MRAD, measured=-MRAD),
+            'wire.command_angular_unit = "milliradian".',
+        ),
         (FORWARD, Vehicle(counted=2.0, measured=2.0), "It goes 2.00 times as fast as commanded."),
-        (FORWARD, Vehicle(measured=2.0), "2.00 times what the counter says."),
+        (FORWARD, Vehicle(measured=2.0), "2.00 times the velocity of the counter."),
         (FORWARD, Vehicle(stands_after_s=5.0), "It did not stand within 2 s"),
         (FORWARD, Vehicle(driven_s=0.8), "not let through for long enough to measure."),
         (FORWARD, Vehicle(let_through=0.5), "Safety said: blocked"),
@@ -144,8 +149,8 @@ def test_what_is_wrong_is_named(asked: Twist, vehicle: Vehicle, said: str) -> No
 @pytest.mark.parametrize(
     ("unit", "counted", "said"),
     [
-        ("decidegree", MRAD, 'set wire.angular_unit = "milliradian"'),
-        ("milliradian", 1 / MRAD, 'set wire.angular_unit = "decidegree"'),
+        ("decidegree", MRAD, 'set wire.command_angular_unit = "milliradian"'),
+        ("milliradian", 1 / MRAD, 'set wire.command_angular_unit = "decidegree"'),
         ("decidegree", 5.73, "seems to be 0.01 rad/s, for which there is no setting"),
         ("decidegree", 0.1, None),
         ("decidegree", 10.0, "seems to be 1 deg/s"),
@@ -157,6 +162,25 @@ def test_a_unit_is_known_by_its_factor(unit: str, counted: float, said: str | No
     verdict = judge(Vehicle(counted=counted), LEFT, unit)
     assert verdict.outcome == "failed"
     assert (said or "does not count") in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("feedback", "measured", "said"),
+    [
+        ("decidegree", 1 / MRAD, 'set wire.feedback_angular_unit = "milliradian"'),
+        ("milliradian", MRAD, 'set wire.feedback_angular_unit = "decidegree"'),
+        ("decidegree", 10.0, "seems to be 0.01 deg/s, for which there is no setting"),
+        ("decidegree", 3.0, "The measured velocity is 3.00 times the velocity of the counter."),
+        ("decidegree", 0.0, "The measured velocity is 0.00 times the velocity of the counter."),
+    ],
+)
+def test_the_unit_of_the_feedback_is_known_by_the_counter(
+    feedback: str, measured: float, said: str
+) -> None:
+    verdict = judge_motion(Vehicle(measured=measured).run(LEFT, feedback=feedback))
+    assert verdict.outcome == "failed"
+    assert said in verdict.text
+    assert "command_angular_unit" not in verdict.text
 
 
 def test_units_hint_at_turns_alone() -> None:
@@ -190,10 +214,10 @@ def test_what_was_seen_of_a_wild_vehicle_is_said() -> None:
 
 def test_nothing_heard_is_nothing_measured() -> None:
     run = Vehicle().run(FORWARD)
-    parts = run.unit, run.released_ns, run.motions
+    parts = run.unit, run.feedback, run.released_ns, run.motions
     assert measure(Run(FORWARD, *parts, [], run.mileages, [])) is None
     assert measure(Run(FORWARD, *parts, run.velocities, run.mileages[:1], [])) is None
-    verdict = judge_motion(Run(FORWARD, *parts[:2], [], [], [], []))
+    verdict = judge_motion(Run(FORWARD, *parts[:3], [], [], [], []))
     assert verdict.text == (
         "The full speed was not let through for long enough to measure. "
         "At most 0.00 m/s were measured of 0.10 asked."
@@ -205,7 +229,9 @@ def test_who_moves_again_has_not_stood() -> None:
     run = Vehicle().run(FORWARD)
     again = Latest(Velocity(linear=0.1, angular=0.0), run.velocities[-1].received_ns + 1)
     moved = [*run.velocities, again]
-    assert stood_after_s(Run(FORWARD, run.unit, run.released_ns, [], moved, [], [])) is None
+    assert (
+        stood_after_s(Run(FORWARD, run.unit, run.unit, run.released_ns, [], moved, [], [])) is None
+    )
 
 
 @pytest.mark.parametrize(

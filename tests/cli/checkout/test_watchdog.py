@@ -104,9 +104,9 @@ class Watched(Board):
 
     commanded_s = 0.0
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame, source: tuple[str, int]) -> None:
         before = len(self.motions)
-        super()._take(frame)
+        super()._take(frame, source)
         if len(self.motions) > before:
             self.commanded_s = time.monotonic()
             self.speed_mmps = self.motions[-1].linear_mmps

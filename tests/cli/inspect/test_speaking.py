@@ -79,26 +79,36 @@ def test_call(rig: Rig, tool: Tool) -> None:
         else:
             caller.reply(Done(text="ended"))
 
-    rig.bus(lambda bus: bus.serve(keys.RELEASE, release))
-    for key in ("safety/release", "/srv/safety/release"):
+    pretend(rig, "safety", {keys.SAFETY: state}, lambda bus: bus.serve(keys.RELEASE, release))
+    whole = f"t2/v1/{rig.robot}/srv/safety/release"
+    for key in ("release", "safety/release", "/srv/safety/release", whole):
         result = tool("call", key, '{"held": false}')
-        assert (result.code, result.lines) == (0, [{"text": "ended"}])
-    assert tool("call", "safety/release", '{"held": false}', "--text").out == "text: ended\n"
+        assert (result.code, result.lines) == (0, [{"text": "ended", "boot": 0}])
+    assert (
+        tool("call", "safety/release", '{"held": false}', "--text").out == "text: ended\nboot: 0\n"
+    )
     result = tool("call", "safety/release")
     assert (result.code, result.out) == (1, "")
     assert result.err == "t2 call: refused: the bumper is free\n"
 
 
 def test_a_call_that_nobody_answers(tool: Tool) -> None:
-    result = tool("call", "safety/reset", "--timeout", "0.3")
+    result = tool("call", "bridge/led", '{"channel": 1, "mode": 0}', "--timeout", "0.3")
     assert (result.code, result.out) == (1, "")
-    assert "safety does not answer" in result.err
+    assert "bridge does not answer" in result.err
     assert "nobody answers" in tool("call", "mine/x", "--timeout", "0.3").err
+
+
+def test_a_short_name_of_two_calls_is_ambiguous(tool: Tool) -> None:
+    result = tool("call", "reset")
+    assert (result.code, result.err) == (
+        1, "t2 call: reset is ambiguous: safety/reset, odom/reset\n",
+    )  # fmt: skip
 
 
 def test_what_there_is_to_call(tool: Tool) -> None:
     assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
-    assert "clear the latches" in tool("call", "--text").out
+    assert "clear the causes that are named" in tool("call", "--text").out
 
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])

@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -39,8 +40,26 @@ def test_echo_shows_a_message_as_json_in_a_pipe(bridge: Bus, tool: Tool) -> None
 def test_echo_shows_a_message_to_people(bridge: Bus, tool: Tool) -> None:
     head, *fields = tool("echo", "bumper", "--once", "--text").out.splitlines()
     assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
-    assert fields == ["pressed: true", "---"]
+    assert fields == ["pressed: true", "lost: 0", "---"]
     assert "boot: " in tool("echo", "bumper", "--once", "--text", "--header").out
+
+
+def test_echo_shows_a_message_as_one_line(bridge: Bus, tool: Tool) -> None:
+    first, second = tool("echo", "bumper", "--count", "2", "-o", "table").out.splitlines()
+    clock, key, fields = first.split(maxsplit=2)
+    assert time.strptime(clock.partition(".")[0], "%H:%M:%S")
+    assert (key, fields) == ("tel/bridge/bumper", '{"pressed":true,"lost":0}')
+    assert second.endswith(fields)
+
+
+def test_echo_of_one_message_gives_up(
+    bridge: Bus, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cli.inspect.echo.ONCE_S", 0.3)
+    result = tool("echo", "safety/state", "--once")
+    assert (result.code, result.out) == (1, "")
+    where = f"t2/v1/{tool.robot}/tel/safety/state"
+    assert f"no message on {where} within 0.3 s; `t2 ls` lists" in result.err
 
 
 def test_echo_shows_one_field(bridge: Bus, tool: Tool) -> None:
@@ -87,7 +106,7 @@ def test_echo_shows_events_that_were_before_it(rig: Rig, tool: Tool) -> None:
 def test_silence_is_said(tool: Tool) -> None:
     result = tool("echo", "tel/none", "--duration", "0.2")
     assert (result.code, result.out) == (1, "")
-    assert "nothing was heard on t2/v1/" in result.err
+    assert "no message on t2/v1/" in result.err
 
 
 # --- hz, delay, bw, ls ------------------------------------------------------------------------
@@ -124,7 +143,7 @@ def test_it_tells_once_a_second_and_says_when_nothing_comes(
     result = tool("hz", "tel/none", "--duration", "0.3")
     assert (result.code, result.out) == (1, "")
     assert "t2 hz: no new messages" in result.err
-    assert "nothing was heard" in result.err
+    assert "no message on" in result.err
 
 
 def test_ls_names_type_rate_and_publisher(rig: Rig, bridge: Bus, tool: Tool) -> None:
@@ -224,7 +243,7 @@ def test_ctrl_c_ends_it_without_a_word(number: signal.Signals, bridge: Bus, rig:
 
 
 def test_a_reader_that_goes_away_ends_it_without_a_word(bridge: Bus, rig: Rig) -> None:
-    words = f"echo bumper --set bus.connect={rig.endpoint} --robot {rig.robot}"
+    words = f"echo bumper -o json --set bus.connect={rig.endpoint} --robot {rig.robot}"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,

@@ -86,6 +86,14 @@ def test_frames_that_are_refused_while_it_listens() -> None:
     assert [each.level for each in link(link_of(round_trip=None), None)] == ["ok"]
 
 
+def test_datagrams_that_the_system_refuses_to_send_while_it_listens() -> None:
+    first, second = link(link_of(send_errors=7), link_of(send_errors=4))
+    assert (first.level, first.todo) == ("wrong", advice.SEND_ERRORS)
+    assert first.text == "the system refused to send 3 datagrams to the board"
+    assert second.level == "ok"
+    assert [each.level for each in link(link_of(send_errors=7), link_of(send_errors=7))] == ["ok"]
+
+
 def test_a_bridge_that_waits() -> None:
     found = list(link(link_of(armed=False, waiting="link lost"), None))
     assert found[-1].level == "note"

@@ -38,12 +38,13 @@ class Tool:
     capsys: pytest.CaptureFixture[str]
 
     def __call__(self, *words: str, robot: str | None = None) -> Result:
-        """Run it to its end, as in a pipe."""
+        """Run it to its end; it shows JSON unless the words want another form."""
         named = robot or self.robot
         where = ("--set", f"bus.connect={self.endpoint}", *(("--robot", named) if named else ()))
         self.capsys.readouterr()
         try:
-            code = main([*words, *where])
+            form = () if {"--text", "-o"} & {*words} else ("-o", "json")
+            code = main([*words, *form, *where])
         except SystemExit as end:  # the command line is no good
             code = int(str(end.code))
         told = self.capsys.readouterr()

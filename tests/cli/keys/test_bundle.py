@@ -1,12 +1,16 @@
 """The settings that go to a machine: valid ones, and the way to its router."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from cli.keys.bundle import SOCKET, bus_toml, endpoints
 from cli.keys.profile import Profile, profile
+from cli.settings import Everything
+from common.config import Sources, load
 from common.members import ROLES
+from common.settings import Shared
 
 ROBOT = profile("robot", "001", (), ())
 OTHER = profile("robot", "002", (), ("robot-2.lan", "fd00::2"))
@@ -57,6 +61,28 @@ def test_the_others_dial(who: Profile, routers: list[Profile], dialled: list[str
 )
 def test_who_drives_one_robot_need_not_name_it(robots: tuple[str, ...], chosen: object) -> None:
     assert tomllib.loads(bus_toml(Profile("driver", "b", robots), [])).get("robot") == chosen
+
+
+@pytest.mark.parametrize(
+    ("sources", "told"),
+    [
+        ((), {}),
+        (("teleop", "web", "checkout"), {}),
+        (("teleop",), {"dashboard": {"source": "teleop"}}),
+        (("nav", "x"), {"teleop": {"source": "nav"}, "dashboard": {"source": "nav"}}),
+    ],
+)
+def test_screens_drive_as_a_source_that_the_certificate_may_use(
+    sources: tuple[str, ...], told: dict[str, object], tmp_path: Path
+) -> None:
+    who = Profile("driver", "b", ("001",), (), sources)
+    table = tomllib.loads(bus_toml(who, [ROBOT]))
+    assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == told
+    file = tmp_path / "bus.toml"
+    file.write_text(bus_toml(who, [ROBOT]))
+    config = load(Everything, Sources(files=(file,))).config
+    assert config.teleop.source == (sources[0] if "teleop" in told else "teleop")
+    load(Shared, Sources(files=(file,)))  # other programs accept it
 
 
 def test_a_router_that_names_this_host_alone_is_dialled_on_it() -> None:

@@ -67,6 +67,17 @@ def test_the_life_of_a_certificate(desk: Desk) -> None:
     assert desk.states()["driver.anna.2"] == "valid"
 
 
+def test_a_driver_gets_the_sources_of_a_person_unless_told_and_keeps_them(desk: Desk) -> None:
+    assert "drives as teleop or web or checkout;" in desk.keys(
+        "issue", "driver", "anna", "--robot", "001"
+    )
+    desk.keys("issue", "driver", "planner", "--robot", "001", "--source", "nav")
+    desk.keys("renew", "driver", "planner")
+    listed = read(desk.folder / "members.json").members
+    assert [each.sources for each in listed] == [("teleop", "web", "checkout"), ("nav",), ("nav",)]
+    desk.keys("issue", "viewer", "hall", "--source", "nav", code=EXIT_CONFIG)
+
+
 def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
     desk.keys("issue", "site", "berlin", "--address", "site.example", "--address", "10.0.0.9")
     desk.keys("issue", "robot", "001")
@@ -121,7 +132,7 @@ def test_the_settings_are_valid_wherever_the_folder_is_put(
     [
         (("init",), 1, "is there already: another CA would lock everybody out"),
         (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is no name"),
-        (("issue", "driver", "anna"), EXIT_CONFIG, "a driver wants --robot ID"),
+        (("issue", "driver", "anna"), EXIT_CONFIG, "a driver needs --robot ID"),
         (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router wants --address"),
         (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
         (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such is not there, and only it"),

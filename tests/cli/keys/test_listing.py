@@ -48,6 +48,7 @@ def test_for_programs() -> None:
                 "role": "driver",
                 "name": "anna",
                 "robots": ["001"],
+                "sources": [],
                 "expires": "2026-12-04T00:00:00Z",
                 "days": 12,
                 "state": "expires soon",

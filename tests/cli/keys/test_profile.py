@@ -39,6 +39,28 @@ def test_a_driver_names_its_robots() -> None:
     assert profile("driver", "anna", ("*",), ()).robots == ("*",)
 
 
+def test_a_driver_names_its_sources() -> None:
+    assert profile("driver", "anna", ("001",), ()).sources == ()
+    nav = profile("driver", "planner", ("001",), (), ("nav", "nav-2", "nav"))
+    assert nav.sources == ("nav", "nav-2")
+    assert nav.name == "planner"
+
+
+@pytest.mark.parametrize("source", ["", "*", "Nav", "nav/x", "1nav", "n" * 33, "nav\n", "**"])
+def test_what_is_no_source(source: str) -> None:
+    with pytest.raises(ConfigError, match="is not a source name"):
+        profile("driver", "anna", ("001",), (), (source,))
+
+
+def test_a_source_is_as_long_as_it_may_be() -> None:
+    assert profile("driver", "anna", ("001",), (), ("n" * 32,)).sources == ("n" * 32,)
+
+
+def test_sources_are_for_drivers() -> None:
+    with pytest.raises(ConfigError, match="--source is for drivers; a viewer does not"):
+        profile("viewer", "hall", (), (), ("nav",))
+
+
 @pytest.mark.parametrize("role", ROLES)
 def test_who_listens(role: Role) -> None:
     assert Profile(role, "x").listens is (role in LISTENERS)
@@ -47,7 +69,7 @@ def test_who_listens(role: Role) -> None:
 @pytest.mark.parametrize(
     ("role", "name", "robots", "addresses", "said"),
     [
-        ("driver", "anna", (), (), "a driver wants --robot ID"),
+        ("driver", "anna", (), (), "a driver needs --robot ID"),
         ("viewer", "guest", ("001",), (), "a viewer has no robots to name"),
         ("robot", "001", ("002",), (), "a robot has no robots to name"),
         ("fleet", "control", (), ("10.0.0.1",), "a fleet dials, and nobody dials it"),

@@ -50,6 +50,14 @@ def test_a_drivers_certificate() -> None:
     )
 
 
+def test_a_drivers_sources() -> None:
+    who = msgspec.structs.replace(member("driver", "anna"), sources=("nav",))
+    told = list(words.issued(Profile("driver", "anna", ("001",), (), ("nav",)), who, "k/d", []))
+    assert "  drives as nav; no other source is allowed" in told
+    told = list(words.issued(ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]))
+    assert not [line for line in told if "drives as" in line]
+
+
 def test_a_driver_of_every_robot() -> None:
     anna = msgspec.structs.replace(member("driver", "anna"), robots=("*",))
     who = Profile("driver", "anna", ("*",))

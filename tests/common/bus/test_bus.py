@@ -57,6 +57,28 @@ def test_messages_keep_their_order_and_are_counted_at_both_ends(rig: Rig) -> Non
     assert heard[0].raw is None
 
 
+def test_sources_that_nobody_knows_are_counted_together(rig: Rig) -> None:
+    heard: set[str] = set()
+
+    def take(arrival: Arrival[Drive]) -> None:
+        heard.add(arrival.key)
+
+    hearer = rig.bus(
+        lambda bus: bus.subscribe(keys.DRIVE, take, depth=100, known=["nav", "web"], source="*")
+    )
+    sender = rig.bus()
+    names = ["nav", *(f"made up {number}" for number in range(50))]
+    publishers = [sender.publisher(keys.DRIVE, source=name) for name in names]
+    until_heard(
+        lambda: [each.put(Drive(linear=0.0, angular=0.0, echo=0)) for each in publishers],
+        lambda: len(heard) == len(names),
+        "all sources",
+    )
+    everyone = keys.DRIVE.on(rig.robot, source="*")
+    assert set(hearer.counts) == {keys.DRIVE.on(rig.robot, source="nav"), everyone}
+    assert hearer.counts[everyone] >= 50
+
+
 def test_it_travels_as_plain_messagepack_with_its_encoding(rig: Rig) -> None:
     samples: list[zenoh.Sample] = []
     stranger = rig.session()

@@ -199,7 +199,7 @@ def test_a_request_without_payload_is_one_of_defaults(
 ) -> None:
     (reply,) = rig.session().get(keys.RELEASE.on(rig.robot))
     assert reply.ok is not None
-    assert msgpack.unpackb(reply.ok.payload.to_bytes()) == {"text": "held"}
+    assert msgpack.unpackb(reply.ok.payload.to_bytes()) == {"text": "held", "boot": 0}
     assert str(reply.ok.encoding) == "application/msgpack;t2.v1.Done"
     assert server.asked[-1] == ReleaseRequest()
 

@@ -14,7 +14,7 @@ from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.bus.session import client_config, router
 from common.errors import LinkError
-from common.messages import Bumper, Done, Event, ResetRequest
+from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.rig import Rig, until_heard
 from tests.support import Lines, at, free_port, listening, wait_until
 
@@ -101,14 +101,14 @@ def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
     rig.endpoint = nowhere()
     heard: list[Arrival[Bumper]] = []
     seen: list[str] = []
-    replies: list[Done] = []
+    replies: list[ResetDone] = []
     late: list[str] = []
     token = keys.live_key(rig.robot, "bridge", "1")
 
     def declare(bus: Bus) -> None:
         bus.subscribe(keys.BUMPER, heard.append)
         bus.subscribe(keys.EVENTS, lambda a: late.append(a.message.name), depth=99, service="*")
-        bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="done")))
+        bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="done")))
         bus.watch_live(keys.live_key(rig.robot, "*", "*"), lambda key, _: seen.append(key))
 
     with router(listening(rig.endpoint)):

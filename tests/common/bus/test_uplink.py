@@ -7,7 +7,7 @@ import zenoh
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
-from common.messages import Bumper, Done, Event, ResetRequest
+from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.rig import Rig, until_heard
 from tests.support import at, free_port, listening, wait_until
 
@@ -29,7 +29,7 @@ class Onboard:
 
     def declare(self, bus: Bus) -> None:
         bus.on_any(keys.estop_key(bus.robot), self.stops.append)
-        bus.serve(keys.RESET, lambda _, caller: caller.reply(Done(text="done")))
+        bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="done")))
         bus.live(keys.live_key(bus.robot, "safety", "1"))
 
     def put(self) -> None:
@@ -43,7 +43,7 @@ class Room:
         self.heard: list[Arrival[Bumper]] = []
         self.late: list[str] = []
         self.tokens: list[str] = []
-        self.replies: list[Done] = []
+        self.replies: list[ResetDone] = []
         self.bus = rig.bus(self.declare)
 
     def declare(self, bus: Bus) -> None:

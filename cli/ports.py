@@ -1,0 +1,131 @@
+"""What ``t2 up`` listens on, checked before it starts anything.
+
+A second stack on the same ports would be a second safety service on the robot's bus. Each port is
+bound once and released, and claimed while ``t2 up`` runs: of two that start at once, one continues.
+"""
+
+import errno
+import socket
+import sys
+import time
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack
+from typing import Literal, NamedTuple
+
+from cli.settings import Everything
+from common.errors import LinkError
+from common.settings import Bus, protocol
+
+PATIENCE_S = 5.0  # the children of a killed supervisor stop the vehicle meanwhile
+LOOK_S = 0.1
+
+DATAGRAMS = ("udp", "quic")
+
+
+class Port(NamedTuple):
+    """One address that a process listens on."""
+
+    kind: Literal["tcp", "udp", "unix"]
+    host: str  # or the path of a unix socket
+    number: int
+    owner: str  # the process
+    setting: str  # that names it
+
+    def __str__(self) -> str:
+        where = self.host if self.kind == "unix" else f"{self.host}:{self.number}"
+        return f"{self.kind.upper()} {where} ({self.setting})"
+
+
+def wanted(config: Everything, names: Collection[str]) -> list[Port]:
+    """Return what these processes listen on."""
+    found: list[Port] = []
+    if "router" in names:
+        found += routers(config.bus)
+    if "bridge" in names:
+        found += [
+            Port("udp", config.board.listen_address, port, "bridge", "board.listen_ports")
+            for port in config.board.listen_ports
+        ]
+    if "sim" in names:
+        found += [Port("udp", config.board.address, config.board.port, "sim", "board.port")]
+    return found
+
+
+def routers(bus: Bus) -> Iterator[Port]:
+    """Yield what a router listens on."""
+    for endpoint in bus.listen:
+        spoken = protocol(endpoint)
+        address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
+        if spoken == "unixsock-stream":
+            yield Port("unix", address, 0, "router", "bus.listen")
+            continue
+        host, _, number = address.rpartition(":")
+        kind: Literal["tcp", "udp"] = "udp" if spoken in DATAGRAMS else "tcp"
+        yield Port(kind, host.strip("[]"), int(number), "router", "bus.listen")
+
+
+def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
+    """Check that all are free and return the claims on them, to be closed at the end.
+
+    Raise ``LinkError`` naming the first that is not, once patience is over.
+    """
+    claims = ExitStack()
+    end_s = time.monotonic() + patience_s
+    try:
+        for port in ports:
+            while reason := _taken(port, claims):
+                if time.monotonic() > end_s:
+                    raise LinkError(f"{port}: {reason}; {_advice(port)}")
+                time.sleep(LOOK_S)
+    except BaseException:
+        claims.close()
+        raise
+    return claims
+
+
+def _taken(port: Port, claims: ExitStack) -> str:
+    """Claim a port; return why it is not available, or an empty text."""
+    try:
+        (_connect if port.kind == "unix" else _bind)(port)
+        _claim(port, claims)
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            return "another program has it"
+        return f"cannot be bound: {error.strerror}"
+    return ""
+
+
+def _bind(port: Port) -> None:
+    kind = socket.SOCK_STREAM if port.kind == "tcp" else socket.SOCK_DGRAM
+    family, kind, number, _, address = socket.getaddrinfo(port.host, port.number, type=kind)[0]
+    with socket.socket(family, kind, number) as sock:
+        if port.kind == "tcp":  # sockets in TIME_WAIT do not block a listener
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(address)
+        if port.kind == "tcp":
+            sock.listen(1)
+
+
+def _connect(port: Port) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
+        try:
+            sock.connect(port.host)
+        except OSError:  # no socket, or a stale one of a killed router
+            return
+    raise OSError(errno.EADDRINUSE, "another program has it")
+
+
+def _claim(port: Port, claims: ExitStack) -> None:
+    """Claim a name in Linux's abstract namespace; it is released when the process ends."""
+    if sys.platform == "linux":
+        sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+        sock.bind(f"\0t2-up {port.kind} {port.host} {port.number}")
+
+
+def _advice(port: Port) -> str:
+    if port.owner == "router":
+        return (
+            "is a stack running already? `t2 up --no-router` uses the router that is there, and "
+            "--set bus.listen=tcp/127.0.0.1:PORT takes another port"
+        )
+    return f"is a stack running already? --set {port.setting}=PORT takes another port"

@@ -1,0 +1,70 @@
+"""The file of the drive link's Unix socket: where it is, and who may connect.
+
+The socket is in a directory of the user of bridge and safety that no other user can enter. The file
+permissions decide which programs may command motion.
+"""
+
+import os
+import stat
+from pathlib import Path
+from zlib import crc32
+
+from common.errors import ConfigError
+from common.settings import Bus, drive_path
+
+NETWORK = Path("/proc/self/ns/net")
+
+
+def socket_path(where: Bus, robot: str) -> Path:
+    """Return the path that bridge and safety of one stack have in common.
+
+    Without ``bus.drive`` it is derived from what the two share: user, robot, router and network. It
+    does not depend on the login, so that both find it from any shell.
+    """
+    if where.drive:
+        return Path(drive_path(where.drive))
+    router = crc32(" ".join((_network(), *where.endpoints)).encode())
+    folder = Path(os.environ.get("TMPDIR") or "/tmp") / f"t2-{os.getuid()}"
+    path = folder / f"{robot}-{router:08x}.sock"
+    try:
+        drive_path(f"unixsock-stream/{path}")
+    except ValueError as error:
+        raise ConfigError(f"bus.drive: {error}; name a shorter one") from None
+    return path
+
+
+def prepare(path: Path) -> None:
+    """Make the socket's directory; raise ``ConfigError`` when others could connect."""
+    folder = path.parent
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+    except OSError as error:
+        raise ConfigError(f"bus.drive: {folder}: {error.strerror}") from None
+    private = stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o077
+    if not private or found.st_uid != os.getuid():
+        raise ConfigError(
+            f"bus.drive: {folder} must be a directory of this user that no other user can enter "
+            f"(chmod 700); it has mode {stat.S_IMODE(found.st_mode):o} and owner {found.st_uid}"
+        )
+    _check_file(path)
+
+
+def _check_file(path: Path) -> None:
+    """Refuse a file that is not a socket: Zenoh would remove it. A stale socket may stay."""
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise ConfigError(f"bus.drive: {path}: {error.strerror}") from None
+    if not stat.S_ISSOCK(found.st_mode):
+        raise ConfigError(f"bus.drive: {path} exists and is not a socket; remove or rename it")
+
+
+def _network() -> str:
+    """Return this process's network: ``127.0.0.1`` is another router in another one."""
+    try:
+        return str(NETWORK.stat().st_ino)
+    except OSError:
+        return ""

@@ -1,0 +1,29 @@
+"""``python -m services.bridge.child``: the bridge itself; ``services.bridge.guard`` starts it."""
+
+import os
+import signal
+import sys
+
+from common import realtime
+from common.service import run
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from services.bridge.guard_ipc import NAME, received
+
+
+def main() -> int:
+    """Run the bridge until it is told to stop, or its guard has died."""
+    if NAME not in os.environ:
+        print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
+        return 2
+    # systemd sends these to guard and bridge alike; a bridge is told by its guard, or by its end.
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    handover = received(os.environ)
+    # Never ahead of its guard, which has to brake for it.
+    ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, handover), priority=ahead)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,300 @@
+"""The bridge's core: datagrams, motions, calls and ticks in; frames, messages and events out. Pure.
+
+========== ================================== ==================================================
+entry      called by the shell for            leads to
+========== ================================== ==================================================
+reflex     each datagram, first               BRAKE, when it holds a new bumper hit
+datagram   the same datagram                  messages; answers of calls; events
+motion     each message on ``@cmd/motion``    the frame that the lease allows
+switches,  an operator's calls                frames; the board's echo answers them later
+led
+tick       every 10 ms                        queries; STOP or BRAKE that is due; events
+second     once a second                      the switches' message; rates for the link message
+link       5 times a second, and on a change  the link message
+stop, exit the end of the process             STOP or BRAKE
+========== ================================== ==================================================
+
+Each entry but ``reflex`` returns an ``Output``. Times are of the monotonic clock.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from common import messages as m
+from common.errors import WireError
+from common.freshness import Latest
+from common.wire import reports
+from common.wire.frame import Frame, Side
+from common.wire.framing import Framing, Received
+from common.wire.header import OPENING
+from services.bridge.config import BridgeConfig
+from services.bridge.lease import Order
+from services.bridge.link_report import LinkReport
+from services.bridge.motion_output import MotionOutput
+from services.bridge.operator import Operator
+from services.bridge.output import Output, Send
+from services.bridge.poll import Poll
+from services.bridge.readiness import Readiness
+from services.bridge.reflex import Reflex
+from services.bridge.restart_detection import restarted
+from services.bridge.schedule import ANSWERS, ASKED, STEADY, ports_of, queries
+from services.bridge.translate import BumperFilter, Translator, driver
+
+# Frames that count from either port when they report something new.
+DANGERS = (reports.BumperReport, reports.DriverReport)
+Handler = Callable[[Any, bytes, int, Output], None]  # frame, raw bytes, receive time
+# Frames that come all the time: a change of their port is an event.
+POLLED = frozenset((reports.VelocityReport, *ASKED.values(), reports.DriverReport))
+
+
+class Core:
+    """Reads the board's frames, keeps asking it, and tells it what the lease allows."""
+
+    def __init__(
+        self, config: BridgeConfig, boot: int, counters: Counter[str], now_ns: int
+    ) -> None:
+        """Take the boot of our messages, and where to count what was dropped."""
+        self._config, settings = config, config.bridge
+        self._counters = counters
+        self._framing = Framing(config.wire.crc, config.wire.crc_covers)
+        limits = settings.max_linear, settings.max_angular
+        self._translator = Translator(config.wire, config.vehicle, *limits)
+        self.motions = MotionOutput(
+            settings, self._framing, self._translator, boot=boot, counters=counters, now_ns=now_ns
+        )
+        self.readiness = Readiness(settings, config.board)
+        self.operator = Operator(self.readiness, settings.echo_timeout)
+        self._ports = ports_of(config, now_ns)
+        self._poll = Poll(queries(settings), settings.answer_timeout, STEADY)
+        self._bumper = BumperFilter()
+        self._bumper_seq = 0  # of the newest bumper message
+        self._mileage: Latest[m.Mileage] | None = None
+        self._faults: dict[Side, int] = {}
+        parts = self.readiness, self.motions, self._ports, self._poll
+        self.report = LinkReport(config.board, *parts)
+        self._handlers: dict[type[Frame], Handler] = {
+            reports.VelocityReport: self._on_velocity,
+            reports.BumperReport: self._on_bumper,
+            reports.DistanceReport: self._on_distance,
+            reports.UltrasonicReport: self._on_ultrasonic,
+            reports.DriverReport: self._on_driver,
+            reports.UltrasonicBrakeReport: lambda frame, _, __, out: self.readiness.on_echo(
+                frame.on, None, out
+            ),
+            reports.BumperBrakeReport: lambda frame, _, __, out: self.readiness.on_echo(
+                None, frame.on, out
+            ),
+            reports.LedReport: lambda frame, _, __, out: self.operator.on_led_echo(frame.done, out),
+        }
+        self._reflex = Reflex(self._framing)
+
+    @property
+    def port(self) -> int:
+        """The index of the UDP port that commands leave from; read it before the others."""
+        return self._ports.main
+
+    # --- what comes from the board ----------------------------------------------------------
+
+    def reflex(self, datagram: bytes) -> Send | None:
+        """Return BRAKE when a datagram, on whichever port, holds a hit that is not known yet."""
+        if self._bumper.pressed:
+            return None
+        return self._reflex.answer(datagram, self.motions.port)
+
+    def datagram(self, datagram: bytes, port: int, now_ns: int, *, braked: bool) -> Output:
+        """Take in a datagram that came to this port; ``braked``: ``reflex`` returned BRAKE."""
+        out = Output(braked=braked)
+        if port != self._ports.main and self._is_copy(datagram, port, now_ns):
+            self._counters["other_port"] += 1
+            return out
+        for part in self._framing.read(datagram, reports.FROM_BOARD):
+            if isinstance(part, Received):
+                self._on_frame(part, port, now_ns, out)
+            else:
+                self.report.rejected[part.reason] += 1
+        return out
+
+    def _is_copy(self, datagram: bytes, port: int, now_ns: int) -> bool:
+        """Return whether a datagram is one frame that needs no reading: a copy, and no danger."""
+        kind = reports.FROM_BOARD.get(datagram[: OPENING.size])
+        return (
+            kind is not None
+            and len(datagram) == kind.size
+            and kind.frame not in DANGERS
+            and not self._ports.takes(kind.frame, port, now_ns)
+        )
+
+    def _on_frame(self, part: Received, port: int, now_ns: int, out: Output) -> None:
+        frame, kind = part.frame, type(part.frame)
+        news = self._is_news(frame)
+        if not (self._ports.takes(kind, port, now_ns) or news):
+            self._counters["other_port"] += 1
+            return
+        try:
+            self._handlers[kind](frame, part.raw, now_ns, out)
+        except WireError:
+            self.report.rejected["implausible"] += 1
+            return
+        self.report.frames[kind.__name__] += 1
+        self.readiness.on_frame(now_ns, out)
+        changed = self._ports.take(kind, port, now_ns)
+        self.motions.port = self._ports.main
+        if changed and kind in POLLED:
+            number = self._config.board.listen_ports[port]
+            text = f"{kind.__name__} is now taken from UDP port {number}"
+            out.event("port_changed", "warning", text, port=number, frame=kind.__name__)
+
+    def _is_news(self, frame: Frame) -> bool:
+        """Return whether a frame on either port reports a new hit or driver fault."""
+        if isinstance(frame, reports.DriverReport):
+            return bool(frame.fault_bits & ~self._faults.get(frame.side, 0))
+        if not isinstance(frame, reports.BumperReport) or not frame.on:
+            return False
+        if self._bumper.pressed:
+            self._bumper.take(True)  # while either port shows a hit, no row of clear ones counts
+            return False
+        return True
+
+    def _on_velocity(
+        self, frame: reports.VelocityReport, raw: bytes, now_ns: int, out: Output
+    ) -> None:
+        velocity = self._translator.velocity(frame)
+        self.motions.on_velocity(velocity, now_ns)
+        out.publish("velocity", velocity, raw)
+
+    def _on_ultrasonic(
+        self, frame: reports.UltrasonicReport, raw: bytes, now_ns: int, out: Output
+    ) -> None:
+        self._poll.answered("ultrasonic", now_ns)
+        out.publish("ultrasonic", self._translator.ultrasonic(frame), raw)
+
+    def _on_bumper(self, frame: reports.BumperReport, raw: bytes, now_ns: int, out: Output) -> None:
+        message, hit = self._bumper.take(frame.on)
+        if hit:
+            out.hit = self._bumper_seq + 1
+            self.motions.on_hit(out.hit, now_ns)
+            if not out.braked:
+                out.sends.append(self.motions.brake())
+            out.event("contact", "error", "the bumper is hit: BREAK")
+        self._poll.answered("bumper", now_ns)
+        if message is not None:
+            # A short hit stays in the samples until safety has judged one: it may have lost some.
+            pressed = message.pressed or self.motions.lease.hit is not None
+            lost = self._poll.lost("bumper", now_ns)
+            self._bumper_seq += 1
+            out.publish("bumper", m.Bumper(pressed=pressed, lost=lost), raw)
+
+    def _on_distance(
+        self, frame: reports.DistanceReport, raw: bytes, now_ns: int, out: Output
+    ) -> None:
+        # Measured after it was asked for, however long it then waited to be read.
+        asked_ns = self._poll.answered("mileage", now_ns)
+        after = self._translator.mileage(frame, self.readiness.epoch)
+        before = self._mileage
+        if before is not None and self._is_new_board(before, after, now_ns):
+            self.readiness.on_restart(now_ns, out)
+            self._bumper = BumperFilter()
+            self.motions.on_ready(False)  # not only at the next tick: no RUN in between
+            after = self._translator.mileage(frame, self.readiness.epoch)
+        self._mileage = Latest(after, asked_ns)
+        self.motions.on_mileage(after, now_ns)
+        out.publish("mileage", after, raw)
+
+    def _is_new_board(self, before: Latest[m.Mileage], after: m.Mileage, now_ns: int) -> bool:
+        return restarted(
+            before.value,
+            after,
+            before.age_s(now_ns),
+            unbroken=self.readiness.link.up_ns <= before.received_ns,
+            silent=self.readiness.gap_ns > before.received_ns,
+        )
+
+    def _on_driver(self, frame: reports.DriverReport, raw: bytes, now_ns: int, out: Output) -> None:
+        side = frame.side.name.lower()
+        self._poll.answered(f"driver_{side}", now_ns)
+        message = driver(frame)
+        if frame.fault_bits != self._faults.get(frame.side, 0):
+            text = f"{side} motor driver: {', '.join(message.faults) or 'no fault any more'}"
+            level: m.Level = "error" if message.faults else "info"
+            out.event("driver_fault", level, text, side=side, bits=frame.fault_bits)
+        self._faults[frame.side] = frame.fault_bits
+        out.publish(f"driver_{side}", message, raw)
+
+    # --- what comes from the bus ------------------------------------------------------------
+
+    def motion(self, motion: m.Motion, received_ns: int, now_ns: int) -> Output:
+        """Take in a motion message of safety."""
+        out = Output()
+        self.motions.on_motion(motion, received_ns, now_ns, out)
+        return out
+
+    def switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Output:
+        """Take in a call that sets the board's emergency brakes; ``caller`` is handed back."""
+        out = Output()
+        self.operator.on_switches(request, caller, now_ns, out)
+        return out
+
+    def led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Output:
+        """Take in a call that sets a lamp channel; ``caller`` is handed back."""
+        out = Output()
+        frame = self.operator.on_led(request, caller, now_ns, out)
+        if frame is not None:
+            self._ask(frame, now_ns, out)
+        return out
+
+    # --- what is due by time ----------------------------------------------------------------
+
+    def start(self) -> Output:
+        """Return the first frame: STOP."""
+        out = Output()
+        self.motions.order(Order.STOP, out)
+        return out
+
+    def tick(self, now_ns: int, send_errors: int) -> Output:
+        """Send what is due; ``send_errors``: datagrams that the system has refused to send."""
+        out = Output()
+        frames = self.readiness.on_tick(now_ns, out)
+        if self.readiness.link.state != "up":
+            self._bumper = BumperFilter()  # what was received before the gap is no part of a row
+        self.motions.on_ready(self.readiness.ready)
+        self.motions.on_tick(now_ns, out)
+        for frame in (*frames, *self._poll.due(now_ns)):
+            self._ask(frame, now_ns, out)
+        self.operator.on_tick(now_ns, out)
+        if self.report.is_due(now_ns):
+            self.report.publish(now_ns, send_errors, out)
+        return out
+
+    def second(self) -> Output:
+        """Take the rates of the last second; publish the switches."""
+        out = Output()
+        self.report.second()
+        for name, count in self._poll.missed().items():
+            self._counters[f"missed_{name}"] = count
+        out.publish("switches", self.readiness.message())
+        return out
+
+    def link(self, now_ns: int, send_errors: int) -> Output:
+        """Publish what is known of the link to the board."""
+        out = Output()
+        self.report.publish(now_ns, send_errors, out)
+        return out
+
+    def _ask(self, frame: Frame, now_ns: int, out: Output) -> None:
+        """Send a query or a setting from the port that its answers come to."""
+        self.motions.send(frame, self._ports.to_ask(ANSWERS[frame.ID], now_ns), out)
+
+    # --- the end ----------------------------------------------------------------------------
+
+    def stop(self, now_ns: int) -> Output:
+        """Stop the vehicle for good; ``motions.is_stopped`` says when it stands."""
+        out = Output()
+        self.motions.stop(now_ns, out)
+        return out
+
+    def exit(self, now_ns: int) -> Output:
+        """Return the last frame: STOP for a vehicle that stands, otherwise BRAKE."""
+        out = Output()
+        self.motions.on_exit(now_ns, out)
+        return out

@@ -1,0 +1,168 @@
+"""What the wheels are told: the lease's orders as frames, from the port of the commands. Pure."""
+
+from collections import Counter
+
+from common.errors import MessageError
+from common.freshness import S
+from common.messages import Mileage, Motion, Velocity
+from common.wire.frame import Frame
+from common.wire.framing import Framing
+from services.bridge import lease
+from services.bridge.config import Bridge as Settings
+from services.bridge.lease import Lease, Order, Refusal
+from services.bridge.output import Output, Send
+from services.bridge.standstill import Standstill
+from services.bridge.translate import Translator, check_finite
+
+REPORTED_MAX = 20  # a sender that changes its boot all the time must not fill memory and events
+REST_NS = S  # how long a stopping bridge waits for the vehicle to stand
+
+
+class MotionOutput:
+    """Obeys ``@cmd/motion`` as far as the lease allows; otherwise STOP or BRAKE."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        framing: Framing,
+        translator: Translator,
+        *,
+        boot: int,
+        counters: Counter[str],
+        now_ns: int,
+    ) -> None:
+        """Take the bridge's own ``boot``, and where refused motions are counted."""
+        self.lease = Lease(over_since_ns=now_ns)
+        self.port = 0
+        self._boot = boot
+        self._framing = framing
+        self._translator = translator
+        self._counters = counters
+        self._brake = framing.pack(translator.command(Order.BRAKE))
+        self._velocity: tuple[Velocity, int] | None = None
+        self._stopping_ns: int | None = None
+        self._reported: set[tuple[Refusal, int]] = set()  # refused senders that had an event
+        self._lease_ns = round(settings.lease * S)
+        self._silence_ns = round(settings.silence * S)
+        self._standstill = Standstill(
+            settings.deceleration,
+            settings.angular_deceleration,
+            round(settings.coast * S),
+            self._silence_ns,
+        )
+
+    def on_motion(self, motion: Motion, received_ns: int, now_ns: int, out: Output) -> None:
+        """Turn one motion message into one frame."""
+        try:
+            check_finite(motion)
+        except MessageError as error:
+            self._counters["motion_not_finite"] += 1
+            out.warnings.append(str(error))
+            return
+        hit = self.lease.hit
+        self.lease, order, refusal = lease.on_motion(
+            self.lease, motion, now_ns, self._lease_ns, self._boot, received_ns=received_ns
+        )
+        if order is not None:
+            self.order(order, out, motion)
+            out.obeyed = True
+            out.judged = hit is not None and self.lease.hit is None and order is Order.BRAKE
+        self._report(refusal, motion, out)
+
+    def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
+        """Take in the measured velocity."""
+        self._velocity = velocity, now_ns
+        self._standstill.on_velocity(velocity, now_ns)
+
+    def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
+        """Take in the board's counters."""
+        self._standstill.on_mileage(mileage, now_ns)
+
+    def brake(self) -> Send:
+        """Return a BRAKE frame."""
+        return Send(self._brake, self.port, Order.BRAKE)
+
+    def on_hit(self, seq: int, now_ns: int) -> None:
+        """Take in a hit, in the sample that will be published as ``seq``."""
+        self.lease, _ = lease.on_hit(self.lease, seq, now_ns)
+
+    def on_ready(self, ready: bool) -> None:
+        """Take in whether the board may be driven."""
+        self.lease = lease.on_ready(self.lease, ready and self._stopping_ns is None)
+
+    def on_tick(self, now_ns: int, out: Output) -> None:
+        """Send what is due although nobody asked."""
+        limit_ns, standing = self._standstill.limit_ns, self._standing(now_ns)
+        self.lease, order = lease.on_tick(self.lease, now_ns, self._lease_ns, limit_ns, standing)
+        self._standstill.on_lease(self.lease.over_since_ns)
+        if self._standstill.left:
+            self._on_uncommanded(now_ns, out)
+        if order is not None:
+            self.order(order, out)
+
+    def _on_uncommanded(self, now_ns: int, out: Output) -> None:
+        self.lease, order = lease.on_uncommanded(self.lease, now_ns, self._boot)
+        if order is not None:
+            self.order(order, out)
+            text = "moved away from a standstill without a command: BREAK"
+            out.event("uncommanded_motion", "error", text)
+
+    def stop(self, now_ns: int, out: Output) -> None:
+        """Stop the vehicle for good; only the first call sends a frame."""
+        if self._stopping_ns is None:
+            self._stopping_ns = now_ns
+            self.on_ready(False)
+            self.order(Order.BRAKE if self.lease.braking else Order.STOP, out)
+
+    def is_stopped(self, now_ns: int) -> bool:
+        """Return whether the vehicle stands after ``stop``, or had a second to do so."""
+        since_ns = now_ns if self._stopping_ns is None else self._stopping_ns
+        return self._rests(now_ns) or now_ns - since_ns > REST_NS
+
+    def on_exit(self, now_ns: int, out: Output) -> None:
+        """Leave no RUN behind, whatever ends the bridge; the board stops nothing by itself."""
+        self.order(Order.STOP if self._rests(now_ns) else Order.BRAKE, out)
+
+    def _rests(self, now_ns: int) -> bool:
+        """Return whether the vehicle was seen to stand since the bridge began to stop."""
+        measured_ns = self._velocity[1] if self._velocity else 0
+        stopped = self._stopping_ns is not None and measured_ns > self._stopping_ns
+        return stopped and self._standing(now_ns)
+
+    def send(self, frame: Frame, port: int, out: Output) -> None:
+        """Send a query or a setting to the board."""
+        out.sends.append(Send(self._framing.pack(frame), port))
+
+    def order(self, order: Order, out: Output, motion: Motion | None = None) -> None:
+        """Send the frame of an order."""
+        if order is Order.BRAKE:
+            out.sends.append(self.brake())
+            return
+        datagram = self._framing.pack(self._translator.command(order, motion))
+        out.sends.append(Send(datagram, self.port, order))
+
+    def _standing(self, now_ns: int) -> bool:
+        """Judge by the measured velocity; one that has dried up is no evidence any more.
+
+        Without any so far it counts as standing: this bridge has moved nothing yet.
+        """
+        if self._velocity is None:
+            return True
+        velocity, measured_ns = self._velocity
+        fresh = now_ns - measured_ns <= self._silence_ns
+        return fresh and lease.standing(velocity.linear, velocity.angular)
+
+    def _report(self, refusal: Refusal | None, motion: Motion, out: Output) -> None:
+        if refusal is not None:
+            self._counters[f"motion_{refusal}"] += 1
+        if refusal not in (Refusal.JUMP, Refusal.SECOND_AUTHORITY):
+            return
+        if len(self._reported) >= REPORTED_MAX or (refusal, motion.boot) in self._reported:
+            return
+        self._reported.add((refusal, motion.boot))
+        if refusal is Refusal.JUMP:
+            text = "a motion whose seq jumps is refused; its sender may be a copy"
+            out.event("seq_jump", "error", text, boot=motion.boot)
+        else:
+            text = "a second sender on @cmd/motion is refused"
+            out.event("second_authority", "error", text, boot=motion.boot)

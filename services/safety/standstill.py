@@ -1,0 +1,265 @@
+"""Standstill supervision: the vehicle stops on command, and stays where it stopped.
+
+Standstill is commanded by STOP, by BRAKE and by a RUN that the motion frame rounds to zero. Three
+phases:
+
+======== ============================================================= ===========================
+phase    entered                                                       supervised
+======== ============================================================= ===========================
+MOVING   motion is commanded                                           by ``runaway.py``
+STOPPING standstill is commanded, or safety has just started           it stands within
+                                                                       v / a + 0.5 s, at most 3 s
+STANDING it was measured to stand for 0.2 s                            it stays within 0.05 m and
+                                                                       0.05 rad of that place
+======== ============================================================= ===========================
+
+A vehicle in a curve slows down on both axes together, so the longer of the two times counts. An
+unknown velocity is not standstill. A motion of less than 0.5 s adds its own duration to the time
+to stop and does not renew it, unless the vehicle stood meanwhile: otherwise short motions repeated
+would postpone it for ever.
+
+The way from that place is measured twice. The board's counters find a slow creep. The velocities
+find a fast motion, also while the counters are not answered. Neither may trip by noise, drift or
+a restart of the board:
+
+- of two velocities in a row the smaller counts, and none below the standstill threshold
+- the integral of the velocities leaks
+- a counter step that the vehicle cannot make in the time is a damaged frame: it does not count
+- the heading counter may drift, as gyroscopes do
+"""
+
+import math
+from enum import Enum
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from common.freshness import Latest, S
+from common.messages import Mileage
+from services.safety.config import Safety
+from services.safety.twist import STANDING_MPS, STANDING_RADPS, STILL, Twist
+
+GRACE_NS = S // 2  # on top of v / a
+LONGEST_STOP_NS = 3 * S  # both together, whatever the settings
+BRIEF_NS = S // 2  # a shorter motion does not renew the time to stop
+CONFIRM_NS = S // 5  # of standstill until the place counts
+AWAY = 0.05  # m and rad
+LEAK_S = 5.0  # time constant of the integrated velocities
+DRIFT_RADPS = 0.001  # of the heading counter
+LONGEST_GAP_S = 0.1  # between two velocities; over longer gaps the motion is unknown
+FASTEST_MPS = 1.5  # that a counter step may show; at least ``AWAY`` in any time
+FASTEST_RADPS = 2.0
+
+
+class Phase(Enum):
+    """What is supervised."""
+
+    MOVING = "moving"
+    STOPPING = "stopping"
+    STANDING = "standing"
+
+
+class Measured(Struct, frozen=True):
+    """What the board reports: the newest of both, None while unknown."""
+
+    velocity: Latest[Twist] | None
+    counters: Latest[Mileage] | None
+
+
+class Velocities(Struct, frozen=True):
+    """The newest measured velocity, and what it and the one before agree on."""
+
+    newest: Twist | None = None  # None while unknown
+    received_ns: int = 0
+    steady: Twist | None = None
+
+    @property
+    def standing(self) -> bool:
+        """Whether the vehicle is known to be at standstill."""
+        return self.steady is not None and self.steady.is_standing
+
+
+class Standstill(Struct, frozen=True):
+    """The phase, and the way from the place of the standstill."""
+
+    phase: Phase = Phase.STOPPING
+    due_ns: int | None = None  # when it must be at standstill; None until a velocity was measured
+    began_ns: int = 0  # when the newest motion was commanded
+    still_ns: int | None = None  # since when standstill is measured
+    velocities: Velocities = Velocities()
+    counters: Latest[Mileage] | None = None
+    integrated: Twist = STILL  # m and rad, from the velocities
+    counted: Twist = STILL  # m and rad, from the counters
+    left: bool = False  # whether it has just left the place of its standstill
+
+    def is_late(self, now_ns: int) -> bool:
+        """Return whether it should be at standstill by now and is not known to be."""
+        overdue = self.due_ns is not None and now_ns > self.due_ns
+        return self.phase is Phase.STOPPING and overdue and not self.velocities.standing
+
+    @property
+    def text(self) -> str:
+        """Describe, for the operator, a vehicle that does not stop."""
+        twist = self.velocities.steady
+        if twist is None:
+            return "Standstill is not confirmed: no velocity is received."
+        return f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
+
+
+class Supervisor(Struct, frozen=True):
+    """Follows one vehicle; holds no state."""
+
+    deceleration: float  # m/s^2 that the vehicle surely reaches
+    angular_deceleration: float  # rad/s^2
+    fastest: Twist  # assumed while the velocity is unknown
+
+    def follow(
+        self, before: Standstill, commanded: bool, seen: Measured, now_ns: int
+    ) -> Standstill:
+        """Return the supervision now; ``commanded``: whether standstill is commanded."""
+        known = seen.velocity
+        if not commanded and _knows(before, seen):
+            return before
+        after = replace(_count(_integrate(before, known), seen.counters), left=False)
+        if not commanded:
+            return _move(after, now_ns)
+        if before.phase is Phase.MOVING:
+            return self._stop(after, known, now_ns)
+        if before.phase is Phase.STANDING:
+            return self._stay(after, known, now_ns)
+        if after.due_ns is None and known is not None:
+            after = replace(after, due_ns=self._due_ns(known, now_ns))
+        return _settle(after, now_ns)
+
+    def _stop(self, standstill: Standstill, known: Latest[Twist] | None, now_ns: int) -> Standstill:
+        lasted_ns = now_ns - standstill.began_ns
+        if standstill.due_ns is not None and lasted_ns < BRIEF_NS:
+            return _begin(standstill, Phase.STOPPING, standstill.due_ns + lasted_ns)
+        return _begin(standstill, Phase.STOPPING, self._due_ns(known, now_ns))
+
+    def _stay(self, standstill: Standstill, known: Latest[Twist] | None, now_ns: int) -> Standstill:
+        ways = (standstill.integrated, standstill.counted)
+        if all(max(abs(way.linear), abs(way.angular)) <= AWAY for way in ways):
+            return standstill
+        left = replace(standstill, left=True)
+        return _begin(left, Phase.STOPPING, self._due_ns(known, now_ns))
+
+    def _due_ns(self, known: Latest[Twist] | None, now_ns: int) -> int:
+        speed = known.value if known else self.fastest
+        linear_s = abs(speed.linear) / self.deceleration
+        angular_s = abs(speed.angular) / self.angular_deceleration
+        stop_ns = round(max(linear_s, angular_s) * S) + GRACE_NS
+        return now_ns + min(stop_ns, LONGEST_STOP_NS)
+
+
+def supervisor(settings: Safety) -> Supervisor:
+    """Return the supervisor for these settings."""
+    return Supervisor(
+        settings.deceleration,
+        settings.angular_deceleration,
+        Twist(settings.max_linear, settings.max_angular),
+    )
+
+
+def _knows(before: Standstill, seen: Measured) -> bool:
+    """Return whether a motion goes on and nothing new was measured."""
+    velocity_ns = seen.velocity.received_ns if seen.velocity else None
+    same = before.counters is seen.counters and before.velocities.received_ns == velocity_ns
+    return before.phase is Phase.MOVING and same
+
+
+def _begin(standstill: Standstill, phase: Phase, due_ns: int | None) -> Standstill:
+    """Return a phase at its beginning, with zero travel."""
+    return replace(
+        standstill, phase=phase, due_ns=due_ns, still_ns=None, integrated=STILL, counted=STILL
+    )
+
+
+def _move(standstill: Standstill, now_ns: int) -> Standstill:
+    """Return the supervision of a motion; the time to stop is kept until the vehicle stands."""
+    began_ns = standstill.began_ns if standstill.phase is Phase.MOVING else now_ns
+    due_ns = None if standstill.velocities.standing else standstill.due_ns
+    return replace(_begin(standstill, Phase.MOVING, due_ns), began_ns=began_ns)
+
+
+def _settle(standstill: Standstill, now_ns: int) -> Standstill:
+    """Take the place for that of the standstill once it is confirmed."""
+    if not standstill.velocities.standing:
+        return replace(standstill, still_ns=None)
+    still_ns = now_ns if standstill.still_ns is None else standstill.still_ns
+    if now_ns - still_ns >= CONFIRM_NS:
+        return _begin(standstill, Phase.STANDING, None)
+    return replace(standstill, still_ns=still_ns)
+
+
+def _integrate(standstill: Standstill, known: Latest[Twist] | None) -> Standstill:
+    """Take in the newest velocity, once."""
+    before = standstill.velocities
+    if known is None:
+        return replace(standstill, velocities=Velocities())
+    if known.received_ns == before.received_ns:
+        return standstill
+    newest = known.value
+    if before.newest is None:
+        return replace(standstill, velocities=Velocities(newest, known.received_ns, newest))
+    steady = _steady(before.newest, newest)
+    gap_s = min((known.received_ns - before.received_ns) / S, LONGEST_GAP_S)
+    kept = 1 - gap_s / LEAK_S
+    way = standstill.integrated
+    return replace(
+        standstill,
+        velocities=Velocities(newest, known.received_ns, steady),
+        integrated=Twist(
+            way.linear * kept + _over(steady.linear, STANDING_MPS) * gap_s,
+            way.angular * kept + _over(steady.angular, STANDING_RADPS) * gap_s,
+        ),
+    )
+
+
+def _steady(before: Twist, after: Twist) -> Twist:
+    """Return what two velocities agree on, so that a single wrong one does not count."""
+    return Twist(_common(before.linear, after.linear), _common(before.angular, after.angular))
+
+
+def _common(one: float, other: float) -> float:
+    return 0.0 if one * other <= 0 else min(one, other, key=abs)
+
+
+def _over(value: float, threshold: float) -> float:
+    return value if abs(value) >= threshold else 0.0
+
+
+def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill:
+    """Take in the newest counters, once."""
+    before = standstill.counters
+    if newest is None or (before is not None and newest.received_ns == before.received_ns):
+        return standstill
+    standstill = replace(standstill, counters=newest)
+    if before is None or _identity(before.value) != _identity(newest.value):
+        return standstill
+    gap_s = _gap_s(before, newest)
+    step = newest.value.distance - before.value.distance
+    turn = math.remainder(newest.value.heading - before.value.heading, math.tau)
+    drift = DRIFT_RADPS * gap_s
+    turned = standstill.counted.angular + _credible(turn, FASTEST_RADPS * gap_s)
+    counted = Twist(
+        standstill.counted.linear + _credible(step, FASTEST_MPS * gap_s),
+        math.copysign(max(0.0, abs(turned) - drift), turned),
+    )
+    return replace(standstill, counted=counted)
+
+
+def _gap_s(before: Latest[Mileage], newest: Latest[Mileage]) -> float:
+    """Return the time between two readings of one bridge; after a stall they arrive together."""
+    sent_ns = newest.value.mono_ns - before.value.mono_ns
+    return max(newest.received_ns - before.received_ns, sent_ns) / S
+
+
+def _identity(counters: Mileage) -> tuple[int, int]:
+    """Return whose counters these are, and since which start of the board."""
+    return counters.boot, counters.epoch
+
+
+def _credible(step: float, bound: float) -> float:
+    """Return a step of a counter, 0 for one that is not credible (too large, NaN)."""
+    return step if abs(step) <= max(AWAY, bound) else 0.0

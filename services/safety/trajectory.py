@@ -1,0 +1,73 @@
+"""Signed travel by the board's counter over the last metre: which way the vehicle came.
+
+One velocity sample is not evidence of a direction: a vehicle that hits something rebounds. The
+counter is read in steps that are larger than its noise, and a short run the other way does not
+change the answer. Travel before a turn on the spot, a restart or an unlikely jump is forgotten.
+"""
+
+import math
+
+from msgspec import Struct
+
+from common.messages import Direction
+
+REACH_M = 1.0  # of travel is kept
+STEP_M = 0.005  # a smaller change is resolution or noise of the counter
+RUN_M = 0.05  # a shorter run may be a rebound
+TURN_RAD = 0.35  # a larger turn on the spot gives earlier travel another direction
+
+OPPOSITE: dict[Direction, Direction] = {"forward": "backward", "backward": "forward"}
+
+
+class Counter(Struct, frozen=True):
+    """One reading of the board's counters."""
+
+    origin: tuple[int, int]  # boot of the bridge, epoch of the board: comparable only within one
+    distance: float  # m
+    heading: float  # rad
+
+
+class Trajectory(Struct, frozen=True):
+    """The last metre as runs of one sign each."""
+
+    runs: tuple[float, ...] = ()  # m, forward positive, the oldest first
+    at: Counter | None = None  # where the last run ended
+    ended_ns: int | None = None  # when
+
+    def follow(self, counter: Counter, received_ns: int) -> "Trajectory":
+        """Return the trajectory with a reading of the counters."""
+        if self.at is None or self.at.origin != counter.origin:
+            return Trajectory(at=counter)
+        run = counter.distance - self.at.distance
+        if abs(run) > REACH_M:
+            return Trajectory(at=counter)
+        if abs(run) >= STEP_M:
+            return Trajectory(_joined(self.runs, run), counter, received_ns)
+        turned = math.remainder(counter.heading - self.at.heading, math.tau)
+        return Trajectory(at=counter) if abs(turned) > TURN_RAD else self
+
+    @property
+    def net(self) -> float:
+        """The sum of all runs in metres, forward positive."""
+        return sum(self.runs)
+
+    @property
+    def direction(self) -> Direction | None:
+        """The way it came; None unless its net travel and its last longer run agree."""
+        last = next((run for run in reversed(self.runs) if abs(run) >= RUN_M), 0.0)
+        if last * self.net <= 0:
+            return None
+        return "forward" if last > 0 else "backward"
+
+
+def _joined(runs: tuple[float, ...], run: float) -> tuple[float, ...]:
+    """Return the runs with one more, without what lies farther back than the reach."""
+    if runs and math.copysign(run, runs[-1]) == run:
+        run += runs[-1]
+        runs = runs[:-1]
+    runs = (*runs, run)
+    over = max(0.0, sum(map(abs, runs)) - REACH_M)
+    while over >= abs(runs[0]):
+        over -= abs(runs[0])
+        runs = runs[1:]
+    return (math.copysign(abs(runs[0]) - over, runs[0]), *runs[1:])

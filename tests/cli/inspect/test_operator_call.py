@@ -1,0 +1,168 @@
+"""``t2 call`` of an operator: what it takes from safety's state, and when it confirms."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import msgspec
+import pytest
+import zenoh
+
+from cli.inspect import operator_call
+from common import codec, keys
+from common import messages as m
+from common.bus.bus import Bus
+from common.bus.calls import Caller
+from tests.cli.inspect.tool import Tool, pretend
+from tests.common.rig import Rig
+
+CONTACT = m.Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=41)
+IDLE = m.Cause(name="no_request", action="stop", age=1.0, text="Nobody asks to move.", id=40)
+CLEARS = "t2 call: clears contact: The bumper was hit.\n"
+Serve = tuple[keys.Call[Any, Any], Callable[..., None]]
+NOT_CONFIRMED = "not confirmed: safety's state does not show this reset"
+
+
+class Safety:
+    """Publishes a state whose heartbeat rises, and serves calls as configured."""
+
+    def __init__(self, rig: Rig, *serves: Serve) -> None:
+        self.heartbeat = 100
+        self.latched = True
+        self.asked: list[Any] = []
+        self._serves = serves
+        self.bus = pretend(rig, "safety", {keys.SAFETY: self.state}, self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        for call, answer in self._serves:
+            bus.serve(call, partial(self.take, answer))
+
+    def take(self, answer: Callable[..., None], request: msgspec.Struct, caller: Any) -> None:
+        self.asked.append(request)
+        answer(self, caller)
+
+    def state(self) -> m.SafetyState:
+        self.heartbeat += 1
+        causes = (CONTACT, IDLE) if self.latched else (IDLE,)
+        return m.SafetyState(
+            verdict="brake", latched=("contact",) * self.latched, causes=causes, source=None,
+            heartbeat=self.heartbeat, text="", limits=m.Limits(forward=0, backward=0, angular=0),
+        )  # fmt: skip
+
+
+def obey(safety: Safety, caller: Caller[m.ResetDone]) -> None:
+    """Clear the causes, and answer with them."""
+    safety.latched = False
+    done = m.ResetDone(
+        text="Reset.", boot=safety.bus.boot, heartbeat=safety.heartbeat + 1, cleared=(41,)
+    )
+    caller.reply(done)
+
+
+def lie(safety: Safety, caller: Caller[m.ResetDone]) -> None:
+    """Answer with all values of safety's public state, and clear nothing."""
+    caller.reply(m.ResetDone(text="Reset.", boot=safety.bus.boot, cleared=(41,)))
+
+
+def done(_: Safety, caller: Caller[m.Done]) -> None:
+    caller.reply(m.Done(text="done"))
+
+
+def test_a_reset_names_what_is_latched_and_is_confirmed_by_the_state(rig: Rig, tool: Tool) -> None:
+    safety = Safety(rig, (keys.RESET, obey))
+    result = tool("call", "safety/reset", "--text")
+    assert (result.code, result.err) == (0, CLEARS)
+    assert "text: Reset." in result.out
+    (request,) = safety.asked
+    assert isinstance(request, m.ResetRequest)
+    assert request.causes == (41,)
+    assert request.echo is not None
+    assert 100 < request.echo <= safety.heartbeat
+
+
+def test_a_reset_without_effect_is_not_confirmed(rig: Rig, tool: Tool) -> None:
+    Safety(rig, (keys.RESET, lie))
+    result = tool("call", "safety/reset")
+    assert result.code == 1
+    assert NOT_CONFIRMED in result.err
+
+
+@pytest.mark.parametrize(
+    "payload", [b"ok", codec.encode(m.Done(text="ok")), codec.encode(m.ResetDone(text="ok"))]
+)
+def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: Rig, tool: Tool) -> None:
+    Safety(rig)
+    key = keys.RESET.on(rig.robot)
+
+    def answer(query: zenoh.Query) -> None:
+        query.reply(key, payload)
+        query.drop()
+
+    queryable = rig.session().declare_queryable(key, answer)
+    result = tool("call", "safety/reset")
+    assert result.code == 1
+    assert NOT_CONFIRMED in result.err
+    queryable.undeclare()
+
+
+@pytest.mark.parametrize(
+    ("words", "call", "meant"),
+    [
+        (
+            ("safety/release", '{"direction": "backward"}'),
+            keys.RELEASE,
+            m.ReleaseRequest(direction="backward"),
+        ),
+        (("odom/reset", '{"x": 1.0, "echo": null}'), keys.SET_POSE, m.PoseRequest(x=1.0)),
+        (("bridge/switches",), keys.SET_SWITCHES, m.SwitchesRequest()),
+    ],
+)
+def test_every_operator_call_echoes_the_newest_state(
+    words: tuple[str, ...], call: keys.Call[Any, Any], meant: Any, rig: Rig, tool: Tool
+) -> None:
+    reply = m.Switches() if call is keys.SET_SWITCHES else m.Done(text="done")
+    safety = Safety(rig, (call, lambda _, caller: caller.reply(reply)))
+    result = tool("call", *words)
+    assert (result.code, result.err) == (0, "")
+    (asked,) = safety.asked
+    assert 100 < asked.echo <= safety.heartbeat
+    assert asked == msgspec.structs.replace(meant, echo=asked.echo)
+
+
+def test_what_the_user_gives_is_left_as_it_is(rig: Rig, tool: Tool) -> None:
+    safety = Safety(rig, (keys.RESET, obey), (keys.SET_POSE, done))
+    assert tool("call", "odom/reset", '{"echo": 7}').code == 0
+    assert tool("call", "safety/reset", '{"echo": 7, "causes": [8]}').err == ""
+    assert safety.asked == [m.PoseRequest(echo=7), m.ResetRequest(echo=7, causes=(8,))]
+
+
+def test_without_a_state_an_operators_call_is_not_made(
+    rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(operator_call, "SEEN_S", 0.3)
+    for key in ("safety/reset", "safety/release", "odom/reset", "bridge/switches"):
+        result = tool("call", key)
+        assert (result.code, result.out) == (1, "")
+        assert "no state of safety within 1 s" in result.err
+
+
+def test_who_lets_go_needs_no_state(rig: Rig, tool: Tool) -> None:
+    asked: list[m.ReleaseRequest] = []
+
+    def take(request: m.ReleaseRequest, caller: Caller[m.Done]) -> None:
+        asked.append(request)
+        caller.reply(m.Done(text="Let go."))
+
+    rig.bus(lambda bus: bus.serve(keys.RELEASE, take))
+    assert tool("call", "safety/release", '{"held": false}').code == 0
+    assert asked == [m.ReleaseRequest(held=False)]
+
+
+def test_what_is_no_state_is_passed_over(rig: Rig, tool: Tool) -> None:
+    safety = Safety(rig, (keys.RESET, obey))
+    session = rig.session()
+    rig.loop.post(
+        lambda: rig.loop.every(0.01, lambda _: session.put(keys.SAFETY.on(rig.robot), b"\xc1"))
+    )
+    assert tool("call", "safety/reset").code == 0
+    assert not safety.latched

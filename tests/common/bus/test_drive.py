@@ -1,0 +1,218 @@
+"""Both ends of the drive link in one process, beside a real router."""
+
+import socket
+import time
+from pathlib import Path
+
+import pytest
+
+from common import codec, keys
+from common.bus.bus import Arrival, Bus
+from common.bus.drive import DriveLink, DriveOpener, LinkWatch
+from common.errors import ConfigError
+from common.freshness import S
+from common.messages import Bumper, Motion
+from common.settings import Bus as Settings
+from tests.common.rig import Rig, rising, until_heard
+from tests.support import Lines, at, wait_until
+
+
+class Ends:
+    """A bridge's and a safety's link, and what came."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.motions: list[Arrival[Motion]] = []
+        self.bumpers: list[Arrival[Bumper]] = []
+        self.bridge = self.bridge_end()
+        self.safety = self.safety_end()
+        self.linked()
+
+    def bridge_end(self) -> DriveLink:
+        bus = Bus(at(self.rig.endpoint), self.rig.robot, self.rig.loop.post)
+        link = DriveLink(bus, listens=True)
+        link.subscribe(keys.MOTION, self.motions.append, depth=100)
+        self.bumper = link.publisher(keys.BUMPER)
+        self.bridges_bus = self.rig.opened(bus)
+        return link
+
+    def safety_end(self) -> DriveLink:
+        bus = Bus(at(self.rig.endpoint), self.rig.robot, self.rig.loop.post)
+        link = DriveLink(bus, listens=False)
+        link.subscribe(keys.BUMPER, self.bumpers.append, depth=100)
+        self.motion = link.publisher(keys.MOTION)
+        self.safetys_bus = self.rig.opened(bus)
+        return link
+
+    def linked(self) -> None:
+        wait_until(lambda: self.bridge.connected and self.safety.connected, "the link")
+        until_heard(
+            lambda: (self.motion.put(Motion(command="stop")), self.bumper.put(CLEAR)),
+            lambda: self.motions and self.bumpers,
+            "both ways",
+        )
+
+
+CLEAR = Bumper(pressed=False)
+
+
+@pytest.fixture
+def ends(rig: Rig) -> Ends:
+    return Ends(rig)
+
+
+def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends) -> None:
+    ends.bumpers.clear()
+    first = ends.bumper.next_seq
+    for _ in range(50):
+        ends.bumper.put(CLEAR, b"raw")
+    wait_until(lambda: ends.bumpers[-1:] and ends.bumpers[-1].message.seq == first + 49, "the last")
+    seqs = [arrival.message.seq for arrival in ends.bumpers]
+    assert rising(seqs)
+    assert ends.bumpers[-1].raw == b"raw"
+    key = keys.BUMPER.on(ends.rig.robot)
+    assert ends.bridges_bus.counts[key] == ends.bumper.next_seq - 1
+    assert ends.safetys_bus.counts[key] >= len(ends.bumpers)
+    assert ends.bumpers[-1].message.boot == ends.bridges_bus.boot == ends.bridge.boot
+
+
+def test_who_looks_on_the_bus_sees_each_message_once(ends: Ends) -> None:
+    seen: list[Arrival[Motion]] = []
+    ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, seen.append, depth=100))
+    until_heard(lambda: ends.motion.put(Motion(command="stop")), lambda: seen, "a motion")
+    for _ in range(50):
+        ends.motion.put(Motion(command="stop"))
+        time.sleep(0.002)
+    wait_until(lambda: seen[-1].message.seq == ends.motion.next_seq - 1, "the last")
+    assert rising(arrival.message.seq for arrival in seen)
+
+
+def test_nothing_of_a_burst_is_lost(ends: Ends) -> None:
+    first = ends.motion.next_seq
+    for _ in range(50):
+        for _ in range(8):
+            ends.motion.put(Motion(command="stop"))
+        time.sleep(0.01)
+    wait_until(lambda: ends.motions and ends.motions[-1].message.seq == first + 399, "the last")
+    seqs = [arrival.message.seq for arrival in ends.motions]
+    assert [seq for seq in seqs if seq >= first] == [*range(first, first + 400)]
+
+
+def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
+    stranger = ends.rig.session()
+    copied = Motion(command="run", linear=0.9, seq=10**6, boot=ends.safetys_bus.boot)
+    pressed = Bumper(pressed=True, seq=10**6, boot=ends.bridges_bus.boot)
+    witnessed: list[Arrival[Motion]] = []
+    ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, witnessed.append, depth=100))
+    until_heard(
+        lambda: (
+            stranger.put(keys.MOTION.on(ends.rig.robot), codec.encode(copied)),
+            stranger.put(keys.BUMPER.on(ends.rig.robot), codec.encode(pressed)),
+        ),
+        lambda: any(arrival.message.linear for arrival in witnessed),
+        "the forged motion, at a client of the router",
+    )
+    ends.motion.put(Motion(command="brake"))
+    wait_until(lambda: ends.motions[-1].message.command == "brake", "what came behind it")
+    assert not any(arrival.message.linear for arrival in ends.motions)
+    assert not any(arrival.message.pressed for arrival in ends.bumpers)
+
+
+def test_it_works_without_a_router_and_from_before_there_is_one(rig: Rig) -> None:
+    rig.endpoint = "tcp/127.0.0.1:1"
+
+    def opened(bus: Bus) -> Bus:
+        bus.open()
+        rig._stack.callback(bus.close)
+        return bus
+
+    rig.opened = opened  # type: ignore[method-assign]
+    ends = Ends(rig)
+    assert not ends.bridges_bus.connected
+    assert ends.bridge.connected
+    assert ends.motion.passed_on
+
+
+@pytest.mark.parametrize("first", ["bridge", "safety"])
+def test_an_end_that_is_back_is_found_at_once(ends: Ends, first: str) -> None:
+    gone = ends.bridges_bus if first == "bridge" else ends.safetys_bus
+    left = ends.safety if first == "bridge" else ends.bridge
+    gone.close()
+    wait_until(lambda: not left.connected, "the loss")
+    began_s = time.monotonic()
+    if first == "bridge":
+        ends.bridge = ends.bridge_end()
+    else:
+        ends.safety = ends.safety_end()
+    wait_until(lambda: ends.bridge.connected and ends.safety.connected, "the link")
+    assert time.monotonic() - began_s < 2.0
+    ends.motions.clear()
+    ends.bumpers.clear()
+    ends.linked()
+
+
+def test_the_socket_is_the_users_own(ends: Ends) -> None:
+    assert ends.bridge.socket == ends.safety.socket
+    assert ends.bridge.socket.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_socket_left_by_a_killed_bridge_is_taken_over(rig: Rig, tmp_path: Path) -> None:
+    where = Settings(connect=(rig.endpoint,), drive=f"unixsock-stream/{tmp_path}/t2/d.sock")
+    bus = Bus(where, rig.robot, rig.loop.post)
+    link = DriveLink(bus, listens=True)
+    link.socket.touch()
+    with pytest.raises(ConfigError, match="is not a socket"):
+        DriveLink(bus, listens=True)
+    link.socket.unlink()
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(link.socket))
+    rig.opened(bus)
+    wait_until(lambda: link._session is not None, "it listens")
+
+
+def test_a_second_bridge_waits_and_says_why(ends: Ends, lines: Lines) -> None:
+    second = Bus(at(ends.rig.endpoint), ends.rig.robot, ends.rig.loop.post)
+    link = DriveLink(second, listens=True)
+    ends.rig.opened(second)
+    wait_until(lambda: lines, "a line")
+    assert "cannot listen" in lines[0][1]
+    assert lines[0][2] == {"socket": str(link.socket)}
+    assert not link.connected
+
+
+def test_a_link_that_never_opened_closes(rig: Rig) -> None:
+    bus = Bus(at(rig.endpoint), rig.robot, rig.loop.post)
+    publisher = DriveLink(bus, listens=False).publisher(keys.MOTION)
+    bus.close()
+    publisher.put(Motion(command="stop"))
+
+
+def test_an_end_that_dials_says_nothing_by_itself(rig: Rig) -> None:
+    link = DriveLink(Bus(at(rig.endpoint), rig.robot, rig.loop.post), listens=False)
+    assert link.other == "bridge"
+    assert isinstance(link._opener, DriveOpener)
+
+
+class FakeLink:
+    other, socket, connected = "safety", Path("/run/t2/d.sock"), False
+
+
+def test_a_link_that_is_missing_lost_or_back_is_reported(lines: Lines) -> None:
+    link, events = FakeLink(), []
+    watch = LinkWatch(link, lambda name, level, text: events.append((name, level, text)))  # type: ignore[arg-type]
+    for second in range(12):
+        watch.look(second * S)
+    assert [line[1].split(";")[0] for line in lines] == ["no safety on the drive link"] * 2
+    link.connected = True
+    watch.look(12 * S)
+    assert events == []  # it came for the first time
+    link.connected = False
+    for second in range(13, 19):
+        watch.look(second * S)
+    assert len(lines) == 3
+    link.connected = True
+    watch.look(19 * S)
+    assert [event[:2] for event in events] == [
+        ("drive_link_lost", "error"), ("drive_link_up", "info"),
+    ]  # fmt: skip
+    assert "safety" in events[0][2]

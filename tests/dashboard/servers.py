@@ -1,0 +1,72 @@
+"""Safety's and the bridge's servers, with configured answers."""
+
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from common import keys
+from common.bus.bus import Bus
+from common.bus.calls import Caller
+from common.loop import Loop
+from common.messages import (
+    Cause,
+    Done,
+    Release,
+    ReleaseRequest,
+    ResetDone,
+    ResetRequest,
+    Switches,
+    SwitchesRequest,
+)
+from tests.dashboard.world import World
+from tests.support import bus_on, running
+
+CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
+NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)
+FREE = Release(believed_free="backward", travelled=0.4, age=2.0, forbidden=(), left=0.15)
+
+
+@dataclass
+class Servers:
+    """Safety's and the bridge's servers: what they were asked, and what they answer."""
+
+    world: World
+    resets: list[ResetRequest] = field(default_factory=list)
+    releases: list[ReleaseRequest] = field(default_factory=list)
+    switches: list[SwitchesRequest] = field(default_factory=list)
+    boot: int = 0
+    is_effective: bool = True
+
+    def declare(self, bus: Bus) -> None:
+        bus.serve(keys.RESET, self.reset)
+        bus.serve(keys.RELEASE, self.release)
+        bus.serve(keys.SET_SWITCHES, self.switch)
+
+    def reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
+        self.resets.append(request)
+        if self.is_effective:
+            self.world.latched, self.world.causes = (), ()
+        done = ResetDone(
+            text="Reset.", boot=self.boot, heartbeat=time.monotonic_ns(), cleared=request.causes
+        )
+        caller.reply(done)
+
+    def release(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
+        self.releases.append(request)
+        caller.reply(Done(text="Moving off."))
+
+    def switch(self, request: SwitchesRequest, caller: Caller[Switches]) -> None:
+        self.switches.append(request)
+        caller.reply(Switches())
+
+
+@contextlib.contextmanager
+def serving(endpoint: str, world: World) -> Iterator[Servers]:
+    """Answer while the context lasts, on the bus of a robot with a contact."""
+    it = Servers(world, boot=world.boot)
+    world.safe = True
+    world.latched, world.causes, world.release = ("contact",), (CONTACT,), FREE
+    with running(Loop()) as loop, bus_on(endpoint, loop, it.declare):
+        yield it
+    world.latched, world.causes, world.release = (), (), None

@@ -1,0 +1,87 @@
+"""Which connections are admitted: the limits, the reserve, and which one is closed."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.dashboard.admission import Admission, Place, network_of
+
+ORDINARY, RESERVE = Place.ORDINARY, Place.RESERVE
+
+
+@pytest.fixture
+def admission() -> Admission:
+    return Admission(total=4, per_network=2, reserve=2)
+
+
+def test_one_network_fills_its_own_part(admission: Admission) -> None:
+    assert admission.admit(1, "a") == (ORDINARY, None)
+    assert admission.admit(2, "a") == (ORDINARY, None)
+    assert admission.admit(3, "a") == (RESERVE, None)
+    assert admission.admit(4, "b") == (ORDINARY, None)
+
+
+def test_all_networks_fill_the_whole(admission: Admission) -> None:
+    for number, network in enumerate("aabb"):
+        assert admission.admit(number, network) == (ORDINARY, None)
+    assert admission.admit(9, "c") == (RESERVE, None)
+
+
+def test_the_oldest_in_a_full_reserve_ends(admission: Admission) -> None:
+    for number in (1, 2, 3, 4):
+        admission.admit(number, "a")
+    assert admission.admit(5, "a") == (RESERVE, 3)
+    assert admission.admit(6, "a") == (RESERVE, 4)
+
+
+def test_a_network_pushes_out_its_own(admission: Admission) -> None:
+    for number, network in enumerate("aabb"):
+        admission.admit(number, network)
+    admission.admit(10, "c")
+    admission.admit(11, "a")
+    assert admission.admit(12, "a") == (RESERVE, 11)
+    assert admission.admit(13, "a") == (RESERVE, 12)
+
+
+def test_an_end_gives_the_place_back(admission: Admission) -> None:
+    admission.admit(1, "a")
+    admission.admit(2, "a")
+    admission.release(1)
+    admission.release(1)
+    assert admission.admit(3, "a") == (ORDINARY, None)
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.booleans()), max_size=60))
+def test_the_limits_hold_and_a_newcomer_stays(steps: list[tuple[str, bool]]) -> None:
+    admission = Admission(total=4, per_network=2, reserve=2)
+    inside: dict[int, tuple[str, Place]] = {}
+    for number, (network, is_end) in enumerate(steps):
+        if is_end and inside:
+            gone = next(iter(inside))
+            del inside[gone]
+            admission.release(gone)
+            continue
+        place, ended = admission.admit(number, network)
+        inside[number] = (network, place)
+        if ended is not None:
+            assert ended != number
+            assert inside.pop(ended)[1] is RESERVE
+        ordinary = [whose for whose, where in inside.values() if where is ORDINARY]
+        assert len(ordinary) <= 4
+        assert all(ordinary.count(whose) <= 2 for whose in "abc")
+        assert len(inside) - len(ordinary) <= 2
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("10.7.5.1", "10.7.5.1", True),
+        ("10.7.5.1", "10.7.5.2", False),
+        ("::ffff:10.7.5.1", "10.7.5.1", True),
+        ("2001:db8::1", "2001:db8::ffff:1", True),
+        ("2001:db8:0:1::1", "2001:db8:0:2::1", False),
+        ("fe80::1%eth0", "fe80::2%eth0", True),
+    ],
+)
+def test_the_network_of_an_address(one: str, other: str, same: bool) -> None:
+    assert (network_of(one) == network_of(other)) is same

@@ -1,0 +1,59 @@
+"""Protections of safety taken out: standstill, override, and what sonars and bumper polls hide."""
+
+from collections.abc import Callable
+from typing import Any
+
+from services.safety.arbiter import Arbiter
+from services.safety.blind import Blind
+from services.safety.standstill import Standstill, Supervisor
+from sim.vehicle import Twist as Rolling
+from tests.invariants.stack import Stack
+
+FAULT_MM = 0xFFFF
+
+
+def never_stops(stack: Stack) -> None:
+    stack.vehicle.measured = Rolling(0.28)
+    stack.sticks["teleop"].asks = None
+
+
+def pushed(stack: Stack) -> None:
+    stack.sticks["teleop"].asks = None
+    stack.run(2500)
+    stack.vehicle.measured = Rolling(0.28)
+
+
+def nav_goes_on(stack: Stack) -> None:
+    """Overrule nav by teleop, then end teleop's requests."""
+    stack.sticks["teleop"].asks, stack.sticks["nav"].asks = None, (0.0, 0.0)
+    stack.run(1000)
+    stack.sticks["nav"].asks = (0.3, 0.0)
+    stack.run(300)
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(300)
+    stack.sticks["teleop"].asks = None
+
+
+def goes_on_blind(stack: Stack) -> None:
+    """Let the front sonar fail while the stick is held on."""
+    stack.vehicle.ranges[2] = FAULT_MM
+
+
+def knows_at_once(blind: Blind, unseen: Any, _: Any, now_ns: int) -> Blind:
+    return Blind(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
+
+
+SAFETY_BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] = {
+    "a stop is not supervised": (
+        Standstill, "is_late", lambda *_: False, never_stops, "no BRAKE while",
+    ),
+    "a standstill is not supervised": (
+        Supervisor, "_stay", lambda self, standstill, *_: standstill, pushed, "no BRAKE while",
+    ),
+    "an override does not hold": (
+        Arbiter, "overruled", lambda self, _: self, nav_goes_on, "nav was not neutral",
+    ),
+    "a hold that was meant for a good sonar drives on blind": (
+        Blind, "after", knows_at_once, goes_on_blind, "toward sonar 2",
+    ),
+}  # fmt: skip

@@ -1,0 +1,167 @@
+"""The memory of one latched contact: travel, forbidden directions, holds."""
+
+import pytest
+
+from common.freshness import S
+from services.safety.latches import Held
+from services.safety.release import COAST_NS, Release, sweep
+from services.safety.trajectory import Counter, Trajectory
+from services.safety.twist import STILL, Twist
+
+REACH = 0.65
+BACK = Twist(-0.1)
+CAME = Trajectory(runs=(0.4,), ended_ns=5)
+TOUCHED = Held(1, 1, 0, (1, 1), "hit", 40)
+
+
+def at(distance: float, epoch: int = 0) -> Counter:
+    return Counter((7, epoch), distance, 0.0)
+
+
+def moving(
+    release: Release,
+    sent: Twist | None = BACK,
+    known: Twist | None = STILL,
+    counter: Counter | None = None,
+    *,
+    dt_s: float = 0.02,
+    now_ns: int = 0,
+) -> Release:
+    return release.moving(sent, known, counter, reach=REACH, dt_s=dt_s, now_ns=now_ns)
+
+
+def test_it_moves_straight_in_the_chosen_direction() -> None:
+    assert Release().away(0.1) == STILL
+    assert Release().hold("forward", 0).away(0.1) == Twist(0.1, 0.0)
+    assert Release().hold("backward", 0).away(0.1) == Twist(-0.1, 0.0)
+
+
+def test_a_hold_is_a_lease() -> None:
+    assert not Release().is_held(0, 0.3)
+    held = Release().hold("forward", 0)
+    assert held.is_held(round(0.3 * S), 0.3)
+    assert not held.is_held(round(0.3 * S) + 1, 0.3)
+
+
+def test_the_end_of_a_hold_asks_for_a_newer_heartbeat() -> None:
+    ended = Release().hold("forward", 0).end(12)
+    assert (ended.held_ns, ended.let_go) == (None, 12)
+    assert ended.end(11).let_go == 12
+
+
+@pytest.mark.parametrize(
+    ("sent", "known", "travelled"),
+    [
+        (BACK, STILL, 0.05),
+        (BACK, None, 0.05),
+        (BACK, Twist(0.0, 0.4), 0.13),
+        (BACK, Twist(-0.4), 0.2),
+        (Twist(0.1), Twist(-0.02), 0.05),
+    ],
+)
+def test_the_larger_speed_counts(sent: Twist, known: Twist | None, travelled: float) -> None:
+    assert moving(Release(), sent, known, dt_s=0.5).travelled == pytest.approx(travelled)
+    assert sweep(Twist(-0.1, -0.2), REACH) == pytest.approx(0.23)
+
+
+def test_the_counters_count_when_they_show_more() -> None:
+    release = moving(Release(), counter=at(1.0))
+    release = moving(release, counter=at(0.9), dt_s=0.5)
+    assert release.travelled == pytest.approx(0.1)
+    assert release.left(0.15) == pytest.approx(0.05)
+    release = moving(release, counter=at(0.95))  # back and forth is travel
+    assert release.travelled == pytest.approx(0.15)
+    assert moving(release, counter=at(0.8)).left(0.15) == 0.0
+
+
+def test_counters_that_cannot_be_compared_count_nothing() -> None:
+    release = moving(Release(), counter=at(1.0))
+    assert moving(release, counter=at(0.0, epoch=1), dt_s=0).travelled == pytest.approx(0.002)
+    gap = moving(release, counter=None)
+    assert moving(gap, counter=at(0.5)).counted == pytest.approx(0.5)  # across the gap
+
+
+def test_only_a_release_and_its_coasting_count() -> None:
+    idle = moving(Release(), sent=None, known=Twist(0.5), counter=at(1.0))
+    assert (idle.travelled, idle.counter, idle.moved_ns) == (0.0, at(1.0), None)
+    begun = moving(idle, counter=at(0.9))
+    assert begun.counted == pytest.approx(0.1)
+    assert begun.moved_ns == 0
+    coasting = moving(begun, None, Twist(-0.1), at(0.8), dt_s=0.5, now_ns=COAST_NS)
+    assert coasting.travelled == pytest.approx(0.2)
+    assert coasting.moved_ns == COAST_NS
+    over = moving(begun, None, Twist(-0.1), at(0.8), dt_s=0.5, now_ns=COAST_NS + 1)
+    assert over.travelled == begun.travelled
+    assert over.counter == at(0.8)
+
+
+@pytest.mark.parametrize(
+    ("known", "moves"), [(STILL, False), (Twist(-0.01), False), (Twist(-0.02), True), (None, True)]
+)
+def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
+    begun = moving(Release())
+    assert (moving(begun, None, known, now_ns=9).moved_ns == 9) == moves
+
+
+def test_a_new_contact_has_everything_anew_but_the_end_of_the_last_hold() -> None:
+    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), held_ns=3, let_go=12)
+    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, let_go=12)
+
+
+def held(good: int, occurrence: int = 40) -> Held:
+    return Held(1, 1, good, (1, 1), "hit", occurrence)
+
+
+def test_the_same_press_changes_nothing() -> None:
+    used = Release().hold("backward", 3)
+    assert used.after(held(0), TOUCHED, CAME, 9) is used
+
+
+def test_a_clear_bumper_ends_the_hold() -> None:
+    used = moving(Release().hold("backward", 3))
+    assert used.after(held(0), held(1), CAME, 9).held_ns is None
+    assert used.after(held(1), held(2), CAME, 9).forbidden == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("later_ns", "forbidden"), [(COAST_NS, {"backward"}), (COAST_NS + 1, set())]
+)
+def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden: set[str]) -> None:
+    used = moving(Release(let_go=5).hold("backward", 0))
+    after = used.after(held(1), TOUCHED, CAME, later_ns)
+    assert after.forbidden == forbidden
+    assert (after.held_ns, after.let_go) == (None, 5)
+    assert after.travelled == used.travelled
+
+
+def test_a_press_without_any_release_forbids_nothing() -> None:
+    assert Release().after(held(1), TOUCHED, CAME, 0).forbidden == frozenset()
+    never_chosen = Release(moved_ns=0)
+    assert never_chosen.after(held(1), TOUCHED, CAME, 0).forbidden == frozenset()
+
+
+def test_the_direction_that_moved_is_forbidden() -> None:
+    moved = moving(Release().hold("backward", 0)).hold("forward", 1)
+    still = moving(moved, sent=None)
+    assert still.after(held(1), TOUCHED, CAME, 0).forbidden == {"backward"}
+    ramp = moving(moved, sent=STILL)  # a RUN of zero has not moved it forward
+    assert ramp.after(held(1), TOUCHED, CAME, 0).forbidden == {"backward"}
+    forward = moving(moved, sent=Twist(0.01))
+    assert forward.after(held(1), TOUCHED, CAME, 0).forbidden == {"forward"}
+
+
+def test_both_directions_can_be_forbidden() -> None:
+    one = moving(Release().hold("backward", 0)).after(held(1), TOUCHED, CAME, 0)
+    both = moving(one.hold("forward", 0)).after(held(1), TOUCHED, CAME, 0)
+    assert both.forbidden == {"forward", "backward"}
+
+
+def test_only_a_new_occurrence_looks_at_the_travel_again() -> None:
+    before = Trajectory(runs=(-0.2,))
+    assert Release(before=before).after(held(1), TOUCHED, CAME, 0).before == before
+    assert Release(before=before).after(held(3, 8), TOUCHED, CAME, 0).before == CAME
+
+
+def test_a_restart_of_safety_leaves_nothing_to_travel() -> None:
+    assert Release(unknown=True).left(0.15) == 0.0
+    assert Release(integrated=0.05).left(0.15) == pytest.approx(0.1)

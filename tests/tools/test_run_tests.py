@@ -1,0 +1,67 @@
+"""The second run of failed tests, on a small suite of its own."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tools.run_tests import RETRIED_MAX
+
+ROOT = Path(__file__).parents[2]
+FIRST_TIME_ONLY = """
+from pathlib import Path
+
+def test_passes():
+    pass
+
+def test_fails_once():
+    mark = Path("mark")
+    if not mark.exists():
+        mark.touch()
+        assert False
+"""
+
+
+def run(folder: Path, tests: str, *words: str) -> "subprocess.CompletedProcess[str]":
+    """Run a suite of one file in an empty folder."""
+    (folder / "test_it.py").write_text(tests, encoding="utf-8")
+    (folder / "pytest.ini").write_text("[pytest]\naddopts = -q -rs\n", encoding="utf-8")
+    command = [sys.executable, str(ROOT / "tools/run_tests.py"), *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("words", [(), ("-n", "2")])
+def test_a_test_that_fails_once_is_named(tmp_path: Path, words: tuple[str, ...]) -> None:
+    done = run(tmp_path, FIRST_TIME_ONLY, *words)
+    assert done.returncode == 0, done.stdout
+    assert "1 failed, 1 passed" in done.stdout
+    assert done.stdout.endswith("passed the second time only:\n  test_it.py::test_fails_once\n")
+
+
+def test_a_test_that_fails_twice_fails_the_run(tmp_path: Path) -> None:
+    done = run(tmp_path, "def test_it():\n    assert False\n")
+    assert done.returncode == 1
+    assert done.stdout.count("1 failed") == 3  # pytest's two summaries, and ours
+    assert "second time only" not in done.stdout
+
+
+def test_a_suite_that_passes_runs_once(tmp_path: Path) -> None:
+    done = run(tmp_path, "def test_it():\n    pass\n")
+    assert done.returncode == 0
+    assert done.stdout.count("passed") == 1
+
+
+@pytest.mark.parametrize(
+    "tests",
+    [
+        f"import pytest\n@pytest.mark.parametrize('n', range({RETRIED_MAX + 1}))\n"
+        "def test_it(n):\n    assert False\n",
+        "import no_such_module\n",
+    ],
+    ids=["many failures", "no collection"],
+)
+def test_what_is_no_stall_has_no_second_run(tmp_path: Path, tests: str) -> None:
+    done = run(tmp_path, tests)
+    assert done.returncode in (1, 2)
+    assert "once more" not in done.stdout

@@ -1,0 +1,44 @@
+"""``python -m tools.run_tests ARGUMENTS``: pytest, with a second run of the tests that failed.
+
+Most tests start real processes with real time limits, and four run at once. A host that stalls
+processes fails a few of them. So the tests that failed run a second time, one by one, with the
+machine to themselves. A test that fails again fails the run; the others are listed at the end.
+
+Many failures are no stall: with more than ``RETRIED_MAX`` there is no second run.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+FAILED = 1  # pytest's exit code for failed tests, as opposed to usage errors and interrupts
+RETRIED_MAX = 12
+CACHE = Path(".pytest_cache/v/cache/lastfailed")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the tests; return pytest's exit code."""
+    code = pytest(arguments)
+    if code != FAILED:
+        return code
+    failed = sorted(json.loads(CACHE.read_text("utf-8")))
+    if not 0 < len(failed) <= RETRIED_MAX:
+        return code
+    print(f"\nrun_tests: {len(failed)} failed; they run once more, one by one", flush=True)
+    appended = ["--cov-append"] if "--cov" in arguments else []
+    again = ["--last-failed", "--last-failed-no-failures=none", "-n", "0", *appended]
+    code = pytest([*arguments, *again])
+    if code == 0:
+        print("run_tests: passed the second time only:", *failed, sep="\n  ", flush=True)
+    return code
+
+
+def pytest(arguments: Sequence[str]) -> int:
+    """Run pytest in a process of its own; return its exit code."""
+    return subprocess.run([sys.executable, "-m", "pytest", *arguments], check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
