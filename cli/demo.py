@@ -52,7 +52,9 @@ def run(options: argparse.Namespace) -> int:
     options.no_sim, options.world = False, WORLD
     make_room(options)
     holdup_s = holdup.measured()
-    options.sets = [*own_ports(), *holdup.settings(holdup_s), *options.sets]
+    options.sets = holdup.with_accepted_joined(
+        [*own_ports(), *holdup.settings(holdup_s), *options.sets]
+    )
     config = load(Everything, sources(options)).config
     # What the processes say goes to a file; on the terminal it would tear the picture.
     log.configure(replace(config.log, level="error"), "demo")

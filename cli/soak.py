@@ -62,9 +62,9 @@ def run(options: argparse.Namespace) -> int:
     holdup_s = holdup.measured()
     pace = PATIENT if holdup_s > holdup.LIMIT_S else QUICK
     (control,) = free_ports(socket.SOCK_DGRAM)
-    options.sets = [
+    options.sets = holdup.with_accepted_joined([
         *own_ports(), f"sim.control_port={control}", *holdup.settings(holdup_s), *options.sets
-    ]  # fmt: skip
+    ])  # fmt: skip
     config = load(Everything, sources(options)).config
     log.configure(replace(config.log, level="error"), "soak")
     seconds = options.minutes * 60

@@ -96,14 +96,16 @@ def chain(
     holdup_s = 0.0 if shipped else max(holdup.measured(), BESIDE_OTHERS_S * beside_others)
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
     port = free_port()
-    sets = [
-        *sets,
-        f"board.port={board}",
-        f"board.listen_ports=[{first}, {second}]",
-        f"bus.listen={listen.format(port=port)}",
-        f"sim.control_port={control}",
-        *holdup.settings(holdup_s),
-    ]
+    sets = holdup.with_accepted_joined(
+        [
+            *sets,
+            f"board.port={board}",
+            f"board.listen_ports=[{first}, {second}]",
+            f"bus.listen={listen.format(port=port)}",
+            f"sim.control_port={control}",
+            *holdup.settings(holdup_s),
+        ]
+    )
     config = load(Everything, Sources(sets=sets)).config
     files = [file for file in (folder / "lane.toml",) if file.exists()]
     options = Namespace(no_sim=False, world=world, config=files, sets=sets)

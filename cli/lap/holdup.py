@@ -7,6 +7,7 @@ slower for it, because safety reckons with the longer reaction time.
 """
 
 import time
+from collections.abc import Iterable
 
 LIMIT_S = 0.05  # up to this the shipped limits hold
 SAMPLES_S = 0.005
@@ -55,6 +56,19 @@ def settings(holdup_s: float) -> list[str]:
         f"safety.sources.checkout.lease={longer}",
         f"safety.react={react}",
     ]
+
+
+def with_accepted_joined(sets: Iterable[str]) -> list[str]:
+    """Return the settings with one ``i_accept`` for each section; a later one would replace it."""
+    accepted: dict[str, list[str]] = {}
+    others = []
+    for given in sets:
+        name, _, value = given.partition("=")
+        if name.endswith(".i_accept"):
+            accepted.setdefault(name, []).append(value.strip("[]"))
+        else:
+            others.append(given)
+    return [*(f"{name}={','.join(values)}" for name, values in accepted.items()), *others]
 
 
 def sentence(holdup_s: float) -> str:

@@ -46,3 +46,16 @@ def test_what_is_measured_is_what_a_sleep_took_too_long(monkeypatch: pytest.Monk
     monkeypatch.setattr("cli.lap.holdup.time.sleep", sleep)
     monkeypatch.setattr("cli.lap.holdup.time.monotonic", lambda: clock[0])
     assert holdup.measured(0.5) == pytest.approx(0.995)
+
+
+def test_what_is_accepted_for_the_machine_leaves_what_the_caller_accepts() -> None:
+    sets = holdup.with_accepted_joined(
+        [
+            "safety.i_accept=linear_acceleration",
+            "safety.linear_acceleration=5",
+            *holdup.settings(0.5),
+        ]
+    )
+    safety = load(Everything, Sources(environ={}, sets=sets)).config.safety
+    assert safety.linear_acceleration == 5
+    assert {"linear_acceleration", *holdup.AGES} <= set(safety.i_accept)
