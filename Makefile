@@ -11,7 +11,7 @@ PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 .PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
-	$(BIN)/python -m cli.docs
+	$(BIN)/python -m tools.docs
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -43,16 +43,16 @@ test: $(STAMP) ## all tests
 	$(TESTS) -m alone
 
 fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
-	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
+	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
 
 soak: $(STAMP) ## laps with random faults and kill -9 for MINUTES=30, watching memory and more
-	$(BIN)/t2 soak --minutes $(or $(MINUTES),30)
+	$(BIN)/python -m verification.soak --minutes $(or $(MINUTES),30)
 
 faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faults.md
-	$(BIN)/python -m tests.faults --out docs/faults.md
+	$(BIN)/python -m verification.faults --out docs/faults.md
 
 fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
-	$(BIN)/python -m tests.fleet --robots $(or $(N),50) --out docs/fleet.md
+	$(BIN)/python -m verification.fleet --robots $(or $(N),50) --out docs/fleet.md
 
 # What costs on board is measured with what a robot installs.
 ROBOT = out/robot
@@ -66,10 +66,10 @@ bench: $(STAMP) ## T2 beside what a user would pick instead, measured; renews do
 	$(BIN)/python -m bench --out docs/performance.md
 
 compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
-	$(BIN)/python -m tests.compose
+	$(BIN)/python -m verification.containers
 
 roaming: $(STAMP) ## drive over a bad link between two hosts, and lose it; renews docs/roaming.md
-	$(BIN)/python -m tests.roaming --out docs/roaming.md
+	$(BIN)/python -m verification.roaming --out docs/roaming.md
 
 
 check: lint types cover search ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
@@ -81,7 +81,7 @@ lint: $(STAMP)
 	$(BIN)/lint-imports
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/safety/test_walk.py tests/cli/test_docs_current.py
+SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
 
 search: $(STAMP) ## the search for holes in the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
@@ -94,10 +94,10 @@ cover: $(STAMP) ## all tests but the search, with what those cover that do not m
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 
 pictures: $(STAMP) ## renew the README's pictures of both operator's screens; wants chromium
-	$(BIN)/python -m tests.pictures
+	$(BIN)/python -m tools.pictures
 
 mutants: $(STAMP) ## break each line of the cores and see a test fail; CHANGED=1: of changed files
-	$(BIN)/python -m tests.mutants $(if $(CHANGED),--changed)
+	$(BIN)/python -m verification.mutation $(if $(CHANGED),--changed)
 
 # The cores that decide, as the import rules name them: not a branch of theirs is untested.
 PURE = $(BIN)/python -c 'import tomllib; \
@@ -149,10 +149,10 @@ wheelhouse: $(STAMP) ## all for a robot without internet; SET=laptop WHEEL_PYTHO
 	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
 
 systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; wants root, Docker and debootstrap
-	$(BIN)/python -m tests.systemd
+	$(BIN)/python -m verification.systemd
 
 audit: $(STAMP) ## known flaws of what FILE=requirements.lock names, from a public database
-	$(BIN)/python -m tests.audit $(FILE)
+	$(BIN)/python -m tools.audit $(FILE)
 
 # A tool in an environment of its own, in uv's cache: what it brings is not what T2 stands on.
 SBOM = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python \

@@ -34,7 +34,7 @@ from bench.start import plot as start_plot
 from bench.telemetry import page as telemetry_page
 from bench.telemetry import part as telemetry_part
 from common.freshness import S
-from tests.faults.machine import HoldUps, named
+from verification.faults.machine import HoldUps, named
 
 PAGE = Path(__file__).with_name("page.md")
 UNMEASURED = 3  # exit code where something to measure, or to tell, is not there

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from tests.faults.table import rank
+from verification.faults.table import rank
 
 RAW = Path("out/bench")
 

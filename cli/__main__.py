@@ -14,8 +14,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import NoReturn
 
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError, LinkError, RobotError
-from common.options import EXIT_CONFIG, EXIT_LINK
 from common.version import VERSION
 
 GROUPS = {
@@ -63,22 +63,26 @@ GROUPS = {
         "keys": "create, renew, revoke and list certificates",
         "completion": "print the shell completion for bash, zsh or fish",
     },
-    "Develop": {
-        "soak": "laps with random faults and kill -9, watching memory",
-    },
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 INSPECT = (
     "doctor", "ls", "echo", "hz", "delay", "bw", "pub", "call", "estop", "robots", "services",
     "health", "schema", "topic", "completion",
 )  # fmt: skip
-# Where it is no module of its own name.
 PLACES = {
-    "checkout": "checkout.command",
+    "checkout": "commission.command",
+    "demo": "demo.command",
+    "foxglove": "recordings.foxglove",
+    "info": "recordings.info",
+    "install": "run.install",
     "keys": "keys.command",
-    "replay": "replay.command",
-    "report": "report.command",
     "list": "inspect.ls",
+    "record": "recordings.record",
+    "replay": "recordings.replay.command",
+    "report": "recordings.report.command",
+    "router": "run.router",
+    "up": "run.up",
+    "wire": "wire.command",
 } | {name: f"inspect.{name}" for name in INSPECT}
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 

@@ -4,8 +4,8 @@ import argparse
 import json
 
 from cli.settings import Everything
+from common.cli_args import add_sources, sources
 from common.config import Loaded, load
-from common.options import add_sources, sources
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

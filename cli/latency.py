@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 from cli.inspect.shell import add_output, wants_json
 from common import keys, log
 from common.bus.bus import Arrival, Bus
+from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import LinkError, RobotError
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Health, Timing
-from common.options import add_sources, sources
 from common.settings import Shared
 from services.bridge.timing import quantile
 

@@ -2,8 +2,8 @@
 
 import argparse
 
-from cli.up import passed_on
-from common.options import add_sources
+from cli.run.up import passed_on
+from common.cli_args import add_sources
 from services.metrics import life
 
 

@@ -21,12 +21,12 @@ import msgspec
 from common import keys, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Event, Health, Level, Timing
-from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.schema import schemas
 from common.settings import Shared
 from common.systemd import OFTEN_S, Systemd

@@ -8,9 +8,9 @@ from contextlib import closing
 from pathlib import Path
 
 from common import log, realtime
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError
-from common.options import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from sim.config import Config
 from sim.files import load_plan, load_script
 from sim.process import Process, Trace

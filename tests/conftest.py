@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 
 from common import log
-from tests.support import free_port, router_process
+from verification.harness.support import free_port, router_process
 
 # Two noisy cores: how long an example takes says nothing.
 settings.register_profile("t2", deadline=None)

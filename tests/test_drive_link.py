@@ -17,8 +17,8 @@ from common.bus.session import client_config
 from common.loop import Loop
 from common.source import DriveSource
 from sim.requests import Bumper
-from tests.chain import Chain, chain
-from tests.support import at, bus_on, running, wait_until
+from verification.harness.stack import Chain, chain
+from verification.harness.support import at, bus_on, running, wait_until
 
 pytestmark = pytest.mark.alone
 

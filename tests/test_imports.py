@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ON_BOARD = (
-    "cli.router", "services.bridge.__main__", "services.bridge.child",
+    "cli.run.router", "services.bridge.__main__", "services.bridge.child",
     "services.safety.__main__", "services.odom.__main__",
 )  # fmt: skip
 # What each of them costs stands where it is done without. The rest is for laptops.

@@ -5,10 +5,10 @@ from functools import cache
 
 import pytest
 
-from cli.lap.score import Trace, good, results, stops
-from cli.lap.script import PATIENT, QUICK, Lap, Pace, lap
+from cli.demo.score import Trace, good, results, stops
+from cli.demo.script import PATIENT, QUICK, Lap, Pace, lap
 from sim import trace as t
-from tests.clockwork import Clockwork
+from tests.simulated_stack import Clockwork
 
 LAP_S = 60.0
 

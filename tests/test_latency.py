@@ -10,11 +10,11 @@ import pytest
 from common.bus.host import host_id
 from common.freshness import S
 from sim.requests import Bumper
-from tests.chain import Chain
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
-from tests.stick import Stick, push, stack, stick
-from tests.support import wait_until
-from tests.teleop.terminal import terminal
+from tests.drive_source import Stick, push, stack, stick
+from verification.harness.stack import Chain
+from verification.harness.support import wait_until
+from verification.harness.teleop_terminal import terminal
 
 __all__ = ["stack", "stick"]  # fixtures
 

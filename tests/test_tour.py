@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.lap import holdup
-from tests.support import free_port, wait_until
-from tests.teleop.terminal import PATIENT, Terminal, at_terminal
+from cli.demo import host_stalls
+from verification.harness.support import free_port, wait_until
+from verification.harness.teleop_terminal import PATIENT, Terminal, at_terminal
 
 ROOT = Path(__file__).parents[1]
 TOUR = ROOT / "docs" / "tour.md"
@@ -108,7 +108,7 @@ def elsewhere() -> dict[str, str]:
         f"board.listen_ports=[{first}, {second}]",
         f"bus.listen=tcp/127.0.0.1:{free_port()}",
         f"dashboard.port={page}",
-        *holdup.settings(holdup.measured()),
+        *host_stalls.settings(host_stalls.measured()),
         *PATIENT[1::2],
     ]
     named = (one.split("=", 1) for one in settings)

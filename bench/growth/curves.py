@@ -14,8 +14,8 @@ from bench.load.stack import Pids, Ports, guarded, stack
 from bench.load.throughput import listening
 from bench.series import Series
 from common import keys
-from tests.fleet.ground import crowd, site
-from tests.fleet.part import Part
+from verification.fleet.child import Part
+from verification.fleet.topology import crowd, site
 
 COUNTS = {
     CONSUMERS: (1, 2, 5, 10, 20, 50),
@@ -90,7 +90,7 @@ def pairs(it: Robot, curve: str, counts: Sequence[int], seconds: float) -> list[
 def robots(counts: Sequence[int], seconds: float) -> list[Series]:
     """Measure a site's router with ever more light robots, all of whose streams are looked at."""
     made: list[Series] = []
-    with site() as ground, Part("tests.fleet.ear", ground.site, "everything") as ear:
+    with site() as ground, Part("verification.fleet.subscriber", ground.site, "everything") as ear:
         for count in counts:
             with crowd(ground, count, "peer", 0.0):
                 assert ground.light is not None

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import zenoh
 
 from bench.load.consumer import plain
-from tests.fleet.part import obey
+from verification.fleet.child import obey
 
 HEAD = struct.Struct("<QQ")  # number and time of sending; the least that a message has
 KEY = "t2/v1/001/tel/bench/{}"

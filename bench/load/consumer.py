@@ -13,7 +13,7 @@ from typing import Any
 import msgpack
 import zenoh
 
-from tests.fleet.part import obey
+from verification.fleet.child import obey
 
 TOLD = 1000  # ages at most, evenly spread
 

@@ -18,9 +18,9 @@ from bench.load.page import BARE, BUS, CHAIN, TOGETHER
 from bench.load.stack import Pids, Ports, stack
 from bench.path.processes import robots_python
 from bench.series import Series
-from cli.soak_watch import tree
-from tests.fleet.part import Part
-from tests.support import router_process, wait_until
+from verification.fleet.child import Part
+from verification.harness.support import router_process, wait_until
+from verification.soak.process_stats import tree
 
 TURNS = 3
 WATCHED_S = 5.0  # of each at each rate in a turn
@@ -69,7 +69,7 @@ def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int
 @contextlib.contextmanager
 def on_board(ports: Ports) -> Iterator[Running]:
     """Run the chain while somebody drives it, as teleop does."""
-    with stack(ports) as pids, Part("tests.fleet.hand", ports.endpoint, "001") as hand:
+    with stack(ports) as pids, Part("verification.fleet.source", ports.endpoint, "001") as hand:
 
         def drives() -> bool:
             hand.begin()

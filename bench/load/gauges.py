@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
 
-from cli.soak_watch import GONE
 from common.freshness import S
-from tests.fleet.gauges import TICKS, machine
+from verification.fleet.gauges import TICKS, machine
+from verification.soak.process_stats import GONE
 
 PROC = Path("/proc")
 

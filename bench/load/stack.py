@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from bench.path.processes import robots_python
-from cli.soak_watch import tree
-from tests.support import free_port, router_process, wait_until
+from verification.harness.support import free_port, router_process, wait_until
+from verification.soak.process_stats import tree
 
 CHAIN = ("bridge", "safety", "odom")
 

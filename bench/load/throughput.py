@@ -21,8 +21,8 @@ from bench.load.stack import Pids, Ports, guarded, stack
 from bench.series import Series
 from common import keys
 from common.wire.frame import Frame
-from tests.fleet.part import Part
-from tests.support import wait_until
+from verification.fleet.child import Part
+from verification.harness.support import wait_until
 
 CONSUMERS = (1, 5, 20)
 RATES = (

@@ -12,7 +12,7 @@ from typing import Protocol, cast
 
 from bench.path.processes import answers, given, module, running
 from bench.path.twist import Say
-from tests.support import free_port, wait_until
+from verification.harness.support import free_port, wait_until
 
 
 class Carrier(Protocol):

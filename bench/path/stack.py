@@ -10,8 +10,8 @@ from pathlib import Path
 
 from bench.path.processes import Command, given, module, running
 from common.settings import Bus
-from tests.cli.site import ADDRESS, Site, dialling
-from tests.support import at, free_port
+from verification.harness.certificates import ADDRESS, Site, dialling
+from verification.harness.support import at, free_port
 
 ROBOT = "001"
 BRIDGE, SAFETY = "services.bridge", "services.safety"

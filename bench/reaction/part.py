@@ -13,7 +13,7 @@ from bench.reaction.page import LOADS
 from bench.reaction.responders import RESPONDERS, Responder
 from bench.series import Series
 from common import realtime
-from tests.support import free_port
+from verification.harness.support import free_port
 
 SEED = 20_240_607
 BLOCKS, HITS, WARM = 2, 750, 20

@@ -8,8 +8,8 @@ from pathlib import Path
 from bench.start.processes import children, settings, started
 from bench.start.rows import ODOM, ROUTER, SAFETY
 from common.wire.commands import MotionKind
-from tests.bridge.board import board
-from tests.support import free_port, wait_until
+from verification.harness.fake_board import board
+from verification.harness.support import free_port, wait_until
 
 SETTLED_S = 5.0  # by then each has told its health some times
 GUARD, BRIDGE = "T2, guard", "T2, bridge"

@@ -12,7 +12,7 @@ from bench.start.processes import settings, started
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from tests.support import PATIENCE_S, bus_on, free_port, router_process, running
+from verification.harness.support import PATIENCE_S, bus_on, free_port, router_process, running
 
 Name = tuple[str, str]  # who, and until what
 Times = dict[Name, int]  # ns

@@ -16,7 +16,7 @@ from bench.reaction.page import LOADS
 from bench.series import Series
 from bench.telemetry.page import AGE
 from common.settings import Bus
-from tests.support import wait_until
+from verification.harness.support import wait_until
 
 BLOCKS, ROUNDS = 2, 200
 DECISIONS = 1_000

@@ -6,7 +6,7 @@ Payloads and what is attached to them; what the network wraps around them is not
 import argparse
 
 from cli.inspect import measure
-from cli.inspect.meters import Meter
+from cli.inspect.stream_stats import Meter
 
 add_arguments = measure.add_arguments
 

@@ -12,8 +12,8 @@ import msgspec
 
 from cli.inspect import operator_call, output
 from cli.inspect.addressing import chunks, expression, one_key
+from cli.inspect.payload import read
 from cli.inspect.pub import json_object
-from cli.inspect.reading import read
 from cli.inspect.shell import Seat, add_options, positive, seated, wants_json
 from common import codec, keys
 from common.bus.probe import Answer

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import product
 
-from cli.inspect.reading import kinds
+from cli.inspect.payload import kinds
 from common.keys import CALLS, TOPICS
 
 BASH = """\

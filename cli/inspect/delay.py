@@ -7,7 +7,7 @@ clocks, whose difference is then in the figures (clock ``wall``).
 import argparse
 
 from cli.inspect import measure
-from cli.inspect.meters import Meter
+from cli.inspect.stream_stats import Meter
 
 add_arguments = measure.add_arguments
 

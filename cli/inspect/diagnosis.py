@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from cli.inspect import advice
+from cli.inspect import remedies
 from common.messages import (
     Bumper,
     Driver,
@@ -97,7 +97,7 @@ def router(seen: Seen) -> Iterator[Finding]:
             yield Finding("router", "ok", f"Zenoh {version}, as on this laptop")
         else:
             text = f"Zenoh {version}, on this laptop {seen.zenoh}"
-            yield Finding("router", "note", text, advice.UPDATE)
+            yield Finding("router", "note", text, remedies.UPDATE)
 
 
 def services(seen: Seen) -> Iterator[Finding]:
@@ -105,15 +105,15 @@ def services(seen: Seen) -> Iterator[Finding]:
     for name in sorted({*NEEDED, *seen.instances}):
         count, health = seen.instances.get(name, 0), seen.health.get(name)
         if not count:
-            yield Finding("services", "wrong", f"{name} is not there", advice.START)
+            yield Finding("services", "wrong", f"{name} is not there", remedies.START)
         elif count > 1 and name in NEEDED:
-            yield Finding("services", "wrong", f"{name} is there {count} times", advice.TWICE)
+            yield Finding("services", "wrong", f"{name} is there {count} times", remedies.TWICE)
         elif not health:
             text = f"{name} is there and tells nothing of its health: it hangs"
-            yield Finding("services", "wrong", text, advice.HANGS)
+            yield Finding("services", "wrong", text, remedies.HANGS)
         elif health.lateness > LATE_S:
             text = f"{name} is held up for {health.lateness:.2f} s at a time"
-            yield Finding("services", "note", text, advice.HELD_UP)
+            yield Finding("services", "note", text, remedies.HELD_UP)
         else:
             yield Finding("services", "ok", f"{name} is up for {health.uptime:.0f} s")
 
@@ -123,11 +123,11 @@ def versions(seen: Seen) -> Iterator[Finding]:
     other = {name: h.version for name, h in seen.health.items() if h.version != seen.t2}
     for name, version in sorted(other.items()):
         text = f"{name} is T2 {version}, this laptop {seen.t2}"
-        yield Finding("versions", "note", text, advice.UPDATE)
+        yield Finding("versions", "note", text, remedies.UPDATE)
     if seen.health and not other:
         yield Finding("versions", "ok", f"T2 {seen.t2} everywhere")
     for path, why in sorted(seen.undecodable.items()):
-        yield Finding("versions", "wrong", f"{path}: {why}", advice.UNDECODABLE)
+        yield Finding("versions", "wrong", f"{path}: {why}", remedies.UNDECODABLE)
 
 
 def rights(seen: Seen) -> Iterator[Finding]:
@@ -138,13 +138,13 @@ def rights(seen: Seen) -> Iterator[Finding]:
         )
         return
     if not seen.rates:
-        yield Finding("rights", "wrong", "services are there and nothing is heard", advice.BLIND)
+        yield Finding("rights", "wrong", "services are there and nothing is heard", remedies.BLIND)
         return
     may = {"driving": seen.may_drive, "calls": seen.may_call}
     barred = [what for what, allowed in may.items() if allowed is False]
     if barred:
         text = f"this laptop may watch; it has no way to safety for {' and '.join(barred)}"
-        yield Finding("rights", "note", text, advice.RIGHTS)
+        yield Finding("rights", "note", text, remedies.RIGHTS)
     elif None in may.values():
         yield Finding("rights", "unknown", "driving and calls want safety")
     else:
@@ -159,13 +159,13 @@ def clock(seen: Seen) -> Iterator[Finding]:
     least, most = min(seen.delays_s), max(seen.delays_s)
     if most - least > SPREAD_S:
         text = f"messages take up to {most - least:.2f} s longer than the fastest"
-        yield Finding("clock", "note", text, advice.SLOW_WAY)
+        yield Finding("clock", "note", text, remedies.SLOW_WAY)
     if seen.one_clock:
         yield Finding("clock", "ok", "the robot runs on this very host")
     elif abs(least) > CLOCK_S:
         way = "behind" if least < 0 else "ahead of"
         text = f"this laptop's clock is {abs(least):.1f} s {way} the robot's"
-        yield Finding("clock", "note", text, advice.CLOCK)
+        yield Finding("clock", "note", text, remedies.CLOCK)
     else:
         yield Finding("clock", "ok", f"clocks agree to {abs(least) * 1000:.0f} ms")
 

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from importlib.metadata import version
 
-from cli.inspect import advice, output
+from cli.inspect import output, remedies
+from cli.inspect.collector import listen
+from cli.inspect.connect_probe import dial
 from cli.inspect.diagnosis import Dial, Finding, Seen, network, on_the_way
-from cli.inspect.dial import dial
-from cli.inspect.listening import listen
-from cli.inspect.presence import present, routers
+from cli.inspect.discovery import present, routers
 from cli.inspect.shell import add_options, positive, settings, wants_json
 from cli.inspect.vehicle import at_the_vehicle
 from common import keys
@@ -57,7 +57,7 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
         with probe(config.bus) as opened:
             seen = look(opened, config.robot.id, seconds)
     except LinkError:
-        yield Finding("router", "wrong", "what answers there is no router", advice.NOT_A_ROUTER)
+        yield Finding("router", "wrong", "what answers there is no router", remedies.NOT_A_ROUTER)
         return
     yield from on_the_way(seen)
     yield from at_the_vehicle(seen)

@@ -8,7 +8,7 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
-from cli.inspect.reading import Reading, at, read
+from cli.inspect.payload import Reading, at, read
 from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json
 from common.errors import MessageError
 from common.freshness import S

@@ -13,7 +13,7 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import PRETENDS, chunks, speaker
-from cli.inspect.presence import present
+from cli.inspect.discovery import present
 from cli.inspect.shell import Seat, add_options, quietly, seated, wants_json
 from common import codec, keys
 from common.bus.probe import Answer, Probe

@@ -6,7 +6,7 @@ The average rate, the gaps between two samples, and what was lost on the way by 
 import argparse
 
 from cli.inspect import measure
-from cli.inspect.meters import Meter
+from cli.inspect.stream_stats import Meter
 
 add_arguments = measure.add_arguments
 

@@ -5,9 +5,9 @@ import sys
 
 from cli.inspect import output
 from cli.inspect.addressing import expression, one_key, short, topic_of
+from cli.inspect.discovery import present
 from cli.inspect.graph import by_boot, title
-from cli.inspect.presence import present
-from cli.inspect.reading import read
+from cli.inspect.payload import read
 from cli.inspect.shell import Seat, add_options, seated, wants_json
 from common import codec
 from common.bus.probe import intersects

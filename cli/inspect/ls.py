@@ -10,11 +10,11 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short, topic_of
+from cli.inspect.discovery import present
 from cli.inspect.graph import Member, by_boot, publishers, title
 from cli.inspect.measure import taken
-from cli.inspect.meters import Meter
-from cli.inspect.presence import present
 from cli.inspect.shell import Seat, add_options, positive, quietly, seated, wants_json
+from cli.inspect.stream_stats import Meter
 from common import codec
 from common.bus.probe import intersects
 from common.sample import Sample

@@ -8,9 +8,9 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
-from cli.inspect.meters import Figures, Meter, Taken
-from cli.inspect.reading import read
+from cli.inspect.payload import read
 from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json, whole
+from cli.inspect.stream_stats import Figures, Meter, Taken
 from common.bus.host import host_id
 from common.freshness import S
 from common.sample import Sample

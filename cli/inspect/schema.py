@@ -5,16 +5,22 @@ The types are those of this installation, which need not be the robot's: `t2 doc
 
 import argparse
 import difflib
+import inspect
+import re
+from typing import Literal, get_args, get_origin
 
 import msgspec
+from msgspec import Struct
 
-from cli import docs
 from cli.inspect import output
 from cli.inspect.addressing import expression, topic_of
-from cli.inspect.reading import kinds
+from cli.inspect.payload import kinds
 from cli.inspect.shell import add_options, settings, wants_json
+from common import messages
 from common.errors import RobotError
 from common.keys import CALLS, TOPICS
+
+FIELD = re.compile(r"    (?P<name>\w+): (?P<type>.+?)(?: = (?P<default>.+?))?(?:  # (?P<why>.+))?$")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     kind = kinds()[name]
     print(f"{name}: {(kind.__doc__ or '').splitlines()[0]}\n")
-    print(output.table(("field", "type", "default", ""), docs.rows(kind)) or "no fields")
+    print(output.table(("field", "type", "default", ""), fields_of(kind)) or "no fields")
     return 0
 
 
@@ -68,3 +74,18 @@ def show_all(as_json: bool) -> None:
             output.line({"type": name, "keys": paths})
         return
     print(output.table(("type", "on"), [(n, ", ".join(paths)) for n, paths in carried.items()]))
+
+
+def fields_of(kind: type[Struct]) -> list[tuple[str, str, str, str]]:
+    """Return name, type, default and meaning of a struct's own fields, as its source tells them."""
+    found = filter(None, map(FIELD.match, inspect.getsource(kind).splitlines()))
+    return [
+        (each["name"], spelt(each["type"]), each["default"] or "", each["why"] or "")
+        for each in found
+    ]
+
+
+def spelt(kind: str) -> str:
+    """Return a type with the words that it allows, where the source has a name for them."""
+    words = getattr(messages, kind, None)
+    return " | ".join(map(repr, get_args(words))) if get_origin(words) is Literal else kind

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from cli.inspect import output
 from cli.inspect.addressing import short
+from cli.inspect.discovery import overhear, present
 from cli.inspect.graph import Edge, Member, dot, edges, title
-from cli.inspect.presence import overhear, present
 from cli.inspect.shell import add_options, seated, wants_json
 from common.bus.probe import intersects
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from cli.inspect.addressing import EVERY_ROBOT, is_many, robots_of
 from common.bus.probe import Probe, probe
+from common.cli_args import add_sources, sources
 from common.config import load
-from common.options import add_sources, sources
 from common.settings import Shared
 
 

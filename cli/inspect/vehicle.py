@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from cli.inspect import advice
+from cli.inspect import remedies
 from cli.inspect.diagnosis import Finding, Level, Seen
 from common.keys import BUMPER, MILEAGE, ODOMETRY, ULTRASONIC, VELOCITY
 from common.messages import SONAR_NAMES, Driver, Link
@@ -33,22 +33,22 @@ def link(now: Link, before: Link | None) -> Iterator[Finding]:
     """Tell of the way to the board."""
     if now.state == "never":
         text = f"the board at {now.board} has never been heard"
-        yield Finding("link", "wrong", text, advice.BOARD_NEVER)
+        yield Finding("link", "wrong", text, remedies.BOARD_NEVER)
         return
     if now.state == "lost":
         text = f"the board at {now.board} is silent"
-        yield Finding("link", "wrong", text, advice.BOARD_LOST)
+        yield Finding("link", "wrong", text, remedies.BOARD_LOST)
         return
     earlier = before.rejected if before else {}
     fresh = {why: n - earlier.get(why, 0) for why, n in now.rejected.items()}
     bad = ", ".join(f"{n} {why}" for why, n in fresh.items() if n > 0)
     if bad:
         text = f"the bridge refuses what the board sends: {bad}"
-        yield Finding("link", "note", text, advice.BOARD_REFUSED)
+        yield Finding("link", "note", text, remedies.BOARD_REFUSED)
     refused = now.send_errors - (before.send_errors if before else 0)
     if refused > 0:
         text = f"the system refused to send {refused} datagrams to the board"
-        yield Finding("link", "wrong", text, advice.SEND_ERRORS)
+        yield Finding("link", "wrong", text, remedies.SEND_ERRORS)
     trip = "" if now.round_trip is None else f", answers in {now.round_trip * 1000:.1f} ms"
     yield Finding("link", "ok", f"the board at {now.board} is there{trip}")
     if not now.armed:
@@ -65,7 +65,7 @@ def switches(seen: Seen) -> Iterator[Finding]:
     for name, on in positions.items():
         if not on:
             text = f"the board's {name} brake is {'off' if on is False else 'not confirmed'}"
-            yield Finding("switches", "wrong", text, advice.SWITCHES)
+            yield Finding("switches", "wrong", text, remedies.SWITCHES)
     if all(positions.values()):
         yield Finding("switches", "ok", "both emergency brakes of the board are on")
 
@@ -78,9 +78,9 @@ def sensors(seen: Seen) -> Iterator[Finding]:
             continue
         level: Level = "note" if rate else "wrong"
         text = f"{topic.path} comes at {rate:.0f} of {topic.rate_hz:g} Hz"
-        yield Finding("sensors", level, text, advice.SILENT)
+        yield Finding("sensors", level, text, remedies.SILENT)
     if seen.bumper and seen.bumper.pressed:
-        yield Finding("bumper", "wrong", "the bumper is pressed", advice.BUMPER)
+        yield Finding("bumper", "wrong", "the bumper is pressed", remedies.BUMPER)
     elif seen.bumper:
         yield Finding("bumper", "ok", "the bumper is free")
     if seen.ultrasonic:
@@ -89,8 +89,10 @@ def sensors(seen: Seen) -> Iterator[Finding]:
 
 def sonars(statuses: tuple[str, ...]) -> Iterator[Finding]:
     """Tell of each sonar that cannot be trusted."""
-    by_status = {"fault": ("is faulty", advice.SONAR_FAULT),
-                 "too_near": ("sees something too near to measure", advice.SONAR_NEAR)}  # fmt: skip
+    by_status = {
+        "fault": ("is faulty", remedies.SONAR_FAULT),
+        "too_near": ("sees something too near to measure", remedies.SONAR_NEAR),
+    }
     bad = [(n, status) for n, status in zip(SONAR_NAMES, statuses, strict=True)
            if status in by_status]  # fmt: skip
     for name, status in bad:
@@ -104,9 +106,9 @@ def drivers(told: dict[str, Driver]) -> Iterator[Finding]:
     """Tell of the motor drivers' faults."""
     for side, driver in sorted(told.items()):
         for fault in driver.faults:
-            meaning = advice.FAULTS.get(fault, "a bit that the manual does not explain")
+            meaning = remedies.FAULTS.get(fault, "a bit that the manual does not explain")
             text = f"the {side} driver reports {fault}: {meaning}"
-            yield Finding("drivers", "wrong", text, advice.DRIVER)
+            yield Finding("drivers", "wrong", text, remedies.DRIVER)
         if not driver.faults:
             yield Finding("drivers", "ok", f"the {side} driver reports no fault")
 
@@ -114,11 +116,11 @@ def drivers(told: dict[str, Driver]) -> Iterator[Finding]:
 def driving(seen: Seen) -> Iterator[Finding]:
     """Tell who asks to move, and of those who are one too many."""
     if len(seen.deciding) > 1:
-        yield Finding("driving", "wrong", "two programs publish @cmd/motion", advice.TWICE)
+        yield Finding("driving", "wrong", "two programs publish @cmd/motion", remedies.TWICE)
     for source, boots in sorted(seen.asking.items()):
         if len(boots) > 1:
             text = f"{len(boots)} programs drive as {source}"
-            yield Finding("driving", "wrong", text, advice.ONE_DRIVER)
+            yield Finding("driving", "wrong", text, remedies.ONE_DRIVER)
     if len(seen.asking) > 1:
         names = ", ".join(sorted(seen.asking))
         text = f"{names} ask to move at once; the one with the highest priority drives"
@@ -136,10 +138,10 @@ def safety(seen: Seen) -> Iterator[Finding]:
         return
     for cause in state.causes:
         latched = cause.name in state.latched
-        level: Level = "note" if cause.name in advice.NORMAL else "wrong"
+        level: Level = "note" if cause.name in remedies.NORMAL else "wrong"
         if cause.name == "no_request":
             level = "ok"
-        todo = advice.CAUSES.get(cause.name, advice.RESET if latched else "")
+        todo = remedies.CAUSES.get(cause.name, remedies.RESET if latched else "")
         yield Finding(
             "safety", level, f"{cause.text} ({cause.action}{', latched' * latched})", todo
         )

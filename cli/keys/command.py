@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do what is asked; raise ``RobotError`` without the library for it."""
     try:
-        from cli.keys.verbs import VERBS
+        from cli.keys.operations import VERBS
     except ModuleNotFoundError as error:
         raise RobotError(
             f"it needs {error.name}: install the extra `keys` (pip install -e '.[keys]')"

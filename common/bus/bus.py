@@ -14,8 +14,8 @@ from msgspec import Struct
 from common import codec, settings
 from common.bus.calls import Answers, Caller
 from common.bus.host import host_id
+from common.bus.overwriting_queue import Ring
 from common.bus.publisher import QUERY_CONGESTION, Publisher, qos
-from common.bus.ring import Ring
 from common.bus.sample import copied
 from common.bus.session import Opener
 from common.errors import MessageError

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import zenoh
 
-from common.bus.thinning import thinned
+from common.bus.downsampling import thinned
 from common.errors import ConfigError, LinkError
 from common.log import Logger
 from common.settings import Bus, is_encrypted

@@ -5,10 +5,10 @@ import time
 from collections.abc import Sequence
 
 from common import child_process, log, realtime
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.config import load
 from common.drive_socket import prepare, socket_path
 from common.errors import ConfigError, LinkError
-from common.options import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.settings import Board
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard

@@ -16,7 +16,7 @@ not started    until it could be started       started; tried again after 0 to 5
 
 SIGTERM, SIGINT and SIGHUP are passed on; a bridge that comes to rest sends its last frame itself.
 A signal after the parent has died means that the supervisor was killed: the system sends it then
-(see ``cli.supervisor``), and the bridge brakes at once instead of coasting.
+(see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
 """
 
 import os
@@ -29,8 +29,8 @@ from types import FrameType
 
 from common import child_process
 from common.backoff import Backoff
+from common.cli_args import HOPELESS
 from common.log import Logger
-from common.options import HOPELESS
 from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing

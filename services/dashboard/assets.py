@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from string import Template
 
-from services.dashboard.texts import table
+from services.dashboard.i18n import table
 
 STATIC = Path(__file__).parent / "static"
 TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

@@ -19,12 +19,12 @@ from common.bus.bus import Bus
 from common.freshness import S
 from common.messages import Level, SafetyState
 from common.service import Node
-from services.dashboard import picture
-from services.dashboard import words as w
+from services.dashboard import client_messages as w
+from services.dashboard import snapshot
+from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
+from services.dashboard.driver_lock import Push
 from services.dashboard.robot import Robot
-from services.dashboard.wheel import Push
-from services.dashboard.words import ROBOT
 
 PERIOD_S = 0.05
 REST_TICKS = 10  # between two pictures of what stands still
@@ -126,7 +126,7 @@ class Fleet:
     def _draw(self, name: str, robot: Robot, now_ns: int) -> None:
         here = {key: viewer for key, viewer in self._viewers.items() if viewer.robot == name}
         names = {key: viewer.name for key, viewer in here.items()}
-        moving = picture.now(
+        moving = snapshot.now(
             robot.heard,
             robot.wheel,
             now_ns,
@@ -144,14 +144,14 @@ class Fleet:
             robot.heard.count(now_ns)
             robots = sorted({*self._alive, *self._robots})
             alive = {each: bool(self._alive.get(each)) for each in robots}
-            still = picture.rest(robot.heard, alive, names, robot.protection, now_ns)
+            still = snapshot.rest(robot.heard, alive, names, robot.protection, now_ns)
             self._send(here, still, newer_wins=True)
         if not robot.said_path:
             robot.said_path = True
             self._send_path(here, robot)
         late = [key for key, viewer in here.items() if viewer.told != robot.heard.told]
         if late and self._number % REST_TICKS == 1:
-            self._send(late, {"k": "events", "lines": picture.told(robot.heard)})
+            self._send(late, {"k": "events", "lines": snapshot.told(robot.heard)})
             for key in late:
                 here[key].told = robot.heard.told
 

@@ -16,10 +16,10 @@ from common.errors import ConfigError
 from common.service import REST_S, Node
 from common.systemd import Systemd
 from services.dashboard.config import Dashboard, DashboardConfig
+from services.dashboard.credentials import TOKEN_MIN, Gate, new_token
 from services.dashboard.fleet import Fleet
-from services.dashboard.gate import TOKEN_MIN, Gate, new_token
 from services.dashboard.server import listen, reachable, serving
-from services.dashboard.viewers import Viewers
+from services.dashboard.websocket_hub import Viewers
 
 
 class Host:

@@ -5,9 +5,9 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
-from common.options import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from services.dashboard.config import DashboardConfig
 
 if TYPE_CHECKING:

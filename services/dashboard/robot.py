@@ -21,11 +21,11 @@ from common.operator import CONFIRM_S, confirms, release_request, reset_request
 from common.requests import Phase, Requests, Twist
 from common.source import DriveSource
 from services.dashboard.config import Dashboard
-from services.dashboard.heard import Heard, path_of
+from services.dashboard.driver_lock import Wheel
 from services.dashboard.sectors import Protection
-from services.dashboard.snapshots import Snapshots
+from services.dashboard.snapshot_log import Snapshots
+from services.dashboard.telemetry_cache import Heard, path_of
 from services.dashboard.trail import Trail
-from services.dashboard.wheel import Wheel
 
 R = TypeVar("R", bound=msgspec.Struct)
 Tell = Callable[[m.Level, str], None]

@@ -13,12 +13,12 @@ from starlette.routing import Route, WebSocketRoute
 
 from common.errors import LinkError
 from services.dashboard import assets
+from services.dashboard.auth import Door
+from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
-from services.dashboard.door import Door
-from services.dashboard.gate import Gate
+from services.dashboard.credentials import Gate
 from services.dashboard.listener import Listener
-from services.dashboard.viewers import WORD_MAX, Viewers
-from services.dashboard.words import ROBOT
+from services.dashboard.websocket_hub import WORD_MAX, Viewers
 
 END_S = 1  # that browsers get to hang up
 HEADER_MAX = 16_384  # bytes

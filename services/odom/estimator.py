@@ -30,10 +30,10 @@ from msgspec.structs import replace
 from common import messages as m
 from common.codec import finite
 from common.freshness import Latest, S, fresh
-from services.odom.comparison import COUNTER_STEP_M, COUNTER_STEP_RAD, Comparison, Twist
+from services.odom.arc_segments import Leg, fitted, halved, total
 from services.odom.config import Odom
-from services.odom.legs import Leg, fitted, halved, total
 from services.odom.pose import Belief, Covariance, Pose, Spread
+from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD, Comparison, Twist
 from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 
 LEGS_MAX = 512  # about ten seconds of velocities; then the oldest shape gets coarser

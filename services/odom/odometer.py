@@ -14,8 +14,8 @@ from common.operator import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
-from services.odom.path import Path
 from services.odom.pose import Pose
+from services.odom.trajectory import Path
 
 SILENT_NS = S // 2  # a pause this long is told; shorter ones are seen by the missing samples
 ECHOES = 64  # queued states of safety; a call that echoes a dropped one would be refused

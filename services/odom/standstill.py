@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from common.messages import Mileage
-from services.odom.comparison import COUNTER_STEP_M, COUNTER_STEP_RAD
+from services.odom.arc_segments import Leg
 from services.odom.config import Odom
-from services.odom.legs import Leg
+from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 
 DISTANCE_WRAP_M = 2**32 / 1000  # the counter is an s32 of millimetres
 WINDOW = 1.5  # counter steps around where the counters stood: one step, and rounding

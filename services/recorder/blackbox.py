@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from common.freshness import S
 from common.sample import Sample
 from services.recorder.config import MB, Recorder
-from services.recorder.memory import Memory
-from services.recorder.recording import Recording
-from services.recorder.tape import Begin, End
+from services.recorder.ring_buffer import Memory
+from services.recorder.rolling_writer import Begin, End
+from services.recorder.writer import Recording
 
 SLICE = 400  # samples at once: some 30 ms of work
 

@@ -13,11 +13,11 @@ from common.version import VERSION
 from services.recorder.blackbox import BlackBox
 from services.recorder.config import MB, RecorderConfig
 from services.recorder.latches import Latches
-from services.recorder.recording import Recording
+from services.recorder.mcap_codec import Translator
 from services.recorder.retention import Stored
-from services.recorder.shelf import Shelf
-from services.recorder.tape import Tape
-from services.recorder.translation import Translator
+from services.recorder.rolling_writer import Tape
+from services.recorder.storage import Shelf
+from services.recorder.writer import Recording
 
 # `**` passes by what begins with "@", on purpose: both are needed for all.
 EVERYTHING = ("**", "@cmd/**")

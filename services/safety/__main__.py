@@ -7,7 +7,7 @@ from common import realtime
 from common.bus.bus import Bus
 from common.service import Node, run
 from services.safety.config import SafetyConfig
-from services.safety.ports import Ports
+from services.safety.service import Ports
 
 
 def main(argv: Sequence[str] | None = None) -> int:

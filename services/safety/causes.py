@@ -7,7 +7,7 @@ held from the observation that raises it until it clears in its own way:
 clears     when
 ========== ===================================================================================
 RESET      an operator's reset, once the cause is gone for 3 samples, the vehicle stands and
-           nobody asks to move; then a neutral request (one exception, see ``answers.py``)
+           nobody asks to move; then a neutral request (one exception, see ``operator_requests.py``)
 SETTLED    by itself after it was gone for 0.5 s; then a neutral request
 AT_ONCE    by itself with the observation that no longer shows it (hysteresis is in the observer)
 ========== ===================================================================================

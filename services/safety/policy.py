@@ -22,17 +22,17 @@ from common.freshness import Latest, S
 from common.messages import Command
 from common.messages import Verdict as VerdictName
 from common.settings import Vehicle
-from services.safety.answers import answer, is_creeping
 from services.safety.arbiter import Arbiter
 from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
-from services.safety.ears import Ears
 from services.safety.inputs import Ask, Inputs
 from services.safety.latches import Latches, Observation, latched, observe, ordered
 from services.safety.motion import Plan, Planner, observations
+from services.safety.operator_requests import answer, is_creeping
 from services.safety.runaway import Bounds
 from services.safety.sonar import Rules
+from services.safety.sonar_array import Ears
 from services.safety.standstill import Measured, Standstill, supervisor
 from services.safety.state import RELEASE, State, Verdict
 from services.safety.twist import STILL, Twist

@@ -7,11 +7,11 @@ from msgspec.structs import replace
 
 from common.freshness import S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
-from services.safety.answers import room
 from services.safety.causes import BY_NAME
 from services.safety.inputs import Ask, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
+from services.safety.operator_requests import room
 from services.safety.policy import Policy
 from services.safety.state import State
 from services.safety.trajectory import OPPOSITE

@@ -7,7 +7,7 @@ good samples. ``no_echo`` is free space, at infinity.
 
 A reading that stays the same to the millimetre is not a fault by itself: a wall alongside, or a
 surface beyond the sensor's range, gives just that. It disagrees with odometry where the vehicle
-moved along the sonar's axis, or turned, and nothing else explains it (``ears.py``):
+moved along the sonar's axis, or turned, and nothing else explains it (``sonar_array.py``):
 
 - from the first metre on, the reading is shortened by the way that the vehicle came nearer
 - after ``stuck_travel`` along the axis, or half a radian of turning, the sonar is *suspect*

@@ -7,11 +7,11 @@ from common.messages import Command
 from common.messages import Verdict as VerdictName
 from services.safety.arbiter import Arbiter
 from services.safety.blind import Blind
-from services.safety.ears import Heard
-from services.safety.flapping import Credit
+from services.safety.fault_budget import Credit
 from services.safety.latches import Latches, Token
 from services.safety.release import Release
 from services.safety.runaway import Axis
+from services.safety.sonar_array import Heard
 from services.safety.standstill import Standstill
 from services.safety.trajectory import Trajectory
 from services.safety.twist import STILL, Twist

@@ -18,10 +18,10 @@ from common.bus.bus import Post
 from common.freshness import S
 from services.teleop import panels, table
 from services.teleop.config import Teleop
-from services.teleop.desk import Desk
-from services.teleop.drawing import around
+from services.teleop.controller import Desk
 from services.teleop.hold import Press
 from services.teleop.round_trip import NUMBERS, PROBE_S
+from services.teleop.sonar_view import around
 
 QUESTION = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, ask for it, move it back
 UNANSWERED = 10  # questions; after that many only every tenth is asked

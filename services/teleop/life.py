@@ -18,14 +18,14 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from common import log
+from common.cli_args import EXIT_CONFIG, add_sources, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
-from common.options import EXIT_CONFIG, add_sources, sources
 from common.service import REST_S, Node
 from services.teleop.config import TeleopConfig
-from services.teleop.desk import Desk
+from services.teleop.controller import Desk
+from services.teleop.event_log import Logbook
 from services.teleop.gamepad import find
-from services.teleop.logbook import Logbook
 from services.teleop.round_trip import multiplexer
 
 if TYPE_CHECKING:

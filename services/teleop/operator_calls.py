@@ -6,7 +6,7 @@ from common import keys, operator
 from common.messages import Direction, Done, Level, ResetDone, SafetyState
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.logbook import Logbook
+from services.teleop.event_log import Logbook
 from services.teleop.reset_check import ResetCheck
 
 RESET_TIMEOUT_S = 1.0  # safety refuses a reset that is older anyway

@@ -10,8 +10,8 @@ from bench.growth import curves, page
 from bench.growth.bend import Point, bend
 from bench.load.board import compiled
 from tests.bench.growth_series import made_up
-from tests.fleet.part import Part
-from tests.support import free_port, router_process
+from verification.fleet.child import Part
+from verification.harness.support import free_port, router_process
 
 
 def curve(*costs: float) -> list[Point]:

@@ -23,7 +23,7 @@ from common.wire.framing import Received
 from services.bridge.config import Bridge
 from services.bridge.schedule import queries
 from tests.bench.load_series import made_up
-from tests.support import free_port, wait_until
+from verification.harness.support import free_port, wait_until
 
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import pytest
 
 from common.loop import Loop
-from tests.bridge.board import board
-from tests.bridge.rig import Rig, bridge_process
-from tests.support import bus_on, free_port, router_process, running
+from tests.bridge.bridge_fixture import Rig, bridge_process
+from verification.harness.fake_board import board
+from verification.harness.support import bus_on, free_port, router_process, running
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import subprocess
 from pathlib import Path
 
 from common.wire.commands import MotionKind
-from tests.bridge.board import Board
-from tests.support import wait_until
+from verification.harness.fake_board import Board
+from verification.harness.support import wait_until
 
 PROC = Path("/proc")
 

@@ -16,9 +16,9 @@ from common.wire import reports
 from common.wire.commands import MotionKind
 from common.wire.frame import Side
 from common.wire.framing import Framing
-from tests.bridge.board import board
-from tests.bridge.rig import Rig, bridge_process
-from tests.support import bus_on, running, wait_until
+from tests.bridge.bridge_fixture import Rig, bridge_process
+from verification.harness.fake_board import board
+from verification.harness.support import bus_on, running, wait_until
 
 STOPS = [MotionKind.STOP] * 10
 

@@ -7,8 +7,8 @@ from typing import Any
 from common import keys
 from common import messages as m
 from common.freshness import S
-from tests.bridge.rig import Rig
-from tests.support import wait_until
+from tests.bridge.bridge_fixture import Rig
+from verification.harness.support import wait_until
 
 
 def switches(rig: Rig, **brakes: bool) -> m.SwitchesRequest:

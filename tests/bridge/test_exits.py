@@ -12,8 +12,8 @@ from common.service import Node, serve
 from common.wire.commands import MotionKind
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from tests.bridge.board import board
-from tests.bridge.rig import Rig
+from tests.bridge.bridge_fixture import Rig
+from verification.harness.fake_board import board
 
 
 def end(rig: Rig, *signals: signal.Signals) -> int:

@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.config import Sources, load
-from common.options import EXIT_CONFIG, EXIT_LINK
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
@@ -25,10 +25,10 @@ from services.bridge import child
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
-from tests.bridge.board import Board, board
+from tests.bridge.bridge_fixture import Rig, bridge_process
 from tests.bridge.guarding import PROC, breaks_since, bridge_pid
-from tests.bridge.rig import Rig, bridge_process
-from tests.support import wait_until
+from verification.harness.fake_board import Board, board
+from verification.harness.support import wait_until
 
 
 def test_break_goes_first_then_the_bridges_stop() -> None:

@@ -6,9 +6,9 @@ import sys
 import pytest
 
 from common.wire.commands import MotionKind
-from tests.bridge.board import board
 from tests.common.rights import needs_right
-from tests.support import wait_until
+from verification.harness.fake_board import board
+from verification.harness.support import wait_until
 
 SPIN = """
 import os

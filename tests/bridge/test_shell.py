@@ -17,8 +17,8 @@ from common.wire.reports import BumperReport
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.udp import Sockets
-from tests.bridge.board import Board, board
-from tests.support import wait_until
+from verification.harness.fake_board import Board, board
+from verification.harness.support import wait_until
 
 HIT, STOP, BREAK = (
     Framing().pack(frame)

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from common.wire.commands import MotionKind
-from tests.bridge.board import Board, board
+from tests.bridge.bridge_fixture import Rig, bridge_command, bridge_process
 from tests.bridge.guarding import breaks_since, bridge_pid
-from tests.bridge.rig import Rig, bridge_command, bridge_process
-from tests.common.manager import PATIENCE_US, Manager
-from tests.support import wait_until
+from tests.common.systemd_manager import PATIENCE_US, Manager
+from verification.harness.fake_board import Board, board
+from verification.harness.support import wait_until
 
 Watched = tuple[Board, "subprocess.Popen[bytes]", Manager]
 
@@ -62,7 +62,7 @@ def test_the_guard_beats_though_the_bridge_hangs_and_not_when_it_hangs(watched: 
 
 SUPERVISOR = """
 import sys
-from cli.supervisor import Supervisor
+from cli.run.supervisor import Supervisor
 Supervisor([("bridge", sys.argv[1:])]).run()
 """
 

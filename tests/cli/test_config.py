@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from common.options import EXIT_CONFIG
+from common.cli_args import EXIT_CONFIG
 
 
 @pytest.fixture

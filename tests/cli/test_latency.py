@@ -15,12 +15,12 @@ from cli.__main__ import main
 from cli.latency import SILENCE, Watch, figures, print_line, table
 from common import keys
 from common.bus.bus import Arrival
+from common.cli_args import EXIT_LINK
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Durations, Health, Timing
-from common.options import EXIT_LINK
 from tests.cli.processes import PATIENCE_S, sets, t2
-from tests.support import bus_on, free_port, router_process, running
+from verification.harness.support import bus_on, free_port, router_process, running
 
 TIMING = Timing(
     bounds=(0.001, 0.01),

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import COMMANDS, main
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError, LinkError, RobotError
-from common.options import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import PATIENCE_S
 
 
@@ -47,7 +47,6 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     [
         ("up", "--no-sim"),
         ("demo", "--fast"),
-        ("soak", "--minutes"),
         ("drive", "--source"),
         ("router", "--set"),
         ("sim", "--world"),

@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from cli.docs import DOCS
 from common.messages import Level
 from services.safety.causes import RULES, Clears
 from services.safety.report import EVENT_NAMES
+from tools.docs import DOCS
 
 TREE = DOCS.parent
 ROW = re.compile(r"^\| (\w+) \| `(\w+)` \| ([\w, ]+) \| (.+) \| (.+) \|$", re.MULTILINE)

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from common import log
-from tests.common.desk import Desk
-from tests.common.rig import Rig
-from tests.support import Lines, free_port, router_process
+from tests.common.bus_fixture import Rig
+from tests.common.settings_fixture import Desk
+from verification.harness.support import Lines, free_port, router_process
 
 
 @pytest.fixture(scope="package")

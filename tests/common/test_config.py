@@ -8,7 +8,7 @@ import pytest
 from cli.settings import Everything
 from common.config import DEFAULT_FILE, Sources, flatten, load
 from common.settings import Shared
-from tests.common.desk import Desk
+from tests.common.settings_fixture import Desk
 
 # --- the file that we ship ----------------------------------------------------------------------
 

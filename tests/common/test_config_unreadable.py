@@ -7,7 +7,7 @@ import pytest
 from common.config import Sources, load
 from common.errors import ConfigError
 from common.settings import Shared
-from tests.common.desk import Desk
+from tests.common.settings_fixture import Desk
 
 
 @pytest.mark.parametrize("text", ["a = ", "\x00", "a = " + "[" * 3000, "[board]\n[board]"])

@@ -15,7 +15,7 @@ import pytest
 
 from common import log
 from common.settings import Log
-from tests.support import PATIENCE_S, Lines, wait_until
+from verification.harness.support import PATIENCE_S, Lines, wait_until
 
 
 class Screen(io.StringIO):

@@ -11,7 +11,7 @@ import pytest
 from common import loop as loop_module
 from common.freshness import S
 from common.loop import Loop
-from tests.support import running, wait_until
+from verification.harness.support import running, wait_until
 
 
 class Clock:

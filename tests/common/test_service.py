@@ -11,15 +11,15 @@ import zenoh
 from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.messages import Event, Health
-from common.options import EXIT_CONFIG, EXIT_LINK
 from common.service import Node, resident_bytes, run
 from common.settings import Shared
 from common.version import VERSION
+from tests.common.bus_fixture import Rig
+from tests.common.example_options import SPECIMEN, on
 from tests.common.program import Program, program
-from tests.common.rig import Rig
-from tests.common.specimens import SPECIMEN, on
-from tests.support import free_port, listening, wait_until
+from verification.harness.support import free_port, listening, wait_until
 
 # --- settings -----------------------------------------------------------------------------------
 

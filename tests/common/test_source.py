@@ -10,8 +10,8 @@ from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.messages import Drive
 from common.source import BARRED_AFTER, DriveSource
-from tests.support import at, bus_on, running, wait_until
 from tests.teleop.support import FakeBus, safety_state
+from verification.harness.support import at, bus_on, running, wait_until
 
 
 @pytest.fixture

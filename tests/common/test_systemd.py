@@ -10,10 +10,10 @@ import pytest
 
 from common.freshness import S
 from common.systemd import BEATS, Systemd
-from tests.common.manager import PATIENCE_US, Manager
+from tests.common.example_options import SPECIMEN, on
 from tests.common.program import program
-from tests.common.specimens import SPECIMEN, on
-from tests.support import free_port, wait_until
+from tests.common.systemd_manager import PATIENCE_US, Manager
+from verification.harness.support import free_port, wait_until
 
 PERIOD_NS = PATIENCE_US * 1000 // BEATS
 

@@ -14,8 +14,8 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
 from common.messages import Bumper, Done, Drive, ReleaseRequest
-from tests.common.rig import Rig, until_heard
-from tests.support import PATIENCE_S, wait_until
+from tests.common.bus_fixture import Rig, until_heard
+from verification.harness.support import PATIENCE_S, wait_until
 
 ZENOH = Path(sys.executable).parent / "zenoh"
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import pytest
 
 from common.loop import Loop
-from tests.dashboard.rig import Site, dashboard
-from tests.dashboard.world import World
-from tests.support import bus_on, free_port, router_process, running
+from tests.dashboard.bus_fixture import World
+from verification.harness.dashboard import Site, dashboard
+from verification.harness.support import bus_on, free_port, router_process, running
 
 
 @pytest.fixture(scope="module")

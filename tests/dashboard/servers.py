@@ -19,8 +19,8 @@ from common.messages import (
     Switches,
     SwitchesRequest,
 )
-from tests.dashboard.world import World
-from tests.support import bus_on, running
+from tests.dashboard.bus_fixture import World
+from verification.harness.support import bus_on, running
 
 CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
 NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)

@@ -22,10 +22,10 @@ from cryptography.x509.oid import NameOID
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from services.dashboard.listener import RESERVE
-from tests.dashboard.abuse import FLOODS, flooded, half_open, is_closed
-from tests.dashboard.rig import Eye, Site, dashboard, eye
-from tests.dashboard.world import World
-from tests.support import wait_until
+from tests.dashboard.bus_fixture import World
+from verification.harness.dashboard import Eye, Site, dashboard, eye
+from verification.harness.dashboard_abuse import FLOODS, flooded, half_open, is_closed
+from verification.harness.support import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst
 TRIES = 8

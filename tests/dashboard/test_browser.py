@@ -6,9 +6,8 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from sim.requests import Driver
-from tests.chain import Chain, chain
-from tests.dashboard.rig import Site, dashboard
-from tests.dashboard.window import (
+from verification.harness.dashboard import Site, dashboard
+from verification.harness.dashboard_page import (
     CHROMIUM,
     drives,
     middle,
@@ -20,6 +19,7 @@ from tests.dashboard.window import (
     takes,
     text,
 )
+from verification.harness.stack import Chain, chain
 
 # Alone: a browser that shares the machine answers so late that the hand lapses.
 pytestmark = [

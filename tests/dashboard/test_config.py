@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
-from common.options import EXIT_CONFIG, EXIT_LINK
 from services.dashboard import host, life
 from services.dashboard.config import Dashboard
 

@@ -8,11 +8,11 @@ import pytest
 
 from common import keys
 from common.freshness import S
+from services.dashboard import client_messages as w
 from services.dashboard import fleet as module
-from services.dashboard import words as w
 from services.dashboard.config import DashboardConfig
 from services.dashboard.fleet import REST_TICKS, ROBOTS_MAX, UNWANTED_S, Fleet
-from tests.support import wait_until
+from verification.harness.support import wait_until
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import pytest
 
 from common.messages import Cause
-from tests.dashboard.rig import Eye, Site, eye
+from tests.dashboard.bus_fixture import World
 from tests.dashboard.servers import CONTACT, NEWER, Servers, serving
-from tests.dashboard.world import World
-from tests.support import wait_until
+from verification.harness.dashboard import Eye, Site, eye
+from verification.harness.support import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
 

@@ -7,11 +7,11 @@ import msgspec
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from tests.dashboard.rig import Site, dashboard
+from tests.dashboard.bus_fixture import World
 from tests.dashboard.servers import FREE, NEWER, Servers, serving
-from tests.dashboard.window import CHROMIUM, middle, shows, takes
-from tests.dashboard.world import World
-from tests.support import wait_until
+from verification.harness.dashboard import Site, dashboard
+from verification.harness.dashboard_page import CHROMIUM, middle, shows, takes
+from verification.harness.support import wait_until
 
 pytestmark = [
     pytest.mark.alone,

@@ -13,9 +13,9 @@ from websockets.exceptions import ConnectionClosed
 
 from common.freshness import S
 from services.dashboard.fleet import ROBOTS_MAX
-from tests.dashboard.rig import Eye, Site, dashboard, eye
-from tests.dashboard.world import HOLD, World, drive
-from tests.support import wait_until
+from tests.dashboard.bus_fixture import HOLD, World, drive
+from verification.harness.dashboard import Eye, Site, dashboard, eye
+from verification.harness.support import wait_until
 
 
 @pytest.fixture

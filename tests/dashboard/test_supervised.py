@@ -10,9 +10,9 @@ import pytest
 from common.loop import Loop
 from common.systemd import Systemd
 from services.dashboard.host import Host
-from tests.common.manager import Manager
-from tests.dashboard.rig import dashboard
-from tests.support import PATIENCE_S, wait_until
+from tests.common.systemd_manager import Manager
+from verification.harness.dashboard import dashboard
+from verification.harness.support import PATIENCE_S, wait_until
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from common import realtime
-from tests.compose.engine import compose
+from verification.containers.engine import compose
 
 ROOT = Path(__file__).parents[2]
 ENV = "deploy/compose/robot.env"

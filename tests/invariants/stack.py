@@ -21,9 +21,9 @@ from services.bridge.config import BridgeConfig
 from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
-from services.safety.ports import Ports
-from tests.invariants.judge import STEP_NS, Judge
+from services.safety.service import Ports
 from tests.invariants.net import MS, Letter, Net
+from tests.invariants.oracle import STEP_NS, Judge
 from tests.invariants.process import ROBOT, Process
 from tests.invariants.vehicle import Vehicle
 

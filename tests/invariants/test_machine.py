@@ -14,8 +14,9 @@ from hypothesis.stateful import initialize, invariant, rule, run_state_machine_a
 
 from common import messages as m
 from common.wire.frame import Side
-from tests.invariants.judge import STEP_NS
+from tests.invariants.fault_rules import Troubles
 from tests.invariants.net import ECHO_MS, HOLD_MS, MS, Weather
+from tests.invariants.oracle import STEP_NS
 from tests.invariants.strategies import (
     BUS,
     DIRECTIONS,
@@ -30,7 +31,6 @@ from tests.invariants.strategies import (
     SPEEDS,
     TURNS,
 )
-from tests.invariants.troubles import Troubles
 from tests.invariants.vehicle import NO_ECHO_MM
 
 PATIENCE = 3  # rules

@@ -10,7 +10,7 @@ from pathlib import Path
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.metrics.values import Values, flat
-from tests.support import PATIENCE_S, free_port, wait_until
+from verification.harness.support import PATIENCE_S, free_port, wait_until
 
 
 def scraped(port: int) -> Values:

@@ -12,17 +12,17 @@ import pytest
 
 from common import codec, keys
 from common import messages as m
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.members import Member, Members
-from common.options import EXIT_CONFIG, EXIT_LINK
 from services.metrics import exporter, life
 from services.metrics.exporter import asked
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
-from tests.common.rig import Rig, until_heard
-from tests.metrics.heard import event, health, link, odometry, safety
+from tests.common.bus_fixture import Rig, until_heard
+from tests.metrics.robots import event, health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
-from tests.support import free_port, router_process, wait_until
+from verification.harness.support import free_port, router_process, wait_until
 
 
 def test_a_robot_is_scraped_as_it_fares(rig: Rig, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from common.freshness import Latest, S
 from services.metrics.robot import EXPECTED, KEPT_S, NAMES, WORTH_S, Robot, Tally, prune
-from tests.metrics.heard import NOW_NS, event, health, link, whole
+from tests.metrics.robots import NOW_NS, event, health, link, whole
 
 LATE_NS = NOW_NS + round(WORTH_S * S) + 1
 LONG_NS = NOW_NS + round(KEPT_S * S) + 1

@@ -8,7 +8,7 @@ from common.freshness import Latest, S
 from common.messages import Durations, Timing
 from services.metrics.robot import WORTH_S, Robot
 from services.metrics.samples import FAMILIES, sheet
-from tests.metrics.heard import NOW_NS, event, health, link, odometry, safety, whole
+from tests.metrics.robots import NOW_NS, event, health, link, odometry, safety, whole
 from tests.metrics.values import Values, flat, names
 
 LATE_NS = NOW_NS + round(WORTH_S * S) + 1

@@ -12,12 +12,12 @@ from common.bus.publisher import Publisher
 from common.keys import Topic
 from common.loop import Loop
 from common.messages import Message
-from tests.cli.site import Site
-from tests.metrics.heard import health, link, odometry, safety
+from tests.metrics.robots import health, link, odometry, safety
 from tests.metrics.scraping import running as exporting
 from tests.metrics.scraping import scraped, value
 from tests.metrics.values import names
-from tests.support import at, joined, running, wait_until
+from verification.harness.certificates import Site
+from verification.harness.support import at, joined, running, wait_until
 
 ROBOT = "001"
 

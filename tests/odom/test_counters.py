@@ -5,9 +5,9 @@ import math
 import pytest
 
 from common.messages import Mileage, Velocity
+from services.odom.arc_segments import Leg
 from services.odom.config import Odom
 from services.odom.estimator import Estimator, Outcome, judge, step
-from services.odom.legs import Leg
 from services.odom.standstill import DISTANCE_WRAP_M
 
 UP = math.inf

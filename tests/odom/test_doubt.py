@@ -6,11 +6,11 @@ import pytest
 
 from common.freshness import S
 from common.messages import Mileage, Velocity
-from services.odom.comparison import COUNTER_STEP_M, COUNTER_STEP_RAD
+from services.odom.arc_segments import Leg
 from services.odom.config import Odom
 from services.odom.estimator import START, Estimator, Outcome
-from services.odom.legs import Leg
 from services.odom.pose import Belief, Covariance, Pose, Spread
+from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 
 ODOM = Odom(
     hold=0.1,

@@ -7,9 +7,9 @@ import pytest
 
 from common.freshness import S
 from common.messages import Mileage
-from services.odom.comparison import COUNTER_STEP_M, COUNTER_STEP_RAD
+from services.odom.arc_segments import Leg
 from services.odom.config import Odom
-from services.odom.legs import Leg
+from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 from tests.odom.drive import Listener, started
 

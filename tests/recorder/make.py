@@ -17,12 +17,12 @@ from common.loop import Loop
 from common.messages import SafetyState
 from common.settings import Vehicle
 from common.source import DriveSource
-from services.recorder.reading import Reader
-from services.recorder.recording import Recording
-from services.recorder.translation import Translator
+from services.recorder.mcap_codec import Translator
+from services.recorder.reader import Reader
+from services.recorder.writer import Recording
 from sim.requests import Bumper
-from tests.chain import Chain, chain
-from tests.support import PATIENCE_S, at, running, wait_until
+from verification.harness.stack import Chain, chain
+from verification.harness.support import PATIENCE_S, at, running, wait_until
 
 KEPT = Path(__file__).with_name("lap.mcap")
 PATHS = ("tel/bridge/", "tel/odom/odometry", "tel/safety/state", "evt/", "@cmd/")

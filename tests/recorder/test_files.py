@@ -10,13 +10,13 @@ from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.blackbox import SLICE, BlackBox
 from services.recorder.config import MB, Recorder
-from services.recorder.reading import Reader
-from services.recorder.recording import Recording
-from services.recorder.shelf import RETRY_NS, Shelf
-from services.recorder.tape import Tape
-from services.recorder.translation import Translator
-from tests.recorder import specimen
-from tests.recorder.specimen import BEGIN_NS, MONO_NS, sample
+from services.recorder.mcap_codec import Translator
+from services.recorder.reader import Reader
+from services.recorder.rolling_writer import Tape
+from services.recorder.storage import RETRY_NS, Shelf
+from services.recorder.writer import Recording
+from tests.recorder import samples
+from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
 
 SETTINGS = Recorder(roll_size=1.0, roll_time=10.0, black_box=10.0, tail=2.0)
 
@@ -53,7 +53,7 @@ def desk(tmp_path: Path) -> Desk:
 
 
 def at(second: float) -> Sample:
-    return sample("tel/bridge/velocity", specimen.velocity(), second)
+    return sample("tel/bridge/velocity", samples.velocity(), second)
 
 
 def ns(second: float) -> int:
@@ -77,10 +77,10 @@ def test_a_tape_goes_on_in_a_new_file_after_its_time(desk: Desk) -> None:
 
 def test_a_tape_goes_on_in_a_new_file_after_its_size(desk: Desk) -> None:
     tape = Tape(SETTINGS, desk.begin, desk.end)
-    big = specimen.bare("tel/x", bytes(range(256)) * 4000)
+    big = samples.bare("tel/x", bytes(range(256)) * 4000)
     for number in range(6):
         tape.write(big)
-        tape.write(specimen.bare("tel/x", number.to_bytes(64, "big")))
+        tape.write(samples.bare("tel/x", number.to_bytes(64, "big")))
         tape.flush(ns(0))
     tape.close()
     assert sum(len(each) for each in desk.read()) == 12

@@ -22,11 +22,11 @@ from common.messages import Message
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from services.bridge.translate import BumperFilter
-from services.recorder.reading import Reader
-from tests.bridge.board import Board
-from tests.bridge.rig import bridge_process
+from services.recorder.reader import Reader
+from tests.bridge.bridge_fixture import bridge_process
 from tests.recorder.make import KEPT
-from tests.support import bus_on, running, wait_until
+from verification.harness.fake_board import Board
+from verification.harness.support import bus_on, running, wait_until
 
 STREAMS = ("velocity", "mileage", "ultrasonic", "bumper", "driver/left", "driver/right")
 HEADER = Message.__struct_fields__

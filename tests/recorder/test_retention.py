@@ -8,10 +8,10 @@ import pytest
 
 from common.settings import Vehicle
 from services.recorder.config import MB
-from services.recorder.recording import Recording
+from services.recorder.mcap_codec import Translator
 from services.recorder.retention import Stored, removable, to_remove
-from services.recorder.shelf import Shelf
-from services.recorder.translation import Translator
+from services.recorder.storage import Shelf
+from services.recorder.writer import Recording
 
 OLD, MIDDLE, NEW = "001-20260101-000000", "001-20260201-000000", "001-20260301-000000"
 TAPES = [f"{stamp}.mcap" for stamp in (OLD, MIDDLE, NEW)]

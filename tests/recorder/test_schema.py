@@ -8,7 +8,7 @@ import pytest
 
 from common.messages import Event, Health, Link, Message, SafetyState
 from services.recorder import schema
-from services.recorder.translation import KINDS
+from services.recorder.mcap_codec import KINDS
 
 DRAWN = (schema.POSE, schema.ODOMETRY, schema.TRANSFORM, schema.SCAN, schema.LOG)
 ALL = [schema.of_message(kind) for kind in KINDS.values()] + list(DRAWN)

@@ -21,14 +21,14 @@ from common.freshness import S
 from common.messages import Event
 from common.service import Node
 from services.recorder.config import MB, RecorderConfig
-from services.recorder.reading import Reader, Recorded
+from services.recorder.reader import Reader, Recorded
 from services.recorder.recorder import Recorder
-from services.recorder.recording import Recording
-from tests.chain import Witness
+from services.recorder.writer import Recording
 from tests.cli.inspect.tool import pretend
-from tests.common.rig import Rig, until_heard
-from tests.recorder import specimen
-from tests.support import PATIENCE_S, running, wait_until
+from tests.common.bus_fixture import Rig, until_heard
+from tests.recorder import samples
+from verification.harness.stack import Witness
+from verification.harness.support import PATIENCE_S, running, wait_until
 
 
 def sets(rig: Rig, folder: Path, *more: str) -> list[str]:
@@ -111,8 +111,8 @@ def test_every_key_is_recorded_raw_frames_too(rig: Rig, tmp_path: Path) -> None:
 def test_a_latch_writes_what_was_before_it(rig: Rig, tmp_path: Path) -> None:
     events, numbers = told(rig), count()
     latched: list[str] = []
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
-    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
+    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     with recorder(rig, tmp_path, "recorder.tail=1"):
         heard: list[m.Velocity] = []
         rig.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: heard.append(a.message)))
@@ -138,7 +138,7 @@ def test_a_latch_writes_what_was_before_it(rig: Rig, tmp_path: Path) -> None:
 def test_no_room_is_told_and_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
     events = told(rig)
     latched: list[str] = []
-    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     all_of_it = "recorder.free=1000000"  # a terabyte
     with recorder(rig, tmp_path, all_of_it, "recorder.everything=true"):
         wait_until(lambda: "disk_full" in [each.name for each in events], "the first event")
@@ -169,7 +169,7 @@ def test_an_incident_is_written_though_old_recordings_fill_the_disk(
     monkeypatch.setattr(shutil, "disk_usage", usage)
     events = told(rig)
     latched: list[str] = []
-    pretend(rig, "safety", {keys.SAFETY: lambda: specimen.state(*latched)})
+    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     with recorder(rig, tmp_path, "recorder.free=12", "recorder.tail=1"):
         heard: list[m.SafetyState] = []
         rig.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: heard.append(a.message)))
@@ -191,7 +191,7 @@ def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
     put: list[m.Velocity] = []
 
     def velocity() -> m.Velocity:
-        put.append(specimen.velocity(next(numbers)))
+        put.append(samples.velocity(next(numbers)))
         return put[-1]
 
     pretend(rig, "bridge", {keys.VELOCITY: velocity})
@@ -231,7 +231,7 @@ def test_a_disk_that_refuses_ends_the_file_and_nothing_else(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     events, numbers = told(rig), count()
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
 
     def refuse(_: Recording) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -250,7 +250,7 @@ def test_a_disk_that_refuses_ends_the_file_and_nothing_else(
 
 def test_t2_record_writes_whole_files_until_ctrl_c(rig: Rig, tmp_path: Path) -> None:
     numbers = count()
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: specimen.velocity(next(numbers))})
+    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     where = ["--set", f"bus.connect={rig.endpoint}", "--set", "recorder.free=1"]
     words = ["record", "--folder", str(tmp_path), "--robot", rig.robot, *where]
     with subprocess.Popen(

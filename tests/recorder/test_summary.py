@@ -5,8 +5,8 @@ import pytest
 from common.freshness import S
 from common.messages import Event, Health
 from services.recorder.summary import Note, Summary
-from tests.recorder import specimen
-from tests.recorder.specimen import BEGIN_NS, ROOT
+from tests.recorder import samples
+from tests.recorder.samples import BEGIN_NS, ROOT
 
 VELOCITY = f"{ROOT}/tel/bridge/velocity"
 
@@ -20,7 +20,7 @@ def test_keys_are_counted_with_their_rates() -> None:
     summary = Summary()
     for number in range(11):
         at_ns = BEGIN_NS + number * S // 10
-        message = specimen.velocity()
+        message = samples.velocity()
         summary.take(VELOCITY, "Velocity", message, at_ns, raw=number > 5)
     summary.take("t2/v1/001/tel/mine", "", None, BEGIN_NS + 2 * S, raw=False)
     assert (summary.messages, summary.duration_s) == (12, 2.0)
@@ -46,9 +46,9 @@ def test_events_latches_and_versions_are_told() -> None:
     state = f"{ROOT}/tel/safety/state"
     at_ns = BEGIN_NS + S
     summary.take(f"{ROOT}/tel/odom/health", "Health", health, BEGIN_NS, raw=False)
-    summary.take(state, "SafetyState", specimen.state(), BEGIN_NS, raw=False)
+    summary.take(state, "SafetyState", samples.state(), BEGIN_NS, raw=False)
     summary.take(f"{ROOT}/evt/bridge", "Event", event, at_ns, raw=False)
-    summary.take(state, "SafetyState", specimen.state("contact"), at_ns, raw=False)
+    summary.take(state, "SafetyState", samples.state("contact"), at_ns, raw=False)
     summary.take(f"{ROOT}/tel/dashboard/health", "Health", health, at_ns, raw=False)
     assert summary.versions == {"odom": "1.2", "dashboard": "1.2"}  # by the key: rules go by it
     assert summary.events == [Note(1.0, "bridge", "error", "contact: the bumper is hit")]

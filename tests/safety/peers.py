@@ -28,8 +28,8 @@ from common.messages import (
     Velocity,
 )
 from common.operator import release_request, reset_request
-from tests.safety.scene import FREE, NO_ECHO, link
-from tests.support import wait_until
+from tests.safety.policy_fixture import FREE, NO_ECHO, link
+from verification.harness.support import wait_until
 
 Q = TypeVar("Q", bound=Struct)
 

@@ -10,7 +10,7 @@ from common.messages import Drive, Switches
 from services.safety.config import Safety
 from services.safety.inputs import Ask
 from services.safety.report import state_message
-from tests.safety.scene import TICK_S, Scene
+from tests.safety.policy_fixture import TICK_S, Scene
 
 
 def test_requests_are_ramped() -> None:

@@ -7,7 +7,7 @@ from common.bus.bus import Arrival
 from common.loop import Loop
 from common.messages import Motion, ReleaseRequest
 from tests.safety.peers import PATIENT, Peers, safety_process
-from tests.support import bus_on, running, wait_until
+from verification.harness.support import bus_on, running, wait_until
 
 # Only how old inputs may be is patient; how old a call may be is as shipped.
 SETS = {name: age for name, age in PATIENT.items() if name != "max_echo_age"}

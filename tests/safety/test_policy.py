@@ -10,9 +10,9 @@ from common.freshness import Latest, S
 from common.messages import Limits, SafetyState, Switches
 from services.safety.causes import BY_NAME, Clears
 from services.safety.config import Safety
-from services.safety.flapping import FAILURES
+from services.safety.fault_budget import FAILURES
 from services.safety.latches import latched
-from tests.safety.scene import TICK_S, Scene, link
+from tests.safety.policy_fixture import TICK_S, Scene, link
 
 
 def test_a_start_waits_for_every_input() -> None:

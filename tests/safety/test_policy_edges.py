@@ -7,10 +7,10 @@ from common.freshness import S
 from common.messages import SONAR_NAMES
 from services.safety.causes import RULES
 from services.safety.config import Safety
-from services.safety.flapping import FAILURES
+from services.safety.fault_budget import FAILURES
 from services.safety.latches import Held
 from services.safety.twist import STILL
-from tests.safety.scene import TICK_S, Scene, hit
+from tests.safety.policy_fixture import TICK_S, Scene, hit
 
 
 def test_a_decision_without_a_request_refuses_none() -> None:

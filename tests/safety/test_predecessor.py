@@ -7,7 +7,7 @@ from msgspec.structs import replace as with_fields
 from common.messages import Direction
 from services.safety.latches import latched
 from services.safety.report import motion_message
-from tests.safety.scene import Scene
+from tests.safety.policy_fixture import Scene
 
 OLD, OWN = 5, 6
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")

@@ -8,11 +8,11 @@ from msgspec.structs import replace
 from common.freshness import S
 from common.messages import Direction, Mileage
 from services.safety.causes import BY_NAME
-from services.safety.flapping import Credit
+from services.safety.fault_budget import Credit
 from services.safety.inputs import Hold
 from services.safety.latches import latched
 from services.safety.state import Reply
-from tests.safety.scene import NO_ECHO_TEXT, Scene, hit, link
+from tests.safety.policy_fixture import NO_ECHO_TEXT, Scene, hit, link
 
 HOLD = "The bumper was hit. Hold release to move off, forward or backward."
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")

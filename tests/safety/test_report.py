@@ -13,7 +13,7 @@ from services.safety.report import (
     state_message,
     timed,
 )
-from tests.safety.scene import Scene, hit
+from tests.safety.policy_fixture import Scene, hit
 
 
 def noted(scene: Scene, event: Event | None = None) -> list[str]:

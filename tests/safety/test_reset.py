@@ -11,7 +11,7 @@ from common.freshness import S
 from services.safety.inputs import Reset
 from services.safety.latches import latched
 from services.safety.state import Reply
-from tests.safety.scene import NO_ECHO_TEXT, Scene, hit
+from tests.safety.policy_fixture import NO_ECHO_TEXT, Scene, hit
 
 UNKNOWN = "It is not known whether the vehicle stands: its velocity is not heard."
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.freshness import Latest, S
 from common.heartbeat import CAPACITY, Heartbeat
 from common.messages import Mileage, Velocity
-from services.safety.flapping import FAILURES, Credit
+from services.safety.fault_budget import FAILURES, Credit
 from services.safety.inputs import Inputs
 from services.safety.ramp import ramp, start
 from services.safety.runaway import Axis, Bounds

@@ -9,7 +9,7 @@ from common.freshness import Latest, S
 from common.messages import Mileage
 from services.safety.standstill import Measured, Phase, Standstill, Supervisor, Velocities
 from services.safety.twist import Twist
-from tests.safety.scene import TICK_S
+from tests.safety.policy_fixture import TICK_S
 
 TICK_NS = round(TICK_S * S)
 SUPERVISOR = Supervisor(0.6, 1.0, Twist(1.0, 1.0))

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import S
-from tests.safety.scene import TICK_S, Scene, hit
+from tests.safety.policy_fixture import TICK_S, Scene, hit
 
 
 def until(scene: Scene, command: str) -> None:

@@ -16,7 +16,7 @@ from common.freshness import S
 from common.messages import SONAR_NAMES, Direction
 from services.safety.arbiter import Channel
 from services.safety.causes import RULES, Clears
-from services.safety.flapping import Credit
+from services.safety.fault_budget import Credit
 from services.safety.inputs import Estop, Event, Hold, Reset
 from services.safety.latches import Held, latched, ordered
 from services.safety.release import Release
@@ -24,7 +24,7 @@ from services.safety.runaway import Axis
 from services.safety.standstill import Phase, Standstill
 from services.safety.state import RELEASE, State, Verdict
 from services.safety.twist import STILL, Twist
-from tests.safety.scene import NO_ECHO, Scene
+from tests.safety.policy_fixture import NO_ECHO, Scene
 
 BRAKING = {
     "contact", "estop", "estop_reader", "predecessor", "runaway", "uncommanded_motion",

@@ -1,11 +1,11 @@
 """Wandering through the office: a sonar that saturates must not immobilise the vehicle.
 
-``python -m tests.safety.wander`` prints the figures of longer runs.
+``python -m verification.vehicles.wander`` prints the figures of longer runs.
 """
 
 import pytest
 
-from tests.safety.wander import run
+from verification.vehicles.wander import run
 
 
 @pytest.mark.parametrize(("saturation", "seed"), [(5.0, 0), (3.0, 0), (3.0, 1)])

@@ -10,8 +10,8 @@ from common.errors import LinkError, MessageError
 from sim.control import HOST, Control, ControlSocket
 from sim.injection import Reply
 from sim.requests import Bumper, RemoveBox
-from tests.sim.rig import Rig
-from tests.support import PATIENCE_S, free_port
+from tests.sim.sim_fixture import Rig
+from verification.harness.support import PATIENCE_S, free_port
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame
-from tests.sim.rig import WALL_AHEAD, Rig, room
+from tests.sim.sim_fixture import WALL_AHEAD, Rig, room
 
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 

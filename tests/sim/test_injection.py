@@ -9,7 +9,7 @@ from common.wire import commands as c
 from common.wire import reports as r
 from sim import requests as q
 from sim.trace import Disturbed
-from tests.sim.rig import START_NS, Rig, room
+from tests.sim.sim_fixture import START_NS, Rig, room
 
 BOX: dict[str, Any] = {"name": "crate", "x": 3.0, "y": 0.0, "length": 1.0, "width": 1.0}
 CRATE = room(BOX).boxes[0]

@@ -15,8 +15,8 @@ import pytest
 
 from cli.__main__ import main as t2
 from common import realtime
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import LinkError
-from common.options import EXIT_CONFIG, EXIT_LINK
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
@@ -26,7 +26,7 @@ from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
 from sim.trace import read
 from sim.world import Box
 from tests.common.rights import needs_right
-from tests.support import PATIENCE_S, free_port, wait_until
+from verification.harness.support import PATIENCE_S, free_port, wait_until
 
 FRAMING = Framing()
 

@@ -7,7 +7,7 @@ from common.wire.frame import Frame, Side
 from sim import trace as t
 from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar
 from sim.simulation import CATCH_UP_NS
-from tests.sim.rig import EMPTY, PORTS, START_NS, WALL_AHEAD, Rig, config
+from tests.sim.sim_fixture import EMPTY, PORTS, START_NS, WALL_AHEAD, Rig, config
 
 LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
 

@@ -9,7 +9,7 @@ from sim.geometry import Pose
 from sim.requests import Sonar, SonarName
 from sim.sonar import Sonars
 from sim.world import World
-from tests.sim.rig import room
+from tests.sim.sim_fixture import room
 
 VEHICLE = Vehicle(length=1.0, width=0.6, sonar_min=0.05, sonar_max=4.0)
 # x from -2 to 3, y from -1 to 2: every side at another distance.

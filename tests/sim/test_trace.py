@@ -4,7 +4,7 @@ import msgspec
 
 from sim.requests import Freeze
 from sim.trace import BumperSent, Disturbed, Line, Power, read
-from tests.sim.rig import START_NS, Rig
+from tests.sim.sim_fixture import START_NS, Rig
 
 
 def test_truth_is_one_json_object_with_all_that_tests_judge_by() -> None:

@@ -10,7 +10,7 @@ from common.freshness import S
 from common.wire import commands as c
 from sim import trace as t
 from sim.requests import PowerCycle, Script, Step, Wire
-from tests.sim.rig import START_NS, WALL_AHEAD, Rig, config, room
+from tests.sim.sim_fixture import START_NS, WALL_AHEAD, Rig, config, room
 
 
 def test_commands_are_traced_in_si_and_queries_only_counted() -> None:

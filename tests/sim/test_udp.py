@@ -8,7 +8,7 @@ from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
 from sim.udp import BURST, BoardSocket, bound, drain
-from tests.support import free_port, wait_until
+from verification.harness.support import free_port, wait_until
 
 
 @pytest.fixture

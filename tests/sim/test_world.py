@@ -6,7 +6,7 @@ import pytest
 
 from sim.geometry import Pose, Rectangle
 from sim.world import BUMPER_TRAVEL, Plan, World
-from tests.sim.rig import room
+from tests.sim.sim_fixture import room
 
 BODY = Rectangle(0.5, 0.25)
 BOX = {"name": "box", "x": 3.0, "y": 0.0, "length": 2.0, "width": 1.0}

@@ -15,10 +15,10 @@ from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Relea
 from common.requests import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.desk import Desk
-from services.teleop.logbook import Logbook
+from services.teleop.controller import Desk
+from services.teleop.event_log import Logbook
 from services.teleop.view import View
-from tests.support import at
+from verification.harness.support import at
 
 
 class FakeBus(Bus):

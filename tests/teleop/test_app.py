@@ -16,10 +16,10 @@ from common.freshness import S
 from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
-from services.teleop.desk import Desk
-from tests.support import PATIENCE_S
-from tests.teleop.near import NearApp
+from services.teleop.controller import Desk
 from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
+from verification.harness.support import PATIENCE_S
+from verification.harness.teleop_app import NearApp
 
 
 class Bench:

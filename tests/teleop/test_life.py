@@ -13,8 +13,8 @@ from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Drive, Health
 from services.teleop import life
-from tests.support import bus_on, free_port, running, wait_until
-from tests.teleop.terminal import Terminal, terminal
+from verification.harness.support import bus_on, free_port, running, wait_until
+from verification.harness.teleop_terminal import Terminal, terminal
 
 
 @pytest.fixture

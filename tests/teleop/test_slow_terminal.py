@@ -10,8 +10,8 @@ from common.bus.bus import Arrival, Bus
 from common.freshness import S
 from common.loop import Loop
 from common.messages import Drive, Event
-from tests.support import bus_on, running, wait_until
-from tests.teleop.terminal import STRICT, TELEOP, Terminal, terminal
+from verification.harness.support import bus_on, running, wait_until
+from verification.harness.teleop_terminal import STRICT, TELEOP, Terminal, terminal
 
 REPEAT_S = 0.033
 FAR_S = 0.21  # each way: 0.42 s there and back

@@ -4,8 +4,8 @@ from common import keys
 from common.freshness import S
 from common.messages import Bumper
 from services.teleop.view import Ear
-from tests.support import at
 from tests.teleop.support import FakeBus
+from verification.harness.support import at
 
 
 def test_a_value_is_shown_while_it_is_worth_it() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from common.loop import Loop
-from tests.chain import Chain, chain
-from tests.stick import Stick
-from tests.support import bus_on, running
+from tests.drive_source import Stick
 from tests.zenohd.router import command, found
+from verification.harness.stack import Chain, chain
+from verification.harness.support import bus_on, running
 
 
 @pytest.fixture(scope="module")

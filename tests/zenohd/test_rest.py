@@ -11,16 +11,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from cli.router import access_of
+from cli.run.router import access_of
 from common import codec, keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.messages import Odometry
-from tests.chain import Chain
-from tests.cli.site import Site
-from tests.common.rig import rising
-from tests.support import at, free_port, joined, running, wait_until
+from tests.common.bus_fixture import rising
 from tests.zenohd.router import Rest, command, found, rest
+from verification.harness.certificates import Site
+from verification.harness.stack import Chain
+from verification.harness.support import at, free_port, joined, running, wait_until
 
 pytestmark = pytest.mark.alone
 

@@ -9,10 +9,10 @@ from common.bus.bus import Bus
 from common.bus.probe import probe
 from common.loop import Loop
 from common.messages import Event, ResetRequest
-from tests.chain import Chain
 from tests.cli.processes import ran, sets
-from tests.stick import Stick, moves_since, push
-from tests.support import bus_on, running, wait_until
+from tests.drive_source import Stick, moves_since, push
+from verification.harness.stack import Chain
+from verification.harness.support import bus_on, running, wait_until
 
 pytestmark = pytest.mark.alone
 

@@ -3,8 +3,8 @@
 import pytest
 
 from tests.cli.inspect.tool import Tool
+from tests.common.bus_fixture import Rig
 from tests.common.conftest import rig, shared_router
-from tests.common.rig import Rig
 
 __all__ = ["rig", "shared_router", "tool"]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli.inspect import advice
+from cli.inspect import remedies
 from cli.inspect.diagnosis import (
     Dial,
     Finding,
@@ -61,7 +61,7 @@ def test_what_to_do_about_the_network_is_said() -> None:
 
 def test_another_router_is_noted() -> None:
     (found,) = router(seen(routers=["1.9.0"]))
-    assert (found.level, found.todo) == ("note", advice.UPDATE)
+    assert (found.level, found.todo) == ("note", remedies.UPDATE)
     (found,) = router(seen(routers=[]))
     assert found.level == "note"
 
@@ -71,10 +71,10 @@ def test_services_that_are_missing_twice_stuck_or_late() -> None:
     there = {"safety": 2, "odom": 1, "mine": 1}
     found = {each.text.split()[0]: each for each in services(seen(instances=there, health=told))}
     assert {name: (each.level, each.todo) for name, each in found.items()} == {
-        "bridge": ("wrong", advice.START),
-        "safety": ("wrong", advice.TWICE),
-        "odom": ("note", advice.HELD_UP),
-        "mine": ("wrong", advice.HANGS),
+        "bridge": ("wrong", remedies.START),
+        "safety": ("wrong", remedies.TWICE),
+        "odom": ("note", remedies.HELD_UP),
+        "mine": ("wrong", remedies.HANGS),
     }
 
 

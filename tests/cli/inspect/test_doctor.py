@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from cli.inspect import advice
-from cli.inspect.dial import dial
+from cli.inspect import remedies
+from cli.inspect.connect_probe import dial
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.messages import Drive
 from sim.requests import Bumper, Freeze, Sonar
-from tests.chain import Chain, chain
 from tests.cli.inspect.tool import Tool
-from tests.support import at, bus_on, free_port, router_process, running, wait_until
+from verification.harness.stack import Chain, chain
+from verification.harness.support import at, bus_on, free_port, router_process, running, wait_until
 
 TRIES_S = 30.0
 
@@ -70,13 +70,13 @@ def test_all_is_well_but_for_a_bumper_and_a_sonar(stack: Chain, doctor: Doctor) 
     until_well(doctor)
 
     stack.control.do(Bumper(pressed=True))
-    found = until_wrong(doctor, "bumper", advice.BUMPER)
-    assert ("safety", advice.BUMPER) in wrong(found)
+    found = until_wrong(doctor, "bumper", remedies.BUMPER)
+    assert ("safety", remedies.BUMPER) in wrong(found)
     stack.control.do(Bumper(pressed=False))
     reset(doctor, stack)
 
     stack.control.do(Sonar(name="rear_left", fault=True))
-    found = until_wrong(doctor, "sonar", advice.SONAR_FAULT)
+    found = until_wrong(doctor, "sonar", remedies.SONAR_FAULT)
     assert "the rear left sonar is faulty" in [each["text"] for each in found]
     stack.control.do(Sonar(name="rear_left"))
 
@@ -92,7 +92,7 @@ def reset(doctor: Doctor, stack: Chain) -> None:
 
 def test_a_frozen_board(stack: Chain, doctor: Doctor) -> None:
     stack.control.do(Freeze(seconds=3600.0))
-    found = until_wrong(doctor, "link", advice.BOARD_LOST)
+    found = until_wrong(doctor, "link", remedies.BOARD_LOST)
     assert any(each["where"] == "sensors" and each["level"] == "unknown" for each in found)
     stack.control.do(Freeze(seconds=0.0))
 
@@ -113,7 +113,7 @@ def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
         bus_on(stack.endpoint, loop, declare),
     ):
         loop.post(lambda: loop.every(0.05, ask))
-        until_wrong(doctor, "driving", advice.ONE_DRIVER)
+        until_wrong(doctor, "driving", remedies.ONE_DRIVER)
 
 
 def test_services_that_are_not_there_and_all_is_well_once_they_are(
@@ -128,7 +128,7 @@ def test_services_that_are_not_there_and_all_is_well_once_they_are(
     stack.processes["odom"].send_signal(signal.SIGCONT)
     stack.processes["bridge"].terminate()
     stack.processes["bridge"].wait()
-    found = until_wrong(doctor, "services", advice.START)
+    found = until_wrong(doctor, "services", remedies.START)
     assert ("link", "unknown") in {(each["where"], each["level"]) for each in found}
     stack.start("bridge")
     until_well(doctor)
@@ -143,7 +143,7 @@ def test_no_router(capsys: pytest.CaptureFixture[str]) -> None:
     lines = result.out.splitlines()
     assert "WRONG" in lines[0]
     assert "nothing listens" in lines[0]
-    assert lines[1].strip() == f"-> {advice.REFUSED}"
+    assert lines[1].strip() == f"-> {remedies.REFUSED}"
     assert lines[-1] == "1 thing wrong."
 
 
@@ -152,27 +152,27 @@ def test_a_router_and_nobody_on_it(capsys: pytest.CaptureFixture[str]) -> None:
     with router_process(endpoint):
         result = Tool(endpoint, "001", capsys)("doctor", "--duration", "0.2")
     assert result.code == 1
-    assert wrong(result.lines) == [("services", advice.START)] * 3
+    assert wrong(result.lines) == [("services", remedies.START)] * 3
 
 
 def test_what_answers_is_no_router(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         result = Tool(f"tcp/127.0.0.1:{port}", "001", capsys)("doctor")
-    assert wrong(result.lines) == [("router", advice.NOT_A_ROUTER)]
+    assert wrong(result.lines) == [("router", remedies.NOT_A_ROUTER)]
 
 
 def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not dial("udp/127.0.0.1:7447", at()).tried
-    assert dial(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == advice.NO_SOCKET
+    assert dial(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == remedies.NO_SOCKET
     assert dial(f"unixsock-stream/{tmp_path}", at()).trouble == ""
     with socket.create_server(("127.0.0.1", 0)) as server:
         reached = dial(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at())
     assert (reached.trouble, reached.tried) == ("", True)
     for error, todo in (
-        (socket.gaierror(), advice.NO_NAME),
-        (TimeoutError(), advice.NO_WAY),
-        (OSError(101, "Network is unreachable"), advice.NO_WAY),
+        (socket.gaierror(), remedies.NO_NAME),
+        (TimeoutError(), remedies.NO_WAY),
+        (OSError(101, "Network is unreachable"), remedies.NO_WAY),
     ):
 
         def fail(*_: object, error: OSError = error) -> None:

@@ -12,8 +12,8 @@ from common.bus.bus import Bus
 from common.bus.session import router
 from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.rig import Rig
-from tests.support import free_port, listening, wait_until
+from tests.common.bus_fixture import Rig
+from verification.harness.support import free_port, listening, wait_until
 
 Join = Callable[[str], Rig]
 LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)

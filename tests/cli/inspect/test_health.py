@@ -11,7 +11,7 @@ from cli.inspect import health as command
 from common import keys
 from common.bus.bus import Bus
 from tests.cli.inspect.tool import Tool, health, pretend
-from tests.common.rig import Rig
+from tests.common.bus_fixture import Rig
 
 
 def test_health(rig: Rig, tool: Tool) -> None:

@@ -6,9 +6,9 @@ import threading
 import pytest
 
 from cli.inspect import echo, estop
-from common.options import EXIT_LINK
+from common.cli_args import EXIT_LINK
 from tests.cli.inspect.tool import Tool
-from tests.support import free_port, router_process
+from verification.harness.support import free_port, router_process
 
 
 @pytest.mark.parametrize("word", ["ls", "services", "health", "estop"])

@@ -14,7 +14,7 @@ from common import messages as m
 from common.bus.bus import Bus
 from common.bus.calls import Caller
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.rig import Rig
+from tests.common.bus_fixture import Rig
 
 CONTACT = m.Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=41)
 IDLE = m.Cause(name="no_request", action="stop", age=1.0, text="Nobody asks to move.", id=40)

@@ -9,8 +9,8 @@ from cli.inspect.permission import is_loopback, reason
 from common import keys
 from common.messages import Drive, Link
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.rig import Rig
-from tests.support import wait_until
+from tests.common.bus_fixture import Rig
+from verification.harness.support import wait_until
 
 ROOT = "t2/v1/001"
 

@@ -8,8 +8,8 @@ from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.messages import Cause, Done, Limits, ReleaseRequest, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.rig import Rig
-from tests.support import wait_until
+from tests.common.bus_fixture import Rig
+from verification.harness.support import wait_until
 
 
 def state(*latched: str) -> SafetyState:
@@ -31,7 +31,7 @@ def test_pub_fills_in_the_header(rig: Rig, tool: Tool) -> None:
     assert (result.code, result.err) == (0, "")
     assert [line["published"] for line in result.lines] == [1, 2]
     wait_until(lambda: len(watched) == 2, "both messages")
-    from cli.inspect.reading import read
+    from cli.inspect.payload import read
 
     values = [read(*each).value for each in watched]
     assert [(each["celsius"], each["seq"] > 0) for each in values] == [(21.5, True)] * 2

@@ -14,7 +14,7 @@ from common.bus.bus import Bus
 from common.messages import Bumper, Event
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
-from tests.common.rig import Rig
+from tests.common.bus_fixture import Rig
 
 
 def bumper() -> Bumper:

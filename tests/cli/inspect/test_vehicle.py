@@ -4,7 +4,7 @@ from typing import Any, get_args
 
 import pytest
 
-from cli.inspect import advice
+from cli.inspect import remedies
 from cli.inspect.diagnosis import Finding, Seen
 from cli.inspect.vehicle import STREAMS, at_the_vehicle, drivers, driving, link, safety, switches
 from common import messages as m
@@ -69,7 +69,7 @@ def test_a_bridge_that_tells_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "todo"), [("never", advice.BOARD_NEVER), ("lost", advice.BOARD_LOST)]
+    ("state", "todo"), [("never", remedies.BOARD_NEVER), ("lost", remedies.BOARD_LOST)]
 )
 def test_a_board_that_is_not_there(state: str, todo: str) -> None:
     found = list(at_the_vehicle(seen(link=link_of(state), bumper=m.Bumper(pressed=True))))
@@ -80,7 +80,7 @@ def test_a_board_that_is_not_there(state: str, todo: str) -> None:
 def test_frames_that_are_refused_while_it_listens() -> None:
     before, now = link_of(rejected={"bad_crc": 4, "no_magic": 1}), {"bad_crc": 9, "no_magic": 1}
     first, second = link(link_of(rejected=now), before)
-    assert (first.level, first.todo) == ("note", advice.BOARD_REFUSED)
+    assert (first.level, first.todo) == ("note", remedies.BOARD_REFUSED)
     assert first.text.endswith("sends: 5 bad_crc")
     assert second.text.endswith("is there, answers in 2.0 ms")
     assert [each.level for each in link(link_of(round_trip=None), None)] == ["ok"]
@@ -88,7 +88,7 @@ def test_frames_that_are_refused_while_it_listens() -> None:
 
 def test_datagrams_that_the_system_refuses_to_send_while_it_listens() -> None:
     first, second = link(link_of(send_errors=7), link_of(send_errors=4))
-    assert (first.level, first.todo) == ("wrong", advice.SEND_ERRORS)
+    assert (first.level, first.todo) == ("wrong", remedies.SEND_ERRORS)
     assert first.text == "the system refused to send 3 datagrams to the board"
     assert second.level == "ok"
     assert [each.level for each in link(link_of(send_errors=7), link_of(send_errors=7))] == ["ok"]
@@ -111,7 +111,7 @@ def test_a_bridge_that_waits() -> None:
 def test_switches(told: m.Switches | None, said: list[str]) -> None:
     found = wrong(switches(seen(switches=told)))
     assert [text for text, _ in found] == [f"the board's {each}" for each in said]
-    assert {todo for _, todo in found} == {advice.SWITCHES}
+    assert {todo for _, todo in found} == {remedies.SWITCHES}
 
 
 def test_streams_that_are_missing_or_thin() -> None:
@@ -134,9 +134,9 @@ def test_a_pressed_bumper_and_sonars_that_cannot_be_trusted() -> None:
     told = m.Ultrasonic(ranges=(None,) * 3 + (1.0,) * 5, status=status)
     found = wrong(at_the_vehicle(seen(bumper=m.Bumper(pressed=True), ultrasonic=told)))
     assert found == [
-        ("the bumper is pressed", advice.BUMPER),
-        ("the left sonar is faulty", advice.SONAR_FAULT),
-        ("the front left sonar sees something too near to measure", advice.SONAR_NEAR),
+        ("the bumper is pressed", remedies.BUMPER),
+        ("the left sonar is faulty", remedies.SONAR_FAULT),
+        ("the front left sonar sees something too near to measure", remedies.SONAR_NEAR),
     ]
 
 
@@ -149,25 +149,25 @@ def test_driver_faults_say_what_they_mean() -> None:
 
 def test_one_driver_too_many() -> None:
     (found,) = driving(seen(asking={"web": {1, 2}}))
-    assert (found.level, found.todo) == ("wrong", advice.ONE_DRIVER)
+    assert (found.level, found.todo) == ("wrong", remedies.ONE_DRIVER)
     (found,) = driving(seen(asking={"web": {1}, "teleop": {2}}))
     assert (found.level, found.text.split(" ask")[0]) == ("note", "teleop, web")
     (found,) = driving(seen(asking={"web": {1}}))
     assert (found.level, found.text) == ("ok", "web asks to move")
     found = next(driving(seen(deciding={1, 2})))
-    assert (found.level, found.todo) == ("wrong", advice.TWICE)
+    assert (found.level, found.todo) == ("wrong", remedies.TWICE)
 
 
 def test_safety_s_causes_with_what_to_do() -> None:
     latched, passing = safety(seen(safety=state_of("contact", "neutral", latched=("contact",))))
-    assert (latched.level, latched.todo) == ("wrong", advice.BUMPER)
+    assert (latched.level, latched.todo) == ("wrong", remedies.BUMPER)
     assert latched.text == "The bumper was hit. (brake, latched)"
-    assert (passing.level, passing.todo) == ("note", advice.CAUSES["neutral"])
+    assert (passing.level, passing.todo) == ("note", remedies.CAUSES["neutral"])
 
 
 def test_a_cause_of_a_newer_safety() -> None:
     (found,) = safety(seen(safety=state_of("smoke", latched=("smoke",))))
-    assert (found.level, found.todo) == ("wrong", advice.RESET)
+    assert (found.level, found.todo) == ("wrong", remedies.RESET)
     (found,) = safety(seen(safety=state_of("smoke")))
     assert (found.level, found.todo) == ("wrong", "")
 
@@ -178,5 +178,5 @@ def test_nothing_holds_it_back() -> None:
 
 
 def test_every_cause_and_every_fault_has_its_advice() -> None:
-    assert advice.CAUSES.keys() == {rule.name for rule in RULES}
-    assert advice.FAULTS.keys() == set(get_args(FaultName))
+    assert remedies.CAUSES.keys() == {rule.name for rule in RULES}
+    assert remedies.FAULTS.keys() == set(get_args(FaultName))

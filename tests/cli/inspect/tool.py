@@ -12,7 +12,7 @@ from common import keys
 from common.bus.bus import Bus
 from common.keys import Topic
 from common.messages import Health, Message
-from tests.common.rig import Rig
+from tests.common.bus_fixture import Rig
 
 
 @dataclass(frozen=True)

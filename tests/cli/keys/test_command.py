@@ -12,9 +12,9 @@ import pytest
 
 from cli.__main__ import main
 from cli.keys.profile import CA_DAYS, DAY_S
+from common.cli_args import EXIT_CONFIG
 from common.config import Sources, load
 from common.members import read
-from common.options import EXIT_CONFIG
 from common.settings import Shared
 from tests.cli.processes import PATIENCE_S, t2
 
@@ -187,7 +187,7 @@ def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) ->
         def time() -> float:
             return later_s
 
-    monkeypatch.setattr("cli.keys.verbs.time", Later)
+    monkeypatch.setattr("cli.keys.operations.time", Later)
     assert "the CA has reached its end" in desk.keys("issue", "viewer", "v", code=1)
     assert "the CA has ended: make another" in desk.keys("list")
 

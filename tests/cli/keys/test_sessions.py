@@ -1,6 +1,6 @@
 """Zenoh's own TLS against our certificates: whom it lets in, and whom it believes.
 
-What somebody may do once he is in is tested elsewhere (``tests/cli/test_rights.py``).
+What somebody may do once he is in is tested elsewhere (``tests/cli/keys/test_rights.py``).
 """
 
 import contextlib
@@ -14,15 +14,15 @@ import msgspec
 import pytest
 import zenoh
 
-from cli.keys.authority import Authority
-from cli.keys.folder import locked
+from cli.keys.ca import Authority
 from cli.keys.profile import DAY_S, Profile, Span, profile
+from cli.keys.store import locked
 from common.bus.session import client_config, router
 from common.config import Sources, load
 from common.errors import LinkError
 from common.members import Members
 from common.settings import Bus, Shared
-from tests.support import free_port, wait_until
+from verification.harness.support import free_port, wait_until
 
 KEY = "t2/v1/001/tel/bridge/velocity"
 ROBOT = profile("robot", "001", (), ())

@@ -12,8 +12,8 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
-from tests.common.rig import Rig, rising, until_heard
-from tests.support import at, wait_until
+from tests.common.bus_fixture import Rig, rising, until_heard
+from verification.harness.support import at, wait_until
 
 
 def bumper(rig: Rig) -> str:

@@ -9,8 +9,8 @@ from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
-from tests.common.rig import Rig, until_heard
-from tests.support import at, wait_until
+from tests.common.bus_fixture import Rig, until_heard
+from verification.harness.support import at, wait_until
 
 
 class Server:

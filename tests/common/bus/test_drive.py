@@ -13,8 +13,8 @@ from common.errors import ConfigError
 from common.freshness import S
 from common.messages import Bumper, Motion
 from common.settings import Bus as Settings
-from tests.common.rig import Rig, rising, until_heard
-from tests.support import Lines, at, wait_until
+from tests.common.bus_fixture import Rig, rising, until_heard
+from verification.harness.support import Lines, at, wait_until
 
 
 class Ends:

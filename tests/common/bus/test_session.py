@@ -15,8 +15,8 @@ from common.bus.probe import probe
 from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.rig import Rig, until_heard
-from tests.support import Lines, at, free_port, listening, wait_until
+from tests.common.bus_fixture import Rig, until_heard
+from verification.harness.support import Lines, at, free_port, listening, wait_until
 
 
 def nowhere() -> str:

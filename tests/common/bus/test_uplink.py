@@ -8,8 +8,8 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.rig import Rig, until_heard
-from tests.support import at, free_port, listening, wait_until
+from tests.common.bus_fixture import Rig, until_heard
+from verification.harness.support import at, free_port, listening, wait_until
 
 
 def somewhere() -> str:

@@ -1,1 +1,0 @@
-"""Checking a real vehicle out before its first drive: `t2 checkout`."""

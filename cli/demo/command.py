@@ -1,0 +1,161 @@
+"""``t2 demo``: a simulated T2 drives a lap through the real services."""
+
+import argparse
+import contextlib
+import socket
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from cli.demo import host_stalls
+from cli.demo.driver import PERIOD_S, Driver
+from cli.demo.score import good, read, results
+from cli.demo.script import PATIENT, QUICK, Lap, lap
+from cli.interrupt import interruptible
+from cli.run.supervisor import Supervisor
+from cli.run.up import commands
+from cli.settings import Everything
+from common import log
+from common.bus.bus import Bus
+from common.cli_args import add_sources, sources
+from common.config import load
+from common.errors import ConfigError, LinkError, RobotError
+from common.freshness import S
+from common.loop import Loop
+from sim.files import load_plan
+
+WORLD = "office"
+PATIENCE_S = 120.0  # a lap takes a third of that; a busy machine stops it now and then
+LOOK_S, DRAW_S = 0.1, 0.125
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--fast", action="store_true", help="end before the way home, no plot")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
+    )
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Drive the lap; 0 when all went as it should, 128 and the number after a signal."""
+    try:
+        from cli.demo.show import Show
+    except ImportError as error:
+        raise RobotError(
+            f"the demo wants {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
+        ) from None
+    options.no_sim, options.world = False, WORLD
+    make_room(options)
+    holdup_s = host_stalls.measured()
+    options.sets = host_stalls.with_accepted_joined(
+        [*own_ports(), *host_stalls.settings(holdup_s), *options.sets]
+    )
+    config = load(Everything, sources(options)).config
+    # What the processes say goes to a file; on the terminal it would tear the picture.
+    log.configure(replace(config.log, level="error"), "demo")
+    pace = PATIENT if holdup_s > host_stalls.LIMIT_S else QUICK
+    driven, plan = Lap(lap(options.fast, pace)), load_plan(WORLD, config.vehicle)
+    with (
+        Show(plan, config.vehicle, options.out) as show,
+        closing(Loop()) as loop,
+        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
+    ):
+        if holdup_s > host_stalls.LIMIT_S:
+            show.say(host_stalls.sentence(holdup_s))
+        driver = Driver(bus, driven, show.step)
+        bus.open()
+        interrupted = drive(options, loop, driver, show.draw)
+    if interrupted:
+        return 128 + interrupted
+    trace = read(trace_file(options)) if trace_file(options).exists() else None
+    if trace is None or not trace.truth:
+        raise LinkError(f"the simulated vehicle never ran; see {log_file(options)}")
+    rows = results(trace, driver.odometry, driven, options.fast)
+    if not options.fast:
+        show.plot(trace, driver.odometry)
+    show.results(rows, driver)
+    return 0 if good(rows) else 1
+
+
+def drive(
+    options: argparse.Namespace,
+    loop: Loop,
+    driver: Driver,
+    draw: Callable[[Driver, int], None],
+) -> int:
+    """Keep the processes running until the lap is over, or patience is; return a signal or 0."""
+    began_ns = time.monotonic_ns()
+    with log_file(options).open("wb") as output, interruptible(loop) as signals:
+        supervisor = Supervisor(traced(options), output)
+
+        def look(now_ns: int) -> None:
+            if supervisor.look(time.monotonic()):
+                raise LinkError(f"a process cannot run; see {output.name}")
+            if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * S:
+                loop.stop()
+
+        loop.every(LOOK_S, look)
+        loop.every(PERIOD_S, driver.on_beat)
+        loop.every(DRAW_S, lambda now_ns: draw(driver, now_ns))
+        try:
+            loop.run()
+        finally:
+            supervisor.end()
+    return signals[0] if signals else 0
+
+
+def make_room(options: argparse.Namespace) -> None:
+    """Make the folder for what the demo writes; an earlier lap's trace is none of this one."""
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        log_file(options).write_bytes(b"")
+        trace_file(options).unlink(missing_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out {options.out}: cannot be written: {error.strerror}") from None
+
+
+def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
+    """Return the processes of ``t2 up``, with a simulator that writes down what happens."""
+    trace = ["--trace", str(trace_file(options))]
+    return [
+        (name, [*command, *(trace if name == "sim" else [])]) for name, command in commands(options)
+    ]
+
+
+def trace_file(options: argparse.Namespace) -> Path:
+    """Return where the simulator writes."""
+    out: Path = options.out
+    return out / "trace.jsonl"
+
+
+def log_file(options: argparse.Namespace) -> Path:
+    """Return where the processes write what they have to say."""
+    out: Path = options.out
+    return out / "processes.log"
+
+
+def own_ports() -> list[str]:
+    """Return settings with ports of the demo's own, so that it runs beside ``t2 up``."""
+    board, first, second, router = free_ports(*[socket.SOCK_DGRAM] * 3, socket.SOCK_STREAM)
+    return [
+        f"board.port={board}",
+        f"board.listen_ports=[{first}, {second}]",
+        "board.address=127.0.0.1",
+        "board.listen_address=127.0.0.1",
+        f"bus.listen=tcp/127.0.0.1:{router}",
+        "bus.connect=",
+    ]
+
+
+def free_ports(*kinds: socket.SocketKind) -> list[int]:
+    """Return ports of 127.0.0.1 that were free a moment ago, no two the same."""
+    with contextlib.ExitStack() as stack:
+        socks = [stack.enter_context(socket.socket(socket.AF_INET, kind)) for kind in kinds]
+        for sock in socks:
+            sock.bind(("127.0.0.1", 0))
+        return [sock.getsockname()[1] for sock in socks]

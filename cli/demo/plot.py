@@ -1,0 +1,97 @@
+"""The lap on paper: the way through the room, and the speeds over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+
+from cli.demo.score import Trace
+from common.freshness import S
+from common.messages import Odometry
+from sim import trace as t
+from sim.geometry import Pose, Rectangle
+from sim.world import Box, Plan
+
+INK, TRUE, COUNTED, HIT = "#37474f", "#1565c0", "#ef6c00", "#c62828"
+
+
+def save(
+    files: Sequence[Path],
+    plan: Plan,
+    body: Rectangle,
+    trace: Trace,
+    odometry: Sequence[Odometry],
+) -> None:
+    """Draw the lap into each file, in the format that its name says."""
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    FigureCanvasAgg(figure)
+    room, speeds = figure.subplots(2, 1, height_ratios=[3, 1])
+    _draw_room(room, plan)
+    _draw_way(room, body, trace, odometry)
+    _draw_speeds(speeds, trace)
+    for file in files:
+        figure.savefig(file, dpi=110)
+
+
+def _draw_room(axes: Axes, plan: Plan) -> None:
+    for wall in plan.walls:
+        xs, ys = zip(*wall.points, strict=True)
+        axes.plot(xs, ys, color=INK, linewidth=3, solid_capstyle="projecting")
+    for box in plan.boxes:
+        style = {"hatch": "////", "fill": False} if box.low else {"facecolor": "#b0bec5"}
+        axes.add_patch(Polygon(_corners(box), edgecolor=INK, **style))
+        if box.low:
+            above = box.x, box.y + box.width / 2 + 0.08
+            axes.annotate(f"{box.name}\n(too low for sonar)", above, ha="center", fontsize=8)
+        else:
+            axes.annotate(box.name, (box.x, box.y), ha="center", va="center", fontsize=8)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    axes.set_title(f"A lap of T2 through {plan.title}", pad=28)
+
+
+def _draw_way(axes: Axes, body: Rectangle, trace: Trace, odometry: Sequence[Odometry]) -> None:
+    truth = trace.truth
+    axes.plot([x.x for x in truth], [x.y for x in truth], color=TRUE, linewidth=2, label="truth")
+    axes.plot([p.x for p in odometry], [p.y for p in odometry], color=COUNTED, linewidth=1.2,
+              linestyle="--", label="odometry")  # fmt: skip
+    before = [x for x in truth if not x.contact and x.clearance is not None]
+    closest = min(before, key=lambda x: x.clearance or 0.0, default=truth[0])
+    hit = next((x for x in truth if x.contact), None)
+    _draw_body(axes, body, truth[0], INK, "start")
+    _draw_body(axes, body, closest, TRUE, "stopped by sonar")
+    if hit is not None:
+        _draw_body(axes, body, hit, HIT, "stopped by the bumper")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8)
+
+
+def _draw_body(axes: Axes, body: Rectangle, at: t.Truth, color: str, label: str) -> None:
+    """Draw the vehicle's outline, with a stroke that shows its front."""
+    pose = Pose(at.x, at.y, at.heading)
+    corners = [pose.outward(x, y) for x, y in body.corners()]
+    axes.add_patch(Polygon(corners, fill=False, edgecolor=color, linewidth=1.2, label=label))
+    nose = pose.outward(body.half_length, 0.0)
+    axes.plot([pose.x, nose[0]], [pose.y, nose[1]], color=color, linewidth=1.2)
+
+
+def _draw_speeds(axes: Axes, trace: Trace) -> None:
+    start_ns = trace.truth[0].mono_ns
+    runs = [(c.mono_ns, c.linear if c.kind == "run" else 0.0) for c in trace.commands]
+    axes.step([(at - start_ns) / S for at, _ in runs], [v for _, v in runs], where="post",
+              color=COUNTED, linewidth=1.2, label="commanded, at the board")  # fmt: skip
+    axes.plot([(x.mono_ns - start_ns) / S for x in trace.truth], [x.linear for x in trace.truth],
+              color=TRUE, linewidth=1.5, label="true")  # fmt: skip
+    for hit in (b for b in trace.bumper if b.pressed):
+        axes.axvline((hit.mono_ns - start_ns) / S, color=HIT, linewidth=1, linestyle=":")
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("speed, m/s")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
+
+
+def _corners(box: Box) -> list[tuple[float, float]]:
+    return [box.pose.outward(x, y) for x, y in box.shape.corners()]

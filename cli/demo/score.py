@@ -1,0 +1,136 @@
+"""What came of the lap: the trace of the simulator against what the services said.
+
+The trace and the messages carry the same host's monotonic clock, so that a frame here and a message
+there can be told apart in time. Lengths in metres, times in seconds.
+"""
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cli.demo.script import Lap
+from common.freshness import S
+from common.messages import Odometry
+from sim import trace as t
+
+Result = tuple[str, str, bool | None]  # what, how much, whether it is as it should be
+
+# The wall is seen by sonar: the margin of safety, less what noise and a step of braking take.
+CLEARANCE_MIN = 0.05
+HOME_MAX = 0.25
+STOP_MAX = 0.1
+ODOMETRY_MAX = 0.15
+REST_SAMPLES = 20  # of the truth, which is written at 20 Hz
+REACTION_MAX = 0.5  # what must hold on a machine that is busy; docs/safety.md has the budget
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What the simulator wrote down, sorted by kind."""
+
+    truth: Sequence[t.Truth]
+    commands: Sequence[t.Command]
+    bumper: Sequence[t.BumperSent]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A bumper hit and what followed."""
+
+    reaction_s: float | None  # from the frame that says so to the BREAK frame
+    distance_m: float | None  # driven from that frame to standstill; None: it never stood
+    speed_mps: float  # when it was hit
+
+
+def read(file: Path) -> Trace:
+    """Read a trace, also one that is still being written."""
+    records = t.read(file.read_bytes())
+    return Trace(
+        [r for r in records if isinstance(r, t.Truth)],
+        [r for r in records if isinstance(r, t.Command)],
+        [r for r in records if isinstance(r, t.BumperSent)],
+    )
+
+
+def stops(trace: Trace) -> list[Stop]:
+    """Return what followed each bumper hit."""
+    return [_stop(trace, hit.mono_ns) for hit in trace.bumper if hit.pressed]
+
+
+def odometry_errors(trace: Trace, odometry: Sequence[Odometry]) -> tuple[float, float]:
+    """Return how far odometry was from the truth at most, in metres: driving, and at rest.
+
+    While driving it holds the time that a frame takes on its way; at rest it does not.
+    """
+    times = [truth.mono_ns for truth in trace.truth]
+    driving = resting = 0.0
+    for pose in odometry:
+        at = bisect_left(times, pose.mono_ns)
+        if at < REST_SAMPLES or at >= len(times):
+            continue
+        truth = _between(trace.truth[at - 1], trace.truth[at], pose.mono_ns)
+        error = math.hypot(pose.x - truth[0], pose.y - truth[1])
+        driving = max(driving, error)
+        if all(x.linear == 0 and x.angular == 0 for x in trace.truth[at - REST_SAMPLES : at]):
+            resting = max(resting, error)
+    return driving, resting
+
+
+def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) -> list[Result]:
+    """Return the table of results; a lap is good when nothing in it is False."""
+    last = trace.truth[-1]
+    wall = min((x.clearance for x in trace.truth if x.clearance is not None), default=math.inf)
+    driving, resting = odometry_errors(trace, odometry)
+    rows: list[Result] = [
+        ("lap finished", f"{lap.index} of {len(lap.steps)} steps", lap.step is None),
+        ("distance driven", f"{last.distance:.2f} m", last.distance > 1.0),
+        ("closest to what sonar sees", f"{wall:.2f} m", wall > CLEARANCE_MIN),
+        ("odometry off the truth, driving", f"{driving * 100:.1f} cm at most", None),
+        (
+            "odometry off the truth, at rest",
+            f"{resting * 100:.1f} cm at most",
+            resting < ODOMETRY_MAX,
+        ),
+    ]
+    for number, stop in enumerate(stops(trace), 1):
+        reaction = stop.reaction_s
+        driven = stop.distance_m
+        took = "never" if reaction is None else f"{reaction * 1000:.1f} ms"
+        way = "never" if driven is None else f"{driven * 100:.1f} cm"
+        rows += [
+            (f"contact {number}: frame to BREAK frame", took,
+             reaction is not None and reaction < REACTION_MAX),
+            (f"contact {number}: stopped within", f"{way} from {stop.speed_mps:.2f} m/s",
+             driven is not None and driven < STOP_MAX),
+        ]  # fmt: skip
+    if not fast:
+        home = math.hypot(last.x, last.y)
+        rows.append(("from home at the end", f"{home * 100:.1f} cm", home < HOME_MAX))
+    rows.append(("stops that were not planned", ", ".join(lap.unplanned) or "none", None))
+    return rows
+
+
+def good(rows: Sequence[Result]) -> bool:
+    """Tell whether the lap went as it should: all finished, and a contact was met."""
+    met = any(what.startswith("contact") for what, _, _ in rows)
+    return met and all(fine is not False for _, _, fine in rows)
+
+
+def _stop(trace: Trace, hit_ns: int) -> Stop:
+    breaks = (c.mono_ns for c in trace.commands if c.mono_ns >= hit_ns and c.kind == "break")
+    first = next(breaks, None)
+    before = [x for x in trace.truth if x.mono_ns <= hit_ns] or trace.truth[:1]
+    after = (x for x in trace.truth if x.mono_ns > hit_ns)
+    rest = next((x for x in after if abs(x.linear) < 0.001), None)
+    return Stop(
+        None if first is None else (first - hit_ns) / S,
+        None if rest is None else rest.distance - before[-1].distance,
+        max((abs(x.linear) for x in before[-20:]), default=0.0),
+    )
+
+
+def _between(a: t.Truth, b: t.Truth, at_ns: int) -> tuple[float, float]:
+    part = (at_ns - a.mono_ns) / max(1, b.mono_ns - a.mono_ns)
+    return a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)

@@ -1,0 +1,218 @@
+"""``t2 install``: have systemd run T2's services on this computer; wants root.
+
+Units, their user and, where there are none, settings are written; nothing is started. What an
+operator has written is never touched: the settings, and whatever `systemctl edit` makes.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from cli.settings import Everything
+from common.config import DEFAULT_FILE, Sources, load
+from common.errors import RobotError
+
+TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
+UNITS = Path("/usr/local/lib/systemd/system")
+USER = Path("/etc/sysusers.d/t2.conf")
+SETTINGS = Path("/etc/t2/t2.toml")
+KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; the way in for laptops
+ENABLED = Path("/etc/systemd/system/multi-user.target.wants/t2.target")
+# By this line every version knows the units of every other one: it stays as it is.
+MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
+SIM = "t2-sim.service"
+BACKOFF = "t2-.service.d/20-backoff.conf"
+BACKOFF_SINCE = 254  # the systemd that knows it
+EXTRAS = {"t2-recorder.service": "mcap", "t2-dashboard.service": "uvicorn"}
+HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the units
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """The files of a computer, or of a folder that stands for one; says what it does."""
+
+    root: Path
+    dry: bool
+
+    def has(self, path: Path) -> bool:
+        """Tell whether there is such a file, or a link of that name."""
+        return os.path.lexists(self.at(path))
+
+    def at(self, path: Path) -> Path:
+        """Return where a file of that computer is for us."""
+        return self.root / path.relative_to("/")
+
+    def write(self, path: Path, text: str) -> None:
+        """Write a file that is not yet so, whole or not at all."""
+        file = self.at(path)
+        if file.exists() and file.read_text(encoding="utf-8") == text:
+            print(f"same    {path}")
+            return
+        print(f"replace {path}" if file.exists() else f"write   {path}")
+        if not self.dry:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            part = file.with_name(f".{file.name}.part")
+            part.write_text(text, encoding="utf-8")
+            part.chmod(0o644)
+            part.replace(file)
+
+    def remove(self, path: Path) -> None:
+        """Remove a file, if there is one."""
+        if self.has(path):
+            print(f"remove  {path}")
+            if not self.dry:
+                self.at(path).unlink()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument(
+        "--prefix", type=Path, default=here(), metavar="DIR",
+        help="the Python environment that has T2; this one by default",
+    )  # fmt: skip
+    parser.add_argument(
+        "--root", type=Path, default=Path("/"), metavar="DIR",
+        help="write into this folder as if it were /",
+    )  # fmt: skip
+    parser.add_argument("--sim", action="store_true", help="a simulated vehicle, not a real one")
+    parser.add_argument("--dry-run", action="store_true", help="say what it would do, do nothing")
+    parser.add_argument("--uninstall", action="store_true", help="remove units and user again")
+
+
+def here() -> Path:
+    """Return this environment, by the link that t2-install.sh keeps on it, if there is one."""
+    prefix = Path(sys.prefix)
+    current = prefix.parent / "current"
+    return current if current.is_symlink() and current.resolve() == prefix.resolve() else prefix
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write or remove the files, and say what to run next; raise ``RobotError`` before that."""
+    host = Host(options.root.absolute(), options.dry_run)
+    check_rights(host, options.prefix)
+    if options.uninstall:
+        uninstall(host)
+    else:
+        check_prefix(options.prefix)
+        install(host, options.prefix, options.sim)
+    return 0
+
+
+def install(host: Host, prefix: Path, sim: bool) -> None:
+    """Write what is wanted, and remove what an earlier installation had more than that."""
+    given = [path for path in (SETTINGS, KEYS) if host.has(path)]
+    # They must do for this version.
+    load(Everything, Sources(files=(DEFAULT_FILE, *map(host.at, given)), environ={}))
+    start = "enable --now t2.target"
+    if host.has(UNITS / "t2.target"):
+        start = "restart t2.target  # while the vehicle stands"
+    wanted = {USER: template("t2.sysusers")}
+    options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
+    for name in names_here(sim or host.has(UNITS / SIM)):
+        text = template(name).replace("@PREFIX@", str(prefix))
+        wanted[UNITS / name] = MARK + text.replace("@SETTINGS@", options)
+    for path in sorted(ours(host) - wanted.keys()):
+        host.remove(path)
+    for path, text in sorted(wanted.items()):
+        host.write(path, text)
+    if host.has(SETTINGS):
+        print(f"keep    {SETTINGS}")
+    else:
+        host.write(SETTINGS, settings(sim))
+    print(f"next: systemd-sysusers\n      systemctl daemon-reload\n      systemctl {start}")
+
+
+def uninstall(host: Host) -> None:
+    """Remove all but settings and recordings; raise ``RobotError`` while T2 is enabled."""
+    if host.has(ENABLED):
+        raise RobotError("t2.target is enabled: say `systemctl disable --now t2.target` first")
+    for path in sorted(ours(host)):
+        host.remove(path)
+    print("next: systemctl daemon-reload")
+    print(f"{SETTINGS.parent} and /var/lib/t2 are yours, they stay")
+
+
+# --- what there is to write ---------------------------------------------------------------------
+
+
+def names() -> list[str]:
+    """Return every unit and drop-in, by its place under a folder of units."""
+    found = [*TEMPLATES.glob("t2*.*"), *TEMPLATES.glob("t2-.service.d/*.conf")]
+    kinds = {".service", ".target", ".conf"}
+    files = (path for path in found if path.is_file() and path.suffix in kinds)
+    return sorted(str(path.relative_to(TEMPLATES)) for path in files)
+
+
+def ours(host: Host) -> set[Path]:
+    """Return every file that an installation may have, but for the settings.
+
+    A version with other units than this one's has left its mark in them.
+    """
+    folder = host.at(UNITS)
+    found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
+    marked = (path for path in found if path.read_bytes().startswith(MARK.encode()))
+    return {USER, *(UNITS / n for n in names()), *(UNITS / p.relative_to(folder) for p in marked)}
+
+
+def names_here(sim: bool) -> list[str]:
+    """Return those that this computer is to have, and say which it cannot."""
+    left_out = {name for name, library in EXTRAS.items() if find_spec(library) is None}
+    for name in sorted(left_out):
+        print(f"without {name}: {EXTRAS[name]} is not installed")
+    if not sim:
+        left_out.add(SIM)
+    if systemd_version() < BACKOFF_SINCE:
+        left_out.add(BACKOFF)
+    return [name for name in names() if name not in left_out]
+
+
+def template(name: str) -> str:
+    """Return a file of deploy/systemd."""
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def systemd_version() -> int:
+    """Return the version of systemd here, 0 where there is none."""
+    try:
+        said = subprocess.run(
+            ["systemctl", "--version"], capture_output=True, text=True, check=False
+        ).stdout
+    except OSError:
+        return 0
+    found = re.match(r"systemd (\d+)", said)
+    return int(found[1]) if found else 0
+
+
+def settings(sim: bool) -> str:
+    """Return the settings of a robot that has none yet: the vehicle's, and the bus on board."""
+    vehicle = "# A simulated vehicle.\n"
+    if not sim:
+        vehicle = (DEFAULT_FILE.parent / "vehicle.toml").read_text(encoding="utf-8")
+    return vehicle + template("onboard.toml")
+
+
+# --- what must be so ----------------------------------------------------------------------------
+
+
+def check_rights(host: Host, prefix: Path) -> None:
+    """Raise ``RobotError`` when the files cannot be written."""
+    if host.root == Path("/") and os.geteuid() != 0 and not host.dry:
+        raise RobotError(
+            f"wants root, for {UNITS} and {SETTINGS.parent}: say `sudo {prefix}/bin/t2 install`; "
+            "--dry-run or --root DIR show what it would do"
+        )
+
+
+def check_prefix(prefix: Path) -> None:
+    """Raise ``RobotError`` when the services, which see little, would not see T2."""
+    for place in HIDDEN:
+        if prefix.is_relative_to(place):
+            raise RobotError(
+                f"services do not see {place}, and T2 is in {prefix}: install it elsewhere, "
+                "as deploy/t2-install.sh does"
+            )

@@ -1,0 +1,85 @@
+"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c."""
+
+import argparse
+import signal
+from collections.abc import Sequence
+from importlib.util import find_spec
+
+from cli.run.ports import claimed, wanted
+from cli.run.router import add_insecure
+from cli.run.supervisor import Supervisor
+from cli.settings import Everything
+from common import child_process, log, realtime
+from common.cli_args import add_sources, sources
+from common.config import load
+from common.errors import ConfigError
+
+Commands = list[tuple[str, Sequence[str]]]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
+    parser.add_argument("--only", metavar="NAME", help="this one alone, such as bridge")
+    parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
+    parser.add_argument("--no-router", action="store_true", help="one is running, such as zenohd")
+    add_insecure(parser)
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Keep the stack running until SIGINT or SIGTERM."""
+    config = load(Everything, sources(options)).config
+    if config.robot.realtime:
+        realtime.ask(realtime.SUPERVISOR, alone=True)
+    log.configure(config.log, "up")
+    started = chosen([*commands(options), *recorder(options)], options.only)
+    with claimed(wanted(config, [name for name, _ in started])):
+        return supervised(started, config, simulated=not options.no_sim)
+
+
+def supervised(started: Commands, config: Everything, *, simulated: bool) -> int:
+    """Keep these running until a signal."""
+    supervisor = Supervisor(started)
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, lambda *_: supervisor.stop())
+    log.Logger().info(
+        "starting; `t2 drive` in a second terminal drives it",
+        robot=config.robot.id,
+        board=f"{config.board.address}:{config.board.port}",
+        simulated=simulated,
+        bus=list(config.bus.endpoints),
+    )
+    return supervisor.run()
+
+
+def chosen(all_of_them: Commands, only: str | None) -> Commands:
+    """Return the one that is wanted, or all; raise ``ConfigError`` for one that there is not."""
+    names = [name for name, _ in all_of_them]
+    if only is not None and only not in names:
+        raise ConfigError(f"--only {only}: no such process; there are {', '.join(names)}")
+    return [each for each in all_of_them if only in (None, each[0])]
+
+
+def commands(options: argparse.Namespace) -> Commands:
+    """Return what is run, by name: the later ones stand on the earlier ones."""
+    passed = passed_on(options)
+    # Demo, soak and tests make options of their own, and always want a router.
+    modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
+    if not options.no_sim:
+        modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
+    modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}
+    return [(name, child_process.command(*words, *passed)) for name, words in modules.items()]
+
+
+def recorder(options: argparse.Namespace) -> Commands:
+    """Return the black box, where its library is installed: nobody waits for it."""
+    if find_spec("mcap") is None:
+        return []
+    return [("recorder", child_process.command("services.recorder", *passed_on(options)))]
+
+
+def passed_on(options: argparse.Namespace) -> list[str]:
+    """Return the options that say where settings come from, as they were given."""
+    files = [word for file in options.config or () for word in ("--config", str(file))]
+    return files + [word for text in options.sets for word in ("--set", text)]

@@ -1,0 +1,1 @@
+"""``t2 wire``: captured frames, decoded."""

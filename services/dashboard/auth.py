@@ -1,0 +1,138 @@
+"""Authentication of the web server: every request passes the gate or gets the token page.
+
+Every answer carries the headers that keep other pages and scripts out, and ends its connection: a
+connection has one request and one deadline.
+"""
+
+import asyncio
+import base64
+import hashlib
+import html
+from collections.abc import Callable
+from urllib.parse import parse_qs
+
+from starlette.datastructures import MutableHeaders
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from services.dashboard.admission import Place
+from services.dashboard.credentials import COOKIE, Gate
+from services.dashboard.i18n import TEXTS
+from services.dashboard.listener import Connection
+
+WRONG_S = 1.0  # what a wrong token costs
+BODY_MAX = 1024  # bytes of a form with a token
+SAFE = ("GET", "HEAD")
+ESTOP = "/estop/"
+STYLE = """body{font:18px system-ui,sans-serif;background:#0d1117;color:#f0f6fc;display:grid;
+place-content:center;min-height:90vh;gap:12px;text-align:center}input,button{font:inherit;
+padding:12px;border-radius:8px;border:1px solid #57606a;width:100%;box-sizing:border-box}
+button{background:#1f6feb;color:#fff;margin-top:12px}"""  # of the page that asks for the token
+STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
+HEADERS = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
+    f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self'; base-uri 'none'; "
+    "form-action 'self'; frame-ancestors 'none'",
+    "x-frame-options": "DENY",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+    "connection": "close",
+}
+
+Find = Callable[[tuple[str, int] | None], Connection | None]
+
+
+class Door:
+    """Lets through to the application what the gate lets in."""
+
+    def __init__(self, app: ASGIApp, gate: Gate, find: Find, secure: bool) -> None:
+        self.app = app
+        self._gate = gate
+        self._find = find
+        self._secure = secure
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request or connection."""
+        connection = self._find(scope["client"])
+        send = _guarded(connection, send)
+        is_socket = scope["type"] == "websocket"
+        if _is_reserved(connection) and not scope["path"].startswith(ESTOP):
+            await _refuse(is_socket, "too many connections; only E-STOP is served")(
+                scope, receive, send
+            )
+            return
+        headers = {
+            name.decode("latin1"): value.decode("latin1") for name, value in scope["headers"]
+        }
+        acts = is_socket or scope["method"] not in SAFE
+        if self._gate.lets_act(headers) if acts else self._gate.lets_in(headers):
+            await self.app(scope, receive, send)
+        elif is_socket:
+            await _refuse(is_socket, "")(scope, receive, send)
+        else:
+            answer = await self._ask(Request(scope, receive))
+            await answer(scope, receive, send)
+
+    async def _ask(self, request: Request) -> Response:
+        if not self._gate.token:
+            name = f"{request.url.scheme}://localhost:{request.scope['server'][1]}"
+            return PlainTextResponse(f"Open the dashboard as {name}\n", status_code=403)
+        token = await self._given(request)
+        if self._gate.knows(token):
+            answer = RedirectResponse("/", status_code=303)
+            answer.set_cookie(
+                COOKIE, self._gate.badge, httponly=True, samesite="strict", secure=self._secure
+            )
+            return answer
+        if token:
+            await asyncio.sleep(WRONG_S)
+        return HTMLResponse(asking(wrong=bool(token)), status_code=401)
+
+    async def _given(self, request: Request) -> str:
+        if request.method != "POST":
+            return request.query_params.get("token", "")
+        body = b""
+        async for part in request.stream():
+            body += part
+            if len(body) > BODY_MAX:
+                return ""
+        return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
+
+
+def _is_reserved(connection: Connection | None) -> bool:
+    return connection is not None and connection.place is Place.RESERVE
+
+
+def _guarded(connection: Connection | None, send: Send) -> Send:
+    """Return ``send`` with our headers; a WebSocket that is accepted loses its deadline."""
+
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            MutableHeaders(scope=message).update(HEADERS)
+        elif message["type"] == "websocket.accept" and connection is not None:
+            connection.settle()
+        await send(message)
+
+    return guarded
+
+
+def _refuse(is_socket: bool, why: str) -> ASGIApp:
+    async def close(_: Scope, __: Receive, send: Send) -> None:
+        await send({"type": "websocket.close", "code": 1008})
+
+    return close if is_socket else PlainTextResponse(f"{why}\n", 503, {"retry-after": "1"})
+
+
+def asking(wrong: bool) -> str:
+    """Return the page that asks for the token."""
+    lines = [html.escape(text) for text in TEXTS["token_wrong" if wrong else "token_ask"]]
+    return f"""<!doctype html><meta charset=utf-8><title>T2</title>
+<meta name=viewport content="width=device-width, initial-scale=1">
+<style>{STYLE}</style>
+<form method=post action="/"><h1>T2</h1><p>{"<br>".join(lines)}</p>
+<input name=token type=password autofocus autocomplete=current-password><button>OK</button></form>
+"""

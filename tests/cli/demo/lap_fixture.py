@@ -1,0 +1,91 @@
+"""What a lap is about, made up: poses, verdicts, views, traces."""
+
+from typing import Any
+
+from cli.demo.score import Trace
+from cli.demo.script import View
+from common.freshness import S
+from common.messages import Cause, Limits, Odometry, SafetyState
+from sim import trace as t
+
+TICK_NS = S // 20  # the simulator writes down the truth 20 times a second
+
+
+def odometry(**fields: Any) -> Odometry:
+    """Return a pose at the start, standing, unless said otherwise."""
+    known: dict[str, Any] = dict.fromkeys(("x", "y", "heading", "linear", "angular"), 0.0)
+    known |= {
+        "pose_covariance": (0.0,) * 9,
+        "twist_covariance": (0.0,) * 4,
+        "epoch": 0,
+        "residual": 0.0,
+        "slip": False,
+    }
+    return Odometry(**(known | fields))
+
+
+def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> SafetyState:
+    """Return safety's state with these causes; it runs when there is none."""
+    known: dict[str, Any] = {
+        "verdict": "stop" if causes or latched else "run",
+        "latched": latched,
+        "causes": tuple(
+            Cause(name=name, action="stop", age=0.1, text=f"there is {name}") for name in causes
+        ),
+        "source": "demo",
+        "limits": Limits(forward=1.0, backward=1.0, angular=1.0),
+        "heartbeat": 1,
+        "text": ", ".join(causes) or "drives as asked",
+    }
+    return SafetyState(**(known | fields))
+
+
+def view(
+    *causes: str,
+    latched: tuple[str, ...] = (),
+    verdict: str | None = None,
+    pressed: bool = False,
+    refusal: str | None = None,
+    **pose: float,
+) -> View:
+    """Return what the driver knows."""
+    words = {} if verdict is None else {"verdict": verdict}
+    return View(odometry(**pose), safety(*causes, latched=latched, **words), pressed, refusal)
+
+
+def truth(tick: int, **fields: Any) -> t.Truth:
+    """Return the truth at a tick: standing at the start with a metre around it."""
+    known: dict[str, Any] = dict.fromkeys(
+        ("x", "y", "heading", "linear", "angular", "distance"), 0.0
+    )
+    known |= {
+        "clearance": 1.0,
+        "contact": False,
+        "pressed": False,
+        "wheels": (0.0,) * 4,
+        "command": command(0, "stop"),
+        "braking": False,
+        "ultrasonic_brake": True,
+        "bumper_brake": True,
+        "silent": False,
+    }
+    return t.Truth(mono_ns=tick * TICK_NS, **(known | fields))
+
+
+def command(at_ns: int, kind: t.Kind, linear: float = 0.0) -> t.Command:
+    """Return a command that the board took."""
+    return t.Command(mono_ns=at_ns, kind=kind, linear=linear, angular=0.0)
+
+
+def hit_lap(stands: bool = True, brakes: bool = True) -> Trace:
+    """Return 2 m at 0.8 m/s, a hit at tick 50, BREAK 20 ms later, standstill after 4 cm."""
+    hit_ns = 50 * TICK_NS
+    driving = [truth(n, x=n * 0.04, distance=n * 0.04, linear=0.8) for n in range(51)]
+    still = [truth(51 + n, x=2.04, distance=2.04, linear=0.0, contact=True) for n in range(40)]
+    on = [truth(51 + n, x=2.0 + n * 0.04, distance=2.0 + n * 0.04, linear=0.8) for n in range(40)]
+    commands = [command(0, "run", 0.8), *([command(hit_ns + S // 50, "break")] if brakes else [])]
+    bumper = [
+        t.BumperSent(mono_ns=0, pressed=False),
+        t.BumperSent(mono_ns=hit_ns, pressed=True),
+    ]
+    return Trace(driving + (still if stands else on), commands, bumper)

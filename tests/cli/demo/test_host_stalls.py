@@ -1,0 +1,61 @@
+"""Longer limits for a slow machine: always such that the services take them."""
+
+import pytest
+
+from cli.demo import host_stalls
+from cli.settings import Everything
+from common.config import Sources, load
+
+
+def limits(holdup_s: float) -> Everything:
+    return load(Everything, Sources(environ={}, sets=host_stalls.settings(holdup_s))).config
+
+
+@pytest.mark.parametrize("holdup_s", [0.0, 0.02, host_stalls.LIMIT_S])
+def test_a_good_machine_keeps_the_shipped_limits(holdup_s: float) -> None:
+    assert host_stalls.settings(holdup_s) == []
+
+
+@pytest.mark.parametrize("holdup_s", [0.051, 0.1, 0.25, 0.34, 0.5, 0.7, 1.0, 1.5, 2.0, 3.3, 5.0])
+def test_every_hold_up_gives_settings_that_are_accepted(holdup_s: float) -> None:
+    config = limits(holdup_s)
+    assert config.safety.bumper_age == config.bridge.lease == config.safety.release_lease
+    assert 1.0 <= config.safety.bumper_age <= 3.0
+    assert 0.5 <= config.safety.react <= 1.5
+
+
+def test_a_longer_hold_up_never_gives_a_shorter_limit() -> None:
+    configs = [limits(tenths / 10) for tenths in range(51)]
+    for name in (*host_stalls.AGES, *host_stalls.SLOWER, "react", "runaway_time", "release_lease"):
+        values = [getattr(config.safety, name) for config in configs]
+        assert values == sorted(values), name
+
+
+def test_it_is_measured_and_said() -> None:
+    assert 0.0 <= host_stalls.measured(0.02) < 60.0
+    assert "0.34 s" in host_stalls.sentence(0.34)
+
+
+def test_what_is_measured_is_what_a_sleep_took_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    naps = iter([0.005, 0.305, 0.005, 1.0])
+
+    def sleep(_: float) -> None:
+        clock[0] += next(naps)
+
+    monkeypatch.setattr("cli.demo.host_stalls.time.sleep", sleep)
+    monkeypatch.setattr("cli.demo.host_stalls.time.monotonic", lambda: clock[0])
+    assert host_stalls.measured(0.5) == pytest.approx(0.995)
+
+
+def test_what_is_accepted_for_the_machine_leaves_what_the_caller_accepts() -> None:
+    sets = host_stalls.with_accepted_joined(
+        [
+            "safety.i_accept=linear_acceleration",
+            "safety.linear_acceleration=5",
+            *host_stalls.settings(0.5),
+        ]
+    )
+    safety = load(Everything, Sources(environ={}, sets=sets)).config.safety
+    assert safety.linear_acceleration == 5
+    assert {"linear_acceleration", *host_stalls.AGES} <= set(safety.i_accept)

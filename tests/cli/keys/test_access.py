@@ -1,0 +1,144 @@
+"""Rights as rules: what each role is granted, without a router."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from cli.keys.access import VERBS, Verb, access_control, driver, rights
+from common import keys
+from common.members import Member, Role
+from tools.rights_table import CLASSES, MINE, OTHER, ROLES, may
+
+UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
+ON_BOARD = ("bridge", "safety", "odom", "recorder")
+
+
+def member(role: Role, name: str = "anna", robots: tuple[str, ...] = ()) -> Member:
+    return Member(
+        common_name=f"{role}.{name}.1", role=role, name=name, robots=robots, expires=UNTIL
+    )
+
+
+def test_nobody_from_outside_may_speak_for_safety_to_the_wheels() -> None:
+    for role, given in ROLES.items():
+        if role != "router of 001":
+            assert not may(given, "write", keys.MOTION.on(MINE)), role
+
+
+@pytest.mark.parametrize("role", ["viewer", "fleet"])
+def test_who_only_watches_cannot_move_anything(role: str) -> None:
+    given = ROLES[role]
+    for key in (keys.DRIVE.on(MINE, source="x"), keys.DRIVE.on("*", source="*"), "**"):
+        assert not may(given, "write", key)
+    for call in keys.CALLS:
+        assert not may(given, "ask", call.on(MINE))
+
+
+def test_a_viewer_cannot_keep_a_robot_from_working() -> None:
+    assert not may(ROLES["viewer"], "write", keys.estop_key(MINE))
+
+
+def test_a_driver_has_the_robots_that_its_certificate_names() -> None:
+    given = driver((MINE,))
+    for wanted, robot in ((True, MINE), (False, OTHER), (False, "*")):
+        assert may(given, "write", keys.DRIVE.on(robot, source="teleop")) is wanted
+        assert may(given, "write", keys.estop_key(robot)) is wanted
+        assert all(may(given, "ask", call.on(robot)) is wanted for call in keys.CALLS)
+
+
+def test_a_driver_drives_as_the_sources_that_its_certificate_names() -> None:
+    for sources, may_use in (
+        (("teleop", "web"), {"teleop": True, "web": True, "nav": False, "*": False}),
+        (("nav",), {"teleop": False, "nav": True, "*": False}),
+        ((), {"teleop": True, "nav": True, "*": True}),  # a list without sources
+    ):
+        bo = replace(member("driver", "bo", (MINE,)), sources=sources)
+        for source, wanted in may_use.items():
+            assert may(rights(bo), "write", keys.DRIVE.on(MINE, source=source)) is wanted
+        assert may(rights(bo), "write", keys.estop_key(MINE)), "a driver can stop"
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("service", ON_BOARD)
+def test_a_member_never_speaks_for_a_service_on_board(role: str, service: str) -> None:
+    given = ROLES[role]
+    assert not may(given, "write", keys.HEALTH.on(MINE, service=service))
+    assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
+    assert not may(given, "serve", keys.info_key(MINE, service, "config"))
+    assert not may(given, "live", keys.live_key(MINE, service, "1"))
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("verb", ["write", "serve", "live"])
+def test_what_a_member_says_has_keys_of_a_known_length(role: str, verb: Verb) -> None:
+    said = ROLES[role].get(verb, ())
+    assert said
+    assert not [expression for expression in said if "**" in expression]
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+def test_what_advanced_publishers_keep_is_asked_and_answered_where_it_is(role: str) -> None:
+    given, kept = ROLES[role], f"{keys.EVENTS.on(MINE, service='dashboard')}/@adv"
+    assert may(given, "read", f"{kept}/pub/**")  # as zenoh-ext subscribes
+    assert may(given, "ask", f"{kept}/**")
+    assert may(given, "recall", f"{kept}/**")
+    assert may(given, "serve", f"{kept}/pub/1f/uhlc/_")
+    assert not may(given, "serve", f"{kept}/pub/1f/uhlc/_/a")
+    assert not may(given, "read", f"{keys.VELOCITY.on(MINE)}/@adv/**"), "events alone are kept"
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+def test_every_key_that_is_published_can_be_watched(role: str) -> None:
+    for topic in keys.TOPICS:
+        key = topic.on(MINE, service="x", side="left", source="x")
+        assert may(ROLES[role], "read", key)
+
+
+def test_a_robots_router_speaks_for_its_robot_alone() -> None:
+    given = rights(member("robot", OTHER))
+    for topic in keys.TOPICS:
+        names = {"service": "x", "side": "left", "source": "x"}
+        assert may(given, "write", topic.on(OTHER, **names))
+        assert not may(given, "write", topic.on(MINE, **names))
+
+
+def test_rules_name_their_member_and_whoever_is_on_board_may_do_everything() -> None:
+    made: dict[str, Any] = access_control(
+        [member("viewer"), member("driver", "bo", (MINE,))], ["tcp", "unixsock-stream"]
+    )
+    assert (made["enabled"], made["default_permission"]) == (True, "deny")
+    assert made["subjects"] == [
+        {"id": "onboard", "link_protocols": ["tcp", "unixsock-stream"]},
+        {"id": "viewer.anna.1", "cert_common_names": ["viewer.anna.1"]},
+        {"id": "driver.bo.1", "cert_common_names": ["driver.bo.1"]},
+    ]
+    ids = [rule["id"] for rule in made["rules"]]
+    assert len(set(ids)) == len(ids)
+    for policy in made["policies"]:
+        (who,) = policy["subjects"]
+        assert policy["rules"] == [name for name in ids if name.startswith(f"{who} ")]
+    onboard = [rule for rule in made["rules"] if rule["id"].startswith("onboard ")]
+    assert {flow for rule in onboard for flow in rule["flows"]} == {"ingress", "egress"}
+
+
+def test_without_a_plain_listener_nobody_is_on_board() -> None:
+    made: dict[str, Any] = access_control([member("viewer")], [])
+    assert [subject["id"] for subject in made["subjects"]] == ["viewer.anna.1"]
+    assert all(rule["id"].startswith("viewer.anna.1 ") for rule in made["rules"])
+
+
+def test_every_verb_is_made_of_zenohs_messages() -> None:
+    known = {
+        "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
+        "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
+    }  # fmt: skip
+    used = {message for sides in VERBS.values() for side in sides for message in side}
+    assert used == known
+
+
+def test_the_table_has_a_cell_for_each_role_and_class() -> None:
+    verbs = {role: {verb for verb in VERBS for key in CLASSES.values() if may(given, verb, key)}
+             for role, given in ROLES.items()}  # fmt: skip
+    assert all(found for found in verbs.values())

@@ -1,0 +1,147 @@
+"""What is in a certificate, read back; what is done about a key that does not fit."""
+
+from datetime import timedelta
+from ipaddress import ip_address
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec, ed25519
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_pem_private_key,
+)
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+from cli.keys.ca import (
+    Authority,
+    certificate_from,
+    certificate_pem,
+    key_pem,
+)
+from cli.keys.profile import DAY_S, Profile, Span, profile
+from common.errors import RobotError
+
+SPAN = Span(1.8e9, 1.8e9 + 10 * DAY_S)
+ROBOT = profile("robot", "001", (), ("10.7.5.220", "robot.lan"))
+DRIVER = profile("driver", "anna", ("001",), ())
+
+
+@pytest.fixture(scope="module")
+def authority() -> Authority:
+    return Authority.found("berlin", SPAN)
+
+
+def issued(authority: Authority, who: Profile) -> x509.Certificate:
+    return certificate_from(authority.issue(who, SPAN).certificate)
+
+
+def no_passphrase() -> bytes:
+    raise AssertionError("nobody should have been asked")
+
+
+def test_the_authority_signs_certificates_and_no_other_authority(authority: Authority) -> None:
+    found = authority.certificate
+    basic = found.extensions.get_extension_for_class(x509.BasicConstraints)
+    assert basic.critical
+    assert basic.value == x509.BasicConstraints(ca=True, path_length=0)
+    usage = found.extensions.get_extension_for_class(x509.KeyUsage)
+    assert usage.critical
+    assert usage.value.key_cert_sign
+    assert not usage.value.digital_signature
+    assert found.subject.rfc4514_string() == "CN=T2 CA of berlin"
+    assert isinstance(found.signature_hash_algorithm, SHA256)
+    found.verify_directly_issued_by(found)
+
+
+@pytest.mark.parametrize("who", [ROBOT, DRIVER])
+def test_every_certificate(authority: Authority, who: Profile) -> None:
+    made = authority.issue(who, SPAN)
+    found = certificate_from(made.certificate)
+    found.verify_directly_issued_by(authority.certificate)
+    assert found.not_valid_before_utc.timestamp() == SPAN.begins_s
+    assert found.not_valid_after_utc - found.not_valid_before_utc == timedelta(days=10)
+    basic = found.extensions.get_extension_for_class(x509.BasicConstraints)
+    assert (basic.critical, basic.value.ca) == (True, False)
+    usage = found.extensions.get_extension_for_class(x509.KeyUsage)
+    assert usage.critical
+    assert usage.value.digital_signature
+    assert not usage.value.key_cert_sign
+    key = load_pem_private_key(made.private_key, None)
+    assert isinstance(key, ec.EllipticCurvePrivateKey)
+    assert isinstance(key.curve, ec.SECP256R1)
+    assert key.public_key() == found.public_key()
+
+
+def test_the_list_names_what_the_certificate_names(authority: Authority) -> None:
+    made = authority.issue(DRIVER, SPAN)
+    found = certificate_from(made.certificate)
+    assert found.subject.rfc4514_string() == f"CN={made.member.common_name}"
+    assert made.member.common_name == f"driver.anna.{found.serial_number:040x}"[:20]
+    assert made.member.expires == found.not_valid_after_utc
+    assert (made.member.role, made.member.name, made.member.robots) == ("driver", "anna", ("001",))
+
+
+def test_two_certificates_have_nothing_in_common(authority: Authority) -> None:
+    one, two = authority.issue(DRIVER, SPAN), authority.issue(DRIVER, SPAN)
+    assert one.member.common_name != two.member.common_name
+    assert one.private_key != two.private_key
+
+
+def test_a_router_serves_and_dials_and_a_driver_only_dials(authority: Authority) -> None:
+    server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
+    for who, expected in ((ROBOT, [server, client]), (DRIVER, [client])):
+        usage = issued(authority, who).extensions.get_extension_for_class(x509.ExtendedKeyUsage)
+        assert list(usage.value) == expected
+
+
+def test_a_routers_addresses_are_in_its_certificate(authority: Authority) -> None:
+    found = issued(authority, ROBOT)
+    names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert names.get_values_for_type(x509.IPAddress) == [
+        ip_address("10.7.5.220"), ip_address("127.0.0.1"),
+    ]  # fmt: skip
+    assert names.get_values_for_type(x509.DNSName) == ["robot.lan", "localhost"]
+    with pytest.raises(x509.ExtensionNotFound):
+        issued(authority, DRIVER).extensions.get_extension_for_class(x509.SubjectAlternativeName)
+
+
+def test_a_routers_addresses_are_on_the_list(authority: Authority) -> None:
+    assert authority.issue(ROBOT, SPAN).member.addresses == ROBOT.addresses
+    assert authority.issue(DRIVER, SPAN).member.addresses == ()
+
+
+def test_it_is_read_back(authority: Authority) -> None:
+    certificate = certificate_pem(authority.certificate)
+    loaded = Authority.load(certificate, key_pem(authority.key), no_passphrase)
+    assert loaded.certificate == authority.certificate
+
+
+def test_an_encrypted_key_wants_its_passphrase(authority: Authority) -> None:
+    certificate = certificate_pem(authority.certificate)
+    encrypted = key_pem(authority.key, b"correct horse")
+    assert b"ENCRYPTED" in encrypted
+    Authority.load(certificate, encrypted, lambda: b"correct horse")
+    with pytest.raises(RobotError, match="a wrong passphrase, or no key"):
+        Authority.load(certificate, encrypted, lambda: b"wrong")
+
+
+def test_keys_that_do_not_fit(authority: Authority) -> None:
+    certificate = certificate_pem(authority.certificate)
+    stranger = Authority.found("berlin", SPAN)
+    with pytest.raises(RobotError, match="another one's than the certificate"):
+        Authority.load(certificate, key_pem(stranger.key), no_passphrase)
+    with pytest.raises(RobotError, match="cannot be read"):
+        Authority.load(certificate, b"no key", no_passphrase)
+    other_kind = ed25519.Ed25519PrivateKey.generate().private_bytes(
+        Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()
+    )
+    with pytest.raises(RobotError, match="no key of `t2 keys init`"):
+        Authority.load(certificate, other_kind, no_passphrase)
+
+
+def test_what_is_no_certificate() -> None:
+    with pytest.raises(RobotError, match="this is no certificate"):
+        certificate_from(b"-----BEGIN")

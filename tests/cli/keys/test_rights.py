@@ -1,0 +1,199 @@
+"""Every cell of the table in ``docs/security.md``, tried with real certificates and sessions.
+
+What is denied leaves no trace. So each trial ends with something that is allowed, on the same
+session: once that has come, what did not come before it never will.
+"""
+
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+import zenoh
+import zenoh.ext
+
+from cli.keys.access import Verb
+from common import keys
+from common.bus.session import client_config
+from tools.rights_table import CLASSES, MINE, ROLES, may
+from verification.harness.certificates import Site, dialling
+from verification.harness.support import at, wait_until
+
+KEYS = tuple(CLASSES.values())
+PLAIN = tuple(key for key in KEYS if "*" not in key)  # that can be served, or hold a token
+SURE = keys.VELOCITY.on(MINE)  # every role may read it
+BLOCK = zenoh.CongestionControl.BLOCK  # a trial must not be lost for want of room
+TIMEOUT_S = 2.0
+EVERY = ("**", "**/@cmd/**", "**/@adv/**")  # what begins with @ is matched by itself alone
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, zenoh.Session]]:
+    """Open a session of each role at one router, and one on board."""
+    site = Site(tmp_path_factory.mktemp("site") / "keys")
+    certified = {
+        "viewer": site.member("viewer", "hall"),
+        "driver of 001": site.member("driver", "anna", "--robot", MINE),
+        "fleet": site.member("fleet", "room"),
+        "site's router": site.member("site", "berlin", "--address", "127.0.0.1"),
+        "router of 001": site.member("robot", MINE, "--address", "127.0.0.1"),
+    }
+    assert certified.keys() == ROLES.keys()
+    with site.router(certified["router of 001"]) as (secured, onboard), ExitStack() as closing:
+        made = {"on board": zenoh.open(client_config(at(onboard)))}
+        for role, member in certified.items():
+            made[role] = zenoh.open(client_config(dialling(member, secured)))
+        for session in made.values():
+            closing.enter_context(session)
+        yield made
+
+
+def granted(role: str, verb: Verb, tried: tuple[str, ...] = KEYS) -> set[str]:
+    """Return the keys on which the table grants a verb."""
+    return {key for key in tried if may(ROLES[role], verb, key)}
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    came: list[tuple[str, str]] = []
+
+    def hear(sample: zenoh.Sample) -> None:
+        came.append((str(sample.key_expr), sample.payload.to_string()))
+
+    ears = [sessions["on board"].declare_subscriber(key, hear) for key in EVERY]
+    mine, marker = sessions[role], next(iter(sorted(granted(role, "write"))))
+
+    def passed() -> bool:
+        mine.put(marker, "are you there", congestion_control=BLOCK)
+        return bool(came)
+
+    wait_until(passed, "the ears on board are known")
+    for kind in ("put", "delete"):
+        came.clear()
+        for key in KEYS:
+            if kind == "put":
+                mine.put(key, role, congestion_control=BLOCK)
+            else:
+                mine.delete(key, congestion_control=BLOCK)
+        mine.put(marker, "end", congestion_control=BLOCK)
+        wait_until(lambda: (marker, "end") in came, "the last put")
+        told = {key for key, text in came if text == (role if kind == "put" else "")}
+        assert told == granted(role, "write"), kind
+    for ear in ears:
+        ear.undeclare()
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_read(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    came: set[tuple[str, str]] = set()  # the key as it was subscribed to, and what came there
+
+    def hearer(key: str) -> Any:
+        return lambda sample: came.add((key, sample.payload.to_string()))
+
+    ears = [sessions[role].declare_subscriber(key, hearer(key)) for key in KEYS]
+    onboard = sessions["on board"]
+
+    def put_all(text: str) -> None:
+        for key in KEYS:
+            onboard.put(key, text, congestion_control=BLOCK)
+
+    def heard() -> set[str]:
+        put_all("first")
+        return {key for key, _ in came}
+
+    wait_until(lambda: heard() >= granted(role, "read"), "all that may be read")
+    put_all("second")
+    onboard.put(SURE, "end", congestion_control=BLOCK)
+    wait_until(lambda: (SURE, "end") in came, "the last put")
+    assert {key for key, _ in came} == granted(role, "read")
+    for ear in ears:
+        ear.undeclare()
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_ask(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    served = [sessions["on board"].declare_queryable(key, answer) for key in PLAIN]
+    expected = granted(role, "ask", PLAIN)
+    wait_until(lambda: asked(sessions[role], PLAIN) >= expected, "all that may be asked")
+    assert asked(sessions[role], PLAIN) == expected
+    for one in served:
+        one.undeclare()
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_serve(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    served = [sessions[role].declare_queryable(key, answer) for key in PLAIN]
+    expected = granted(role, "serve", PLAIN)
+    wait_until(lambda: asked(sessions["on board"], PLAIN) >= expected, "all that may be served")
+    assert asked(sessions["on board"], PLAIN) == expected
+    for one in served:
+        one.undeclare()
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_live(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    tokens = [sessions[role].liveliness().declare_token(key) for key in PLAIN]
+    expected = granted(role, "live", PLAIN)
+    wait_until(lambda: alive(sessions["on board"]) >= expected, "all that may live")
+    assert alive(sessions["on board"]) == expected
+    for token in tokens:
+        token.undeclare()
+
+
+def answer(query: zenoh.Query) -> None:
+    query.reply(query.key_expr, b"yes")
+    query.drop()
+
+
+def asked(session: zenoh.Session, tried: tuple[str, ...]) -> set[str]:
+    """Return which of these keys somebody answers on, all asked at the same time."""
+    answered: set[str] = set()
+    ended = threading.Semaphore(0)
+
+    def note(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            answered.add(str(reply.ok.key_expr))
+
+    for key in tried:
+        session.get(key, zenoh.handlers.Callback(note, ended.release), timeout=TIMEOUT_S)
+    for _ in tried:
+        assert ended.acquire(timeout=10 * TIMEOUT_S)
+    return answered
+
+
+def alive(session: zenoh.Session) -> set[str]:
+    """Return the tokens that a session sees."""
+    return {str(reply.ok.key_expr) for key in EVERY
+            for reply in session.liveliness().get(key, timeout=TIMEOUT_S) if reply.ok}  # fmt: skip
+
+
+@pytest.mark.parametrize(("speaker", "hearer"), [("on board", "viewer"), ("viewer", "on board")])
+def test_who_comes_late_gets_the_events_that_are_kept(
+    sessions: Mapping[str, zenoh.Session], speaker: str, hearer: str
+) -> None:
+    key = keys.EVENTS.on(MINE, service="dashboard")
+    cache = zenoh.ext.CacheConfig(max_samples=10)
+    published = zenoh.ext.declare_advanced_publisher(
+        sessions[speaker], key, cache=cache, publisher_detection=True
+    )
+    published.put("kept")
+    came: list[str] = []
+    history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+    for _ in range(5):  # a query may be ahead of the declarations
+        heard = zenoh.ext.declare_advanced_subscriber(
+            sessions[hearer],
+            key,
+            lambda s: came.append(s.payload.to_string()),
+            history=history,
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        )
+        try:
+            wait_until(lambda: came, "the event that is kept", TIMEOUT_S)
+        except AssertionError:
+            continue
+        finally:
+            heard.undeclare()
+        break
+    assert came[0] == "kept"
+    published.undeclare()

@@ -1,0 +1,186 @@
+"""The folder: who may read what, that a file is whole or not there, and that no member is lost."""
+
+import os
+import stat
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cli.keys.ca import Authority
+from cli.keys.profile import DAY_S, Profile, Span, profile
+from cli.keys.store import Folder, locked
+from common.errors import RobotError
+from common.members import Members
+from tests.cli.keys.site_fixture import member, members
+from verification.harness.support import wait_until
+
+SPAN = Span(1.8e9, 1.8e9 + 10 * DAY_S)
+ROBOT = profile("robot", "001", (), ())
+DRIVER = profile("driver", "anna", ("001",), ())
+
+
+def no_passphrase() -> bytes:
+    raise AssertionError("nobody should have been asked")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    with locked(tmp_path / "keys", create=True) as made:
+        made.found(Authority.found("berlin", SPAN), Members(site="berlin"), b"")
+    return made
+
+
+def hand_out(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
+    issued = folder.authority(None, no_passphrase).issue(who, SPAN)
+    listed = Members(site="berlin", members=(*folder.read().members, issued.member))
+    target = folder.hand_out(who, issued, listed, settings=settings)
+    folder.write(listed)
+    return target
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def test_only_the_owner_reads_what_is_secret(folder: Folder) -> None:
+    target = hand_out(folder, ROBOT)
+    assert (mode(folder.path), mode(target)) == (0o700, 0o700)
+    assert mode(folder.ca_key) == mode(target / "private.key") == 0o600
+    names = {"ca.pem", "certificate.pem", "private.key", "bus.toml", "members.json"}
+    assert {file.name for file in target.iterdir()} == names
+    for name in names - {"private.key"}:
+        assert mode(target / name) == 0o644
+
+
+def test_a_loose_umask_changes_nothing(folder: Folder) -> None:
+    before = os.umask(0)
+    try:
+        target = hand_out(folder, DRIVER)
+    finally:
+        os.umask(before)
+    assert (mode(target), mode(target / "private.key")) == (0o700, 0o600)
+    assert mode(folder.members) == 0o644
+
+
+def test_the_list_goes_to_routers_and_to_no_other(folder: Folder) -> None:
+    robot, driver = hand_out(folder, ROBOT), hand_out(folder, DRIVER)
+    assert (robot / "members.json").read_bytes() == folder.members.read_bytes()
+    assert not (driver / "members.json").exists()
+
+
+def test_a_router_that_was_struck_off_gets_no_list(folder: Folder) -> None:
+    robot = hand_out(folder, ROBOT)
+    folder.write(members(member("robot", "001", revoked=True)))
+    assert (robot / "members.json").read_bytes() != folder.members.read_bytes()
+
+
+def test_settings_that_somebody_has_edited_stay(folder: Folder) -> None:
+    target = hand_out(folder, DRIVER)
+    (target / "bus.toml").write_text("# mine\n", encoding="utf-8")
+    hand_out(folder, DRIVER, settings=False)
+    assert (target / "bus.toml").read_text(encoding="utf-8") == "# mine\n"
+    hand_out(folder, DRIVER, settings=True)
+    assert "connect" in (target / "bus.toml").read_text(encoding="utf-8")
+    (target / "bus.toml").unlink()
+    hand_out(folder, DRIVER, settings=False)
+    assert (target / "bus.toml").exists()
+
+
+@pytest.mark.parametrize("name", ["ca.pem", "ca.key", "members.json"])
+def test_an_authority_is_never_written_over(folder: Folder, name: str) -> None:
+    kept = (folder.path / name).read_bytes()
+    for other in {"ca.pem", "ca.key", "members.json"} - {name}:
+        (folder.path / other).unlink()
+    with pytest.raises(RobotError, match=f"{name} is there already: another CA would lock"):
+        folder.found(Authority.found("x", SPAN), Members(site="x"), b"")
+    assert [file.name for file in folder.path.iterdir()] == [name]
+    assert (folder.path / name).read_bytes() == kept
+
+
+def test_what_is_missing_is_said(folder: Folder) -> None:
+    folder.ca_key.unlink()
+    with pytest.raises(RobotError, match=r"ca.key is not there, and only it can sign.*--ca-key"):
+        folder.authority(None, no_passphrase)
+    assert folder.read() == Members(site="berlin")  # the list needs no key
+    folder.ca.unlink()
+    with pytest.raises(RobotError, match="has no CA; `t2 keys init` makes one"):
+        folder.read()
+
+
+def test_the_key_may_lie_elsewhere(folder: Folder, tmp_path: Path) -> None:
+    away = folder.ca_key.rename(tmp_path / "stick.key")
+    assert (
+        folder.authority(away, no_passphrase).certificate
+        == folder.authority(away, no_passphrase).certificate
+    )
+
+
+def test_no_folder_is_made_by_looking(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="keys has no CA"), locked(tmp_path / "keys"):
+        pass
+    assert not (tmp_path / "keys").exists()
+
+
+@pytest.mark.parametrize(
+    ("trouble", "raised", "said"),
+    [
+        (OSError(28, "No space left"), RobotError, "members.json: No space left"),
+        (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
+    ],
+)
+def test_a_full_disk_or_ctrl_c_leaves_the_old_list_and_nothing_else(
+    trouble: BaseException,
+    raised: type[BaseException],
+    said: str,
+    folder: Folder,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hand_out(folder, ROBOT)
+    kept = folder.members.read_bytes()
+
+    def stopped(_: int) -> None:
+        raise trouble
+
+    monkeypatch.setattr("cli.keys.store.os.fsync", stopped)
+    with pytest.raises(raised, match=said):
+        folder.write(Members(site="berlin"))
+    assert folder.members.read_bytes() == kept
+    assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]
+
+
+def test_a_file_in_the_way_is_said(tmp_path: Path) -> None:
+    (tmp_path / "keys").write_text("", encoding="utf-8")
+    with (
+        pytest.raises(RobotError, match="keys: File exists"),
+        locked(tmp_path / "keys", create=True),
+    ):
+        pass
+
+
+def in_a_thread(call: Callable[[], None]) -> threading.Thread:
+    thread = threading.Thread(target=call, daemon=True)
+    thread.start()
+    return thread
+
+
+def test_of_two_commands_at_once_the_second_waits(folder: Folder) -> None:
+    entered: list[str] = []
+
+    def second() -> None:
+        with locked(folder.path):
+            entered.append("second")
+
+    with locked(folder.path):
+        thread = in_a_thread(second)
+        wait_until(lambda: waits_for_a_lock(), "the second command to wait")
+        entered.append("first")
+    thread.join()
+    assert entered == ["first", "second"]
+
+
+def waits_for_a_lock() -> bool:
+    """Tell whether somebody in this process waits for a lock on a file."""
+    lines = Path("/proc/locks").read_text(encoding="ascii").splitlines()
+    return any("->" in line and f" {os.getpid()} " in line for line in lines)

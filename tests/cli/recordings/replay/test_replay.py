@@ -1,0 +1,213 @@
+"""``t2 replay`` on a real bus."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from cli.inspect import permission
+from cli.recordings.replay import targets
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival, Bus
+from common.settings import Vehicle
+from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Translator
+from tests.cli.inspect.tool import Tool, pretend
+from tests.common.bus_fixture import Rig
+from tests.recorder import samples
+from tests.recorder.samples import bare, sample
+from verification.harness.support import wait_until
+
+FAST = ("--rate", "1000")
+
+
+@pytest.fixture(autouse=True)
+def _short(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permission, "LOOK_S", 0.5)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A recording of five seconds, with all that must not be played."""
+    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), {})
+    for second in range(5):
+        made.write(
+            sample("tel/bridge/velocity", samples.velocity(second), second, raw=b"%d" % second)
+        )
+        made.write(sample("@cmd/motion", m.Motion(command="run", linear=1.0), second))
+        made.write(
+            sample("@cmd/drive/demo", m.Drive(linear=second / 10, angular=0, echo=1), second)
+        )
+    made.write(bare("@cmd/drive/demo", b"\xc1", at_s=4.5))
+    made.write(bare("tel/mine", b"gone", at_s=4.5, deleted=True))
+    made.write(bare("estop", b"", at_s=5.0))
+    made.write(bare("tel/mine", b"last", at_s=5.0))
+    made.close()
+    return made.path
+
+
+@pytest.fixture
+def came(rig: Rig) -> Iterator[list[zenoh.Sample]]:
+    """All that comes for the robot."""
+    found: list[zenoh.Sample] = []
+    session = rig.session()
+    declared = [
+        session.declare_subscriber(f"t2/v1/{rig.robot}/{each}", found.append)
+        for each in ("**", "@cmd/**")
+    ]
+    yield found
+    for each in declared:
+        each.undeclare()
+
+
+def shown(came: list[zenoh.Sample]) -> list[tuple[str, bytes, bytes]]:
+    return [
+        (
+            str(each.key_expr).split("/", 3)[3],
+            each.payload.to_bytes(),
+            each.attachment.to_bytes() if each.attachment else b"",
+        )
+        for each in came
+    ]
+
+
+def test_it_comes_to_the_byte_without_what_moves(
+    path: Path, came: list[zenoh.Sample], tool: Tool
+) -> None:
+    result = tool("replay", str(path), *FAST)
+    assert (result.code, result.err) == (0, "played 6 messages\n")
+    wait_until(lambda: len(came) >= 6, "six messages")
+    whole = [
+        sample("tel/bridge/velocity", samples.velocity(second), second) for second in range(5)
+    ]
+    assert shown(came) == [
+        *(("tel/bridge/velocity", one.payload, b"%d" % n) for n, one in enumerate(whole)),
+        ("tel/mine", b"last", b""),
+    ]
+    assert str(came[0].encoding) == whole[0].encoding
+
+
+@pytest.mark.parametrize(
+    ("words", "played"),
+    [
+        (["--only", "tel/mine"], 1),
+        (["--skip", "tel/bridge/*"], 1),
+        (["--from", "1", "--to", "3"], 3),
+        (["--from", "4", "--only", "tel/bridge/**", "--only", "tel/mine"], 2),
+    ],
+)
+def test_what_is_asked_for(path: Path, tool: Tool, words: list[str], played: int) -> None:
+    result = tool("replay", str(path), *words, *FAST)
+    assert (result.code, result.err) == (0, f"played {played} messages\n")
+
+
+def test_nothing_to_play_is_a_failure(path: Path, tool: Tool) -> None:
+    result = tool("replay", str(path), "--only", "@cmd/**", *FAST)
+    assert (result.code, result.err) == (1, "played 0 messages\n")
+
+
+@pytest.mark.parametrize("service", ["bridge", "safety"])
+def test_not_while_somebody_acts(
+    path: Path, came: list[zenoh.Sample], rig: Rig, tool: Tool, service: str
+) -> None:
+    pretend(rig, service, {})
+    result = tool("replay", str(path), *FAST)
+    assert result.code == 1
+    assert f"{service} of robot {rig.robot} is there" in result.err
+    assert tool("replay", str(path), *FAST, robot="nobody").code == 0
+    assert came == []
+
+
+def test_somebody_who_comes_meanwhile_ends_it(
+    path: Path, rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    play = targets.BusTarget.play
+
+    def and_then(self: targets.BusTarget, path: str, it: Any) -> bool:
+        if path == "tel/bridge/velocity":
+            pretend(rig, "safety", {})
+            monkeypatch.setattr(targets.BusTarget, "play", play)
+        return play(self, path, it)
+
+    monkeypatch.setattr(targets.BusTarget, "play", and_then)
+    result = tool("replay", str(path), "--rate", "0.5")
+    assert result.code == 1
+    assert f"safety of robot {rig.robot} is there" in result.err
+
+
+def link(board: str) -> m.Link:
+    return m.Link(
+        state="up", board=board, epoch=0, armed=True, waiting="", rates={}, rejected={},
+        round_trip=None,
+    )  # fmt: skip
+
+
+def state(heartbeat: int) -> Callable[[], m.SafetyState]:
+    return lambda: m.SafetyState(
+        verdict="run", latched=(), causes=(), source=None, heartbeat=heartbeat, text="",
+        limits=m.Limits(forward=1.0, backward=1.0, angular=1.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("board", "said"),
+    [(None, "no bridge of robot"), ("10.7.5.224:4002", "is at 10.7.5.224:4002: a real one")],
+)
+def test_a_real_vehicle_is_not_asked_to_move(
+    path: Path, rig: Rig, tool: Tool, board: str | None, said: str
+) -> None:
+    asked: list[m.Drive] = []
+    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
+    if board:
+        pretend(rig, "bridge", {keys.LINK: lambda: link(board)})
+    result = tool("replay", str(path), "--simulator", *FAST)
+    assert result.code == 1
+    assert said in result.err
+    assert asked == []
+
+
+def test_a_simulated_vehicle_is_asked_as_if_now(path: Path, rig: Rig, tool: Tool) -> None:
+    asked: list[m.Drive] = []
+    moved: list[Arrival[m.Motion]] = []
+    stops: list[int] = []
+
+    def declare(bus: Bus) -> None:
+        bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), depth=64, source="*")
+        bus.subscribe(keys.MOTION, moved.append)
+        bus.on_any(keys.estop_key(rig.robot), stops.append)
+
+    rig.bus(declare)
+    pretend(rig, "bridge", {keys.LINK: lambda: link("127.0.0.1:4003")})
+    pretend(rig, "safety", {keys.SAFETY: state(77)})
+    result = tool("replay", str(path), "--simulator", "--rate", "20")
+    assert (result.code, result.err) == (0, "played 6 messages\n")
+    wait_until(lambda: len(asked) == 5 and stops, "all that was asked, and the stop")
+    assert [each.linear for each in asked] == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert [each.seq for each in asked] == [1, 2, 3, 4, 5]
+    assert {each.boot for each in asked} != {0}
+    assert asked[-1].echo == 77
+    assert moved == []
+
+
+def test_frames_go_to_no_real_board_s_bridge(path: Path, tool: Tool) -> None:
+    result = tool("replay", str(path), "--frames", "--set", "board.address=10.7.5.224")
+    assert result.code == 1
+    assert "--frames: the board is at 10.7.5.224: a real one" in result.err
+
+
+def test_a_recording_that_is_cut_is_played_as_far_as_it_goes(path: Path, tool: Tool) -> None:
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) - 20])
+    result = tool("replay", str(path), *FAST)
+    assert result.code == 0
+    assert "the recording is cut short" in result.err
+
+
+@pytest.mark.parametrize(
+    "words", [["--rate", "0"], ["--from", "-1"], ["--only", "//"], ["--skip", "tel//x"]]
+)
+def test_a_bad_command_line(path: Path, tool: Tool, words: list[str]) -> None:
+    assert tool("replay", str(path), *words).code == 2

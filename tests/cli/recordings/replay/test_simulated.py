@@ -1,0 +1,25 @@
+"""``t2 replay --simulator`` before the real stack: the vehicle goes the way that it went."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from verification.harness.stack import chain
+from verification.harness.support import wait_until
+
+LAP = Path(__file__).parents[3] / "recorder" / "lap.mcap"
+MOVING_MPS = 0.1
+
+pytestmark = pytest.mark.alone
+
+
+def test_a_simulated_vehicle_drives_as_it_was_driven(tmp_path: Path) -> None:
+    with chain(tmp_path, "office") as stack:
+        wait_until(lambda: '"service": "safety"' in stack.log.read_text(), "safety")
+        words = ["replay", str(LAP), "--simulator", "--set", f"bus.connect={stack.endpoint}"]
+        with subprocess.Popen([sys.executable, "-m", "cli", *words]) as process:
+            wait_until(lambda: stack.speed() > MOVING_MPS, "it drives")
+            assert process.wait(60) == 0
+        wait_until(lambda: abs(stack.speed()) < MOVING_MPS / 10, "it stands again")

@@ -1,0 +1,97 @@
+"""``t2 foxglove``: what a viewer gets over its web socket."""
+
+import json
+import struct
+import threading
+from typing import Any
+
+import pytest
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from common import keys
+from tests.cli.inspect.conftest import rig, shared_router, tool
+from tests.cli.inspect.tool import Tool, pretend
+from tests.common.bus_fixture import Rig
+from tests.recorder import samples
+from verification.harness.support import PATIENCE_S, free_port, wait_until
+
+__all__ = ["rig", "shared_router", "tool"]
+
+PROTOCOL = Subprotocol("foxglove.sdk.v1")
+MESSAGE_DATA = 1
+
+
+class Viewer(threading.Thread):
+    """Asks for one topic, as soon as it is there, and keeps the first message of it."""
+
+    def __init__(self, port: int, topic: str) -> None:
+        super().__init__(daemon=True)
+        self.channel: dict[str, Any] = {}
+        self.message: dict[str, Any] = {}
+        self._port = port
+        self._topic = topic
+        self.start()
+
+    def run(self) -> None:
+        socket = wait_until(self._connected, "the server")
+        assert socket is not None
+        with socket:
+            while not self.message:
+                said = socket.recv(PATIENCE_S)
+                if isinstance(said, str):
+                    self._on_text(socket, json.loads(said))
+                elif said[0] == MESSAGE_DATA:
+                    # opcode, subscription, log time
+                    self.message = json.loads(said[struct.calcsize("<BIQ") :])
+
+    def _connected(self) -> ClientConnection | None:
+        try:
+            return connect(f"ws://127.0.0.1:{self._port}", subprotocols=[PROTOCOL])
+        except OSError:
+            return None
+
+    def _on_text(self, socket: ClientConnection, said: dict[str, Any]) -> None:
+        for channel in said.get("channels", []):
+            if channel["topic"] == self._topic:
+                self.channel = channel
+                self._ask(socket)
+        # The server tells of a channel a moment before it lets anybody subscribe to it.
+        if "Unknown channel" in said.get("message", ""):
+            self._ask(socket)
+
+    def _ask(self, socket: ClientConnection) -> None:
+        ask = {"id": 1, "channelId": self.channel["id"]}
+        socket.send(json.dumps({"op": "subscribe", "subscriptions": [ask]}))
+
+
+@pytest.mark.parametrize(
+    ("topic", "schema", "field"),
+    [
+        ("foxglove/pose", "foxglove.PoseInFrame", "pose"),
+        ("t2/v1/{robot}/tel/odom/odometry", "t2.v1.Odometry", "residual"),
+    ],
+)
+def test_a_viewer_sees_it_live(rig: Rig, tool: Tool, topic: str, schema: str, field: str) -> None:
+    port = free_port()
+    pretend(rig, "odom", {keys.ODOMETRY: samples.odometry})
+    viewer = Viewer(port, topic.format(robot=rig.robot))
+    result = tool("foxglove", "--port", str(port), "--duration", "6")
+    viewer.join(PATIENCE_S)
+    assert (result.code, result.err) == (0, "")
+    assert f"ws://127.0.0.1:{port}" in result.out
+    assert (viewer.channel["schemaName"], viewer.channel["encoding"]) == (schema, "json")
+    assert field in viewer.message
+    assert field in json.loads(viewer.channel["schema"])["properties"]
+
+
+def test_a_taken_port_is_told(tool: Tool) -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        result = tool("foxglove", "--port", str(port), "--duration", "1")
+    assert result.code == 69
+    assert f"cannot listen on 127.0.0.1:{port}" in result.err

@@ -1,0 +1,273 @@
+"""``t2 install`` into a folder: what it writes, keeps, refuses and takes away."""
+
+from configparser import ConfigParser
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from cli.run import install
+from cli.settings import Everything
+from common import realtime
+from common.cli_args import EXIT_CONFIG
+from common.config import DEFAULT_FILE, Sources, load
+
+PREFIX = "/opt/t2/current"
+UNITS = "usr/local/lib/systemd/system"
+
+
+def t2_install(root: Path, *words: str) -> int:
+    return main(["install", "--root", str(root), "--prefix", PREFIX, *words])
+
+
+def files(root: Path) -> dict[str, str]:
+    """Return every file under a folder, by its name there."""
+    found = (path for path in root.rglob("*") if path.is_file())
+    return {str(path.relative_to(root)): path.read_text() for path in found}
+
+
+def unit(text: str) -> ConfigParser:
+    """Read a unit; of a key that is given more than once the last counts."""
+    parser = ConfigParser(strict=False, interpolation=None, delimiters=("=",))
+    parser.optionxform = str  # type: ignore[assignment, method-assign]
+    parser.read_string(text)
+    return parser
+
+
+def test_all_but_the_simulator_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert t2_install(tmp_path) == 0
+    written = files(tmp_path)
+    services = {Path(name).name for name in written if name.endswith(".service")}
+    names = ("router", "bridge", "safety", "odom", "recorder", "dashboard")
+    assert services == {f"t2-{name}.service" for name in names}
+    assert not any("@PREFIX@" in text for text in written.values())
+    assert (
+        f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"
+        in (written[f"{UNITS}/t2-safety.service"])
+    )
+    assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
+    said = capsys.readouterr().out
+    assert "write   /etc/t2/t2.toml" in said
+    assert said.endswith("systemctl enable --now t2.target\n")
+
+
+def test_the_settings_are_the_vehicles_and_valid(tmp_path: Path) -> None:
+    t2_install(tmp_path)
+    sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
+    config = load(Everything, sources).config
+    assert config.board.address == "10.7.5.224"
+    assert config.bus.endpoints == ("unixsock-stream//run/t2/bus.sock",)
+    assert config.recorder.folder == "/var/lib/t2/recordings"
+
+
+def test_keys_that_are_there_are_used(tmp_path: Path) -> None:
+    keys = tmp_path / "etc/t2/keys/bus.toml"
+    keys.parent.mkdir(parents=True)
+    keys.write_text('[bus]\nlisten = ["unixsock-stream//run/t2/bus.sock", "tcp/127.0.0.1:7447"]\n')
+    t2_install(tmp_path)
+    command = unit(files(tmp_path)[f"{UNITS}/t2-router.service"])["Service"]["ExecStart"]
+    assert command.endswith(" --config /etc/t2/t2.toml --config /etc/t2/keys/bus.toml")
+
+
+def test_a_link_to_this_environment_is_named_instead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    version = tmp_path / "1.0"
+    version.mkdir()
+    monkeypatch.setattr("sys.prefix", str(version))
+    assert install.here() == version
+    (tmp_path / "current").symlink_to("2.0")
+    assert install.here() == version
+    (tmp_path / "current").unlink()
+    (tmp_path / "current").symlink_to("1.0")
+    assert install.here() == tmp_path / "current"
+
+
+def test_a_simulated_vehicle_stays_one_until_it_is_uninstalled(tmp_path: Path) -> None:
+    t2_install(tmp_path, "--sim")
+    assert f"{UNITS}/t2-sim.service" in files(tmp_path)
+    sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
+    assert load(Everything, sources).config.board.address == "127.0.0.1"
+    t2_install(tmp_path)
+    assert f"{UNITS}/t2-sim.service" in files(tmp_path)
+
+
+def test_a_second_time_changes_nothing_and_an_edit_is_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t2_install(tmp_path)
+    settings = tmp_path / "etc/t2/t2.toml"
+    settings.write_text('[robot]\nid = "007"\n')
+    before = files(tmp_path)
+    capsys.readouterr()
+    assert t2_install(tmp_path) == 0
+    assert files(tmp_path) == before
+    said = capsys.readouterr().out
+    assert "keep    /etc/t2/t2.toml" in said
+    assert "write" not in said
+    assert "replace" not in said
+    assert "systemctl restart t2.target" in said
+
+
+def test_an_older_unit_is_replaced_and_what_cannot_run_is_removed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t2_install(tmp_path)
+    (tmp_path / UNITS / "t2-odom.service").write_text("older\n")
+    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "uvicorn" else True)
+    capsys.readouterr()
+    t2_install(tmp_path)
+    said = capsys.readouterr().out
+    assert "without t2-dashboard.service: uvicorn is not installed" in said
+    assert f"remove  /{UNITS}/t2-dashboard.service" in said
+    assert f"replace /{UNITS}/t2-odom.service" in said
+    assert f"{UNITS}/t2-dashboard.service" not in files(tmp_path)
+
+
+@pytest.mark.parametrize("words", [(), ("--uninstall",)])
+def test_what_another_version_wrote_goes_and_what_somebody_else_wrote_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    t2_install(tmp_path)
+    odom = (tmp_path / UNITS / "t2-odom.service").read_text()
+    theirs = {"t2-lidar.service": "[Service]\nExecStart=lidar\n", "t2-.service.d/50-site.conf": ""}
+    for name in ("t2-lamp.service", "t2-.service.d/30-older.conf"):
+        (tmp_path / UNITS / name).write_text(odom)
+    for name, text in theirs.items():
+        (tmp_path / UNITS / name).write_text(text)
+    (tmp_path / UNITS / "t2-masked.service").symlink_to("/dev/null")
+    capsys.readouterr()
+    assert t2_install(tmp_path, *words) == 0
+    left = {str(path.relative_to(tmp_path / UNITS)) for path in (tmp_path / UNITS).rglob("*")}
+    assert {*theirs, "t2-masked.service"} <= left
+    assert not {"t2-lamp.service", "t2-.service.d/30-older.conf"} & left
+    assert f"remove  /{UNITS}/t2-lamp.service" in capsys.readouterr().out
+
+
+def test_settings_that_will_not_do_are_said_before_anything_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = tmp_path / "etc/t2/t2.toml"
+    settings.parent.mkdir(parents=True)
+    settings.write_text("[bus]\nlaese = 1.0\n")
+    assert t2_install(tmp_path) == EXIT_CONFIG
+    assert "bus.laese: unknown; did you mean 'lease'?" in capsys.readouterr().err
+    assert list(files(tmp_path)) == ["etc/t2/t2.toml"]
+
+
+def test_a_dry_run_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert t2_install(tmp_path, "--dry-run") == 0
+    assert files(tmp_path) == {}
+    assert f"write   /{UNITS}/t2.target" in capsys.readouterr().out
+
+
+def test_uninstalled_it_leaves_settings_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t2_install(tmp_path, "--sim")
+    enabled = tmp_path / "etc/systemd/system/multi-user.target.wants/t2.target"
+    enabled.parent.mkdir(parents=True)
+    enabled.symlink_to("/nowhere")
+    assert t2_install(tmp_path, "--uninstall") == 1
+    assert "systemctl disable --now t2.target" in capsys.readouterr().err
+    enabled.unlink()
+    assert t2_install(tmp_path, "--uninstall", "--dry-run") == 0
+    assert f"{UNITS}/t2.target" in files(tmp_path)
+    assert t2_install(tmp_path, "--uninstall") == 0
+    assert list(files(tmp_path)) == ["etc/t2/t2.toml"]
+
+
+@pytest.mark.parametrize("prefix", [f"{place}/t2" for place in install.HIDDEN])
+def test_a_place_that_services_do_not_see_is_refused(
+    tmp_path: Path, prefix: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["install", "--root", str(tmp_path), "--prefix", prefix]) == 1
+    assert f"T2 is in {prefix}: install it elsewhere" in capsys.readouterr().err
+    assert files(tmp_path) == {}
+
+
+def test_without_rights_it_says_so(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    assert main(["install", "--prefix", PREFIX]) == 1
+    assert "wants root" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("said", "version"),
+    [("systemd 252 (252.39-1)\n+PAM", 252), ("systemd 257~rc1", 257), ("busybox", 0)],
+)
+def test_the_backoff_is_written_for_a_systemd_that_knows_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, version: int
+) -> None:
+    tool = tmp_path / "bin" / "systemctl"
+    tool.parent.mkdir()
+    tool.write_text(f"#!/bin/sh\necho '{said}'\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tool.parent}:/bin")
+    assert install.systemd_version() == version
+    t2_install(tmp_path)
+    assert (f"{UNITS}/t2-.service.d/20-backoff.conf" in files(tmp_path)) == (version >= 254)
+    tool.unlink()
+    monkeypatch.setenv("PATH", str(tool.parent))
+    assert install.systemd_version() == 0
+
+
+# --- the units ----------------------------------------------------------------------------------
+
+SERVICES = sorted(path.name for path in install.TEMPLATES.glob("t2-*.service"))
+REAL = [name for name in SERVICES if name != install.SIM]
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_service_belongs_to_the_target(name: str) -> None:
+    wanted = [line for line in install.template("t2.target").splitlines() if "Wants=" in line]
+    assert name in " ".join(wanted)
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_every_service_is_watched(name: str) -> None:
+    service = unit(install.template(name))["Service"]
+    assert service["Type"] == "notify"
+    assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # these machines hold processes up
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_the_bridge_alone_can_reach_the_boards_cable(name: str) -> None:
+    denied = unit(install.template(name))["Service"].get("IPAddressDeny", "").split()
+    cable = {"10.7.5.0/24", "255.255.255.255", "multicast"}  # as in deploy/nftables/t2.nft
+    assert bool({"any"} & {*denied} or cable <= {*denied}) == (name != "t2-bridge.service")
+
+
+def test_the_bridge_is_the_last_to_start_and_the_first_to_stop() -> None:
+    after = unit(install.template("t2-bridge.service"))["Unit"]["After"].split()
+    assert {"network.target", "t2-router.service", "t2-safety.service", "t2-sim.service"} == {
+        *after
+    }
+    for name in SERVICES:
+        assert "t2-bridge" not in unit(install.template(name))["Unit"].get("After", "")
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_who_stands_before_the_wheels_alone_may_go_ahead(name: str) -> None:
+    service = unit(install.template(name))["Service"]
+    ahead = name in ("t2-router.service", "t2-safety.service", "t2-bridge.service")
+    assert service.get("LimitRTPRIO") == (str(realtime.GUARD) if ahead else None)
+    assert service.get("RestrictRealtime") == (None if ahead else "yes")
+
+
+def test_the_common_part_overrides_nothing_of_a_services_own() -> None:
+    common = unit(install.template("t2-.service.d/10-t2.conf"))["Service"]
+    for name in SERVICES:
+        assert not common.keys() & unit(install.template(name))["Service"].keys(), name
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_the_drive_link_is_open_to_bridge_and_safety_alone(name: str) -> None:
+    service = unit(install.template(name))["Service"]
+    hidden = service.get("InaccessiblePaths") == "/run/t2-drive"
+    assert hidden == (name not in ("t2-bridge.service", "t2-safety.service"))
+    assert (service.get("ReadWritePaths") == "/run/t2-drive") == (name == "t2-bridge.service")

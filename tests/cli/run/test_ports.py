@@ -1,0 +1,148 @@
+"""What ``t2 up`` listens on: which ports those are, and that nothing starts while one is taken."""
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from cli.run import ports
+from cli.run.ports import Port, claimed, routers, wanted
+from cli.settings import Everything
+from common import settings
+from common.bus.session import router
+from common.cli_args import EXIT_LINK
+from common.errors import LinkError
+from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
+from tests.cli.stack import ports as own_ports
+from tests.cli.stack import starts
+from verification.harness.support import free_port, listening, wait_until
+
+ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
+
+
+@contextlib.contextmanager
+def held(kind: socket.SocketKind) -> Iterator[int]:
+    """Hold a port of this host."""
+    with socket.socket(socket.AF_INET, kind) as sock:
+        sock.bind(("127.0.0.1", 0))
+        if kind == socket.SOCK_STREAM:
+            sock.listen()
+        yield sock.getsockname()[1]
+
+
+def udp(number: int) -> Port:
+    return Port("udp", "127.0.0.1", number, "bridge", "board.listen_ports")
+
+
+def tcp(number: int) -> Port:
+    return Port("tcp", "127.0.0.1", number, "router", "bus.listen")
+
+
+# --- which ---------------------------------------------------------------------------------------
+
+
+def test_each_process_has_its_own() -> None:
+    config = Everything()
+    owners = [port.owner for port in wanted(config, ALL)]
+    assert owners == ["router", "bridge", "bridge", "sim"]
+    assert {port.owner for port in wanted(config, ["bridge", "safety"])} == {"bridge"}
+    assert wanted(config, ["safety"]) == []
+
+
+def test_a_routers_endpoints_in_every_form() -> None:
+    listen = ("tcp/127.0.0.1:7447", "tls/[::1]:7448#iface=lo", "quic/localhost:9?a=b",
+              "unixsock-stream//run/t2/bus.sock")  # fmt: skip
+    bus = settings.Bus(listen=listen, ca="a", certificate="b", private_key="c", members="d")
+    assert [(port.kind, port.host, port.number) for port in routers(bus)] == [
+        ("tcp", "127.0.0.1", 7447),
+        ("tcp", "::1", 7448),
+        ("udp", "localhost", 9),
+        ("unix", "/run/t2/bus.sock", 0),
+    ]
+
+
+# --- taken or free -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "of"), [(socket.SOCK_STREAM, tcp), (socket.SOCK_DGRAM, udp)])
+def test_a_taken_port_is_named_with_what_to_do(
+    kind: socket.SocketKind, of: Callable[[int], Port]
+) -> None:
+    with held(kind) as number:
+        port = of(number)
+        with pytest.raises(LinkError) as raised:
+            claimed([port], 0.0)
+    said = str(raised.value)
+    assert f"127.0.0.1:{number} ({port.setting}): another program has it" in said
+    assert "is a stack running already?" in said
+    claimed([port], 0.0).close()  # and now it is free
+
+
+def test_a_unix_socket_that_answers_is_taken_and_a_stale_one_is_not(tmp_path: Path) -> None:
+    path = str(tmp_path / "bus.sock")
+    port = Port("unix", path, 0, "router", "bus.listen")
+    with router(listening(f"unixsock-stream/{path}")), pytest.raises(LinkError, match="another"):
+        claimed([port], 0.0)
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(f"{path}.2")
+    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
+        pass
+
+
+def test_an_address_of_another_host_says_so() -> None:
+    with pytest.raises(LinkError, match=r"192\.0\.2\.1:4002 .*cannot be bound: .*assign"):
+        claimed([Port("udp", "192.0.2.1", 4002, "bridge", "board.listen_ports")], 0.0)
+
+
+def test_two_that_start_at_once_do_not_both_go_on() -> None:
+    port = udp(free_port(socket.SOCK_DGRAM))
+    with claimed([port], 0.0), pytest.raises(LinkError, match="another program has it"):
+        claimed([port], 0.0)
+
+
+def test_what_a_killed_one_has_left_is_waited_for() -> None:
+    with contextlib.ExitStack() as leaving:
+        number = leaving.enter_context(held(socket.SOCK_DGRAM))
+        threading.Timer(3 * ports.LOOK_S, leaving.close).start()
+        began_s = time.monotonic()
+        claimed([udp(number)]).close()
+        assert time.monotonic() - began_s >= 2 * ports.LOOK_S
+
+
+def test_one_that_is_refused_keeps_no_claim_on_the_others() -> None:
+    free = udp(free_port(socket.SOCK_DGRAM))
+    with held(socket.SOCK_DGRAM) as number, pytest.raises(LinkError):
+        claimed([free, udp(number)], 0.0)
+    claimed([free], 0.0).close()
+
+
+# --- a whole stack -------------------------------------------------------------------------------
+
+
+def test_a_second_stack_starts_nothing_and_the_first_goes_on(tmp_path: Path) -> None:
+    log, words = tmp_path / "log", [*own_ports(), "log.format=json"]
+    words = sets(*words, f"recorder.folder={tmp_path}")
+    with running(t2("up", *words), log):
+        wait_until(lambda: starts(log, "bridge") and starts(log, "safety"), "a stack", PATIENCE_S)
+        for more in ([], ["--no-sim"], ["--no-router"]):
+            second = ran("up", *words, *more)
+            assert second.returncode == EXIT_LINK
+            assert "another program has it; is a stack running already?" in second.stderr
+            assert "started" not in second.stderr
+            assert "Traceback" not in second.stderr
+        assert starts(log, "safety") == 1
+
+
+def test_the_shipped_ports_are_what_the_services_bind() -> None:
+    config = replace(Everything(), bus=settings.Bus())
+    assert [str(port) for port in wanted(config, ALL)] == [
+        "TCP 127.0.0.1:7447 (bus.listen)",
+        "UDP 127.0.0.1:4002 (board.listen_ports)",
+        "UDP 127.0.0.1:4001 (board.listen_ports)",
+        "UDP 127.0.0.1:4003 (board.port)",
+    ]

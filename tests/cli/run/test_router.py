@@ -1,0 +1,124 @@
+"""``t2 router``: it listens or says why not, and leaves when told."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from cli.__main__ import main
+from cli.run.router import open_to
+from common.bus.session import client_config
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.settings import Bus
+from tests.cli.processes import PATIENCE_S, ran, sets
+from verification.harness.support import at, free_port, router_process, wait_until
+
+
+def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(endpoint) as first:
+        second = ran("router", *sets(f"bus.listen={endpoint}"))
+        assert second.returncode == EXIT_LINK
+        assert f"t2 router: the router cannot listen on {endpoint}: " in second.stderr
+        assert "in use" in second.stderr
+        assert "Traceback" not in second.stderr
+        first.send_signal(signal.SIGINT)
+        assert first.wait(PATIENCE_S) == 0
+
+
+def test_dead_links_leave_it_threads_to_read_the_others() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(endpoint) as router, zenoh.open(client_config(at(endpoint))):
+        tasks = Path(f"/proc/{router.pid}/task")
+
+        def readers() -> int:
+            names = [comm.read_text(encoding="ascii") for comm in tasks.glob("*/comm")]
+            return sum(name.startswith("rx-") for name in names)
+
+        wait_until(lambda: readers() >= 32, "threads that read")
+
+
+def test_an_address_of_another_host_is_a_sentence() -> None:
+    result = ran("router", "--insecure", *sets("bus.listen=tcp/192.0.2.1:7447"))
+    assert result.returncode == EXIT_LINK
+    assert result.stderr.startswith("t2 router: the router cannot listen on tcp/192.0.2.1:7447: ")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_it_does_not_open_a_robot_to_its_network_by_itself(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["router", *sets("bus.listen=tcp/0.0.0.0:7447")]) == EXIT_CONFIG
+    said = capsys.readouterr().err
+    assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in said
+    assert "--insecure lets in all" in said
+
+
+def test_it_prints_its_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["router", "--print", "--insecure", *sets("bus.listen=tcp/0.0.0.0:7447")]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["mode"], printed["listen"]) == ("router", {"endpoints": ["tcp/0.0.0.0:7447"]})
+    zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
+
+
+def test_it_writes_its_configuration_where_there_is_no_shell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["router", "--print", str(tmp_path / "router.json5")]) == 0
+    assert json.loads((tmp_path / "router.json5").read_text())["mode"] == "router"
+    assert capsys.readouterr().out == ""
+    assert main(["router", "--print", str(tmp_path / "none" / "x")]) == EXIT_CONFIG
+    assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
+
+
+def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["router", "--print"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["listen"] == {"endpoints": ["tcp/127.0.0.1:7447"]}
+    assert "access_control" not in printed
+
+
+@pytest.mark.parametrize(
+    ("bus", "words"),
+    [
+        (Bus(), "every program on this machine"),
+        (Bus(insecure=True), "everybody on the network, without a certificate"),
+        (
+            Bus(listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"),
+            "this machine, and members with a certificate",
+        ),
+        (
+            Bus(uplink=("tcp/127.0.0.1:1",)),
+            "every program on this machine, and whom the router tcp/127.0.0.1:1 lets in",
+        ),
+    ],
+)
+def test_it_says_whom_it_lets_in(bus: Bus, words: str) -> None:
+    assert open_to(bus) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [(None, "cannot be read: No such file or directory; `t2 keys` makes it"),
+     ("{}", "is no list of members: Object missing required field `site`"),
+     ("[", "is no list of members: ")],
+)  # fmt: skip
+def test_a_list_of_members_that_is_none(
+    text: str | None, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    listed = tmp_path / "members.json"
+    if text is not None:
+        listed.write_text(text)
+    assert main(["router", *sets(f"bus.members={listed}")]) == EXIT_CONFIG
+    assert f"t2 router: {listed}: {words}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("setting", ["listen", "uplink"])
+@pytest.mark.parametrize("endpoint", ["router", "tcp/", "/127.0.0.1:7447"])
+def test_what_is_no_endpoint_is_refused_before_anything_opens(
+    endpoint: str, setting: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["router", *sets(f"bus.{setting}={endpoint}")]) == EXIT_CONFIG
+    assert "should look like tcp/127.0.0.1:7447" in capsys.readouterr().err

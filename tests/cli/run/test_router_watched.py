@@ -1,0 +1,169 @@
+"""``t2 router`` and its probe: ready when it answers, killed when it hangs."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zenoh
+from msgspec.structs import replace
+
+from cli.run.router_watch import Watch
+from common.bus import answering
+from common.bus.session import client_config, router
+from common.settings import Bus, Log
+from tests.cli.processes import PATIENCE_S, alive, wait_gone
+from tests.common.systemd_manager import Manager
+from verification.harness.support import at, free_port, listening, router_process, wait_until
+
+# Matching these two takes Zenoh 1.10.2 a minute: long enough to be found, and it ends by itself.
+EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"
+LONG = "t2/v1/001/evt/dashboard/@adv/" + "/".join("a" * 40)
+DEADLINE_S = 1.0
+DETECTED_S = 2 * DEADLINE_S
+NOISE_S = 3.0  # delay of a busy host
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+@pytest.fixture
+def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Manager]:
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as made:
+        for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC"):
+            monkeypatch.setenv(name, made.environ[name])
+        yield made
+
+
+def probe_of(router: "subprocess.Popen[bytes]") -> int:
+    """Return the process of a router's probe, once there is one."""
+    path = Path(f"/proc/{router.pid}/task/{router.pid}/children")
+    return int(wait_until(lambda: path.read_text().split(), "a probe")[0])
+
+
+def successor(router: "subprocess.Popen[bytes]", first: int) -> int:
+    """Return the process of a router's next probe; 0 while there is none, or a dead one."""
+    probe = probe_of(router)
+    return probe if probe != first and alive(probe) else 0
+
+
+def explode(endpoint: str) -> None:
+    """Declare key expressions whose matching takes long."""
+    with (
+        zenoh.open(client_config(at(endpoint))) as reader,
+        zenoh.open(client_config(at(endpoint))) as writer,
+    ):
+        reader.declare_subscriber(EXPLODES, lambda _: None)
+        time.sleep(0.2)  # the router knows it
+        writer.put(LONG, b"")
+        time.sleep(0.1)
+
+
+# --- a router that works ------------------------------------------------------------------------
+
+
+def test_it_is_ready_when_it_answers_and_beats_from_then_on(
+    manager: Manager, endpoint: str
+) -> None:
+    with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
+        wait_until(lambda: manager.beats() > 2, "beats")
+        assert manager.told[0] == "READY=1"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE_S) == 0
+    assert manager.hear()[-1] == "STOPPING=1"
+
+
+def test_a_probe_that_ends_is_started_again_and_ends_with_its_router(endpoint: str) -> None:
+    with router_process(endpoint) as process:
+        first = probe_of(process)
+        os.kill(first, signal.SIGKILL)
+        second = wait_until(lambda: successor(process, first), "another probe")
+        assert process.poll() is None
+        process.kill()
+        process.wait()
+        wait_gone([second])
+
+
+def test_ctrl_c_reaches_the_probe_and_does_not_end_it(endpoint: str) -> None:
+    with router_process(endpoint) as process:
+        probe = probe_of(process)
+        ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        wait_until(
+            lambda: all(_ignores(probe, number) for number in ends),
+            "a probe that has set its signals",
+        )
+        for number in ends:
+            os.kill(probe, number)
+        time.sleep(0.2)
+        assert alive(probe)
+
+
+def _ignores(pid: int, number: signal.Signals) -> bool:
+    words = Path(f"/proc/{pid}/status").read_text(encoding="ascii").split()
+    return bool(int(words[words.index("SigIgn:") + 1], 16) >> (number - 1) & 1)
+
+
+def _command(pid: int) -> bytes:
+    return Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def test_a_router_that_dials_its_sites_answers_too(endpoint: str) -> None:
+    where = listening(endpoint, "tcp/127.0.0.1:1")  # and no router there
+    with router(where):
+        assert answering.answers(answering.router_at(where))
+
+
+# --- a router that hangs ------------------------------------------------------------------------
+
+
+def test_one_that_hangs_on_key_matching_is_killed(endpoint: str) -> None:
+    with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
+        wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
+        explode(endpoint)
+        assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
+
+
+def test_one_that_is_frozen_is_killed(endpoint: str) -> None:
+    with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
+        wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
+        process.send_signal(signal.SIGSTOP)
+        assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
+
+
+def test_nobody_there_is_no_answer(endpoint: str) -> None:
+    assert not answering.answers(at(endpoint))
+
+
+def test_the_router_itself_is_dialled_whatever_services_dial() -> None:
+    bus = Bus(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
+              insecure=True)  # fmt: skip
+    assert answering.router_at(bus).endpoints == ("tcp/127.0.0.1:1",)
+    tls = replace(bus, listen=("tls/0.0.0.0:1", "unixsock-stream//x"), ca="a", certificate="b",
+                  private_key="c", members="d")  # fmt: skip
+    assert answering.router_at(tls).endpoints == ("unixsock-stream//x",)
+
+
+def test_a_probe_that_cannot_be_started_does_not_end_the_router(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    watch = Watch(Bus(), Log())
+    tried = threading.Event()
+
+    def refused(*_: object, **__: object) -> None:
+        tried.set()
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr(subprocess, "Popen", refused)
+    thread = threading.Thread(target=watch.run, args=(lambda: None,))
+    thread.start()
+    assert tried.wait(PATIENCE_S)
+    watch.stop()
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive()

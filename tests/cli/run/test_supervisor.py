@@ -1,0 +1,190 @@
+"""Processes that belong together: restarts on an injected clock, real ends of real processes."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from cli.run import supervisor as module
+from cli.run.supervisor import Child, Supervisor
+from common.backoff import BACKOFF_S
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from tests.cli.processes import alive, running, wait_gone
+from verification.harness.support import wait_until
+
+SLEEP = ["sleep", "1000"]
+
+
+@pytest.fixture
+def supervised() -> Iterator[list[Supervisor]]:
+    """Collect supervisors and end what they have started."""
+    made: list[Supervisor] = []
+    yield made
+    for supervisor in made:
+        for child in supervisor.children:
+            if child.process is not None:
+                child.process.kill()
+                child.process.wait()
+
+
+def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]:
+    supervisor = Supervisor([("it", command)])
+    supervised.append(supervisor)
+    return supervisor, supervisor.children[0]
+
+
+def kill(child: Child) -> None:
+    """Kill the child's process, without a look of the supervisor's."""
+    process = child.process
+    assert process is not None
+    process.kill()
+    process.wait()
+
+
+# --- restarts ---------------------------------------------------------------------------------
+
+
+def test_a_crash_restarts_at_once_and_then_ever_later(supervised: list[Supervisor]) -> None:
+    supervisor, child = one(supervised, *SLEEP)
+    now_s = 100.0
+    for wait_s in (*BACKOFF_S, BACKOFF_S[-1]):
+        assert supervisor.look(now_s) == 0
+        kill(child)
+        assert supervisor.look(now_s) == 0
+        assert child.process is None
+        assert child.due_s == now_s + wait_s
+        if wait_s:
+            assert supervisor.look(now_s + wait_s - 0.01) == 0
+            assert child.process is None, f"started again before {wait_s} s were over"
+        now_s += wait_s
+
+
+@pytest.mark.parametrize("code", [EXIT_CONFIG, EXIT_LINK])
+def test_a_hopeless_one_ends_all_with_its_code(supervised: list[Supervisor], code: int) -> None:
+    supervisor = Supervisor([("calm", SLEEP), ("hopeless", ["sh", "-c", f"exit {code}"])])
+    supervised.append(supervisor)
+    assert supervisor.run() == code
+    calm, hopeless = (child.process for child in supervisor.children)
+    assert calm is not None
+    assert calm.returncode == -signal.SIGTERM
+    assert hopeless is not None
+    assert hopeless.returncode == code
+
+
+def test_killed_from_outside_is_a_crash_and_not_the_end(supervised: list[Supervisor]) -> None:
+    supervisor, child = one(supervised, *SLEEP)
+    supervisor.look(0.0)
+    assert child.process is not None
+    first = child.process.pid
+    kill(child)
+    assert supervisor.look(1.0) == 0
+    assert supervisor.look(1.0) == 0
+    assert child.process is not None
+    assert child.process.pid != first
+
+
+def test_a_supervisor_that_was_stopped_starts_nothing(supervised: list[Supervisor]) -> None:
+    supervisor, child = one(supervised, *SLEEP)
+    supervisor.stop()
+    assert supervisor.run() == 0
+    assert child.process is None
+
+
+# --- the end ----------------------------------------------------------------------------------
+
+
+def reporter(name: str, file: Path, on_term: str = "exit 0") -> tuple[str, list[str]]:
+    """Return a process that writes down its start and its SIGTERM."""
+    script = f'trap "echo -{name} >> {file}; {on_term}" TERM; echo +{name} >> {file}; '
+    return name, ["sh", "-c", script + "while :; do sleep 0.05; done"]
+
+
+def test_the_last_one_is_ended_first(tmp_path: Path, supervised: list[Supervisor]) -> None:
+    file = tmp_path / "order"
+    supervisor = Supervisor([reporter(name, file) for name in "abc"])
+    supervised.append(supervisor)
+    supervisor.look(0.0)
+    wait_until(lambda: file.exists() and len(file.read_text().split()) == 3, "three starts")
+    supervisor.end()
+    assert file.read_text().split()[3:] == ["-c", "-b", "-a"]
+
+
+def test_one_that_ignores_sigterm_is_killed(
+    tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "PATIENCE_S", 0.2)
+    file = tmp_path / "order"
+    supervisor = Supervisor([reporter("deaf", file, on_term=":")])
+    supervised.append(supervisor)
+    supervisor.look(0.0)
+    wait_until(lambda: file.exists() and file.read_text(), "its start")
+    supervisor.end()
+    process = supervisor.children[0].process
+    assert process is not None
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_a_child_is_in_a_group_of_its_own(supervised: list[Supervisor]) -> None:
+    # Ctrl-c goes to the terminal's group: it must not reach the bridge before its turn.
+    supervisor, child = one(supervised, *SLEEP)
+    supervisor.look(0.0)
+    assert child.process is not None
+    assert os.getpgid(child.process.pid) == child.process.pid != os.getpgid(0)
+    assert os.getsid(child.process.pid) == child.process.pid  # not in our session
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
+def test_a_child_whose_parent_died_before_it_could_say_so_does_not_run() -> None:
+    made = subprocess.Popen(SLEEP, preexec_fn=partial(module._die_with_parent, 1))
+    assert made.wait(5.0) == 1
+
+
+def test_output_goes_to_the_file(tmp_path: Path, supervised: list[Supervisor]) -> None:
+    file = tmp_path / "log"
+    with file.open("wb") as output:
+        supervisor = Supervisor(
+            [("it", ["sh", "-c", "echo out; echo err >&2; sleep 1000"])], output
+        )
+        supervised.append(supervisor)
+        supervisor.look(0.0)
+        wait_until(lambda: len(file.read_text().split()) == 2, "both lines")
+    assert sorted(file.read_text().split()) == ["err", "out"]
+
+
+PARENT = """
+import signal, time
+from cli.run.supervisor import Supervisor
+supervisor = Supervisor([("one", ["sleep", "1000"]), ("two", ["sleep", "1000"])])
+signal.signal(signal.SIGINT, lambda *_: supervisor.stop())
+supervisor.look(time.monotonic())
+print(*(child.process.pid for child in supervisor.children), flush=True)
+raise SystemExit(supervisor.run())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGKILL, -9), (signal.SIGINT, 0)])
+def test_children_end_with_their_parent(number: signal.Signals, code: int, tmp_path: Path) -> None:
+    output = tmp_path / "pids"
+    with running([sys.executable, "-c", PARENT], output) as parent:
+        wait_until(lambda: output.read_text().endswith("\n"), "two children")
+        pids = [int(word) for word in output.read_text().split()]
+        assert all(map(alive, pids))
+        parent.send_signal(number)
+        assert parent.wait() == code
+        wait_gone(pids)
+
+
+def test_a_command_that_is_not_there_is_an_error(supervised: list[Supervisor]) -> None:
+    supervisor = Supervisor([("calm", SLEEP), ("none", ["/no/such/program"])])
+    supervised.append(supervisor)
+    with pytest.raises((OSError, subprocess.SubprocessError)):
+        supervisor.run()
+    calm = supervisor.children[0].process
+    assert calm is not None
+    assert calm.returncode == -signal.SIGTERM

@@ -1,0 +1,132 @@
+"""``t2 up`` as a process: it comes up, mends itself, and leaves nothing behind."""
+
+import os
+import signal
+import socket
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from cli.run.up import chosen, commands
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.errors import ConfigError
+from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
+from tests.cli.stack import STACK, ports, starts
+from verification.harness.support import wait_until
+
+
+def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with running(
+        t2("up", *sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")), log
+    ) as up:
+        wait_until(lambda: all(starts(log, name) for name in STACK), "all six", PATIENCE_S)
+        first = children(up.pid)
+        assert set(first) == STACK
+
+        # The router's port and the bridge's two come back though their holders were killed.
+        for victim in ("router", "bridge"):
+            os.kill(first[victim], signal.SIGKILL)
+        wait_until(lambda: starts(log, "router") == starts(log, "bridge") == 2, "both", PATIENCE_S)
+        second = children(up.pid)
+        assert set(second) == STACK
+        changed = {name for name in STACK if first[name] != second[name]}
+        assert changed == {"router", "bridge"}
+        assert log.read_text().count("ended, starts again") == 2
+
+        up.send_signal(signal.SIGINT)
+        assert up.wait(PATIENCE_S) == 0
+        wait_gone(list(second.values()))
+    said = log.read_text()
+    assert "Traceback" not in said
+    # In reverse order: the bridge stops the vehicle while its board is still there.
+    assert said.rindex('"service": "odom", "event": "stopped"') < said.rindex(
+        '"service": "bridge", "event": "stopped"'
+    )
+
+
+def test_a_taken_port_ends_it_all_with_a_sentence(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        words = sets(*ports(), f"board.listen_ports={port}", f"recorder.folder={tmp_path}")
+        with running(t2("up", "--no-sim", *words), log) as up:
+            assert up.wait(PATIENCE_S) == EXIT_LINK
+    said = log.read_text()
+    assert f"127.0.0.1:{port}" in said
+    assert "another program has it" in said
+    assert "Traceback" not in said
+    assert '"started"' not in said, "nothing may start before all ports are free"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (sets("board.port=0"), "board.port = 0"),
+        (sets("safety.margin=0"), "margin"),
+        (["--config", "no/such.toml"], "no/such.toml"),
+    ],
+)
+def test_a_bad_setting_opens_nothing(
+    words: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delattr("cli.run.up.Supervisor")
+    assert main(["up", *words]) == EXIT_CONFIG
+    error = capsys.readouterr().err
+    assert error.startswith("t2 up: ")
+    assert said in error
+
+
+# --- what is run ------------------------------------------------------------------------------
+
+
+def options(**given: object) -> Namespace:
+    return Namespace(**({"no_sim": False, "world": None, "config": None, "sets": []} | given))
+
+
+def test_later_ones_stand_on_earlier_ones() -> None:
+    names = [name for name, _ in commands(options())]
+    assert names == ["router", "sim", "bridge", "safety", "odom"]
+
+
+def test_without_the_simulated_vehicle() -> None:
+    names = [name for name, _ in commands(options(no_sim=True, world="office"))]
+    assert names == ["router", "bridge", "safety", "odom"]
+
+
+def test_on_a_router_that_is_running() -> None:
+    names = [name for name, _ in commands(options(no_router=True))]
+    assert names == ["sim", "bridge", "safety", "odom"]
+
+
+def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
+    files = [Path("a.toml"), Path("b.toml")]
+    made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))
+    passed = [
+        "--config",
+        "a.toml",
+        "--config",
+        "b.toml",
+        "--set",
+        "robot.id=2",
+        "--set",
+        "log.level=debug",
+    ]
+    for name, command in made.items():
+        assert command[-len(passed) :] == passed, name
+    assert " ".join(made["sim"][1:6]) == "-P -m sim --world x"
+    assert " ".join(made["router"][1:5]) == "-P -m cli router"
+
+
+def test_one_of_them_alone() -> None:
+    everything = commands(options())
+    assert chosen(everything, None) == everything
+    assert [name for name, _ in chosen(everything, "bridge")] == ["bridge"]
+    with pytest.raises(ConfigError, match="--only brigde: no such process; there are router, sim"):
+        chosen(everything, "brigde")

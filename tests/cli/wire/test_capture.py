@@ -1,0 +1,180 @@
+"""Datagrams out of hex, text, pcap and pcapng; errors that name file and line."""
+
+import contextlib
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dpkt import arp, ethernet, pcap, sll, sll2, tcp  # type: ignore[import-untyped]
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cli.wire import capture
+from cli.wire.capture import Datagram
+from common.errors import RobotError
+from tests.cli.captures import (
+    DISTANCE,
+    RUN,
+    VELOCITY,
+    as_pcap,
+    as_pcapng,
+    on_ethernet,
+    packet,
+)
+
+ENDS = "10.7.5.224:4002 > 10.7.5.220:4001"
+
+
+# --- hex ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "47530800",
+        "4753 0800",
+        "47:53:08:00",
+        "0x47, 0x53, 0x08, 0x00",
+        "47-53-08-00",
+        "\t4753\n0800",
+    ],
+)
+def test_hex_in_any_dress(text: str) -> None:
+    assert capture.read(text) == [Datagram("", b"GS\x08\x00")]
+
+
+def test_long_hex_is_no_file_name() -> None:
+    assert capture.read(RUN.hex() * 100) == [Datagram("", RUN * 100)]
+
+
+@pytest.mark.parametrize("text", ["no/such/file", "zz", ""])
+def test_neither_hex_nor_file(text: str) -> None:
+    with pytest.raises(RobotError, match="is no hex and no file"):
+        capture.read(text)
+
+
+def test_text_has_a_datagram_a_line(tmp_path: Path) -> None:
+    file = tmp_path / "frames.txt"
+    file.write_text("# captured by hand\n4753 # magic\n\n00 01\n", encoding="utf-8")
+    assert capture.read(str(file)) == [
+        Datagram(f"{file} line 2", b"GS"),
+        Datagram(f"{file} line 4", b"\x00\x01"),
+    ]
+
+
+def test_a_bad_line_is_named() -> None:
+    with pytest.raises(RobotError, match=r"^frames line 2: '47 5' is not hex$"):
+        capture.from_bytes("frames", b"47 53\n47 5\n")
+
+
+def test_text_without_hex_is_refused() -> None:
+    with pytest.raises(RobotError, match="frames: has no hex lines"):
+        capture.from_bytes("frames", b"# nothing\n")
+
+
+def test_other_bytes_are_refused() -> None:
+    with pytest.raises(RobotError, match="neither pcap, pcapng nor hex text"):
+        capture.from_bytes("frames", b"\xff\xfe\x00")
+
+
+@pytest.mark.parametrize("content", [b"4753", as_pcap([on_ethernet(packet(b"GS"))])])
+def test_standard_input(content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+    assert [datagram.data for datagram in capture.read("-")] == [b"GS"]
+
+
+# --- captures -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_the_payload_of_each_udp_packet(write: Callable[..., bytes]) -> None:
+    content = write([on_ethernet(packet(VELOCITY)), on_ethernet(packet(DISTANCE + VELOCITY))])
+    assert capture.from_bytes("trip", content) == [
+        Datagram(f"packet 1 {ENDS}", VELOCITY),
+        Datagram(f"packet 2 {ENDS}", DISTANCE + VELOCITY),
+    ]
+
+
+def cooked(network: object) -> bytes:
+    return bytes(sll.SLL(ethtype=ethernet.ETH_TYPE_IP, data=network))
+
+
+def cooked_again(network: object) -> bytes:
+    return bytes(sll2.SLL2(ethtype=ethernet.ETH_TYPE_IP, data=network))
+
+
+def loopback(network: object) -> bytes:
+    return (2).to_bytes(4, sys.byteorder) + bytes(network)  # type: ignore[call-overload, no-any-return]
+
+
+@pytest.mark.parametrize(
+    ("link", "dress"),
+    [
+        (pcap.DLT_LINUX_SLL, cooked),
+        (pcap.DLT_LINUX_SLL2, cooked_again),
+        (pcap.DLT_NULL, loopback),
+        (pcap.DLT_RAW, bytes),
+        (pcap.DLT_IPV4, bytes),
+    ],
+)
+@pytest.mark.parametrize("write", [as_pcap, as_pcapng])
+def test_other_links(
+    link: int, dress: Callable[[object], bytes], write: Callable[..., bytes]
+) -> None:
+    content = write([dress(packet(RUN))], link)
+    assert capture.from_bytes("trip", content) == [Datagram(f"packet 1 {ENDS}", RUN)]
+
+
+@pytest.mark.parametrize(("link", "dress"), [(pcap.DLT_EN10MB, on_ethernet), (pcap.DLT_RAW, bytes)])
+def test_ipv6(link: int, dress: Callable[[object], bytes]) -> None:
+    content = as_pcap([dress(packet(RUN, "::1", "fe80::2"))], link)
+    (datagram,) = capture.from_bytes("trip", content)
+    assert datagram == Datagram("packet 1 ::1:4002 > fe80::2:4001", RUN)
+
+
+def test_other_packets_are_passed_over() -> None:
+    other = packet(b"")
+    other.p, other.data = 6, tcp.TCP()
+    arp_packet = bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_ARP, data=arp.ARP()))
+    unknown = bytes(ethernet.Ethernet(type=0x9000, data=b"loop"))
+    content = as_pcap([arp_packet, unknown, on_ethernet(other), on_ethernet(packet(RUN))])
+    assert [each.where for each in capture.from_bytes("trip", content)] == [f"packet 4 {ENDS}"]
+
+
+def test_a_capture_without_udp_is_refused() -> None:
+    with pytest.raises(RobotError, match="trip: has no UDP packets"):
+        capture.from_bytes("trip", as_pcap([]))
+
+
+def test_an_unknown_link_is_named() -> None:
+    with pytest.raises(RobotError, match="trip: link type 105 is not known"):
+        capture.from_bytes("trip", as_pcap([b"x"], 105))
+
+
+def test_a_broken_packet_is_counted_to() -> None:
+    content = as_pcap([on_ethernet(packet(RUN)), b"\x01"])
+    with pytest.raises(RobotError, match="trip: broken after packet 2"):
+        capture.from_bytes("trip", content)
+
+
+def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dpkt", None)
+    with pytest.raises(RobotError, match="\\[inspect\\]"):
+        capture.from_bytes("trip", as_pcap([on_ethernet(packet(RUN))]))
+
+
+flips = st.lists(st.tuples(st.integers(4, 10_000), st.integers(1, 255)), max_size=3)
+
+
+@given(st.sampled_from([as_pcap, as_pcapng]), st.integers(4, 10_000), flips)
+def test_a_damaged_capture_is_read_or_refused(
+    write: Callable[..., bytes], length: int, changes: list[tuple[int, int]]
+) -> None:
+    """Nothing but ``RobotError`` comes out, and never an empty answer."""
+    damaged = bytearray(write([on_ethernet(packet(RUN)), on_ethernet(packet(VELOCITY))])[:length])
+    for at, change in changes:
+        damaged[4 + at % max(1, len(damaged) - 4) if len(damaged) > 4 else 0] ^= change
+    with contextlib.suppress(RobotError):
+        assert capture.from_bytes("trip", bytes(damaged))

@@ -1,0 +1,76 @@
+"""Buses of one robot on a real router, with a loop in a thread for their handlers."""
+
+import contextlib
+from collections.abc import Callable, Iterable
+from itertools import count
+from types import TracebackType
+from typing import Self
+
+import zenoh
+
+from common.bus.bus import Bus
+from common.bus.session import client_config
+from common.loop import Loop
+from verification.harness.support import at, running, wait_until
+
+_robots = count(1)
+
+
+class Rig:
+    """Opens what a test needs on the bus and closes it at the end."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.endpoint = endpoint
+        self.robot = f"r{next(_robots)}"
+        self.loop = Loop()
+        self._stack = contextlib.ExitStack()
+        self._running = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        self._running.enter_context(running(self.loop))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._running.close()  # first, for its timers put on the sessions
+        self._stack.close()
+
+    def bus(self, declare: Callable[[Bus], object] = lambda _: None) -> Bus:
+        """Open a bus with these declarations; it is connected on return."""
+        bus = Bus(at(self.endpoint), self.robot, self.loop.post)
+        declare(bus)
+        return self.opened(bus)
+
+    def opened(self, bus: Bus) -> Bus:
+        """Open a bus that has its declarations; it is connected on return."""
+        bus.open()
+        self._stack.callback(bus.close)
+        wait_until(lambda: bus.connected, "a session with the router")
+        return bus
+
+    def session(self) -> zenoh.Session:
+        """Open a bare session, as a stranger would."""
+        session: zenoh.Session = self._stack.enter_context(
+            zenoh.open(client_config(at(self.endpoint)))
+        )
+        return session
+
+
+def until_heard(put: Callable[[], object], heard: Callable[[], object], what: str) -> None:
+    """Put again and again until it is heard: what is put before all is declared is lost."""
+
+    def once() -> object:
+        put()
+        return heard()
+
+    wait_until(once, what)
+
+
+def rising(numbers: Iterable[int]) -> bool:
+    """Tell whether each is greater than the one before."""
+    found = list(numbers)
+    return found == sorted(set(found))

@@ -1,0 +1,53 @@
+"""A small service, run as ``python -m tests.common.example_service KIND [options]``.
+
+KINDs are plain, restless (never at rest), failing (once it is connected), refused (a port) and
+hanging (its loop, from a SIGUSR1 to the next).
+"""
+
+import signal
+import sys
+from collections.abc import Callable
+
+from common import keys
+from common.errors import LinkError
+from common.messages import Bumper
+from common.service import Node, run
+from common.settings import Shared
+
+
+def build(node: Node[Shared]) -> None:
+    """Publish the bumper, and go wrong as asked."""
+    kind = sys.argv[1]
+    if kind == "refused":
+        raise LinkError("port 4002 is taken")
+    bumper = node.bus.publisher(keys.BUMPER)
+
+    def tick(_: int) -> None:
+        bumper.put(Bumper(pressed=True))
+        if kind == "failing" and node.bus.connected:
+            raise RuntimeError("a bug of ours")
+
+    node.loop.every(0.05, tick)
+    if kind == "hanging":
+        node.loop.every(0.01, hang(node))
+    node.is_stopped = lambda: kind != "restless"
+    node.counters["resets"] += 1
+    node.event("built", "info", "all is built", count=3)
+
+
+def hang(node: Node[Shared]) -> Callable[[int], None]:
+    """Return a timer that does not return while it is told to hang."""
+    told: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, _: told.append(number))
+
+    def tick(_: int) -> None:
+        if len(told) % 2:
+            node.log.info("hangs")
+        while len(told) % 2:
+            signal.pause()
+
+    return tick
+
+
+if __name__ == "__main__":
+    sys.exit(run("specimen", Shared, build, sys.argv[2:]))

@@ -1,0 +1,262 @@
+"""Datagrams to frames and back: round trips, damage, garbage, resynchronisation."""
+
+from collections.abc import Sequence
+
+import crcmod.predefined
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import WireError
+from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCommand, MotionKind
+from common.wire.frame import Frame, Kinds, Side
+from common.wire.framing import Covers, Framing, Reason, Received, Rejected, crc_function
+from common.wire.header import HEADER, MAGIC, OPENING
+from common.wire.reports import FROM_BOARD, BumperReport, LedReport
+from verification.harness.frame_strategies import COMMANDS, REPORTS, commands, read_all, reports
+
+BOTH: list[tuple[Kinds, tuple[Frame, ...]]] = [(TO_BOARD, COMMANDS), (FROM_BOARD, REPORTS)]
+EACH = [(kinds, frame) for kinds, frames in BOTH for frame in frames]
+NAMES = [type(frame).__name__ for _, frame in EACH]
+
+framing = Framing()
+garbage = st.binary(max_size=12).filter(lambda raw: b"G" not in raw)
+
+
+def read(raw: bytes, kinds: Kinds) -> list[Received | Rejected]:
+    return read_all(framing, raw, kinds)
+
+
+def header(size: int, command: int, crc: int) -> bytes:
+    return HEADER.pack(OPENING.pack(MAGIC, size, command), crc)
+
+
+def frames(parts: Sequence[Received | Rejected]) -> list[Frame]:
+    return [part.frame for part in parts if isinstance(part, Received)]
+
+
+def rejected(parts: Sequence[Received | Rejected]) -> list[Reason]:
+    return [part.reason for part in parts if isinstance(part, Rejected)]
+
+
+# --- whole frames ---------------------------------------------------------------------------
+
+
+@given(commands)
+def test_every_command_comes_back(frame: Frame) -> None:
+    assert frames(read(framing.pack(frame), TO_BOARD)) == [frame]
+
+
+@given(reports)
+def test_every_report_comes_back(frame: Frame) -> None:
+    assert frames(read(framing.pack(frame), FROM_BOARD)) == [frame]
+
+
+@given(st.lists(st.tuples(garbage, reports), max_size=6), garbage)
+def test_frames_with_garbage_between_are_all_found(
+    pieces: list[tuple[bytes, Frame]], tail: bytes
+) -> None:
+    raw = b"".join(rubbish + framing.pack(frame) for rubbish, frame in pieces) + tail
+    parts = read(raw, FROM_BOARD)
+    assert frames(parts) == [frame for _, frame in pieces]
+    runs = sum(bool(rubbish) for rubbish, _ in pieces) + bool(tail)
+    assert rejected(parts) == [Reason.NO_MAGIC] * runs
+
+
+@given(st.lists(commands, min_size=1, max_size=6), st.sampled_from(["crc-16", "modbus", "xmodem"]))
+def test_any_crc_over_any_range(sent: list[Frame], crc: str) -> None:
+    ranges: tuple[Covers, ...] = ("payload", "header_and_payload")
+    for covers in ranges:
+        other = Framing(crc, covers)
+        raw = b"".join(other.pack(frame) for frame in sent)
+        assert frames(read_all(other, raw, TO_BOARD)) == sent
+
+
+def test_an_empty_datagram_holds_nothing() -> None:
+    assert read(b"", TO_BOARD) == []
+
+
+# --- damage ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
+def test_every_truncation_is_refused(kinds: Kinds, frame: Frame) -> None:
+    raw = framing.pack(frame)
+    for length in range(1, len(raw)):
+        (part,) = read(raw[:length], kinds)
+        assert isinstance(part, Rejected)
+        assert part.reason is (Reason.NO_MAGIC if length < 2 else Reason.TRUNCATED)
+
+
+@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
+def test_every_truncation_behind_a_whole_frame_is_refused(kinds: Kinds, frame: Frame) -> None:
+    raw = framing.pack(frame)
+    for length in range(1, len(raw)):
+        parts = read(raw + raw[:length], kinds)
+        assert frames(parts) == [frame]
+        assert rejected(parts) == [Reason.NO_MAGIC if length < 2 else Reason.TRUNCATED]
+
+
+@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
+def test_every_flipped_bit_of_a_payload_is_refused(kinds: Kinds, frame: Frame) -> None:
+    raw = framing.pack(frame)
+    for bit in range(HEADER.size * 8, len(raw) * 8):
+        damaged = bytearray(raw)
+        damaged[bit // 8] ^= 1 << bit % 8
+        parts = read(bytes(damaged), kinds)
+        assert parts[0].raw.startswith(MAGIC)
+        assert not frames(parts)
+        assert rejected(parts)[0] is Reason.BAD_CRC
+
+
+@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
+def test_a_crc_over_the_header_refuses_every_flipped_bit(kinds: Kinds, frame: Frame) -> None:
+    careful = Framing("crc-16", "header_and_payload")
+    raw = careful.pack(frame)
+    for bit in range(len(raw) * 8):
+        damaged = bytearray(raw)
+        damaged[bit // 8] ^= 1 << bit % 8
+        assert not frames(read_all(careful, bytes(damaged), kinds))
+
+
+def test_the_header_is_not_protected() -> None:
+    """An id that is flipped to another one of the same size is believed: nothing can tell."""
+    raw = bytearray(framing.pack(BumperReport(True)))
+    raw[4] ^= 1  # 0x7602 becomes 0x7603
+    assert [type(frame).__name__ for frame in frames(read(bytes(raw), FROM_BOARD))] == [
+        "UltrasonicBrakeReport"
+    ]
+
+
+@given(st.binary(max_size=80), st.booleans())
+def test_arbitrary_bytes_never_raise_and_none_is_lost(raw: bytes, to_board: bool) -> None:
+    read(raw, TO_BOARD if to_board else FROM_BOARD)
+
+
+headers = st.builds(
+    lambda size, command, crc, rest: header(size, command, crc) + rest,
+    st.integers(0, 40) | st.integers(0, 0xFFFF),
+    st.sampled_from(sorted(kind.frame.ID for kind in FROM_BOARD.values())) | st.integers(0, 0xFFFF),
+    st.just(0) | st.integers(0, 0xFFFF),
+    st.binary(max_size=24) | st.integers(0, 24).map(bytes),
+)
+
+
+@given(st.lists(headers, max_size=4), st.booleans())
+def test_almost_frames_never_raise_and_no_byte_is_lost(raw: list[bytes], to_board: bool) -> None:
+    read(b"".join(raw), TO_BOARD if to_board else FROM_BOARD)
+
+
+@given(reports, reports, st.data())
+def test_a_damaged_frame_does_not_take_the_next_one_along(
+    bad: Frame, good: Frame, data: st.DataObject
+) -> None:
+    raw = bytearray(framing.pack(bad))
+    at = data.draw(st.integers(HEADER.size, len(raw) - 1))
+    raw[at] ^= data.draw(st.integers(1, 255))
+    parts = read(bytes(raw) + framing.pack(good), FROM_BOARD)
+    assert frames(parts)[-1] == good
+    assert isinstance(parts[0], Rejected)
+
+
+# --- each reason ----------------------------------------------------------------------------
+
+
+def frame_bytes(command: int, payload: bytes, size: int | None = None) -> bytes:
+    """Return a frame with a right CRC and any id, payload and size field."""
+    crc = crc_function("crc-16")(payload)
+    size = HEADER.size + len(payload) if size is None else size
+    return header(size, command, crc) + payload
+
+
+QUERY = "DistanceQuery has 8 bytes, its header says"
+CRC = "header says 0x0001, the bytes give"
+KIND = "motion command is 3, allowed is 0 STOP, 1 RUN,"
+REASONS = [
+    (b"\x00\x01\x02", Reason.NO_MAGIC, "does not start with 47 53"),
+    (b"GS\x08\x00", Reason.TRUNCATED, "4 bytes of an 8-byte header"),
+    (
+        frame_bytes(0x7426, b"\x01")[:-1],
+        Reason.BAD_SIZE,
+        "MotionCommand has 13 bytes, its header says 9",
+    ),
+    (framing.pack(DriverQuery(Side.LEFT))[:-1], Reason.TRUNCATED, "8 of 9 bytes"),
+    (frame_bytes(0x1234, b""), Reason.UNKNOWN_ID, "id 0x1234"),
+    (frame_bytes(0x7600, b"", size=0), Reason.BAD_SIZE, f"{QUERY} 0"),
+    (frame_bytes(0x7600, b"", size=0xFFFF), Reason.BAD_SIZE, f"{QUERY} 65535"),
+    (b"GS\x08\x00\x00\x76\x01\x00", Reason.BAD_CRC, f"{CRC} 0x0000"),
+    (
+        frame_bytes(0x7605, b"\x02"),
+        Reason.BAD_VALUE,
+        "motor driver is 2, allowed is 0 left, 1 right",
+    ),
+    (frame_bytes(0x7426, b"\x03\0\0\0\0"), Reason.BAD_VALUE, f"{KIND} 2 BREAK"),
+]
+
+
+@pytest.mark.parametrize(("raw", "reason", "detail"), REASONS)
+def test_each_reason_is_named_with_its_detail(raw: bytes, reason: Reason, detail: str) -> None:
+    assert read(raw, TO_BOARD) == [Rejected(reason, raw, detail)]
+
+
+@pytest.mark.parametrize(("raw", "reason", "detail"), REASONS)
+def test_each_reason_is_the_same_behind_a_frame(raw: bytes, reason: Reason, detail: str) -> None:
+    whole = framing.pack(DistanceQuery())
+    parts = read(whole + raw, TO_BOARD)
+    assert parts == [Received(DistanceQuery(), whole), Rejected(reason, raw, detail)]
+
+
+def test_every_reason_is_covered() -> None:
+    assert {reason for _, reason, _ in REASONS} == set(Reason)
+
+
+def test_reading_goes_on_at_the_next_magic_inside_a_bad_frame() -> None:
+    inner = framing.pack(DistanceQuery())
+    outer = frame_bytes(0x1234, inner)
+    parts = read(outer, TO_BOARD)
+    assert rejected(parts) == [Reason.UNKNOWN_ID]
+    assert frames(parts) == [DistanceQuery()]
+
+
+def test_a_magic_inside_a_good_payload_is_payload() -> None:
+    frame = MotionCommand(MotionKind.RUN, int.from_bytes(b"GS", "little"), 0)
+    assert MAGIC in frame.to_bytes()
+    assert frames(read(framing.pack(frame), TO_BOARD)) == [frame]
+
+
+def test_half_a_magic_at_the_end_is_no_magic() -> None:
+    assert rejected(read(framing.pack(DistanceQuery()) + b"G", TO_BOARD)) == [Reason.NO_MAGIC]
+
+
+def test_a_frame_of_the_other_direction_is_refused() -> None:
+    assert rejected(read(framing.pack(LedReport(True)), TO_BOARD)) == [Reason.BAD_SIZE]
+
+
+# --- CRC ------------------------------------------------------------------------------------
+
+
+def test_the_check_value_of_crc_16_arc() -> None:
+    assert crc_function("crc-16")(b"123456789") == 0xBB3D
+
+
+def test_an_unknown_crc_is_refused() -> None:
+    with pytest.raises(WireError, match="no CRC is called 'crc-17'"):
+        Framing("crc-17")
+
+
+@pytest.mark.parametrize(("name", "bits"), [("crc-8", 8), ("crc-32", 32), ("crc-64", 64)])
+def test_a_crc_of_another_width_is_refused(name: str, bits: int) -> None:
+    with pytest.raises(WireError, match=f"has {bits} bits, the header has room for 16"):
+        Framing(name)
+
+
+def test_a_crc_of_24_bits_is_refused() -> None:
+    assert crcmod.predefined.PredefinedCrc("crc-24").digest_size == 3
+    with pytest.raises(WireError, match="24 bits"):
+        Framing("crc-24")
+
+
+def test_the_crc_field_counts_as_zero_when_the_header_is_covered() -> None:
+    raw = Framing("crc-16", "header_and_payload").pack(DistanceQuery())
+    expected = crc_function("crc-16")(bytes.fromhex("4753080000760000"))
+    assert raw[6:8] == expected.to_bytes(2, "little")

@@ -1,1 +1,0 @@
-"""The containers as compose.yaml has them, on a real Docker engine: ``python -m tests.compose``."""

@@ -1,0 +1,92 @@
+"""What else is on the bus of a dashboard under test."""
+
+import time
+
+from common import keys
+from common.bus.bus import Bus
+from common.freshness import S
+from common.loop import Loop
+from common.messages import Cause, Drive, Release
+from tests.teleop.support import safety_state
+from verification.harness.dashboard import Eye
+from verification.harness.support import PATIENCE_S, wait_until
+
+HOLD = {"x": 1.0, "y": 0.0}
+
+
+class World:
+    """What else is on the bus: a safety that runs, and ears for what is asked."""
+
+    def __init__(self, loop: Loop) -> None:
+        self.requests: list[Drive] = []
+        self.estops: list[int] = []
+        self.stops_elsewhere: list[int] = []
+        self.alive: list[str] = []
+        self.safe = True
+        self.latched: tuple[str, ...] = ()
+        self.causes: tuple[Cause, ...] = ()
+        self.release: Release | None = None
+        self.boot = 0  # of safety
+        self._loop = loop
+
+    def declare(self, bus: Bus) -> None:
+        self.boot = bus.boot
+        state = bus.publisher(keys.SAFETY)
+        bus.subscribe(
+            keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
+        )
+        bus.on_any(keys.estop_key("001"), self.estops.append)
+        bus.on_any(keys.estop_key("one-more"), self.stops_elsewhere.append)
+        bus.watch_live(
+            keys.live_key("001", "dashboard", "*"), lambda key, _: self.alive.append(key)
+        )
+        bus.live(keys.live_key("two words", "bridge", "x"))
+        bus.live(keys.live_key("002", "bridge", "x"))
+        bus.live(keys.live_key("one-more", "bridge", "x"))
+
+        def tell(now_ns: int) -> None:
+            if self.safe:
+                state.put(
+                    safety_state(
+                        heartbeat=now_ns,
+                        latched=self.latched,
+                        causes=self.causes,
+                        release=self.release,
+                    )
+                )
+
+        self._loop.post(lambda: self._loop.every(0.05, tell))
+
+    def quiet(self) -> None:
+        """Wait until no stop has come for a second."""
+        count, since_ns = len(self.estops), time.monotonic_ns()
+
+        def over() -> bool:
+            nonlocal count, since_ns
+            if len(self.estops) != count:
+                count, since_ns = len(self.estops), time.monotonic_ns()
+            return time.monotonic_ns() - since_ns > S
+
+        wait_until(over, "no more stops")
+
+    def moving(self) -> bool:
+        return bool(self.requests) and self.requests[-1].linear > 0
+
+    def zeros(self) -> int:
+        """Return how many zeros came last."""
+        count = 0
+        while count < len(self.requests) and not self.requests[-1 - count].linear:
+            count += 1
+        return count
+
+
+def drive(it: Eye, world: World) -> None:
+    """Answer every picture with a push, until requests to move go out."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not world.moving():
+        assert time.monotonic() < deadline, "nothing was ever asked"
+        picture = it.look()
+        if picture["hands"]["grip"] == "lapsed":
+            it.say("free")  # this machine held somebody up
+        else:
+            it.say("hold", n=picture["n"], **HOLD)

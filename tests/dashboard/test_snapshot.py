@@ -1,0 +1,167 @@
+"""What is shown, from what was heard and when."""
+
+import json
+import math
+from typing import Any
+
+import msgspec
+import pytest
+
+from common import keys
+from common.freshness import S
+from common.messages import (
+    Bumper,
+    Cause,
+    Drive,
+    Driver,
+    Event,
+    Health,
+    Limits,
+    Link,
+    Motion,
+    Odometry,
+    Release,
+    SafetyState,
+    Switches,
+    Ultrasonic,
+    Velocity,
+)
+from common.settings import Vehicle
+from services.dashboard import snapshot
+from services.dashboard.driver_lock import Grip, Wheel
+from services.dashboard.sectors import Protection
+from services.dashboard.telemetry_cache import Heard
+
+AT = 100 * S
+RELEASE = Release(
+    believed_free="backward", travelled=0.41, age=2.0, forbidden=("forward",), left=0.1
+)
+
+
+def full() -> Heard:
+    """Return a robot of which everything was heard at ``AT``."""
+    heard = Heard()
+    causes = (Cause(name="contact", action="brake", age=2.0, text="The bumper was hit."),)
+    for path, message in {
+        "tel/bridge/velocity": Velocity(linear=0.5, angular=0.1),
+        "tel/bridge/ultrasonic": Ultrasonic(ranges=(1.0,) * 8, status=("ok",) * 8),
+        "tel/bridge/bumper": Bumper(pressed=True),
+        "tel/bridge/link": Link(
+            state="up", board="b:1", epoch=0, armed=True, waiting="", rates={}, rejected={},
+            round_trip=None,
+        ),
+        "tel/bridge/driver/left": Driver(faults=("encoder",), bits=4),
+        "tel/bridge/switches": Switches(ultrasonic_brake=True, bumper_brake=False),
+        "tel/odom/odometry": Odometry(
+            x=1.0, y=2.0, heading=0.3, linear=0.5, angular=0.1, pose_covariance=(0.0,) * 9,
+            twist_covariance=(0.0,) * 4, epoch=3, residual=None, slip=False,
+        ),
+        "tel/safety/state": SafetyState(
+            verdict="brake", latched=("contact",), causes=causes, source="nav",
+            limits=Limits(forward=0.0, backward=0.4, angular=0.2), heartbeat=1, text="Hit.",
+            release=RELEASE,
+        ),
+        "@cmd/drive/nav": Drive(linear=0.7, angular=0.2, echo=1),
+        "@cmd/drive/web": Drive(linear=0.1, angular=0.0, echo=1),
+        "@cmd/motion": Motion(command="brake"),
+        "tel/safety/health": Health(
+            service="safety", version="0.1", uptime=9.0, rates={},
+            counters={"late": 2, "overrun": 0}, lateness=0.001, rss=1000,
+        ),
+    }.items():  # fmt: skip
+        heard.hear(path, message, AT)
+    heard.lives("t2/v1/001/live/odom/x", True)
+    return heard
+
+
+def now(heard: Heard, wheel: Wheel | None = None, at: int = AT) -> snapshot.Now:
+    return snapshot.now(
+        heard,
+        wheel or Wheel(0.3),
+        at,
+        number=7,
+        names={"1": "Ada"},
+        connected=True,
+        vehicle=Vehicle(),
+        protection=Protection(),
+    )
+
+
+def test_what_moves() -> None:
+    seen = now(full())
+    assert (seen.n, seen.connected, seen.link, seen.bumper) == (7, True, "up", True)
+    assert (seen.measured, seen.allowed) == ((0.5, 0.1), (0.0, 0.0))
+    assert (seen.pose, seen.epoch) == ((1.0, 2.0, 0.3), 3)
+    assert seen.tones == ("slow",) * 8
+    assert seen.wheels[0] > 0
+    assert seen.safety is not None
+    assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
+    assert seen.safety.release == RELEASE
+    assert seen.hands == snapshot.Hands(None, "", Grip.FREE, 1)
+
+
+def test_what_is_asked_is_of_the_source_that_drives() -> None:
+    assert now(full()).asked == (0.7, 0.2)
+
+
+def test_who_drives() -> None:
+    wheel = Wheel(0.3)
+    wheel.take("1", force=False)
+    wheel.shift("1", 3)
+    assert now(full(), wheel).hands == snapshot.Hands("1", "Ada", Grip.FREE, 3)
+
+
+@pytest.mark.parametrize("heard", [Heard(), full()], ids=["never", "long ago"])
+def test_what_is_not_fresh_is_not_shown(heard: Heard) -> None:
+    seen = now(heard, at=AT + 10 * S)
+    known = (seen.measured, seen.asked, seen.allowed, seen.pose, seen.bumper, seen.link)
+    assert known == (None,) * 6
+    assert seen.safety is None
+    assert seen.tones == ("dark",) * 8
+    assert seen.wheels == (0.0,) * 4
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_what_is_no_number_is_not_shown(number: float) -> None:
+    heard = full()
+    heard.hear("tel/bridge/velocity", Velocity(linear=0.1, angular=number), AT)
+    heard.hear("tel/bridge/ultrasonic", Ultrasonic(ranges=(number,) * 8, status=("ok",) * 8), AT)
+    seen = now(heard)
+    assert (seen.measured, seen.ranges) == (None, (None,) * 8)
+    assert seen.tones == ("dark",) * 8
+    assert seen.wheels == (0.0,) * 4
+
+
+def test_nobody_drives_and_nothing_is_asked() -> None:
+    heard = full()
+    state = heard.newest(keys.SAFETY, AT)
+    assert state is not None
+    heard.hear("tel/safety/state", msgspec.structs.replace(state, source=None), AT)
+    assert now(heard).asked is None
+
+
+def test_what_stands_still() -> None:
+    seen = snapshot.rest(full(), {"001": True}, {"1": "Ada"}, Protection(), AT)
+    assert [(it.name, it.instances, it.version) for it in seen.services] == [
+        ("odom", 1, ""),
+        ("safety", 0, "0.1"),
+    ]
+    assert seen.services[1].troubles == {"late": 2}
+    assert seen.left is not None
+    assert (seen.left.bits, seen.right) == (4, None)
+    assert seen.switches == Switches(ultrasonic_brake=True, bumper_brake=False)
+    assert {it.age for it in seen.streams} == {0.0}
+
+
+def test_the_events() -> None:
+    heard = full()
+    heard.note("safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * S))
+    assert snapshot.told(heard) == [snapshot.Told(2.0, "safety", "stop", "warning", "Stopped.")]
+
+
+def test_it_is_small_json() -> None:
+    coded = msgspec.json.encode(now(full()))
+    read: dict[str, Any] = json.loads(coded)
+    assert read["k"] == "now"
+    assert read["safety"]["causes"][0]["name"] == "contact"
+    assert len(coded) < 1500  # 20 of them a second to each viewer

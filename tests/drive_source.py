@@ -1,0 +1,69 @@
+"""A program that asks to move the whole chain, and what the board was told meanwhile."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.source import DriveSource
+from verification.harness.stack import Chain, chain
+from verification.harness.support import bus_on, running, wait_until
+
+
+@pytest.fixture
+def stack(tmp_path: Path) -> Iterator[Chain]:
+    with chain(tmp_path) as it:
+        yield it
+
+
+class Stick:
+    """A source that asks without a pause: unlike a held key, it is never let go by mistake."""
+
+    def __init__(self, loop: Loop) -> None:
+        self.linear = 0.0
+        self._loop = loop
+
+    def declare(self, bus: Bus) -> None:
+        source = DriveSource(bus, "teleop")
+
+        def ask(_: int) -> None:
+            source.ask(self.linear, 0.0)
+
+        self._loop.post(lambda: self._loop.every(0.05, ask))
+
+
+@pytest.fixture
+def stick(stack: Chain) -> Iterator[Stick]:
+    with running(Loop()) as loop:
+        stick = Stick(loop)
+        with bus_on(stack.endpoint, loop, stick.declare):
+            yield stick
+
+
+def push(stack: Chain, stick: Stick) -> None:
+    """Push the stick until the vehicle moves; center it first when safety wants a neutral."""
+    for _ in range(10):
+        stick.linear = 0.0
+        centered = partial(kinds_since, stack, len(stack.trace().commands))
+        wait_until(lambda: "run" in centered(), "a neutral is taken")  # noqa: B023
+        stick.linear = 0.5
+        try:
+            wait_until(lambda: stack.speed() > 0.1, "the vehicle moves", patience_s=6)
+        except AssertionError:
+            continue
+        return
+    raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
+
+
+def kinds_since(stack: Chain, count: int) -> set[str]:
+    """Return what was commanded after that many commands."""
+    return {command.kind for command in stack.trace().commands[count:]}
+
+
+def moves_since(stack: Chain, count: int) -> bool:
+    """Return whether one of the hundred commands after the first ``count`` moves the vehicle."""
+    wait_until(lambda: len(stack.trace().commands) > count + 100, "a hundred commands")
+    return any(c.kind == "run" and (c.linear or c.angular) for c in stack.trace().commands[count:])

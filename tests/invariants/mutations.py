@@ -1,0 +1,312 @@
+"""Protections taken out one by one, and what the judge then objects to."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from common import keys
+from common import messages as m
+from common.freshness import S
+from common.wire.frame import Side
+from common.wire.framing import Framing
+from common.wire.reports import BumperReport
+from services.bridge import lease as leases
+from services.bridge import link as links
+from services.bridge.core import Core
+from services.bridge.lease import Lease, Order
+from services.bridge.output import Send
+from services.bridge.readiness import Readiness
+from services.safety import conditions, latches
+from services.safety.arbiter import Arbiter
+from services.safety.inputs import Inputs
+from services.safety.service import Ports
+from services.safety.twist import Twist
+from services.safety.zones import Zones
+from sim.vehicle import Twist as Rolling
+from tests.invariants.net import Letter, Weather
+from tests.invariants.process import ROBOT, DriveEnd
+from tests.invariants.stack import Stack
+
+# What is taken out, by what; the scenario in which that matters; the judge's objection.
+Breakage = tuple[object, str, object, Callable[[Stack], None], str]
+
+
+def driving(linear: float = 0.5) -> Stack:
+    """Return a stack that drives as teleop asks."""
+    stack = Stack()
+    stack.run(700)
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(700)
+    stack.sticks["teleop"].asks = (linear, 0.0)
+    stack.run(1500)
+    assert stack.vehicle.twist.linear == pytest.approx(linear, abs=0.05)
+    return stack
+
+
+def hold(stack: Stack, direction: m.Direction = "backward") -> None:
+    """Hold the release for a while."""
+    for _ in range(10):
+        stack.hold(True, direction)
+        stack.run(60)
+
+
+def safety_dies(stack: Stack) -> None:
+    stack.kill("safety", 5000)
+
+
+def estop(stack: Stack) -> None:
+    stack.estop()
+    stack.run(700)
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(700)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+
+
+def board_freezes(stack: Stack) -> None:
+    stack.vehicle.freeze(400)
+
+
+def wall(stack: Stack) -> None:
+    stack.vehicle.ranges[2] = 250
+
+
+def hit_while_a_run_is_under_way(stack: Stack) -> None:
+    stack.net.weather["motion"] = Weather(late_ms=60)
+    stack.run(300)
+    stack.vehicle.pressed = True
+
+
+def motions_get_lost(stack: Stack) -> None:
+    """Let the bridge's lease end without safety hearing of it in time."""
+    stack.net.weather.update(streams=Weather(late_ms=120), motion=Weather(lose=1))
+    stack.run(250)
+    stack.net.weather.pop("motion")
+
+
+def board_freezes_and_safety_hears_late(stack: Stack) -> None:
+    """Let the board be back before safety has missed its samples."""
+    stack.net.weather["streams"] = Weather(late_ms=120)
+    stack.run(300)
+    stack.vehicle.freeze(240)
+
+
+def brakes_go_off_and_on(stack: Stack) -> None:
+    """Let safety hear too late that the board's brake was off."""
+    stack.net.weather["streams"] = Weather(late_ms=120)
+    stack.run(300)
+    for on, ms in ((False, 60), (True, 60)):
+        assert stack.switches(on=on)
+        stack.run(ms)
+
+
+HIT = Framing().pack(BumperReport(True))
+
+
+def claims_to_brake(core: Core, datagram: bytes) -> Send | None:
+    return Send(b"", core.port) if HIT in datagram else None
+
+
+def still_armed(lease: Lease, ready: bool) -> Lease:
+    return replace(lease, ready=ready)
+
+
+def safety_dies_latched(stack: Stack) -> None:
+    stack.estop()
+    stack.kill("safety", 20)
+    stack.run(1500)
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(700)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+
+
+def reset_too_early(stack: Stack) -> None:
+    """Reset a driver's fault after its first good sample; they come twice a second."""
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(1500)
+    stack.vehicle.fault(Side.LEFT, 1)
+    stack.run(20)
+    stack.vehicle.fault(Side.LEFT, 0)
+    stack.run(600)
+    stack.reset()
+    stack.run(300)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+
+
+def driver_blinks(stack: Stack) -> None:
+    """Let a driver report a fault and its end in one breath."""
+    for bits in (1, 0):
+        stack.vehicle.fault(Side.LEFT, bits)
+    stack.vehicle.say(stack.vehicle.board.driver(Side.LEFT))
+
+
+def at_the_next_tick(ports: Ports, field: str, *, at_once: bool = False) -> Any:
+    return KEEP(ports, field)
+
+
+def velocities_fall_silent(stack: Stack) -> None:
+    stack.vehicle.tells_velocity = False
+
+
+def reset_without_a_velocity(stack: Stack) -> None:
+    """Let the velocity dry up while the vehicle stands, and reset."""
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(1500)
+    stack.estop()
+    stack.vehicle.tells_velocity = False
+    stack.run(1000)
+    stack.reset()
+    stack.vehicle.tells_velocity = True
+    stack.run(1000)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+
+
+def however_old(inputs: Inputs, *_: object) -> Twist | None:
+    return inputs.measured
+
+
+def successor(stack: Stack, hear: Callable[[Callable[[Letter], None], Letter], None]) -> None:
+    """Let safety die of an emergency stop; the next one hears of the link by ``hear``."""
+    stack.estop()
+    stack.kill("safety", 20)
+    stack.run(25)
+    (ear,) = [
+        ear for ear in stack.net.ears
+        if ear.owner is stack.safety and ear.hears(keys.LINK.on(ROBOT))
+    ]  # fmt: skip
+    take = ear.take
+    ear.take = lambda letter: hear(take, letter)
+
+
+def successor_hits_something(stack: Stack) -> None:
+    """Let it latch a contact before it hears of the link, and creep off."""
+    deaf_until_ns = stack.net.now_ns + S
+
+    def late(take: Callable[[Letter], None], letter: Letter) -> None:
+        if stack.net.now_ns > deaf_until_ns:
+            take(letter)
+
+    successor(stack, late)
+    stack.vehicle.measured = Rolling(0.2)  # still, so that a way off is known
+    stack.run(40)
+    stack.vehicle.pressed, stack.vehicle.measured = True, None
+    stack.sticks["teleop"].asks = None
+    stack.run(2500)
+    hold(stack)
+
+
+def successor_hears_of_no_latch(stack: Stack) -> None:
+    """Let what it hears of the link be older than the latch."""
+
+    def old(take: Callable[[Letter], None], letter: Letter) -> None:
+        assert isinstance(letter.message, m.Link)
+        take(
+            dataclasses.replace(
+                letter, message=replace(letter.message, latched_by=None, armed=True)
+            )
+        )
+
+    successor(stack, old)
+    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.run(1500)
+    stack.sticks["teleop"].asks = (0.5, 0.0)
+
+
+def overwritten(lease: Lease, motion: m.Motion) -> int | None:
+    if motion.latched:
+        return motion.boot
+    return None if lease.latched_by == motion.boot else lease.latched_by
+
+
+def whoever(lease: Lease, motion: m.Motion) -> Any:
+    order, refusal = ORDER(replace(lease, latched_by=None), motion)
+    return order, refusal
+
+
+def untold(lease: Lease, motion: m.Motion, *rest: Any, **more: Any) -> Any:
+    return ON_MOTION(lease, replace(motion, latched=False), *rest, **more)
+
+
+def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
+    return replace(EXPIRE(lease, now_ns, lease_ns), neutral=lease.neutral)
+
+
+def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
+    return replace(lease, sent_ns=now_ns), Order.BRAKE
+
+
+def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
+    """Take what comes through the router, too."""
+    link._process.subscribe(topic, handler, **names)
+
+
+def authority_is_copied(stack: Stack) -> None:
+    hand = stack.hand
+    copy = m.Motion(command="run", linear=0.9, seq=2**19, boot=stack.safety.boot)
+    hand.send(Letter(keys.MOTION.on(ROBOT), copy, hand.boot, stack.net.now_ns))
+
+
+ORDER = leases._order
+EXPIRE, ON_MOTION, KEEP = leases.expire, leases.on_motion, Ports._keep
+
+
+BREAKAGES: dict[str, Breakage] = {
+    "the bridge's lease never ends": (
+        leases, "expire", lambda lease, *_: lease, safety_dies, "a RUN is held",
+    ),
+    "latches clear by time": (
+        latches, "_is_over", lambda *_: True, estop, "safety knows of estop",
+    ),
+    "no neutral after a return": (
+        Arbiter, "disarmed", lambda self: self, board_freezes, "was not neutral",
+    ),
+    "no neutral after a lease": (
+        leases, "expire", still_neutral, motions_get_lost, "no neutral motion came",
+    ),
+    "silence is not noticed": (
+        links, "on_tick", lambda link, *_: link, board_freezes_and_safety_hears_late,
+        "the board is silent",
+    ),
+    "brakes that are off": (
+        Readiness, "ready", property(lambda self: self.link.state == "up"), brakes_go_off_and_on,
+        "its brakes are not both on",
+    ),
+    "no neutral after brakes that were off": (
+        leases, "on_ready", still_armed, brakes_go_off_and_on, "no neutral motion came",
+    ),
+    "the bridge remembers no latch": (
+        leases, "on_motion", untold, safety_dies_latched, "bridge knows of estop",
+    ),
+    "a reset clears what is not gone": (
+        latches, "GOOD_SAMPLES", 0, reset_too_early, "safety knows of driver",
+    ),
+    "no input is too old": (
+        conditions, "_is_old", lambda *_: False, velocities_fall_silent, "old velocity",
+    ),
+    "an old velocity is as good as a new one": (
+        Inputs, "known_velocity", however_old, reset_without_a_velocity, "safety knows of estop",
+    ),
+    "samples are not decided upon one by one": (
+        Ports, "_keep", at_the_next_tick, driver_blinks, "safety knows of driver",
+    ),
+    "a successor's own latch hides the one that is due": (
+        leases, "_latched_by", overwritten, successor_hits_something, "safety knows of estop",
+    ),
+    "a successor need not know of the latch": (
+        leases, "_order", whoever, successor_hears_of_no_latch, "bridge knows of estop",
+    ),
+    "the margin is ignored": (
+        Zones, "allowed", lambda *_: 1.0, wall, "toward sonar 2",
+    ),
+    "a hit needs no judgement": (
+        leases, "on_hit", unjudged, hit_while_a_run_is_under_way, "bridge knows of contact",
+    ),
+    "the drive link takes messages of the router": (
+        DriveEnd, "subscribe", from_anybody, authority_is_copied, "a RUN that no safety sent",
+    ),
+    "the reflex does not brake": (
+        Core, "reflex", claims_to_brake, hit_while_a_run_is_under_way, "without a BREAK",
+    ),
+}  # fmt: skip

@@ -1,0 +1,80 @@
+"""What a 3D panel draws."""
+
+import math
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.messages import SONAR_NAMES, Event, Message
+from common.settings import Vehicle
+from services.recorder.foxglove_views import Views
+from services.recorder.schema import Schema
+from tests.recorder import samples
+
+VEHICLE = Vehicle(length=1.0, width=0.6)
+AT_NS = 1_700_000_000_250_000_000
+
+
+def drawn(message: Message, service: str = "") -> dict[str, tuple[Schema, dict[str, Any]]]:
+    views = Views(VEHICLE).of(message, service, AT_NS)
+    return {topic: (kind, fields) for topic, kind, fields in views}
+
+
+@pytest.mark.parametrize(
+    "message",
+    [samples.odometry(), samples.ultrasonic(), Event(name="a", level="info", text="b")],
+)
+def test_each_has_what_its_schema_says(message: Message) -> None:
+    assert drawn(message)
+    for kind, fields in drawn(message).values():
+        assert fields.keys() == msgspec.json.decode(kind.data)["properties"].keys()
+        assert fields["timestamp"] == {"sec": 1_700_000_000, "nsec": 250_000_000}
+
+
+def test_the_pose_is_turned_by_its_heading() -> None:
+    made = drawn(samples.odometry(x=3.0, heading=math.pi / 2))
+    pose = made["foxglove/pose"][1]["pose"]
+    assert pose["position"] == {"x": 3.0, "y": 2.0, "z": 0.0}
+    half = math.sqrt(0.5)
+    assert pose["orientation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": half, "w": half})
+    transform = made["foxglove/tf"][1]
+    assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("odom", "base_link")
+    assert (transform["translation"], transform["rotation"]) == tuple(pose.values())
+
+
+def test_covariances_are_of_x_y_and_the_turn() -> None:
+    fields = drawn(samples.odometry())["foxglove/odometry"][1]
+    assert fields["linear_velocity"]["x"] == 0.5
+    assert fields["angular_velocity"]["z"] == -0.25
+    pose = fields["pose_covariance"]
+    assert [pose[0], pose[1], pose[5]] == [1.0, 2.0, 3.0]
+    assert [pose[30], pose[31], pose[35]] == [7.0, 8.0, 9.0]
+    twist = fields["velocity_covariance"]
+    assert [twist[0], twist[5], twist[30], twist[35]] == [10.0, 11.0, 12.0, 13.0]
+    assert (sum(pose), sum(twist), len(pose), len(twist)) == (45.0, 46.0, 36, 36)
+
+
+def test_a_pose_that_is_no_number_is_not_drawn() -> None:
+    assert drawn(samples.odometry(x=math.nan)) == {}
+
+
+def test_each_sonar_is_a_scan_where_it_sits() -> None:
+    made = drawn(samples.ultrasonic())
+    assert list(made) == [f"foxglove/sonar/{name}" for name in SONAR_NAMES]
+    left = made["foxglove/sonar/left"][1]
+    assert left["pose"]["position"] == {"x": 0.0, "y": 0.3, "z": 0.0}
+    assert set(left["ranges"]) == {1.0}
+    assert left["start_angle"] == -left["end_angle"] < 0
+    assert made["foxglove/sonar/front_left"][1]["ranges"] == []
+
+
+def test_an_event_is_a_line_of_the_log() -> None:
+    event = Event(name="contact", level="error", text="the bumper is hit")
+    line = drawn(event, "bridge")["foxglove/log"][1]
+    assert (line["level"], line["name"]) == (4, "bridge")
+    assert line["message"] == "contact: the bumper is hit"
+
+
+def test_the_rest_is_not_drawn() -> None:
+    assert drawn(samples.velocity()) == {}

@@ -1,0 +1,114 @@
+"""Samples to JSON and back to the very bytes."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common import codec
+from common.errors import MessageError
+from common.messages import Velocity
+from common.sample import Sample
+from common.settings import Vehicle
+from services.recorder.mcap_codec import JSON, Channel, Entry, Translator, to_sample
+from tests.recorder import samples
+from tests.recorder.samples import BEGIN_NS, bare, sample
+
+TRANSLATOR = Translator(Vehicle())
+VELOCITY = "tel/bridge/velocity"
+
+
+def entry(it: Sample) -> Entry:
+    """Return the message itself, without what is drawn of it."""
+    return next(TRANSLATOR.entries(it, it.wall_ns))
+
+
+def test_a_message_is_plain_json_with_its_schema() -> None:
+    made = entry(sample(VELOCITY, samples.velocity(seq=2**32 + 7)))
+    assert msgspec.json.decode(made.data, type=Velocity) == samples.velocity(seq=2**32 + 7)
+    assert set(msgspec.json.decode(made.data)) == set(Velocity.__struct_fields__)
+    assert made.channel.schema is not None
+    assert made.channel.schema.name == "t2.v1.Velocity"
+    assert (made.log_ns, made.publish_ns, made.sequence) == (BEGIN_NS, BEGIN_NS - 5, 7)
+
+
+@pytest.mark.parametrize(
+    "it",
+    [
+        sample(VELOCITY, samples.velocity()),
+        sample(VELOCITY, samples.velocity(), raw=b"\x00\xff"),
+        sample(VELOCITY, samples.velocity(), raw=b""),
+        sample(VELOCITY, samples.velocity(math.nan)),
+        sample(VELOCITY, samples.velocity(math.inf)),
+        sample("tel/odom/odometry", samples.odometry()),
+        bare("estop", b""),
+        bare("estop", b"", deleted=True),
+        bare("estop", b"now", "text/plain"),
+        bare("tel/mine", b'{"a": 1}', JSON),
+        bare("tel/mine", b'{"a":1}', JSON),
+        bare("tel/mine", b'{"a"', JSON),
+        bare("tel/mine", msgspec.msgpack.encode([1, 2])),
+        bare("tel/mine", msgspec.msgpack.encode({1: 2})),
+        bare("tel/mine", msgspec.msgpack.encode({"a": b"bytes"})),
+        bare("tel/mine", msgspec.msgpack.encode({"_raw": "mine"})),
+        bare("tel/mine", msgspec.msgpack.encode({"x": msgspec.msgpack.Ext(5, b"x")})),
+        bare("tel/mine", b"\x81\xa1a\xca\x3f\x80\x00\x00"),  # a float of 32 bits
+        bare("tel/mine", b"\xdf\x00\x00\x00\x00"),  # an empty map, said at length
+        bare("tel/mine", b"\x91" * 3000 + b"\x90"),  # deeper than anybody reads
+        bare(VELOCITY, b"\xc1", codec.encoding(Velocity)),
+    ],
+    ids=repr,
+)
+def test_the_very_bytes_come_back(it: Sample) -> None:
+    back = to_sample(entry(it))
+    assert (back.key, back.payload, back.encoding) == (it.key, it.payload, it.encoding)
+    assert (back.raw, back.deleted) == (it.raw, it.deleted)
+    assert back.wall_ns == it.wall_ns
+
+
+@given(payload=st.binary(max_size=60), raw=st.none() | st.binary(max_size=9), deleted=st.booleans())
+def test_any_bytes_come_back(payload: bytes, raw: bytes | None, deleted: bool) -> None:
+    for encoding in ("", JSON, codec.encoding(Velocity)):
+        back = to_sample(entry(bare("tel/mine", payload, encoding, raw=raw, deleted=deleted)))
+        assert (back.payload, back.raw, back.deleted) == (payload, raw, deleted)
+
+
+def test_bytes_stand_beside_the_fields_only_where_they_are_needed() -> None:
+    plain = entry(sample(VELOCITY, samples.velocity()))
+    odd = entry(sample(VELOCITY, samples.velocity(math.nan)))
+    assert b"_payload" not in plain.data
+    assert msgspec.json.decode(odd.data)["linear"] is None
+    assert b"_payload" in odd.data
+
+
+def test_what_is_none_of_ours_has_no_schema() -> None:
+    made = entry(bare("tel/mine", msgspec.msgpack.encode({"celsius": 21.5}), "application/msgpack"))
+    assert made.channel.schema is None
+    assert msgspec.json.decode(made.data) == {"celsius": 21.5}
+
+
+@pytest.mark.parametrize("wrong", [{"t_ns": -1, "seq": "x"}, {"t_ns": 2**63, "seq": -1}, {}])
+def test_a_header_that_a_file_cannot_hold_is_left_out(wrong: dict[str, object]) -> None:
+    made = entry(bare("tel/mine", msgspec.msgpack.encode(wrong)))
+    assert (made.publish_ns, made.sequence) == (BEGIN_NS, 0)
+
+
+def test_what_is_drawn_follows_and_is_marked() -> None:
+    it = sample("evt/safety", samples.state())
+    assert [each.channel.drawn for each in TRANSLATOR.entries(it, 5)] == [False]
+    it = sample("tel/odom/odometry", samples.odometry())
+    assert [each.channel.drawn for each in TRANSLATOR.entries(it, 5)] == [False, True, True, True]
+
+
+def test_a_damaged_message_is_kept_and_not_drawn() -> None:
+    it = bare("tel/odom/odometry", b"\x81\xa1x\x05", codec.encoding(type(samples.odometry())))
+    (only,) = TRANSLATOR.entries(it, 5)
+    assert msgspec.json.decode(only.data) == {"x": 5}
+
+
+@pytest.mark.parametrize("data", [b"[]", b"{", b'{"_payload": "?"}', b'{"_raw": 5}'])
+def test_what_the_recorder_never_wrote_is_refused(data: bytes) -> None:
+    with pytest.raises(MessageError, match="no message of the recorder"):
+        to_sample(Entry(Channel("a/key", None), data, 0, 0))

@@ -1,0 +1,142 @@
+"""Files, whole and cut at any place."""
+
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from common.errors import RobotError
+from common.freshness import S
+from common.messages import Odometry, Velocity
+from common.settings import Vehicle
+from services.recorder.mcap_codec import Translator
+from services.recorder.reader import Reader, Recorded
+from services.recorder.writer import Recording
+from tests.recorder import samples
+from tests.recorder.samples import BEGIN_NS, bare, sample
+
+TRANSLATOR = Translator(Vehicle())
+CHUNKS, EACH = 5, 20
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A whole file of a few chunks."""
+    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {"robot": "001"})
+    for number in range(CHUNKS * EACH):
+        made.write(
+            sample("tel/bridge/velocity", samples.velocity(number, number), number / 50, b"frame")
+        )
+        if number % EACH == EACH - 1:
+            made.flush()
+    made.close()
+    return made.path
+
+
+def read(path: Path) -> tuple[list[Recorded], Reader]:
+    with Reader(path) as reader:
+        return list(reader), reader
+
+
+def test_what_was_written_is_read(path: Path) -> None:
+    found, reader = read(path)
+    assert [each.sample.raw for each in found] == [b"frame"] * CHUNKS * EACH
+    assert [each.message for each in found] == [
+        samples.velocity(number, number) for number in range(CHUNKS * EACH)
+    ]
+    assert {(each.key, each.kind) for each in found} == {
+        ("t2/v1/001/tel/bridge/velocity", "Velocity")
+    }
+    assert [each.log_ns for each in found[:2]] == [BEGIN_NS, BEGIN_NS + S // 50]
+    assert reader.about == {"robot": "001"}
+    assert (reader.cut, reader.damaged, reader.readable) == (False, 0, path.stat().st_size)
+
+
+def test_other_tools_find_an_index_and_drawn_topics(tmp_path: Path) -> None:
+    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+    made.write(sample("tel/odom/odometry", samples.odometry()))
+    made.write(bare("tel/mine", b"\x80"))
+    made.close()
+    with made.path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    schemas = {
+        channel.topic: summary.schemas[channel.schema_id].name if channel.schema_id else ""
+        for channel in summary.channels.values()
+    }
+    assert schemas == {
+        "t2/v1/001/tel/odom/odometry": "t2.v1.Odometry",
+        "t2/v1/001/tel/mine": "",
+        "foxglove/pose": "foxglove.PoseInFrame",
+        "foxglove/tf": "foxglove.FrameTransform",
+        "foxglove/odometry": "foxglove.Odometry",
+    }
+    found, _ = read(made.path)
+    assert [each.kind for each in found] == ["Odometry", ""]
+    assert isinstance(found[0].message, Odometry)
+    assert found[1].message is None
+
+
+def test_wherever_it_is_cut_all_before_is_read(path: Path, tmp_path: Path) -> None:
+    whole, part = path.read_bytes(), tmp_path / "part.mcap"
+    counts = []
+    for end in range(200, len(whole) - 8, 97):
+        part.write_bytes(whole[:end])
+        found, reader = read(part)
+        assert reader.cut
+        assert reader.readable <= end
+        assert [each.message.seq for each in found if each.message] == list(range(len(found)))
+        assert len(found) % EACH == 0
+        counts.append(len(found))
+    assert counts == sorted(counts)
+    assert {0, EACH, CHUNKS * EACH} <= set(counts)
+
+
+def test_a_damaged_chunk_is_left_out(path: Path) -> None:
+    whole = bytearray(path.read_bytes())
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    second = summary.chunk_indexes[1]
+    whole[second.chunk_start_offset + second.chunk_length - 20] ^= 0x55
+    path.write_bytes(whole)
+    found, reader = read(path)
+    assert len(found) == (CHUNKS - 1) * EACH
+    assert (reader.cut, reader.damaged) == (False, 1)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89MCAP", b"no such file at all", b"\x00" * 99])
+def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RobotError, match=r"x\.mcap: is no MCAP file"):
+        read(path)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=r"gone\.mcap: cannot be read: No such file"):
+        Reader(tmp_path / "gone.mcap")
+
+
+def test_the_time_of_a_file_does_not_jump_with_the_clock(tmp_path: Path) -> None:
+    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+    first, second = (sample("tel/x", samples.velocity(), at_s) for at_s in (0.0, 1.0))
+    made.write(first)
+    stepped = {name: getattr(second, name) for name in second.__struct_fields__} | {"wall_ns": 5}
+    made.write(type(second)(**stepped))
+    made.close()
+    assert [each.log_ns for each in read(made.path)[0]] == [BEGIN_NS, BEGIN_NS + S]
+
+
+def test_a_file_that_is_there_is_not_written_over(path: Path) -> None:
+    with pytest.raises(FileExistsError):
+        Recording(path, TRANSLATOR, {})
+
+
+def test_a_message_that_is_not_as_it_should_be_is_none(tmp_path: Path) -> None:
+    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+    it = sample("tel/bridge/velocity", samples.velocity())
+    made.write(bare("tel/bridge/velocity", b"\x80", it.encoding))
+    made.close()
+    (found,), _ = read(made.path)
+    assert (found.kind, found.message, found.sample.payload) == (Velocity.__name__, None, b"\x80")

@@ -1,0 +1,274 @@
+"""The shell in this process: what goes in and what comes out of one loop."""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+import zenoh
+
+from common import codec, keys, realtime
+from common.bus.bus import Arrival, Bus
+from common.bus.drive import DriveLink
+from common.bus.session import client_config
+from common.config import Sources, load
+from common.loop import Loop
+from common.messages import (
+    Bumper,
+    Drive,
+    Motion,
+    ReleaseRequest,
+    SafetyState,
+    Velocity,
+)
+from common.operator import reset_request
+from common.service import Node
+from services.safety import __main__ as program
+from services.safety.config import SafetyConfig
+from services.safety.service import Ports, source_of
+from verification.harness.support import at, bus_on, running, wait_until
+
+
+def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
+    sources = Sources(environ={}, sets=[f"bus.connect={endpoint}", *sets])
+    return Node("safety", load(SafetyConfig, sources))
+
+
+@contextlib.contextmanager
+def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
+    node = make_node(endpoint, *sets)
+    reader = node.open_bus()
+    Ports(node, reader)
+    with running(node.loop):
+        for bus in (node.bus, reader):
+            bus.open()
+        wait_until(lambda: node.bus.connected and reader.connected, "both sessions")
+        yield node
+        closed = threading.Event()
+
+        def close() -> None:
+            for bus in (reader, node.bus):
+                bus.close()
+            closed.set()
+
+        node.loop.post(close)  # where they are used: a put must not meet a session that ends
+        wait_until(closed.is_set, "closed sessions")
+
+
+@dataclass
+class Seen:
+    motions: list[Motion] = field(default_factory=list)
+    states: list[SafetyState] = field(default_factory=list)
+    answers: list[str] = field(default_factory=list)
+    drive: DriveLink = field(init=False)
+
+    def watch(self, bus: Bus) -> None:
+        self.drive = DriveLink(bus, listens=True)
+        bus.subscribe(keys.MOTION, self._motion, depth=64)
+        bus.subscribe(keys.SAFETY, self._state, depth=64)
+
+    def _motion(self, arrival: Arrival[Motion]) -> None:
+        self.motions.append(arrival.message)
+
+    def _state(self, arrival: Arrival[SafetyState]) -> None:
+        self.states.append(arrival.message)
+
+
+def repeat_until(do: Callable[[], object], true: Callable[[], object], what: str) -> None:
+    """Do it again and again: samples right after a declaration may be lost."""
+
+    def tried() -> object:
+        do()
+        return true()
+
+    wait_until(tried, what)
+
+
+def test_stop_is_published_from_the_beginning_and_the_heartbeat_rises(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with running(loop), safety_on(endpoint), bus_on(endpoint, loop, seen.watch):
+        wait_until(lambda: len(seen.motions) > 20 and len(seen.states) > 5, "a stream of both")
+    assert "run" not in {motion.command for motion in seen.motions}
+    beats = [state.heartbeat for state in seen.states]
+    assert beats == sorted(set(beats))
+    assert seen.states[0].text  # in words, whatever the reason is
+
+
+def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch) as bus,
+    ):
+        bumper, velocity = (seen.drive.publisher(each) for each in (keys.BUMPER, keys.VELOCITY))
+        repeat_until(
+            lambda: (
+                velocity.put(Velocity(linear=0.0, angular=0.0)),
+                bumper.put(Bumper(pressed=True)),
+            ),
+            lambda: seen.motions and seen.motions[-1].command == "brake",
+            "the brake",
+        )
+        assert seen.motions[-1].judged_boot == bus.boot
+        wait_until(lambda: seen.states and seen.states[-1].release, "a latched contact")
+        for held in (True, False):
+            bus.ask(
+                keys.RELEASE,
+                ReleaseRequest(held=held, direction="backward", echo=seen.states[-1].heartbeat),
+                lambda done: seen.answers.append(done.text),
+                seen.answers.append,
+            )
+        bus.ask(
+            keys.RESET,
+            reset_request(seen.states[-1]),
+            lambda done: seen.answers.append(done.text),
+            seen.answers.append,
+        )
+        wait_until(lambda: len(seen.answers) == 3, "three answers")
+        assert "Let go." in seen.answers
+        assert any("Not gone yet" in text for text in seen.answers)
+        wait_until(node.is_stopped, "rest")
+        wait_until(
+            lambda: any(c.name == "leaving" for state in seen.states[-1:] for c in state.causes),
+            "leaving",
+        )
+
+
+def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch) as bus,
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        drive, other = (bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
+        key = keys.DRIVE.on("001", source="demo")
+        wanted = {"refused_late", "refused_unknown_source", "refused_not_a_request"}
+        repeat_until(
+            lambda: (
+                drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+                other.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+                session.put(key, b"\xc1"),
+                session.delete(key),
+            ),
+            lambda: wanted <= set(node.counters),
+            "every reason",
+        )
+
+
+def test_a_request_is_posted_to_the_loop_once(endpoint: str) -> None:
+    loop, posts = Loop(), 0
+    with running(loop), safety_on(endpoint) as node, bus_on(endpoint, loop, lambda _: None) as bus:
+        drive = bus.publisher(keys.DRIVE, source="demo")
+        post = node.bus.post
+
+        def counted(call: Callable[[], None]) -> None:
+            nonlocal posts
+            posts += 1
+            post(call)
+
+        node.bus.post = counted
+        repeat_until(
+            lambda: drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+            lambda: node.counters["refused_late"] >= 30,
+            "requests",
+        )
+        assert posts <= node.counters["refused_late"] + 5  # others on the bus, and what waits
+        assert node.bus.counters["overrun"] == 0
+
+
+def test_an_estop_by_delete_latches(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint),
+        bus_on(endpoint, loop, seen.watch),
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        repeat_until(
+            lambda: session.delete("t2/v1/001/estop"),
+            lambda: seen.states and "estop" in seen.states[-1].latched,
+            "a latched emergency stop",
+        )
+
+
+@pytest.mark.parametrize("who", ["berlin-007", "berlin-$*", "*"])
+def test_an_estop_for_one_a_site_or_all_latches(endpoint: str, who: str) -> None:
+    latched: list[tuple[str, ...]] = []
+    with (
+        safety_on(endpoint, "robot.id=berlin-007"),
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        states = session.declare_subscriber(
+            keys.SAFETY.on("berlin-007"),
+            lambda sample: latched.append(
+                codec.decode(sample.payload.to_bytes(), SafetyState).latched
+            ),
+        )
+        repeat_until(
+            lambda: session.put(keys.estop_key(who), b""),
+            lambda: latched and "estop" in latched[-1],
+            "a latched emergency stop",
+        )
+        states.undeclare()
+
+
+def test_the_source_is_the_last_part_of_the_key() -> None:
+    assert source_of(keys.DRIVE.on("001", source="nav")) == "nav"
+
+
+def test_the_program_opens_a_reader_and_closes_it(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Bus] = []
+
+    def run(
+        name: str,
+        root: object,
+        build: Callable[[Node[SafetyConfig]], None],
+        argv: object,
+        *,
+        priority: int,
+    ) -> int:
+        assert priority == realtime.SAFETY
+        node = make_node(endpoint, "safety.margin=0.0", 'safety.i_accept=["margin"]')
+        opened.append(node.open_bus())
+        monkeypatch.setattr(node, "open_bus", lambda: opened[0])
+        build(node)
+        with running(node.loop):
+            wait_until(lambda: opened[0].connected, "the reader")
+        return 5
+
+    monkeypatch.setattr(program, "run", run)
+    assert program.main([]) == 5
+    assert not opened[0].connected
+
+
+def test_what_the_bridge_measures_is_not_taken_from_the_router(endpoint: str) -> None:
+    loop, seen = Loop(), Seen()
+    with (
+        running(loop),
+        safety_on(endpoint) as node,
+        bus_on(endpoint, loop, seen.watch),
+        zenoh.open(client_config(at(endpoint))) as session,
+    ):
+        measured = [topic for topic in keys.TOPICS if topic.publisher == "bridge"]
+        repeat_until(
+            lambda: [
+                session.put(topic.on("001", side=side), b"\xc1")
+                for topic in measured
+                for side in ("left", "right")
+            ],
+            lambda: node.bus.counts[keys.MOTION.on("001")] > 50,
+            "a second",
+        )
+        assert node.bus.counters["undecodable"] == 0
+        bumper = seen.drive.publisher(keys.BUMPER)
+        repeat_until(
+            lambda: bumper.put(Bumper(pressed=True)),
+            lambda: seen.motions and seen.motions[-1].command == "brake",
+            "what comes by the drive link",
+        )

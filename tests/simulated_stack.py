@@ -1,0 +1,171 @@
+"""The whole chain in one thread and in simulated time: every core, no bus, no socket, no process.
+
+It shows what the shipped settings do on a machine that is never late, faster than real time and
+the same each time. The shells are tested elsewhere, with real processes.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from msgspec.structs import replace
+
+from cli.demo.script import Ask as Wish
+from cli.demo.script import Lap, View
+from common import messages as m
+from common.freshness import Latest, S
+from common.operator import reset_request
+from services.bridge.config import BridgeConfig
+from services.bridge.core import Core
+from services.bridge.output import Output, Send
+from services.odom.config import Odom
+from services.odom.estimator import Estimator
+from services.safety.config import SafetyConfig
+from services.safety.inputs import Ask, Event, Hold, Inputs, Reset
+from services.safety.policy import Policy
+from services.safety.report import motion_message, state_message
+from sim import trace as t
+from sim.config import Config
+from sim.files import load_plan
+from sim.simulation import Simulation
+
+MS = S // 1000
+TICK_NS = 10 * MS
+BOOT = 77  # of the bridge
+START_NS = 100 * S
+
+
+class Clockwork:
+    """Sim, bridge, safety, odometry and the lap's driver, turned by hand."""
+
+    def __init__(self, lap: Lap, world: str = "office") -> None:
+        self.lap = lap
+        self.now_ns = START_NS
+        self.records: list[t.Line] = []
+        self.odometry: list[m.Odometry] = []
+        self.answers: list[tuple[str, bool, str]] = []
+        bridge, safety = BridgeConfig(), SafetyConfig()
+        self.sim = Simulation(Config(), load_plan(world, safety.vehicle), START_NS)
+        self._ports = bridge.board.listen_ports
+        self._bridge = Core(bridge, BOOT, Counter(), START_NS)
+        self._seq: Counter[str] = Counter()
+        self._policy = Policy(safety.safety, safety.vehicle)
+        self._state = self._policy.start()
+        self._inputs = Inputs(reader=True, boot=1)
+        self._estimator = Estimator(Odom())
+        self._pressed = False
+        self._told: m.SafetyState | None = None
+        self._refusal: str | None = None
+        self._granted = False
+        self._index = 0
+        self._do(self._bridge.start())
+
+    def run(self, seconds: float) -> Iterator[None]:
+        """Turn for so long, a tick at a time."""
+        end_ns = self.now_ns + round(seconds * S)
+        while self.now_ns < end_ns:
+            self.now_ns += TICK_NS
+            self.sim.advance(self.now_ns)
+            self._deliver()
+            self._tick()
+            yield
+
+    # --- bridge ---------------------------------------------------------------------------
+
+    def _deliver(self) -> None:
+        for datagram in self.sim.take_sent(self.now_ns):
+            port = self._ports.index(datagram.port)
+            brake = self._bridge.reflex(datagram.payload)
+            if brake is not None:
+                self._send(brake)
+            self._do(
+                self._bridge.datagram(datagram.payload, port, self.now_ns, braked=brake is not None)
+            )
+        self.records += self.sim.take_records()
+
+    def _do(self, out: Output) -> None:
+        """Carry out what the bridge's core returned, as its shell does."""
+        for send in out.sends:
+            self._send(send)
+        for stream, message, _ in out.messages:
+            self._take(stream, message)
+
+    def _send(self, send: Send) -> None:
+        self.sim.receive(send.datagram, self._ports[send.port], self.now_ns)
+
+    def _take(self, stream: str, message: m.Message) -> None:
+        """Pass a message of the bridge on to safety and odometry."""
+        if isinstance(message, m.Velocity):
+            self._estimator.on_velocity(message, self.now_ns)
+        elif isinstance(message, m.Mileage):
+            self._estimator.on_mileage(message, self.now_ns)
+        elif isinstance(message, m.Bumper):
+            self._pressed = message.pressed
+        self._keep(**{stream.removeprefix("driver_"): message})
+        if stream in ("bumper", "ultrasonic"):
+            self._decide()
+
+    # --- safety ---------------------------------------------------------------------------
+
+    def _keep(self, **samples: m.Message) -> None:
+        latest = {}
+        for name, sample in samples.items():
+            self._seq[name] += 1
+            stamped = replace(sample, seq=self._seq[name], boot=BOOT)
+            latest[name] = Latest(stamped, self.now_ns)
+        self._inputs = replace(self._inputs, **latest)
+
+    def _decide(self, event: Event | None = None) -> None:
+        inputs = replace(self._inputs, event=event)
+        self._state, verdict = self._policy.decide(self._state, inputs, self.now_ns)
+        if verdict.reply:
+            self._refusal = None if verdict.reply.done else verdict.reply.text
+            self._granted = verdict.reply.done
+            self.answers.append((type(event).__name__, verdict.reply.done, verdict.reply.text))
+        self._seq["motion"] += 1
+        motion = replace(motion_message(self._state, inputs), seq=self._seq["motion"], boot=1)
+        self._do(self._bridge.motion(motion, self.now_ns, self.now_ns))
+
+    # --- by time --------------------------------------------------------------------------
+
+    def _tick(self) -> None:
+        elapsed = (self.now_ns - START_NS) // TICK_NS
+        self._tick_bridge(elapsed)
+        if elapsed % 2 == 0:
+            self._decide()
+            estimate = self._estimator.estimate(self.now_ns)
+            if estimate is not None:
+                self.odometry.append(replace(estimate, mono_ns=self.now_ns))
+        if elapsed % 5 == 0:
+            beat = self._state.heartbeat.beat(self.now_ns)
+            self._state = replace(self._state, heartbeat=beat)
+            self._told = state_message(self._policy, self._state, self.now_ns)
+            self._drive()
+        self._deliver()
+
+    def _tick_bridge(self, elapsed: int) -> None:
+        self._do(self._bridge.tick(self.now_ns, 0))
+        if elapsed % 20 == 0:
+            self._do(self._bridge.link(self.now_ns, 0))
+        if elapsed % 100 == 0:
+            self._do(self._bridge.second())
+
+    def _drive(self) -> None:
+        assert self._told is not None
+        if not self.odometry:
+            return
+        view = View(self.odometry[-1], self._told, self._pressed, self._refusal, self._granted)
+        wish = self.lap.advance(view, self.now_ns)
+        if self.lap.index != self._index:
+            self._index, self._refusal, self._granted = self.lap.index, None, False
+        self._wish(wish, self._told.heartbeat)
+
+    def _wish(self, wish: Wish, echo: int) -> None:
+        self._seq["drive"] += 1
+        linear, angular = wish.twist
+        request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)
+        self._decide(Ask("demo", request, self.now_ns))
+        assert self._told is not None
+        if wish.press == "reset":
+            self._decide(Reset(echo, reset_request(self._told).causes))
+        elif wish.press == "release":  # the lap hits its box driving forward
+            self._decide(Hold(True, "backward", echo))

@@ -1,0 +1,118 @@
+"""Robots, sites and a region: the configuration that ``docs/fleet.md`` gives for a site's router.
+
+Nobody runs this yet. It is tried here, so that what is said about more than one site is true.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+import pytest
+import zenoh
+
+from common import keys
+from common.bus.session import client_config, router_config
+from common.settings import Bus
+from tests.common.bus_fixture import until_heard
+from verification.harness.support import at, free_port, listening, wait_until
+
+# What a site's router that dials a region's has besides its uplink.
+SITE: dict[str, object] = {
+    "region_name": "site",
+    "gateway": {"south": [{"filters": [{"region_names": ["robot"]}, {"modes": ["client"]}]}]},
+}
+SITES = ("berlin", "munich")
+ROBOTS = tuple(f"{site}-00{number}" for site in SITES for number in (1, 2))
+
+
+@dataclass
+class Tree:
+    """Sessions that sit at the region's router, at berlin's, and on each robot."""
+
+    region: zenoh.Session
+    berlin: zenoh.Session
+    robots: Mapping[str, zenoh.Session]
+    stops: set[str] = field(default_factory=set)
+
+
+def routing(where: Bus, more: dict[str, object]) -> zenoh.Session:
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(router_config(where) | more)))
+
+
+@pytest.fixture(scope="module")
+def tree() -> Iterator[Tree]:
+    region, *sites = (f"tcp/127.0.0.1:{free_port()}" for _ in range(1 + len(SITES)))
+    by_name = dict(zip(SITES, sites, strict=True))
+    with ExitStack() as stack:
+        own = {}
+        for name in ROBOTS:  # before there is anybody to dial
+            own[name] = f"tcp/127.0.0.1:{free_port()}"
+            uplink = by_name[name.partition("-")[0]]
+            stack.enter_context(routing(listening(own[name], uplink), {}))
+        for endpoint in sites:
+            stack.enter_context(routing(listening(endpoint, region), SITE))
+        stack.enter_context(routing(listening(region), {}))
+        region_at, berlin_at, *robots_at = (
+            stack.enter_context(zenoh.open(client_config(at(endpoint))))
+            for endpoint in (region, by_name["berlin"], *own.values())
+        )
+        made = Tree(region_at, berlin_at, dict(zip(ROBOTS, robots_at, strict=True)))
+        kept = [serve(made, name, session) for name, session in made.robots.items()]
+        yield made
+        assert kept
+
+
+def serve(tree: Tree, name: str, session: zenoh.Session) -> object:
+    """Be that robot."""
+    reset = keys.RESET.on(name)
+    return (
+        session.liveliness().declare_token(keys.live_key(name, "safety", "1")),
+        session.declare_queryable(reset, lambda query: query.reply(reset, b"done")),
+        session.declare_subscriber(keys.estop_key(name), lambda _: tree.stops.add(name)),
+    )
+
+
+def test_the_region_sees_all_and_a_site_its_own(tree: Tree) -> None:
+    seen: dict[str, set[str]] = {"region": set(), "berlin": set()}
+
+    def note(where: str, sample: zenoh.Sample) -> None:
+        seen[where].add(str(sample.key_expr).split("/")[2])
+
+    every = keys.VELOCITY.on("*")
+    ears = [
+        tree.region.declare_subscriber(every, lambda sample: note("region", sample)),
+        tree.berlin.declare_subscriber(every, lambda sample: note("berlin", sample)),
+    ]
+
+    def put() -> None:
+        for name, session in tree.robots.items():
+            session.put(keys.VELOCITY.on(name), b"")
+
+    until_heard(put, lambda: seen["region"] == set(ROBOTS), "all of them")
+    until_heard(put, lambda: len(seen["berlin"]) >= 2, "a site's own")
+    assert seen["berlin"] == {name for name in ROBOTS if name.startswith("berlin")}
+    for ear in ears:
+        ear.undeclare()
+
+
+def test_the_region_knows_and_asks_each(tree: Tree) -> None:
+    def alive() -> set[str]:
+        replies = tree.region.liveliness().get(keys.live_key("*", "*", "*"), timeout=2.0)
+        return {str(reply.ok.key_expr).split("/")[2] for reply in replies if reply.ok}
+
+    def answers(name: str) -> bool:
+        return any(reply.ok for reply in tree.region.get(keys.RESET.on(name), timeout=2.0))
+
+    wait_until(lambda: alive() == set(ROBOTS), "every token")
+    wait_until(lambda: all(map(answers, ROBOTS)), "every answer")
+
+
+@pytest.mark.parametrize("whom", ["munich-$*", "*"])
+def test_the_region_stops_one_site_or_all(tree: Tree, whom: str) -> None:
+    meant = {name for name in ROBOTS if whom == "*" or name.startswith("munich")}
+    tree.stops.clear()
+    until_heard(
+        lambda: tree.region.put(keys.estop_key(whom), b""), lambda: tree.stops >= meant, "all stops"
+    )
+    assert tree.stops == meant

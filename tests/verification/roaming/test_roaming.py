@@ -1,0 +1,39 @@
+"""The core of the campaign: two hosts with clocks of their own, and the air between them cut."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from verification.roaming.__main__ import CANNOT
+
+pytestmark = pytest.mark.alone
+
+NAMES = ("1 % lost", "down for 1 s")
+
+
+def test_the_vehicle_stops_when_the_link_is_lost_and_its_own_chain_goes_on(tmp_path: Path) -> None:
+    only = [word for name in NAMES for word in ("--only", name)]
+    out = tmp_path / "roaming.md"
+    command = [
+        sys.executable,
+        "-m",
+        "verification.roaming",
+        "--seconds",
+        "3",
+        "--times",
+        "1",
+        *only,
+    ]
+    done = subprocess.run(
+        [*command, "--out", str(out)], capture_output=True, text=True, timeout=110, check=False
+    )
+    if done.returncode == CANNOT:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = out.read_text(encoding="utf-8").splitlines()
+    assert any(re.match(r"\| 1 % lost \| \d+% of \d+ \|", line) for line in lines)
+    assert any(re.match(r"\| down for 1 s \| 1 \| [^|]* \(1\) \|", line) for line in lines)
+    assert lines[-1] == "All is as it should be."

@@ -1,0 +1,171 @@
+"""The operator of a soak: what he sets right before he drives, and when he begins anew."""
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import pytest
+
+from cli.demo.script import QUICK, lap
+from common import keys
+from common import messages as m
+from common.bus.bus import Bus
+from common.errors import LinkError
+from common.freshness import S
+from sim.control import Control
+from sim.requests import Asked, Place
+from sim.trace import Truth
+from tests.cli.demo.lap_fixture import odometry, safety, truth
+from verification.harness.support import at
+from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
+
+BEAT_NS = S // 20
+
+
+class Desk(Bus):
+    """A bus without a router, whose calls are answered by hand."""
+
+    def __init__(self) -> None:
+        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+        self.asked: list[Any] = []
+        self.reply: Callable[[Any], None] = lambda _: None
+        self.refuse: Callable[[str], None] = lambda _: None
+
+    def ask(
+        self,
+        call: keys.Call[Any, Any],
+        request: Any,
+        on_reply: Callable[[Any], None],
+        on_refusal: Callable[[str], None],
+        timeout_s: float = 2.0,
+    ) -> None:
+        self.asked.append(request)
+        self.reply, self.refuse = on_reply, on_refusal
+
+
+class Vehicle:
+    """The simulator's control socket, made up."""
+
+    def __init__(self) -> None:
+        self.done: list[Asked] = []
+        self.now = truth(0)
+        self.there = True
+
+    def do(self, request: Asked) -> None:
+        if not self.there:
+            raise LinkError("the simulator's control socket: timed out")
+        self.done.append(request)
+
+    def truth(self) -> Truth:
+        return self.now
+
+
+class Scene:
+    """An operator, his bus and his vehicle, at a clock of their own."""
+
+    def __init__(self) -> None:
+        self.desk, self.vehicle, self.now_ns = Desk(), Vehicle(), 100 * S
+        self.operator = Operator(self.desk, cast("Control", self.vehicle), QUICK)
+        self.driver = self.operator._driver
+        self.driver.safety = safety("neutral")
+
+    def beat(self, seconds: float = 0.0, boot: int = 5, verdict: m.Verdict = "run") -> None:
+        """Beat for so long, at least once, with a pose that is always young."""
+        end_ns = self.now_ns + round(seconds * S)
+        while True:
+            self.now_ns += BEAT_NS
+            self.driver.safety = safety(verdict=verdict)
+            self.driver.odometry.append(odometry(boot=boot, mono_ns=self.now_ns))
+            self.operator.on_beat(self.now_ns)
+            if self.now_ns >= end_ns:
+                return
+
+    def drives(self) -> bool:
+        """Beat once and tell whether a request went out."""
+        (source,) = (p for p in self.desk.publishers if p.topic is keys.DRIVE)
+        before = source.last
+        self.beat()
+        return source.last is not before
+
+    def ready(self) -> None:
+        """Let the operator set right what he wants to."""
+        self.now_ns += TRY_NS
+        self.beat()
+        self.desk.reply(m.Done(text="the pose is set"))
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(scene: Scene) -> None:
+    assert not scene.drives()
+    assert scene.vehicle.done == [Place(x=0.0, y=0.0)]
+    assert scene.desk.asked == [m.PoseRequest(echo=1)]
+    assert not scene.drives()
+    scene.ready()
+    assert scene.drives()
+
+
+def test_what_cannot_be_set_right_is_tried_again(scene: Scene) -> None:
+    scene.vehicle.there = False
+    scene.beat(2.0)
+    assert scene.desk.asked == []
+    scene.vehicle.there = True
+    scene.beat(1.0)
+    scene.desk.refuse("there is no router")
+    scene.beat(2 * TRY_NS / S)
+    assert len(scene.desk.asked) >= 3
+    assert not scene.drives()
+
+
+def test_a_new_odometry_is_told_the_true_pose_once_the_vehicle_stands(scene: Scene) -> None:
+    scene.ready()
+    assert scene.drives()
+    scene.desk.asked.clear()
+    scene.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
+    scene.beat(2.0, boot=6)
+    assert scene.desk.asked == []
+    scene.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
+    scene.beat(1.0, boot=6)
+    pose = scene.desk.asked[0]
+    assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, 7.0 - math.tau))
+    index = scene.driver.lap.index
+    scene.desk.reply(m.Done(text="the pose is set"))
+    scene.beat(boot=6)
+    assert scene.driver.lap.index >= index, "the lap goes on"
+
+
+def test_without_odometry_nobody_asks_to_move(scene: Scene) -> None:
+    scene.ready()
+    assert scene.drives()
+    (source,) = (p for p in scene.desk.publishers if p.topic is keys.DRIVE)
+    before = source.last
+    scene.operator.on_beat(scene.now_ns + OLD_NS + 1)
+    assert source.last is before
+
+
+def test_a_lap_that_gets_nowhere_is_begun_anew(scene: Scene) -> None:
+    scene.ready()
+    scene.vehicle.done.clear()
+    scene.beat(STEP_S[QUICK] - 1.0, verdict="stop")
+    assert scene.vehicle.done == []
+    scene.beat(2.0, verdict="stop")
+    assert scene.vehicle.done[0] == Place(x=0.0, y=0.0)
+    assert scene.driver.lap.index == 0
+
+
+def test_after_a_lap_comes_the_next_one(scene: Scene) -> None:
+    scene.ready()
+    first = scene.driver.lap
+    first.index = len(lap(fast=False))
+    scene.beat()
+    assert scene.driver.lap is not first
+    assert scene.drives()
+
+
+def test_old_poses_are_not_kept(scene: Scene) -> None:
+    scene.ready()
+    scene.beat(5.0)
+    assert len(scene.driver.odometry) == 1

@@ -1,0 +1,92 @@
+"""``python -m tools.pictures``: the README's pictures of both operator's screens, while they drive.
+
+The real ones, before the real services and the simulated vehicle; chromium takes the pictures.
+"""
+
+import asyncio
+import re
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Browser, sync_playwright
+
+from common.config import Sources, load
+from common.service import Node
+from services.teleop.config import TeleopConfig
+from services.teleop.controller import Desk
+from services.teleop.event_log import Logbook
+from services.teleop.gamepad import find
+from sim.requests import Place
+from verification.harness.dashboard import dashboard
+from verification.harness.dashboard_page import CHROMIUM, opened, takes
+from verification.harness.stack import Chain, chain
+from verification.harness.support import running, wait_until
+from verification.harness.teleop_app import NearApp
+
+IMAGES = Path("docs/images")
+COLUMNS, ROWS = 104, 34
+GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # that many presses of W; ms
+
+
+def main() -> None:
+    """Make them anew."""
+    with tempfile.TemporaryDirectory() as folder, chain(Path(folder), "office") as stack:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            picture_dashboard(stack, browser, Path(folder))
+            browser.close()
+        stack.control.do(Place(x=0.0, y=0.0))
+        screen = asyncio.run(terminal_screen(stack))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            picture_terminal(screen, browser)
+            browser.close()
+
+
+async def terminal_screen(stack: Chain) -> str:
+    """Drive from a terminal, and return what it shows then, as SVG."""
+    sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
+    node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
+    desk = Desk(node, Logbook())
+    node.present()
+    desk.plug(find(node.config.teleop))
+    app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    with running(node.loop):
+        node.bus.open()
+        async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+            while desk.view.safety is None or desk.view.safety.verdict == "inhibited":
+                await pilot.pause(REPEAT_S)
+            await pilot.press(GEAR)
+            for _ in range(HELD):
+                await pilot.press("w")
+                await pilot.pause(REPEAT_S)
+            screen = app.export_screenshot(title="t2 drive")
+        node.bus.close()
+    return re.sub(r"@font-face \{.*?\}", "", screen, flags=re.DOTALL)  # they lie elsewhere
+
+
+def picture_terminal(screen: str, browser: Browser) -> None:
+    """Keep what a terminal shows."""
+    page = browser.new_page(viewport={"width": 1300, "height": 900})
+    page.set_content(screen)
+    page.locator("svg").screenshot(path=IMAGES / "drive.png", omit_background=True)
+    page.close()
+
+
+def picture_dashboard(stack: Chain, browser: Browser, folder: Path) -> None:
+    """Drive by the page's keys, and keep what it shows then."""
+    with dashboard(stack.endpoint, folder) as site:
+        page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")
+        opened(page, site)
+        takes(page)
+        page.keyboard.press(GEAR)
+        page.keyboard.down("w")
+        wait_until(lambda: stack.speed() > 0.1, "it drives")
+        page.keyboard.down("a")
+        page.wait_for_timeout(HELD_MS)
+        page.screenshot(path=IMAGES / "dashboard.png")
+        page.close()
+
+
+if __name__ == "__main__":
+    main()

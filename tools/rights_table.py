@@ -1,0 +1,66 @@
+"""The table of rights in ``docs/security.md``: each role, each class of keys, each verb."""
+
+from collections.abc import Mapping
+
+from cli.keys import access
+from cli.keys.access import Rights, Verb
+from cli.keys.profile import OPERATORS_SOURCES
+from common import keys
+from common.bus.probe import includes
+
+MINE, OTHER = "001", "002"  # a driver's robot, and one that it was not given
+
+ROLES: Mapping[str, Rights] = {
+    "viewer": access.viewer(),
+    "driver of 001": access.driver((MINE,), OPERATORS_SOURCES),
+    "fleet": access.fleet(),
+    "site's router": access.site(),
+    "router of 001": access.robot(MINE),
+}
+DASHBOARD = keys.EVENTS.on(MINE, service="dashboard")
+# One key of each class, with the words that the table has for it.
+CLASSES: Mapping[str, str] = {
+    "measured, decided, health": keys.VELOCITY.on(MINE),
+    "events": keys.EVENTS.on(MINE, service="safety"),
+    "events that an operator's dashboard keeps": f"{DASHBOARD}/@adv/pub/1/uhlc/_",
+    "any longer key below these": f"{DASHBOARD}/@adv/pub/1/uhlc/_/a/a/a",
+    "requests to move": keys.DRIVE.on(MINE, source="teleop"),
+    "requests to move as a source that is not hers": keys.DRIVE.on(MINE, source="nav"),
+    "requests to move another robot": keys.DRIVE.on(OTHER, source="teleop"),
+    "what safety lets through": keys.MOTION.on(MINE),
+    "emergency stop": keys.estop_key(MINE),
+    "emergency stop of another robot": keys.estop_key(OTHER),
+    "emergency stop of all": keys.estop_key("*"),
+    "calls": keys.RESET.on(MINE),
+    "calls of another robot": keys.RESET.on(OTHER),
+    "what a service tells who asks": keys.info_key(MINE, "safety", "config"),
+    "presence of the services on board": keys.live_key(MINE, "safety", "1"),
+    "health of an operator's dashboard": keys.HEALTH.on(MINE, service="dashboard"),
+    "presence of an operator's dashboard": keys.live_key(MINE, "dashboard", "1"),
+    "health of an operator's teleop": keys.HEALTH.on(MINE, service="teleop"),
+    "any other key of the robot": f"{keys.ROOT}/{MINE}/anything",
+    "keys outside of T2": "anything",
+}
+WORDS: Mapping[Verb, str] = {
+    "read": "read", "write": "**write**", "ask": "ask", "serve": "answer", "live": "be there",
+}  # fmt: skip
+
+
+def may(given: Rights, verb: Verb, key: str) -> bool:
+    """Tell whether rights hold a verb on a key, or on every key of an expression."""
+    return any(includes(expression, key) for expression in given.get(verb, ()))
+
+
+def table() -> str:
+    """Return the table."""
+    lines = [
+        f"| | key | {' | '.join(ROLES)} |",
+        f"| --- | --- |{' --- |' * len(ROLES)}",
+    ]
+    for words, key in CLASSES.items():
+        cells = (
+            ", ".join(WORDS[verb] for verb in WORDS if may(given, verb, key)) or "-"
+            for given in ROLES.values()
+        )
+        lines.append(f"| {words} | `{key}` | {' | '.join(cells)} |")
+    return "\n".join(lines)

@@ -1,0 +1,46 @@
+"""A dashboard beside the stack, and an operator's browser that stops the vehicle by it."""
+
+import contextlib
+import time
+import urllib.request
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any
+
+from verification.faults.stack_fixture import Lane
+from verification.harness.dashboard import Site, dashboard
+from verification.harness.dashboard_abuse import FLOODS, flooded, half_open
+
+HALF_OPEN = 500
+SETTLE_S = 1.0  # until the abuse has had its effect
+
+Abuse = Callable[[Site], AbstractContextManager[Any]]
+
+
+def flood(site: Site) -> AbstractContextManager[None]:
+    """Send 50 000 messages a second, as a viewer."""
+    return flooded(site, FLOODS["look"])
+
+
+def unfinished(site: Site) -> AbstractContextManager[Any]:
+    """Begin requests and never end them."""
+    return half_open(site, HALF_OPEN)
+
+
+def estop_while(abuse: Abuse) -> Callable[[Lane], int]:
+    """Press the browser's E-STOP while a client abuses the web server."""
+
+    def inject(lane: Lane) -> int:
+        with contextlib.ExitStack() as stack:
+            site = stack.enter_context(dashboard(lane.stack.endpoint, lane.folder))
+            stack.enter_context(abuse(site))
+            time.sleep(SETTLE_S)
+            request = urllib.request.Request(
+                f"{site.url}estop/001", method="POST", headers={"Origin": site.url.rstrip("/")}
+            )
+            at_ns = time.monotonic_ns()
+            with urllib.request.urlopen(request, timeout=10):
+                time.sleep(0.1)
+        return at_ns
+
+    return inject

@@ -1,0 +1,172 @@
+"""A program on a host behind a bad cable.
+
+``python -m verification.faults.remote_host ENDPOINT MODULE [WORD]...``
+
+The host has a network, a monotonic clock and a boot of its own; ``MODULE`` runs there, with the
+router's endpoint as seen from there and the words. This process holds both ends of the cable, a TUN
+device in each network, and does to the packets what it is told. Reads lines from standard input:
+``sim.requests.Wire`` as JSON, where ``to_pc`` is the way to the robot, and ``Address``; all else it
+hands on to the program.
+"""
+
+import ctypes
+import fcntl
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import uuid
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from common.bus.host import BOOT_ID
+from common.freshness import S
+from sim.faults import Cable, Datagram
+from sim.requests import Wire
+
+TUNSETIFF = 0x400454CA  # linux/if_tun.h
+IFF_TUN, IFF_NO_PI = 0x0001, 0x1000
+CLONE_NEWNS, CLONE_NEWTIME, CLONE_NEWNET = 0x00020000, 0x00000080, 0x40000000  # linux/sched.h
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+PACKET_MAX = 2048
+IDLE_S = 0.1
+AHEAD_S = 86_400  # of the far host's monotonic clock: it was started a day before
+OFFSETS = Path("/proc/self/timens_offsets")
+
+
+class Address(msgspec.Struct, frozen=True, tag_field="do", tag="address"):
+    """The far host's address from now on: the last of its four numbers."""
+
+    last: int
+
+
+@dataclass
+class Line:
+    """The cable between two hosts, its end at each, and who is told what is no matter of it."""
+
+    near: int
+    far: int
+    net: str
+    program: int
+    to_far: Cable = field(default_factory=lambda: Cable(1))
+    to_near: Cable = field(default_factory=lambda: Cable(2))
+
+    def forward(self) -> None:
+        """Carry packets until standard input ends."""
+        said = b""
+        while True:
+            stdin = sys.stdin.fileno()
+            ready, _, _ = select.select([self.near, self.far, stdin], [], [], self._wait_s())
+            self._carry(self.near, self.to_far, self.far)
+            self._carry(self.far, self.to_near, self.near)
+            if stdin in ready:
+                new = os.read(stdin, PACKET_MAX)
+                if not new:
+                    return
+                *lines, said = (said + new).split(b"\n")
+                for line in lines:
+                    self._obey(line)
+
+    def _carry(self, source: int, cable: Cable, sink: int) -> None:
+        now_ns = time.monotonic_ns()
+        for packet in _waiting(source):
+            cable.put(Datagram(packet, 0), now_ns)
+        for datagram in cable.take(now_ns):
+            os.write(sink, datagram.payload)
+
+    def _obey(self, line: bytes) -> None:
+        if not line.startswith(b"{"):
+            os.write(self.program, line + b"\n")
+            return
+        what = msgspec.json.decode(line, type=Wire | Address)
+        if isinstance(what, Address):
+            _ip("addr", "flush", "dev", "far")
+            _ip("addr", "add", f"{self.net}.{what.last}/24", "dev", "far")
+            return
+        if what.direction in ("to_pc", "both"):
+            self.to_near.faults = what
+        if what.direction in ("to_board", "both"):
+            self.to_far.faults = what
+
+    def _wait_s(self) -> float:
+        due = [cable.due_ns for cable in (self.to_far, self.to_near) if cable.due_ns is not None]
+        return max(0.0, (min(due) - time.monotonic_ns()) / S) if due else IDLE_S
+
+
+def net(port: int) -> str:
+    """Return the network between a router of that port and its far host: one for each."""
+    return f"10.{port >> 8}.{port & 255}"
+
+
+def main() -> None:
+    """Be the far host until standard input ends."""
+    endpoint, module, *words = sys.argv[1:]
+    protocol, port = endpoint.partition("/")[0], int(endpoint.rpartition(":")[2])
+    set_congestion_control()
+    near = _end(f"near{port}", f"{net(port)}.1")
+    _move_out()
+    far = _end("far", f"{net(port)}.2")
+    _ip("link", "set", "lo", "up")
+    command = [sys.executable, "-m", module, f"{protocol}/{net(port)}.1:{port}", *words]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, preexec_fn=die_with_parent) as process:
+        assert process.stdin is not None
+        try:
+            Line(near, far, net(port), process.stdin.fileno()).forward()
+        finally:
+            process.kill()
+
+
+def set_congestion_control() -> None:
+    """Let TCP in this network go by loss, as on most hosts; cubic is the machine's own alone."""
+    Path("/proc/sys/net/ipv4/tcp_congestion_control").write_text("reno\n")
+
+
+def die_with_parent() -> None:
+    """Let the kernel kill this process when the one that started it is no more."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _move_out() -> None:
+    """Leave for a host of its own; the clock is that of children, not of this process."""
+    timed = CLONE_NEWTIME if OFFSETS.exists() else 0  # a kernel without has one clock for all
+    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET | CLONE_NEWNS | timed):
+        raise OSError(ctypes.get_errno(), "no host of its own")
+    set_congestion_control()
+    if timed:
+        OFFSETS.write_text(f"monotonic {AHEAD_S} 0\n")
+    subprocess.run(["mount", "--make-rprivate", "/"], check=True)
+    with tempfile.NamedTemporaryFile() as boot:
+        Path(boot.name).write_text(f"{uuid.uuid4()}\n")
+        subprocess.run(["mount", "--bind", boot.name, str(BOOT_ID)], check=True)
+
+
+def _end(name: str, address: str) -> int:
+    """Make one end of the cable in the network that this process is in."""
+    device = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
+    fcntl.ioctl(device, TUNSETIFF, struct.pack("16sH", name.encode(), IFF_TUN | IFF_NO_PI))
+    _ip("addr", "add", f"{address}/24", "dev", name)
+    _ip("link", "set", name, "up")
+    return device
+
+
+def _ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True)
+
+
+def _waiting(device: int) -> list[bytes]:
+    packets = []
+    while True:
+        try:
+            packets.append(os.read(device, PACKET_MAX))
+        except BlockingIOError:
+            return packets
+
+
+if __name__ == "__main__":
+    main()

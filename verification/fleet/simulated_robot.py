@@ -1,0 +1,189 @@
+"""``python -m verification.fleet.simulated_robot``: many light robots in one process.
+
+Each has a session of its own that dials the site's router as a robot's router does, declares what
+a robot declares, and publishes what a robot publishes. An emergency stop latches it.
+"""
+
+import argparse
+import contextlib
+import itertools
+import json
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import zenoh
+
+from common import keys
+from common.bus.publisher import Publisher
+from common.bus.session import client_config
+from common.messages import Message, SafetyState
+from services.recorder.reader import Reader
+from verification.fleet.child import obey
+from verification.fleet.streams import SERVICES, Stream, schedule, streams, thinning
+from verification.harness.support import at
+
+LAP = Path(__file__).parents[2] / "tests/recorder/lap.mcap"
+AT_ONCE = 8  # sessions that are being opened: each takes half a second, and little work
+ASLEEP_S = 0.0005  # a shorter wait is none
+INNER = ("tel/**", "@cmd/motion", "@cmd/drive/*")  # what a robot's services read
+
+
+class Robot:
+    """One of them."""
+
+    def __init__(self, session: zenoh.Session, name: str, all_of_them: Sequence[Stream]) -> None:
+        self.stopped = False
+        self._boot = time.monotonic_ns()
+        self._streams = all_of_them
+        self._sent: Counter[str] = Counter()
+        self._publishers: list[Publisher[Message]] = []
+        for stream in all_of_them:
+            key = stream.topic.on(name, **stream.names)
+            self._publishers.append(Publisher(stream.topic, key, self._boot, self._sent, 1))
+        for service in SERVICES:
+            key = keys.EVENTS.on(name, service=service)
+            events: Publisher[Any] = Publisher(keys.EVENTS, key, self._boot, self._sent)
+            self._publishers.append(events)
+        for publisher in self._publishers:
+            publisher.declare(session)
+        self._declared = self._declare(session, name)
+
+    def put(self, number: int) -> None:
+        """Publish on one of its streams."""
+        stream = self._streams[number]
+        message = stream.message
+        if isinstance(message, SafetyState):
+            latched = ("estop",) if self.stopped else ()
+            message = msgspec.structs.replace(message, latched=latched)
+        self._publishers[number].put(message, stream.raw)
+
+    def _declare(self, session: zenoh.Session, name: str) -> list[Any]:
+        def stop(_: zenoh.Sample) -> None:
+            self.stopped = True
+
+        far = zenoh.Locality.REMOTE  # its own words stay out of it
+        tokens = [
+            session.liveliness().declare_token(keys.live_key(name, service, f"{self._boot:x}"))
+            for service in SERVICES
+        ]
+        read = [
+            session.declare_subscriber(f"{keys.ROOT}/{name}/{path}", print, allowed_origin=far)
+            for path in INNER
+        ]
+        answered = [call.on(name) for call in keys.CALLS]
+        answered += [
+            keys.info_key(name, service, part)
+            for service in SERVICES
+            for part in ("schema", "config", "last")
+        ]
+        served = [session.declare_queryable(key, print) for key in answered]
+        return [
+            *tokens, *read, *served, session.declare_subscriber(keys.estop_key(name), stop),
+        ]  # fmt: skip
+
+
+def config(site: str, shape: str, thin: list[dict[str, object]]) -> zenoh.Config:
+    """Return how one dials the site's: as a peer, which robots do, as a router, or a client."""
+    made = client_config(at(site))
+    made.insert_json5("mode", json.dumps(shape))
+    made.insert_json5("listen/endpoints", "[]")
+    made.insert_json5("connect/timeout_ms", "30000")
+    made.insert_json5("connect/exit_on_failure", "true")
+    if thin:
+        made.insert_json5("downsampling", json.dumps(thin))
+    return made
+
+
+def recorded() -> list[Stream]:
+    """Return a robot's streams, from the recording that the tests keep."""
+    with Reader(LAP) as reader:
+        return streams(itertools.takewhile(lambda row: not latched(row[1]), rows(reader)))
+
+
+def rows(reader: Reader) -> Iterator[tuple[str, Message, bytes | None]]:
+    """Yield path, message and frame of what was recorded."""
+    for entry in reader:
+        if (message := entry.message) is not None:
+            yield entry.key.split("/", 3)[3], message, entry.sample.raw
+
+
+def latched(message: Message) -> bool:
+    """Tell whether the lap ends here."""
+    return isinstance(message, SafetyState) and bool(message.latched)
+
+
+class Crowd:
+    """Publishes for all of them, and counts."""
+
+    def __init__(self, robots: Sequence[Robot], all_of_them: Sequence[Stream]) -> None:
+        self.left = threading.Event()
+        self._robots = robots
+        self._slots = schedule(all_of_them, len(robots))
+        self._sent = 0
+        self._late_s: list[float] = []
+
+    def run(self) -> None:
+        """Publish what is due until told to leave; what is late is sent all the same."""
+        begin_s, second = time.monotonic(), 0
+        while not self.left.is_set():
+            for at_s, robot, number in self._slots:
+                wait_s = begin_s + second + at_s - time.monotonic()
+                if wait_s > ASLEEP_S:
+                    time.sleep(wait_s)
+                self._robots[robot].put(number)
+                self._sent += 1
+            self._late_s.append(time.monotonic() - begin_s - second - 1.0)
+            second += 1
+
+    def begin(self) -> None:
+        self._sent, self._late_s = 0, []
+        self._since_s = time.monotonic()
+
+    def end(self) -> object:
+        """Tell the rate, what it should be, and how late it was."""
+        past_s = time.monotonic() - self._since_s
+        return {
+            "hz": self._sent / past_s,
+            "wanted_hz": len(self._slots),
+            "late_s": max(self._late_s, default=0.0),
+            "stopped": sum(robot.stopped for robot in self._robots),
+        }
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Be these robots until standard input ends."""
+    options = arguments().parse_args(argv)
+    all_of_them = recorded()
+    with contextlib.ExitStack() as stack:
+        pool = stack.enter_context(ThreadPoolExecutor(AT_ONCE))
+
+        def opened(name: str) -> Robot:
+            thin = thinning(name, all_of_them, options.thin) if options.thin else []
+            session = stack.enter_context(zenoh.open(config(options.site, options.shape, thin)))
+            return Robot(session, name, all_of_them)
+
+        robots = list(pool.map(opened, options.names))
+        crowd = Crowd(robots, all_of_them)
+        crowd.begin()
+        obey(crowd.begin, crowd.end, crowd.left.set)
+        crowd.run()
+
+
+def arguments() -> argparse.ArgumentParser:
+    """Return what the command line may say."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("site", help="the site's router")
+    parser.add_argument("names", nargs="+")
+    parser.add_argument("--shape", choices=["router", "peer", "client"], default="peer")
+    parser.add_argument("--thin", type=float, default=0.0, metavar="HZ", help="of each stream")
+    return parser
+
+
+if __name__ == "__main__":
+    main()

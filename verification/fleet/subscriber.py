@@ -1,0 +1,83 @@
+"""``python -m verification.fleet.subscriber SITE WHAT``: count what a site's consumer receives."""
+
+import sys
+import threading
+import time
+from collections import Counter
+
+import msgspec
+import zenoh
+
+from common import keys
+from common.bus.session import client_config
+from common.messages import Message
+from verification.fleet.child import obey
+from verification.harness.support import at
+
+# What somebody at the site looks at.
+WORDS = {
+    "nobody": (),
+    "overview": (keys.SAFETY.path, keys.LINK.path, "evt/*"),
+    "everything": ("tel/**", "evt/*"),
+}
+EVERY = 5  # of how many messages one is asked how old it is
+
+_decoder = msgspec.msgpack.Decoder(Message)
+
+
+class Ear:
+    """Counts messages, bytes, losses and ages; in Zenoh's thread, so that nothing waits."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, int] = {}
+        self.begin()
+
+    def begin(self) -> None:
+        self._count = self._bytes = self._lost = 0
+        self._keys: set[str] = set()
+        self._ages_s: list[float] = []
+        self._since_s = time.monotonic()
+
+    def take(self, sample: zenoh.Sample) -> None:
+        """Take one in."""
+        payload = sample.payload.to_bytes()
+        head = _decoder.decode(payload)
+        key = str(sample.key_expr)
+        self._count += 1
+        self._bytes += len(payload)
+        self._keys.add(key)
+        before = self._newest.get(key, head.seq - 1)
+        self._lost += max(0, head.seq - before - 1)
+        self._newest[key] = head.seq
+        if self._count % EVERY == 0:
+            self._ages_s.append((time.monotonic_ns() - head.mono_ns) / 1e9)
+
+    def end(self) -> object:
+        """Tell it; ``lost`` holds what was thinned out on purpose, too."""
+        past_s = time.monotonic() - self._since_s
+        robots = Counter(key.split("/")[2] for key in self._keys)
+        return {
+            "hz": self._count / past_s,
+            "bytes_per_s": self._bytes / past_s,
+            "lost_hz": self._lost / past_s,
+            "robots": len(robots),
+            "ages_s": self._ages_s,
+        }
+
+
+def main() -> None:
+    """Listen until standard input ends."""
+    site, what = sys.argv[1:]
+    ear, left = Ear(), threading.Event()
+    with zenoh.open(client_config(at(site))) as session:
+        declared = [
+            session.declare_subscriber(f"{keys.ROOT}/*/{word}", ear.take) for word in WORDS[what]
+        ]
+        obey(ear.begin, ear.end, left.set)
+        left.wait()
+        for each in declared:
+            each.undeclare()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The running stack, routers, certificates and clients that verification and tests share."""

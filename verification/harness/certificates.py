@@ -1,0 +1,58 @@
+"""A site with keys of its own, for tests that need certificates: made by ``t2 keys`` itself."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+
+from cli.__main__ import main
+from cli.keys.access import access_control
+from common import members
+from common.bus.session import router
+from common.settings import Bus
+from verification.harness.support import free_port
+
+ADDRESS = "127.0.0.1"
+
+
+class Site:
+    """A CA in a folder, and whom it has let in."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.keys("init", "--site", "berlin")
+
+    def keys(self, *words: str) -> None:
+        """Run ``t2 keys`` on this site's folder."""
+        assert main(["keys", *words, "--folder", str(self.folder)]) == 0
+
+    def member(self, role: str, name: str, *options: str) -> Bus:
+        """Issue a certificate, and return the settings that use it; they dial nothing yet."""
+        self.keys("issue", role, name, *options)
+        return self.settings(role, name)
+
+    def settings(self, role: str, name: str) -> Bus:
+        """Return the settings that use a certificate."""
+        mine = self.folder / f"{role}.{name}"
+        return Bus(
+            ca=str(mine / "ca.pem"),
+            certificate=str(mine / "certificate.pem"),
+            private_key=str(mine / "private.key"),
+            members=str(self.folder / "members.json"),
+        )
+
+    @contextlib.contextmanager
+    def router(self, of: Bus, *uplink: str) -> Iterator[tuple[str, str]]:
+        """Run a router with this certificate; yield its TLS endpoint, and the one for its board."""
+        secured = f"tls/{ADDRESS}:{free_port()}"
+        onboard = f"unixsock-stream/{self.folder}/bus-{free_port()}.sock"
+        where = msgspec.structs.replace(of, listen=(secured, onboard), uplink=uplink)
+        listed = members.read(Path(of.members)).welcome
+        with router(where, access_control(listed, ["unixsock-stream"])):
+            yield secured, onboard
+
+
+def dialling(member: Bus, endpoint: str) -> Bus:
+    """Return the settings of a member that dials an endpoint."""
+    return msgspec.structs.replace(member, connect=(endpoint,))

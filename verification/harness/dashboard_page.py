@@ -1,0 +1,100 @@
+"""What somebody does with the page in a browser, and waits to see."""
+
+import shutil
+from collections.abc import Callable
+
+from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
+
+from verification.harness.dashboard import Site
+from verification.harness.stack import Chain
+from verification.harness.support import wait_until
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PHONE: ViewportSize = {"width": 390, "height": 844}
+STILL_MPS = 0.005
+
+
+def opened(page: Page, site: Site) -> None:
+    page.goto(site.url)
+    shows(page, "#link", "Board: up")
+
+
+def text(page: Page, where: str) -> str:
+    return page.inner_text(where, timeout=20_000)
+
+
+def shows(page: Page, where: str, words: str) -> None:
+    """Wait until a part of the page has these words in it."""
+    page.wait_for_function(
+        "([where, words]) => document.querySelector(where)?.textContent.includes(words)",
+        arg=[where, words],
+        timeout=20_000,
+    )
+
+
+def takes(page: Page) -> None:
+    """Sit down at the wheel, whoever has it."""
+    page.click("#take")
+    page.wait_for_function(
+        "() => document.querySelector('.driving.mine') || document.querySelector('#question').open"
+    )
+    if page.is_visible("#question-yes"):
+        page.click("#question-yes")
+    page.wait_for_selector(".driving.mine")
+
+
+def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None]) -> None:
+    """Hold until the vehicle moves; let go and press again when this machine held somebody up."""
+    for _ in range(10):
+        press()
+        try:
+            wait_until(lambda: abs(stack.speed()) > 0.1, "the vehicle moves", patience_s=4)
+        except AssertionError:
+            release()
+        else:
+            return
+    raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
+
+
+def stands(stack: Chain) -> None:
+    wait_until(lambda: abs(stack.speed()) < STILL_MPS, "the vehicle stands")
+
+
+def middle(page: Page, where: str) -> tuple[float, float, float]:
+    """Return the middle of a part of the page, and half its height."""
+    page.locator(where).scroll_into_view_if_needed()
+    box = page.locator(where).bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["height"] / 2
+
+
+def resets(page: Page) -> None:
+    """Reset until nothing is latched; safety wants to see each cause gone first."""
+
+    def over() -> bool:
+        page.wait_for_timeout(300)
+        if page.locator("#reset.due").count():
+            page.click("#reset")
+            return False
+        return True
+
+    wait_until(over, "a reset")
+
+
+def phone_of(
+    browser: Browser, site: Site, locale: str
+) -> tuple[BrowserContext, Page, Callable[..., None]]:
+    """Return a phone with the page, and what puts fingers on it."""
+    context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, locale=locale)
+    phone = context.new_page()
+    phone.goto(site.url)
+    phone.wait_for_selector("#robots option", state="attached")
+    touch = context.new_cdp_session(phone)
+
+    def finger(kind: str, *points: tuple[float, float]) -> None:
+        touch.send(
+            "Input.dispatchTouchEvent",
+            {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]},
+        )
+
+    return context, phone, finger

@@ -1,0 +1,23 @@
+"""The scenarios, one module for each topic; importing a module adds its own."""
+
+from verification.outside.scenarios import (
+    authority,
+    board,
+    contact,
+    operator,
+    restarts,
+    sonar,
+    standstill,
+)
+from verification.outside.testbed import SCENARIOS
+
+__all__ = [
+    "SCENARIOS",
+    "authority",
+    "board",
+    "contact",
+    "operator",
+    "restarts",
+    "sonar",
+    "standstill",
+]

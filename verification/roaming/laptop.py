@@ -1,0 +1,117 @@
+"""``python -m verification.roaming.laptop ENDPOINT FILE alone|dashboard [SETTING]...``.
+
+An operator's laptop: teleop, without its screen, and a dashboard that somebody looks at.
+
+Reads lines from standard input: speeds, and while the last one is over zero a finger is on W, in
+the fifth gear; ``e`` presses E. Notes what is heard of the robot, and what it is asked.
+"""
+
+import contextlib
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from common import keys
+from common.bus.publisher import Publisher
+from common.config import Sources, load
+from common.freshness import S
+from common.messages import Drive
+from common.service import Node
+from services.teleop.config import TeleopConfig
+from services.teleop.controller import Desk
+from services.teleop.event_log import Logbook
+from services.teleop.hold import Press
+from verification.faults.remote_host import AHEAD_S, OFFSETS, die_with_parent
+from verification.roaming.notes import Notebook
+
+REPEAT_S = 0.03  # of a held key
+LOOK_S = 0.01
+FIFTH_GEAR = "5"
+PORT = 8080  # of the dashboard: the host is our own
+
+
+class Operator:
+    """A finger, and eyes that note what they see; every method in the loop's thread."""
+
+    def __init__(self, node: Node[TeleopConfig], file: Path) -> None:
+        self.held = False
+        logbook = Logbook()
+        logbook.take_log(node.config.log)
+        self._desk = Desk(node, logbook)
+        self._asked: Publisher[Drive] = next(
+            one for one in node.bus.publishers if one.topic is keys.DRIVE
+        )
+        self._noted = 0
+        self._notebook = Notebook(file, node.loop, AHEAD_S * S if OFFSETS.exists() else 0)
+        self._notebook.listen(node.bus, keys.SAFETY)
+        self._notebook.listen(node.bus, keys.ODOMETRY)
+        self._notebook.listen(node.bus, keys.BUMPER)
+        self._press(FIFTH_GEAR, time.monotonic_ns())
+        node.loop.every(REPEAT_S, self._hold)
+        node.loop.every(LOOK_S, self._look)
+
+    def take(self, line: str) -> None:
+        """Do what is said."""
+        if line == "e":
+            self._press("e", time.monotonic_ns())
+        else:
+            self.held = float(line) > 0
+
+    def _hold(self, now_ns: int) -> None:
+        self._desk.terminal.sent(0, now_ns)  # its terminal is near, and answers at once
+        self._desk.terminal.answered(0, now_ns)
+        if self.held:
+            self._press("w", now_ns)
+
+    def _press(self, key: str, now_ns: int) -> None:
+        self._desk.press(Press(key, now_ns), now_ns)
+
+    def _look(self, _: int) -> None:
+        asked = self._asked.last
+        if asked is not None and asked.seq > self._noted:
+            self._noted = asked.seq
+            self._notebook.note("asked", asked, asked.mono_ns, asked.mono_ns)
+
+
+def main() -> None:
+    endpoint, file, beside, *rest = sys.argv[1:]
+    sets = [f"bus.connect={endpoint}", *rest]
+    node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
+    operator = Operator(node, Path(file))
+    node.present()
+
+    def listen() -> None:
+        for line in sys.stdin:
+            node.loop.post(partial(operator.take, line.strip()))
+        node.loop.stop()
+
+    threading.Thread(target=listen, daemon=True).start()
+    node.bus.open()
+    words = [word for one in sets for word in ("--set", one)]
+    with contextlib.ExitStack() as stack:
+        if beside == "dashboard":
+            stack.enter_context(_beside("services.dashboard", *words))
+            stack.enter_context(_beside("verification.roaming.viewer", str(PORT)))
+        node.loop.run()
+    node.bus.close()
+
+
+@contextlib.contextmanager
+def _beside(module: str, *words: str) -> Iterator[None]:
+    """Run something while the context lasts; it ends with this process, however that ends."""
+    with subprocess.Popen(
+        [sys.executable, "-m", module, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=die_with_parent,
+    ) as process:
+        yield
+        process.kill()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,146 @@
+"""What came of a soak: whether anything grew, got stuck, broke down or moved when it must not.
+
+A process is judged by the longest of its lives: the shorter ones end with a kill and are filled
+with the deaths of others, when sessions come and go. Its first minute is warm-up; of what follows,
+the median of the first fifth is held against the median of the last. Every process must have lived
+long enough once, or nothing is known about it.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
+
+from cli.demo.score import Result
+from common.freshness import S
+from sim import trace as t
+from verification.soak.record import Life, Record, Sample, Window
+
+GROWTH_MAX = 2 * 2**20  # bytes of memory
+LOG_MAX = 2000.0  # bytes/s on average, all services together, faults included
+LOG_PEAK_MAX = 10_000.0  # bytes/s in the worst ten seconds
+PEAK_S = 10
+SILENCE_MAX_S = 20.0  # of health: a service is left dead for some seconds, then starts
+SAMPLES_MIN = 10  # of a life that is judged; a fifth of it is 2
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What is asked of this soak, by its length and by the machine."""
+
+    warm_up_s: float
+    lap_s: float  # in each so many seconds one lap must be finished
+    stuck_s: float  # without a step done
+
+
+def results(record: Record, limits: Limits) -> list[Result]:
+    """Return the table; a soak is good when nothing in it is False."""
+    return [
+        *_processes(record.lives, limits.warm_up_s),
+        _log(record.log),
+        ("tracebacks in the log", str(record.tracebacks), record.tracebacks == 0),
+        ("crashes", ", ".join(record.crashes) or "none", not record.crashes),
+        *_health(record.health, record.seconds),
+        ("faults", str(len(record.faults)), len(record.faults) > 0),
+        *_laps(record, limits),
+        _moved(record),
+        ("the watcher was late by", f"{record.late_s:.2f} s at most", None),
+    ]
+
+
+def good(rows: Sequence[Result]) -> bool:
+    """Tell whether nothing was wrong."""
+    return all(fine is not False for _, _, fine in rows)
+
+
+def growth(samples: Sequence[Sample], warm_up_s: float) -> tuple[Sample, Sample] | None:
+    """Return the medians of the first and the last fifth after warm-up; None if too short."""
+    warm = [sample for sample in samples if sample.at_s - samples[0].at_s >= warm_up_s]
+    if len(warm) < SAMPLES_MIN:
+        return None
+    fifth = len(warm) // 5
+    return _median(warm[:fifth]), _median(warm[-fifth:])
+
+
+def moves(command: t.Command) -> bool:
+    """Tell whether a command moves the vehicle."""
+    return command.kind == "run" and bool(command.linear or command.angular)
+
+
+def too_late(runs: Iterable[t.Command], window: Window) -> list[tuple[str, float]]:
+    """Return what moves the vehicle when nothing may: the fault, and how late in seconds."""
+    return [
+        (window.name, (run.mono_ns - window.from_ns) / S)
+        for run in runs
+        if moves(run) and window.from_ns <= run.mono_ns < window.to_ns
+    ]
+
+
+def _median(samples: Sequence[Sample]) -> Sample:
+    return Sample(
+        median(sample.at_s for sample in samples),
+        round(median(sample.rss for sample in samples)),
+        round(median(sample.threads for sample in samples)),
+        round(median(sample.descriptors for sample in samples)),
+    )
+
+
+def _processes(lives: Mapping[Life, Sequence[Sample]], warm_up_s: float) -> list[Result]:
+    rows: list[Result] = []
+    for name in dict.fromkeys(life.name for life in lives):
+        longest = max((lives[life] for life in lives if life.name == name), key=len)
+        span = growth(longest, warm_up_s)
+        if span is None:
+            rows.append((f"{name}: memory", "never lived long enough to be judged", False))
+            continue
+        first, last = span
+        grown = last.rss - first.rss
+        amount = (
+            f"{last.rss / 2**20:.1f} MB, {grown / 2**20:+.2f} in {last.at_s - first.at_s:.0f} s"
+        )
+        rows.append((f"{name}: memory", amount, grown < GROWTH_MAX))
+        threads = last.threads - first.threads
+        descriptors = last.descriptors - first.descriptors
+        held = f"{last.threads} {threads:+d}, {last.descriptors} {descriptors:+d}"
+        rows.append((f"{name}: threads, descriptors", held, threads <= 0 and descriptors <= 0))
+    return rows
+
+
+def _log(log: Sequence[tuple[float, int]]) -> Result:
+    total = log[-1][1] if log else 0
+    rate = total / max(1.0, log[-1][0]) if log else 0.0
+    later = log[PEAK_S:]
+    peak = max(((b[1] - a[1]) / PEAK_S for a, b in zip(log, later, strict=False)), default=rate)
+    amount = f"{total / 1000:.0f} kB, {rate:.0f} bytes/s, {peak:.0f} in the worst {PEAK_S} s"
+    return "log", amount, total > 0 and rate <= LOG_MAX and peak <= LOG_PEAK_MAX
+
+
+def _health(health: Mapping[str, Sequence[float]], end_s: float) -> list[Result]:
+    rows: list[Result] = []
+    for service, times in sorted(health.items()):
+        beats = [*times, end_s]
+        silence = max(b - a for a, b in pairwise(beats))
+        amount = f"{len(times)} messages, silent for {silence:.1f} s at most"
+        rows.append((f"{service}: health", amount, silence <= SILENCE_MAX_S))
+    return rows or [("health", "nobody told how it fares", False)]
+
+
+def _laps(record: Record, limits: Limits) -> list[Result]:
+    said = [progress.what for progress in record.progress]
+    finished, wanted = said.count("lap finished"), int(record.seconds // limits.lap_s)
+    steps = [progress.at_s for progress in record.progress if progress.what == "step"]
+    stuck_s = max(b - a for a, b in pairwise([0.0, *steps, record.seconds]))
+    moving = bool(steps) and stuck_s <= limits.stuck_s
+    return [
+        ("laps finished", f"{finished}, at least {wanted} wanted", finished >= wanted),
+        ("laps given up, and begun anew", str(said.count("begun anew")), None),
+        ("longest time without a step done", f"{stuck_s:.0f} s", moving),
+    ]
+
+
+def _moved(record: Record) -> Result:
+    what = "RUN while it must stand"
+    if not record.moved:
+        return what, f"none in {len(record.windows)} faults", True
+    name, late_s = max(record.moved, key=lambda one: one[1])
+    return what, f"{len(record.moved)}, {late_s:.2f} s too late after {name}", False
