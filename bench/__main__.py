@@ -33,7 +33,7 @@ from bench.start import part as start_part
 from bench.start import plot as start_plot
 from bench.telemetry import page as telemetry_page
 from bench.telemetry import part as telemetry_part
-from common.freshness import S
+from common.freshness import NS_PER_S
 from verification.faults.machine import HoldUps, named
 
 PAGE = Path(__file__).with_name("page.md")
@@ -119,8 +119,8 @@ def measured(part: Part) -> Measured:
     with HoldUps() as holdups:
         begin_ns, ran_ns = time.monotonic_ns(), time.process_time_ns()
         series = part.measure()
-        seconds = (time.monotonic_ns() - begin_ns) / S
-        core = (time.process_time_ns() - ran_ns) / S / seconds
+        seconds = (time.monotonic_ns() - begin_ns) / NS_PER_S
+        core = (time.process_time_ns() - ran_ns) / NS_PER_S / seconds
         held_ms = 1000 * holdups.worst_s(begin_ns, seconds)
     shared = "The machine was shared" if core < WHOLE else "The machine had nothing else to do"
     share = f"{shared}: this run got {core:.0%} of a core, and a" if not part.waits else "A"

@@ -20,7 +20,7 @@ from common.bus.bus import Arrival, Bus
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import LinkError, RobotError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Health, Timing
 from common.settings import Shared
@@ -98,7 +98,7 @@ class Watch:
 
     def look(self, now_ns: int) -> None:
         """Show that nothing comes any more; give up when it is to be shown once."""
-        if self.silent or now_ns - self._heard_ns < PATIENCE_S * S:
+        if self.silent or now_ns - self._heard_ns < PATIENCE_S * NS_PER_S:
             return
         self.silent = True
         if self._once:

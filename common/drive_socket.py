@@ -10,12 +10,12 @@ from pathlib import Path
 from zlib import crc32
 
 from common.errors import ConfigError
-from common.settings import Bus, drive_path
+from common.settings import BusSettings, drive_path
 
 NETWORK = Path("/proc/self/ns/net")
 
 
-def socket_path(where: Bus, robot: str) -> Path:
+def socket_path(where: BusSettings, robot: str) -> Path:
     """Return the path that bridge and safety of one stack have in common.
 
     Without ``bus.drive`` it is derived from what the two share: user, robot, router and network. It

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 T = TypeVar("T")
 
-S = 1_000_000_000  # nanoseconds in a second
+NS_PER_S = 1_000_000_000  # nanoseconds in a second
 
 
 class Latest(Struct, Generic[T], frozen=True):
@@ -17,7 +17,7 @@ class Latest(Struct, Generic[T], frozen=True):
 
     def age_s(self, now_ns: int) -> float:
         """Return how long ago it came, in seconds."""
-        return (now_ns - self.received_ns) / S
+        return (now_ns - self.received_ns) / NS_PER_S
 
 
 def fresh(latest: Latest[T] | None, now_ns: int, limit_s: float) -> bool:

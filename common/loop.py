@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
 
@@ -63,7 +63,7 @@ class Loop:
 
         Like ``watch`` it is for the loop's own thread; another thread posts it.
         """
-        timer = Timer(round(period_s * S), time.monotonic_ns(), handler)
+        timer = Timer(round(period_s * NS_PER_S), time.monotonic_ns(), handler)
         self._timers.append(timer)
         return timer
 
@@ -100,13 +100,13 @@ class Loop:
         late_ns = max((timer.late_ns for timer in self._timers), default=0)
         for timer in self._timers:
             timer.late_ns = 0
-        return late_ns / S
+        return late_ns / NS_PER_S
 
     def _until_due_s(self) -> float | None:
         if not self._timers:
             return None
         due = min(timer.due_ns for timer in self._timers)
-        return max(0, due - time.monotonic_ns()) / S
+        return max(0, due - time.monotonic_ns()) / NS_PER_S
 
     def _call_due(self) -> None:
         for timer in self._timers:

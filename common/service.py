@@ -24,7 +24,7 @@ from common.bus.drive import DriveLink, LinkWatch
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Event, Health, Level, Timing
 from common.schema import schemas
@@ -89,14 +89,14 @@ class Node(Generic[C]):
 
     def _report(self, now_ns: int) -> None:
         counts = Counter(self.bus.counts)
-        past_s = (now_ns - self._reported_ns) / S
+        past_s = (now_ns - self._reported_ns) / NS_PER_S
         rates = {key: (n - self._counted[key]) / past_s for key, n in sorted(counts.items())}
         self._counted, self._reported_ns = counts, now_ns
         self._health.put(
             Health(
                 service=self.name,
                 version=VERSION,
-                uptime=(now_ns - self._started_ns) / S,
+                uptime=(now_ns - self._started_ns) / NS_PER_S,
                 rates=rates,
                 counters=dict(self.bus.counters + self.counters),
                 lateness=self.loop.take_lateness_s(),
@@ -149,7 +149,7 @@ def run(
     return serve(node)
 
 
-def run_behind(
+def run_optional_service(
     name: str,
     root: type[C],
     found: Callable[[], Callable[[Node[C]], object]],
@@ -197,7 +197,7 @@ def serve(node: Node[C]) -> int:
 
 
 def _come_to_rest(node: Node[C]) -> None:
-    deadline_ns = time.monotonic_ns() + round(REST_S * S)
+    deadline_ns = time.monotonic_ns() + round(REST_S * NS_PER_S)
 
     def check(now_ns: int) -> None:
         if node.is_stopped() or now_ns > deadline_ns:

@@ -33,20 +33,20 @@ class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 def check_protections(
-    given: Mapping[str, float], limits: Limits, i_accept: tuple[str, ...]
+    given: Mapping[str, float], limits: Limits, unsafe_overrides: tuple[str, ...]
 ) -> None:
     """Raise ``ValueError`` for a setting that takes a protection away and is not owned up to.
 
     Outside of its limits a protection is as good as gone. Zero never means "off".
     """
-    unknown = sorted(set(i_accept) - set(limits))
+    unknown = sorted(set(unsafe_overrides) - set(limits))
     if unknown:
-        raise ValueError(f"i_accept names {unknown[0]!r}, which takes no protection away")
+        raise ValueError(f"unsafe_overrides names {unknown[0]!r}, which takes no protection away")
     for name, (low, high) in limits.items():
-        if not low <= given[name] <= high and name not in i_accept:
+        if not low <= given[name] <= high and name not in unsafe_overrides:
             raise ValueError(
                 f"{name} = {given[name]} takes a protection away; "
-                f"allowed is {low}..{high}, or name it in i_accept"
+                f"allowed is {low}..{high}, or name it in unsafe_overrides"
             )
 
 
@@ -57,10 +57,10 @@ class Robot(Section, frozen=True, kw_only=True):
     realtime: bool = True  # whether what stands before the wheels asks for SCHED_FIFO
 
 
-class Bus(Section, frozen=True, kw_only=True):
+class BusSettings(Section, frozen=True, kw_only=True):
     """Where the Zenoh router is."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
     uplink: tuple[str, ...] = ()  # the site's router, dialled by the robot's own
@@ -77,7 +77,7 @@ class Bus(Section, frozen=True, kw_only=True):
     laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
 
     def __post_init__(self) -> None:
-        check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.i_accept)
+        check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.unsafe_overrides)
         for endpoint in (*self.listen, *self.connect, *self.uplink):
             if not ENDPOINT.fullmatch(endpoint):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
@@ -176,7 +176,7 @@ def is_local(endpoint: str) -> bool:
 class Board(Section, frozen=True, kw_only=True):
     """The vehicle's main board and our side of its cable (manual 1)."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
@@ -185,7 +185,7 @@ class Board(Section, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         given = {"any_source_port": self.any_source_port}
-        check_protections(given, PROTECTIVE_OF_BOARD, self.i_accept)
+        check_protections(given, PROTECTIVE_OF_BOARD, self.unsafe_overrides)
         for name in ("address", "listen_address"):
             _check_ipv4(name, getattr(self, name))
         if len(set(self.listen_ports)) < len(self.listen_ports):
@@ -245,5 +245,5 @@ class Shared(Struct, frozen=True, kw_only=True):
     """The sections that every service has; a service's own configuration adds to them."""
 
     robot: Robot = Robot()
-    bus: Bus = Bus()
+    bus: BusSettings = BusSettings()
     log: Log = Log()

@@ -9,7 +9,7 @@ import heapq
 import random
 from dataclasses import dataclass, replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.requests import Wire
 
 REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
@@ -50,7 +50,7 @@ class Cable:
         for _ in range(2 if self._happens(self.faults.duplicate) else 1):
             left_ns = self._leaves_ns(len(payload), now_ns)
             if left_ns is not None:
-                due_ns = left_ns + round(self._delay_s() * S)
+                due_ns = left_ns + round(self._delay_s() * NS_PER_S)
                 heapq.heappush(
                     self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
                 )
@@ -72,7 +72,7 @@ class Cable:
         """Return when so many bytes have left, after all before them; None if none may wait."""
         if self.faults.rate is None:
             return now_ns
-        a_byte_ns = 8 * S / self.faults.rate
+        a_byte_ns = 8 * NS_PER_S / self.faults.rate
         begins_ns = max(now_ns, self._free_ns)
         if (begins_ns - now_ns) / a_byte_ns + size > self.faults.queue:
             return None

@@ -2,7 +2,7 @@
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import reports as r
 from common.wire.frame import Frame
 from sim import requests as q
@@ -56,7 +56,7 @@ class Injection:
         return Reply(ok=not error, error=error)
 
     def _due_ns(self, step: q.Step) -> int:
-        return self._start_ns + round(step.at * S)
+        return self._start_ns + round(step.at * NS_PER_S)
 
     def _disturb(self, request: q.Asked, now_ns: int) -> str:
         """Return why it was refused, nothing when it was done."""

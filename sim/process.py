@@ -8,7 +8,7 @@ from typing import Self
 import msgspec
 
 from common.errors import ConfigError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.log import Logger
 from common.loop import Loop
 from sim import trace as t
@@ -59,7 +59,7 @@ class Process:
                 stack.enter_context(closing(control))
                 self.loop.watch(control.sock, lambda now_ns: self._obey(control, now_ns))
             self._opened = stack.pop_all()
-        self.loop.every(STEP_NS / S, self._step)
+        self.loop.every(STEP_NS / NS_PER_S, self._step)
 
     def run(self) -> None:
         """Serve until the loop is stopped."""

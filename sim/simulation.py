@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
@@ -31,11 +31,11 @@ from sim.sonar import Sonars
 from sim.vehicle import Twist, go, next_twist, wheels
 from sim.world import Plan, World
 
-STEP_NS = S // 100
+STEP_NS = NS_PER_S // 100
 STREAM_STEPS = 2  # velocity at 50 Hz
 SONAR_STEPS = 5  # a round of echoes takes about that long: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
-CATCH_UP_NS = S // 2  # a longer hole is skipped: the world stood still meanwhile
+CATCH_UP_NS = NS_PER_S // 2  # a longer hole is skipped: the world stood still meanwhile
 GARBAGE = b"GS" + bytes(20)  # begins as a frame does
 
 ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
@@ -112,7 +112,7 @@ class Simulation:
 
     def freeze(self, seconds: float, now_ns: int) -> None:
         """Let the board hear and say nothing for that long."""
-        self._silent_until_ns = now_ns + round(seconds * S)
+        self._silent_until_ns = now_ns + round(seconds * NS_PER_S)
 
     def power_cycle(self, seconds: float, now_ns: int) -> None:
         """Cut the board's power; it speaks again that much later, with all counters at zero."""
@@ -125,8 +125,8 @@ class Simulation:
 
     def flood(self, rate: int, seconds: float, garbage: bool, now_ns: int) -> None:
         """Send so many datagrams a second besides, for that long."""
-        self._flood = rate * STEP_NS // S, GARBAGE if garbage else None
-        self._flood_until_ns = now_ns + round(seconds * S)
+        self._flood = rate * STEP_NS // NS_PER_S, GARBAGE if garbage else None
+        self._flood_until_ns = now_ns + round(seconds * NS_PER_S)
 
     def lose(self, reports: frozenset[type[Frame]], every: int) -> None:
         """Lose every n-th of these reports from now on."""
@@ -170,7 +170,7 @@ class Simulation:
     def _step(self) -> None:
         self._steps += 1
         self._wake()
-        self._move(STEP_NS / S)
+        self._move(STEP_NS / NS_PER_S)
         if self._steps % SONAR_STEPS == 0:
             self._ranges = self.sonars.measure(self.world, self.pose)
         self.board.sense(self.twist, self._ranges, self._pressed())

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from cli.demo.script import Ask as Wish
 from cli.demo.script import Lap, View
 from common import messages as m
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.operator import reset_request
 from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
@@ -28,10 +28,10 @@ from sim.config import Config
 from sim.files import load_plan
 from sim.simulation import Simulation
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 TICK_NS = 10 * MS
 BOOT = 77  # of the bridge
-START_NS = 100 * S
+START_NS = 100 * NS_PER_S
 
 
 class Clockwork:
@@ -61,7 +61,7 @@ class Clockwork:
 
     def run(self, seconds: float) -> Iterator[None]:
         """Turn for so long, a tick at a time."""
-        end_ns = self.now_ns + round(seconds * S)
+        end_ns = self.now_ns + round(seconds * NS_PER_S)
         while self.now_ns < end_ns:
             self.now_ns += TICK_NS
             self.sim.advance(self.now_ns)

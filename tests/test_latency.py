@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from common.bus.host import host_id
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
 from tests.drive_source import Stick, push, stack, stick
@@ -49,7 +49,7 @@ def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
     lines = tmp_path / "lines"
     with running(t2("latency", "-o", "json", *sets(f"bus.connect={stack.endpoint}")), lines):
         wait_until(lambda: judged(lines), "the judged stop", PATIENCE_S)
-    took_s = (time.monotonic_ns() - pressed_ns) / S
+    took_s = (time.monotonic_ns() - pressed_ns) / NS_PER_S
     told = json.loads(lines.read_text(encoding="utf-8").split("\n")[-2])
     durations = told["durations"]
     assert durations["contact_to_break"]["count"] == 1

@@ -12,7 +12,7 @@ from typing import TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import (
     Bumper,
     Drive,
@@ -32,7 +32,7 @@ from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.state import State
 
-TICK_NS = S // 20
+TICK_NS = NS_PER_S // 20
 QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease, than inputs take to settle
 FREE_M, NEAR_M, INSIDE_M = None, 0.3, 0.1
 FRONT = (1, 2, 3)  # of the sonars
@@ -44,7 +44,7 @@ class Scene(Struct, frozen=True):
     """What is so around the policy, and its memory."""
 
     state: State
-    now_ns: int = 10 * S
+    now_ns: int = 10 * NS_PER_S
     seq: int = 0
     asks: float | None = None  # m/s; None for nobody
     holds: bool = False  # the release

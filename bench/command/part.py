@@ -9,18 +9,18 @@ from bench.path.page import FLOOR
 from bench.path.processes import module, running
 from bench.path.vehicle import Ports
 from bench.series import Series
-from common.settings import Bus
+from common.settings import BusSettings
 
 BLOCKS, ROUNDS = 2, 250
 # So that a frame shows at once what was asked for, and not a step of the ramp on the way there.
 STEEP = (
     "safety.linear_acceleration=10.0",
     "safety.deceleration=10.0",
-    'safety.i_accept=["linear_acceleration", "deceleration"]',
+    'safety.unsafe_overrides=["linear_acceleration", "deceleration"]',
 )
 
 
-def t2(title: str, home: Callable[..., AbstractContextManager[Bus]]) -> turns.Row:
+def t2(title: str, home: Callable[..., AbstractContextManager[BusSettings]]) -> turns.Row:
     """Run T2 as shipped, but for the ramp, and somebody who asks as teleop does."""
 
     @contextlib.contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from verification.fleet.gauges import TICKS, machine
 from verification.soak.process_stats import GONE
 
@@ -32,7 +32,9 @@ class Shares:
     def __exit__(self, *_: object) -> None:
         past_s = time.monotonic() - self._since_s
         after = self._read()
-        self.ns = {name: round((now - self._was[name]) * S / past_s) for name, now in after.items()}
+        self.ns = {
+            name: round((now - self._was[name]) * NS_PER_S / past_s) for name, now in after.items()
+        }
 
     def _read(self) -> dict[str, float]:
         found = {"machine": machine().busy_s}

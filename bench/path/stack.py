@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bench.path.processes import Command, given, module, running
-from common.settings import Bus
+from common.settings import BusSettings
 from verification.harness.certificates import ADDRESS, Site, dialling
 from verification.harness.support import at, free_port
 
@@ -31,7 +31,7 @@ def services(
 
 
 @contextlib.contextmanager
-def local(board: int, port: int, *sets: str, safety: str = SAFETY) -> Iterator[Bus]:
+def local(board: int, port: int, *sets: str, safety: str = SAFETY) -> Iterator[BusSettings]:
     """Run them; tell how a client on the same host dials the router."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     sets = (f"bus.listen={endpoint}", *sets)
@@ -40,7 +40,7 @@ def local(board: int, port: int, *sets: str, safety: str = SAFETY) -> Iterator[B
 
 
 @contextlib.contextmanager
-def secured(board: int, port: int, *sets: str) -> Iterator[Bus]:
+def secured(board: int, port: int, *sets: str) -> Iterator[BusSettings]:
     """Run them with the keys of a site; tell how a driver dials the router by mutual TLS."""
     with tempfile.TemporaryDirectory() as folder:
         with contextlib.redirect_stdout(io.StringIO()):
@@ -54,17 +54,17 @@ def secured(board: int, port: int, *sets: str) -> Iterator[Bus]:
             yield dialling(driver, door)
 
 
-def files(bus: Bus) -> list[str]:
+def files(bus: BusSettings) -> list[str]:
     """Return the settings that name keys."""
     return [f"bus.{name}={getattr(bus, name)}" for name in KEYS if getattr(bus, name)]
 
 
-def joining(bus: Bus) -> list[str]:
+def joining(bus: BusSettings) -> list[str]:
     """Return the settings of who dials."""
     return [f"bus.connect={list(bus.connect)}", *files(bus)]
 
 
-def plain(bus: Bus) -> str:
+def plain(bus: BusSettings) -> str:
     """Return the configuration of who dials with nothing but Zenoh, as JSON."""
     connect = {"endpoints": list(bus.connect), "timeout_ms": FOR_EVER}
     config: dict[str, object] = {"mode": "client", "connect": connect}

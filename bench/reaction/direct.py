@@ -11,13 +11,13 @@ from unittest.mock import patch
 import zenoh
 
 from common.bus import session
-from common.settings import Bus
+from common.settings import BusSettings
 from services.safety.__main__ import main
 
 AS_SHIPPED = session.client_config
 
 
-def listening(where: Bus, turn: int = 0) -> zenoh.Config:
+def listening(where: BusSettings, turn: int = 0) -> zenoh.Config:
     """Return how the first session joins: nobody, but others join it."""
     config = AS_SHIPPED(where, turn)
     config.insert_json5("mode", '"peer"')

@@ -7,7 +7,7 @@ from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.operator import reset_request
-from common.settings import Bus as Where
+from common.settings import BusSettings as Where
 
 
 class Resetter:

@@ -15,7 +15,7 @@ from bench.path.vehicle import Ports, compiled, free_ports
 from bench.reaction.page import LOADS
 from bench.series import Series
 from bench.telemetry.page import AGE
-from common.settings import Bus
+from common.settings import BusSettings
 from verification.harness.support import wait_until
 
 BLOCKS, ROUNDS = 2, 200
@@ -30,7 +30,7 @@ def frames() -> turns.Row:
 
 def t2(
     title: str,
-    home: Callable[..., AbstractContextManager[Bus]] = stack.local,
+    home: Callable[..., AbstractContextManager[BusSettings]] = stack.local,
     attached: Sequence[str] = (),
 ) -> turns.Row:
     """Run T2 as shipped, with a consumer, and others that take so many ms for a sample."""

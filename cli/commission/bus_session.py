@@ -16,7 +16,7 @@ from cli.commission.message_log import Tape
 from cli.commission.motion import too_fast
 from common.bus.bus import Bus
 from common.errors import LinkError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import Call
 from common.loop import Loop
 from common.settings import Shared
@@ -64,7 +64,7 @@ class Bench:
 
     def until(self, true: Callable[[], object], patience_s: float) -> bool:
         """Turn the loop until it is true, at most so long; return whether it is."""
-        end_ns = time.monotonic_ns() + round(patience_s * S)
+        end_ns = time.monotonic_ns() + round(patience_s * NS_PER_S)
         self._done = lambda: true() or time.monotonic_ns() > end_ns
         self.loop.run()
         return bool(true())
@@ -133,7 +133,10 @@ class Bench:
         return fast or bool(self.latched())
 
     def _stands(self, since_ns: int) -> bool:
-        if not self.tape.velocities or self.tape.velocities[-1].received_ns < since_ns + S // 4:
+        if (
+            not self.tape.velocities
+            or self.tape.velocities[-1].received_ns < since_ns + NS_PER_S // 4
+        ):
             return False
         velocity = self.tape.velocities[-1].value
         return Twist(velocity.linear, velocity.angular).is_standing

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cli.commission.verdict import Row, Verdict, judged
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Motion, SafetyState
 
 PROMPT_S = 0.5  # from the cause to the latch and to BREAK, a slow bus included
@@ -79,7 +79,7 @@ def braked_after_s(trip: Trip) -> float | None:
 
 def _first(trip: Trip, times_ns: Sequence[int]) -> float | None:
     # A state may overtake the sample that caused it on its way here: that took no time.
-    return max(0, times_ns[0] - (trip.at_ns or 0)) / S if times_ns else None
+    return max(0, times_ns[0] - (trip.at_ns or 0)) / NS_PER_S if times_ns else None
 
 
 def _let_through(trip: Trip) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from cli.commission.verdict import Verdict, judged
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Link, Switches
 
 ENOUGH = 0.7  # of the rate that was asked: the poll slows down by half when answers are missed
@@ -96,7 +96,7 @@ def _link_problems(
             yield f"{name} comes at {rate:.0f} Hz, expected are {asked[name]:.0f}."
     if switches is None or not (switches.ultrasonic_brake and switches.bumper_brake):
         yield "The board has not echoed that both its emergency brakes are on."
-    seconds = (links[-1].mono_ns - links[0].mono_ns) / S
+    seconds = (links[-1].mono_ns - links[0].mono_ns) / NS_PER_S
     heard = seconds * sum(sum(link.rates.values()) for link in links) / len(links)
     for reason, count in rejected(links).items():
         if reason != BAD_CRC and count > STRAY * heard:

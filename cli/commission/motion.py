@@ -25,17 +25,17 @@ from itertools import pairwise
 from statistics import mean
 
 from cli.commission.verdict import Row, Verdict, judged
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, SafetyState, Velocity
 from services.safety.twist import Twist
 
-SETTLE_NS = round(0.4 * S)  # to reach the speed; much is known of no vehicle
-WINDOW_NS = round(0.6 * S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
+SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; much is known of no vehicle
+WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
 FULL = 0.95  # of what was asked counts as let through
 NOTHING = 0.15  # of what was commanded
 RATIO = 0.25  # off 1 by more is wrong; the next unit is off by 0.43
 UNIT_MATCH = 0.15  # of a known unit's ratio
-STOP_NS = 2 * S  # to stand, after a speed of this tool
+STOP_NS = 2 * NS_PER_S  # to stand, after a speed of this tool
 # rad/s for one unit of the wire, by the name of the setting where there is one
 UNITS = {
     "decidegree": math.radians(0.1),
@@ -119,7 +119,7 @@ def measure(run: Run) -> Measured | None:
     if not whole or end_ns - begin_ns < WINDOW_NS or not velocities or len(counts) < 2:
         return None
     # The bridge's own clock: what a network does to the times of arrival does not matter.
-    seconds = (counts[-1].mono_ns - counts[0].mono_ns) / S
+    seconds = (counts[-1].mono_ns - counts[0].mono_ns) / NS_PER_S
     way = counts[-1].distance - counts[0].distance
     turn = sum(_wrapped(b.heading - a.heading) for a, b in pairwise(counts))
     return Measured(
@@ -141,7 +141,7 @@ def stood_after_s(run: Run) -> float | None:
             stood_ns = None
         elif stood_ns is None:
             stood_ns = velocity.received_ns
-    return None if stood_ns is None else (stood_ns - run.released_ns) / S
+    return None if stood_ns is None else (stood_ns - run.released_ns) / NS_PER_S
 
 
 def unit_of(ratio: float, setting: str) -> str | None:
@@ -208,8 +208,8 @@ def _with_unit(run: Run, text: str, unit: str | None, way: str) -> str:
 
 
 def _standing(stood_s: float | None) -> Iterator[str]:
-    if stood_s is None or stood_s * S > STOP_NS:
-        yield f"It did not stand within {STOP_NS / S:g} s after the release."
+    if stood_s is None or stood_s * NS_PER_S > STOP_NS:
+        yield f"It did not stand within {STOP_NS / NS_PER_S:g} s after the release."
 
 
 def _not_let_through(run: Run) -> str:

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from cli.commission.verdict import Row, Verdict, judged
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Ultrasonic
 
 NEAR_M = 0.6  # a hand is held at 0.2 to 0.4 m
 CLEARLY_M = 0.2  # nearer than at rest: more than noise, less than a hand makes
-HOLD_NS = S // 2
+HOLD_NS = NS_PER_S // 2
 ROOM_M = NEAR_M + CLEARLY_M  # what must be free before a sonar, or a hand could not be told
 
 Rest = tuple[float | None, ...]  # m at rest, None for a faulty sonar

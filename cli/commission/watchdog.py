@@ -21,7 +21,7 @@ from cli.commission.verdict import Verdict, judged
 from cli.commission.watchdog_plan import BREAK, Sample, Trial, judge_trial
 from cli.settings import Everything
 from common.errors import WireError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands, reports
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
@@ -136,7 +136,7 @@ def _try(master: Master, operator: Operator, signals: list[int]) -> Trial:
                 master.send(command)
             for sample in master.velocities(LOOK_S):
                 trial = trial.hear(sample)
-            braked_s = (time.monotonic_ns() - (trial.broken_ns or time.monotonic_ns())) / S
+            braked_s = (time.monotonic_ns() - (trial.broken_ns or time.monotonic_ns())) / NS_PER_S
             if braked_s > WARN_S and not warned:
                 warned = True
                 operator.say("IT DOES NOT STAND: use the vehicle's own switch.")

@@ -13,18 +13,18 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from cli.commission.verdict import Verdict
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import MotionCommand, MotionKind
 from services.bridge.lease import standing
 
 LINEAR_MPS = 0.05
-RUN_NS = S
-SILENCE_NS = S
-PERIOD_NS = S // 20
-DEAF_NS = S // 5  # without a velocity: what cannot be seen is not let go on
+RUN_NS = NS_PER_S
+SILENCE_NS = NS_PER_S
+PERIOD_NS = NS_PER_S // 20
+DEAF_NS = NS_PER_S // 5  # without a velocity: what cannot be seen is not let go on
 TOO_FAST_MPS = 0.2
 MOVING_MPS = 0.03  # over the standstill's 0.02: it did obey the RUN
-STANDS_NS = S // 5  # for so long, to count as standing
+STANDS_NS = NS_PER_S // 5  # for so long, to count as standing
 
 RUN = MotionCommand(MotionKind.RUN, round(LINEAR_MPS * 1000))
 BREAK = MotionCommand(MotionKind.BREAK)
@@ -96,7 +96,7 @@ class Trial:
     def _danger(self, now_ns: int) -> str:
         heard_ns = self.samples[-1].received_ns if self.samples else self.begun_ns
         if now_ns - heard_ns > DEAF_NS:
-            return f"The board was not heard for {DEAF_NS / S:g} s."
+            return f"The board was not heard for {DEAF_NS / NS_PER_S:g} s."
         if self.samples and abs(self.samples[-1].linear) > TOO_FAST_MPS:
             return f"It moved at {self.samples[-1].linear:.2f} m/s, asked were {LINEAR_MPS:g}."
         return ""
@@ -118,7 +118,7 @@ def judge_trial(trial: Trial) -> Verdict:
     """Say what the board did when the commands ended."""
     ran, silent = _split(trial)
     data = [
-        ("commanded", f"{LINEAR_MPS:g} m/s for {RUN_NS / S:g} s, then nothing"),
+        ("commanded", f"{LINEAR_MPS:g} m/s for {RUN_NS / NS_PER_S:g} s, then nothing"),
         ("velocity at the end of RUN", f"{ran[-1].linear:.3f} m/s" if ran else "not heard"),
         ("velocity at the end of the silence", f"{silent[-1].linear:.3f} m/s" if silent else "-"),
         ("velocities in the silence", str(len(silent))),
@@ -150,14 +150,14 @@ def _inconclusive(trial: Trial, ran: Sequence[Sample], silent: Sequence[Sample])
 
 def _finding(trial: Trial, ran: Sequence[Sample], silent: Sequence[Sample]) -> str:
     if not silent[-1].stands:
-        return f"Drives on for {SILENCE_NS / S:g} s without a command: no watchdog."
+        return f"Drives on for {SILENCE_NS / NS_PER_S:g} s without a command: no watchdog."
     last_run_ns = trial.last_run_ns or trial.begun_ns
     moving = [s.received_ns for s in silent if not s.stands]
     slowing = [s.received_ns for s in silent if not _steady(ran[-1], s)]
     stood_ns = next(s.received_ns for s in silent if not moving or s.received_ns > moving[-1])
     return (
-        f"Stops by itself after {(stood_ns - last_run_ns) / S:.2f} s, "
-        f"slowing down from {(slowing[0] - last_run_ns) / S:.2f} s on."
+        f"Stops by itself after {(stood_ns - last_run_ns) / NS_PER_S:.2f} s, "
+        f"slowing down from {(slowing[0] - last_run_ns) / NS_PER_S:.2f} s on."
     )
 
 

@@ -23,7 +23,7 @@ from common.bus.bus import Bus
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from sim.files import load_plan
 
@@ -96,7 +96,7 @@ def drive(
         def look(now_ns: int) -> None:
             if supervisor.look(time.monotonic()):
                 raise LinkError(f"a process cannot run; see {output.name}")
-            if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * S:
+            if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * NS_PER_S:
                 loop.stop()
 
         loop.every(LOOK_S, look)

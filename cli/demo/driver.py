@@ -7,12 +7,12 @@ from cli.demo.script import Ask, Lap, Press, Step, View
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.operator import release_request, reset_request
 from common.source import DriveSource
 
 PERIOD_S = 0.05
-PRESS_NS = round(0.15 * S)  # between two presses of a button; a held release wants 0.3 s
+PRESS_NS = round(0.15 * NS_PER_S)  # between two presses of a button; a held release wants 0.3 s
 
 
 class Driver:

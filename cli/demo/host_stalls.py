@@ -38,15 +38,15 @@ def settings(holdup_s: float) -> list[str]:
     accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
                 "sources.teleop.lease", "sources.checkout.lease"]  # fmt: skip
     return [
-        "bus.i_accept=lease",
+        "bus.unsafe_overrides=lease",
         "bus.lease=10",
         "bus.probe_deadline=10",
-        "bridge.i_accept=lease,silence,heartbeat",
+        "bridge.unsafe_overrides=lease,silence,heartbeat",
         f"bridge.lease={longer}",
         f"bridge.silence={longer}",
         f"bridge.heartbeat={longer}",
         f"bridge.echo_timeout={min(2.0, longer)}",
-        f"safety.i_accept={','.join(accepted)}",
+        f"safety.unsafe_overrides={','.join(accepted)}",
         *(f"safety.{name}={longer}" for name in AGES),
         *(f"safety.{name}=10" for name in SLOWER),
         f"safety.runaway_time={longer}",
@@ -59,12 +59,12 @@ def settings(holdup_s: float) -> list[str]:
 
 
 def with_accepted_joined(sets: Iterable[str]) -> list[str]:
-    """Return the settings with one ``i_accept`` for each section; a later one would replace it."""
+    """Return the settings with one ``unsafe_overrides`` a section; a later one would replace it."""
     accepted: dict[str, list[str]] = {}
     others = []
     for given in sets:
         name, _, value = given.partition("=")
-        if name.endswith(".i_accept"):
+        if name.endswith(".unsafe_overrides"):
             accepted.setdefault(name, []).append(value.strip("[]"))
         else:
             others.append(given)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from cli.demo.score import Trace
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Odometry
 from sim import trace as t
 from sim.geometry import Pose, Rectangle
@@ -81,12 +81,13 @@ def _draw_body(axes: Axes, body: Rectangle, at: t.Truth, color: str, label: str)
 def _draw_speeds(axes: Axes, trace: Trace) -> None:
     start_ns = trace.truth[0].mono_ns
     runs = [(c.mono_ns, c.linear if c.kind == "run" else 0.0) for c in trace.commands]
-    axes.step([(at - start_ns) / S for at, _ in runs], [v for _, v in runs], where="post",
+    axes.step([(at - start_ns) / NS_PER_S for at, _ in runs], [v for _, v in runs], where="post",
               color=COUNTED, linewidth=1.2, label="commanded, at the board")  # fmt: skip
-    axes.plot([(x.mono_ns - start_ns) / S for x in trace.truth], [x.linear for x in trace.truth],
+    times_s = [(x.mono_ns - start_ns) / NS_PER_S for x in trace.truth]
+    axes.plot(times_s, [x.linear for x in trace.truth],
               color=TRUE, linewidth=1.5, label="true")  # fmt: skip
     for hit in (b for b in trace.bumper if b.pressed):
-        axes.axvline((hit.mono_ns - start_ns) / S, color=HIT, linewidth=1, linestyle=":")
+        axes.axvline((hit.mono_ns - start_ns) / NS_PER_S, color=HIT, linewidth=1, linestyle=":")
     axes.set_xlabel("time, s")
     axes.set_ylabel("speed, m/s")
     axes.grid(alpha=0.3)

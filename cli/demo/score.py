@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cli.demo.script import Lap
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Odometry
 from sim import trace as t
 
@@ -125,7 +125,7 @@ def _stop(trace: Trace, hit_ns: int) -> Stop:
     after = (x for x in trace.truth if x.mono_ns > hit_ns)
     rest = next((x for x in after if abs(x.linear) < 0.001), None)
     return Stop(
-        None if first is None else (first - hit_ns) / S,
+        None if first is None else (first - hit_ns) / NS_PER_S,
         None if rest is None else rest.distance - before[-1].distance,
         max((abs(x.linear) for x in before[-20:]), default=0.0),
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Odometry, SafetyState
 
 STANDING = 0.02  # m/s
@@ -113,7 +113,7 @@ class Lap:
 
     def seconds(self, now_ns: int) -> float:
         """Return how long the lap has taken so far."""
-        return (now_ns - self.times_ns[0]) / S if self.times_ns else 0.0
+        return (now_ns - self.times_ns[0]) / NS_PER_S if self.times_ns else 0.0
 
     def _recover(self, latched: tuple[str, ...]) -> Ask:
         if self.recovering != latched:

@@ -10,7 +10,7 @@ from common import messages as m
 from common.bus.host import host_id
 from common.bus.probe import Probe
 from common.errors import MessageError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 
 
@@ -41,7 +41,7 @@ def note(heard: Sample, seen: Seen, host: int) -> None:
         seen.undecodable[path] = PRETENDS
         return
     if path.startswith("tel/"):
-        seen.delays_s.append((heard.wall_ns - message.t_ns) / S)
+        seen.delays_s.append((heard.wall_ns - message.t_ns) / NS_PER_S)
         seen.one_clock |= host != 0 and message.host == host
     keep(message, path.rsplit("/", 1)[-1], seen)
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from cli.inspect import remedies
 from cli.inspect.diagnosis import Dial
-from common.settings import Bus
+from common.settings import BusSettings
 
 PATIENCE_S = 2.0
 ALERT_S = 0.3  # after the handshake, until the other end has said that it refuses us
 STREAMS = ("tcp", "tls", "ws")
 
 
-def dial(endpoint: str, bus: Bus) -> Dial:
+def dial(endpoint: str, bus: BusSettings) -> Dial:
     """Return what comes of it; takes seconds at most where a name is known."""
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
@@ -47,7 +47,7 @@ def connect(host: str, port: int) -> tuple[str, str]:
     return "", ""
 
 
-def handshake(host: str, port: int, bus: Bus) -> tuple[str, str]:
+def handshake(host: str, port: int, bus: BusSettings) -> tuple[str, str]:
     """Return what is wrong with the certificates of either end; nothing when both are taken."""
     try:
         context = ssl.create_default_context(cafile=bus.ca)

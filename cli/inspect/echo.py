@@ -11,7 +11,7 @@ from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
 from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json
 from common.errors import MessageError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 
 SOON_S = 2.0  # the slowest streams come once a second
@@ -132,5 +132,5 @@ def body(value: Any, header: bool) -> Any:
 
 def clock(heard: Sample) -> str:
     """Return the local time at which a sample was received, to the millisecond."""
-    wall = time.strftime("%H:%M:%S", time.localtime(heard.wall_ns // S))
+    wall = time.strftime("%H:%M:%S", time.localtime(heard.wall_ns // NS_PER_S))
     return f"{wall}.{heard.wall_ns // 1_000_000 % 1000:03d}"

@@ -12,7 +12,7 @@ from cli.inspect.payload import read
 from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json, whole
 from cli.inspect.stream_stats import Figures, Meter, Taken
 from common.bus.host import host_id
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 
 TELL_S = 1.0
@@ -116,9 +116,9 @@ def delay(header: dict[str, Any], heard: Sample, host: int) -> tuple[float | Non
     """Return how long it was under way, and by which clock: this host's own, or two wall clocks."""
     mono_ns, t_ns = number(header, "mono_ns"), number(header, "t_ns")
     if mono_ns and host and header.get("host") == host:
-        return (heard.received_ns - mono_ns) / S, "host"
+        return (heard.received_ns - mono_ns) / NS_PER_S, "host"
     if t_ns:
-        return (heard.wall_ns - t_ns) / S, "wall"
+        return (heard.wall_ns - t_ns) / NS_PER_S, "wall"
     return None, ""
 
 

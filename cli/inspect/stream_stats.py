@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 Figures = dict[str, float | int | str | None]
 
@@ -49,7 +49,7 @@ class Meter:
     def rate(self) -> Figures:
         """Return the rate and the gaps between two samples; None below two."""
         stamps = [sample.received_ns for sample in self.taken]
-        gaps = [(later - earlier) / S for earlier, later in pairwise(stamps)]
+        gaps = [(later - earlier) / NS_PER_S for earlier, later in pairwise(stamps)]
         mean = statistics.fmean(gaps) if gaps else 0.0
         return {
             "hz": 1 / mean if mean else None,
@@ -78,7 +78,7 @@ class Meter:
         sizes = [sample.size for sample in self.taken]
         if not sizes:
             return dict.fromkeys(("bytes_per_s", "mean", "min", "max")) | {"window": 0}
-        past_s = (self.taken[-1].received_ns - self.taken[0].received_ns) / S
+        past_s = (self.taken[-1].received_ns - self.taken[0].received_ns) / NS_PER_S
         return {
             # The first one opens the time that the others fill.
             "bytes_per_s": sum(sizes[1:]) / past_s if past_s else None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from cli.inspect import output
 from cli.inspect.shell import add_output, wants_json
 from cli.recordings.recorded import opened
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import ROOT
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def as_json(reader: "Reader", summary: "Summary") -> dict[str, Any]:
 def as_text(reader: "Reader", summary: "Summary") -> str:
     """Return it for people."""
     about = dict(reader.about)
-    began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime((summary.begin_ns or 0) / S))
+    began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime((summary.begin_ns or 0) / NS_PER_S))
     state = f"cut short, {reader.readable} bytes can be read" if reader.cut else "whole"
     if reader.damaged:
         state += f", {reader.damaged} chunks are damaged and left out"

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from cli.settings import Everything
 from common.errors import LinkError
-from common.settings import Bus, protocol
+from common.settings import BusSettings, protocol
 
 PATIENCE_S = 5.0  # the children of a killed supervisor stop the vehicle meanwhile
 LOOK_S = 0.1
@@ -51,7 +51,7 @@ def wanted(config: Everything, names: Collection[str]) -> list[Port]:
     return found
 
 
-def routers(bus: Bus) -> Iterator[Port]:
+def routers(bus: BusSettings) -> Iterator[Port]:
     """Yield what a router listens on."""
     for endpoint in bus.listen:
         spoken = protocol(endpoint)

@@ -14,7 +14,7 @@ from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError
-from common.settings import Bus, Shared, is_encrypted
+from common.settings import BusSettings, Shared, is_encrypted
 from common.systemd import Systemd
 
 
@@ -74,7 +74,7 @@ def tell(text: str, file: str) -> None:
         raise ConfigError(f"--print {file}: cannot be written: {error.strerror}") from None
 
 
-def access_of(bus: Bus) -> dict[str, object] | None:
+def access_of(bus: BusSettings) -> dict[str, object] | None:
     """Return who may do what; None where everybody who gets in may do everything.
 
     Raise ``ConfigError`` when the list of members cannot be read.
@@ -84,7 +84,7 @@ def access_of(bus: Bus) -> dict[str, object] | None:
     return access_control(members.read(Path(bus.members)).welcome, bus.onboard)
 
 
-def open_to(bus: Bus) -> str:
+def open_to(bus: BusSettings) -> str:
     """Say in words who is let in."""
     if bus.insecure:
         who = "everybody on the network, without a certificate"

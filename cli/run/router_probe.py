@@ -19,8 +19,8 @@ import msgspec
 from cli.run.router_attempts import MISSES, Attempts
 from common import log, realtime
 from common.bus.answering import answers, router_at
-from common.freshness import S
-from common.settings import Bus, Log
+from common.freshness import NS_PER_S
+from common.settings import BusSettings, Log
 
 LOOK_S = 0.1
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # they reach the group; the parent decides
@@ -30,7 +30,7 @@ class Setup(msgspec.Struct, frozen=True):
     """The settings that a router passes to its probe."""
 
     parent: int
-    bus: Bus
+    bus: BusSettings
     log: Log
 
 
@@ -53,9 +53,9 @@ def main(text: str) -> int:
     os._exit(0)  # an attempt may hang in Zenoh
 
 
-def watch(parent: int, where: Bus) -> bool:
+def watch(parent: int, where: BusSettings) -> bool:
     """Return whether the parent was killed; False when it ended by itself."""
-    attempts = Attempts(time.monotonic_ns(), round(where.probe_deadline * S))
+    attempts = Attempts(time.monotonic_ns(), round(where.probe_deadline * NS_PER_S))
     ended: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
     while os.getppid() == parent:
         number = attempts.begin(time.monotonic_ns())
@@ -72,7 +72,7 @@ def watch(parent: int, where: Bus) -> bool:
     return False
 
 
-def attempt(number: int, where: Bus, ended: "queue.SimpleQueue[tuple[int, bool]]") -> None:
+def attempt(number: int, where: BusSettings, ended: "queue.SimpleQueue[tuple[int, bool]]") -> None:
     """Try once, and report the result."""
     ended.put((number, answers(where)))
 

@@ -13,7 +13,7 @@ from common import child_process
 from common.backoff import Backoff
 from common.bus.session import READERS_ENV
 from common.log import Logger
-from common.settings import Bus, Log
+from common.settings import BusSettings, Log
 
 # One thread pool for the probe: further threads only cost wake-ups.
 POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
@@ -22,7 +22,7 @@ POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:ap
 class Watch:
     """Keeps a probe of this very process running until ``stop``."""
 
-    def __init__(self, bus: Bus, log: Log) -> None:
+    def __init__(self, bus: BusSettings, log: Log) -> None:
         setup = Setup(parent=os.getpid(), bus=bus, log=log)
         text = msgspec.json.encode(setup).decode()
         self._command = child_process.command("cli.run.router_probe", text)

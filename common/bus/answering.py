@@ -6,15 +6,15 @@ import zenoh
 from msgspec.structs import replace
 
 from common.bus.session import client_config
-from common.settings import Bus
+from common.settings import BusSettings
 
 
-def router_at(where: Bus) -> Bus:
+def router_at(where: BusSettings) -> BusSettings:
     """Return the settings of a client of the router that listens there, and of no other."""
     return replace(where, connect=replace(where, connect=()).endpoints[:1])
 
 
-def answers(where: Bus) -> bool:
+def answers(where: BusSettings) -> bool:
     """Open a session, ask the router at its other end one question, and close the session.
 
     A router that hangs may keep the caller for long: call it in a thread of its own.

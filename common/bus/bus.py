@@ -47,7 +47,7 @@ class Bus:
     router's restart.
     """
 
-    def __init__(self, where: settings.Bus, robot: str, post: Post) -> None:
+    def __init__(self, where: settings.BusSettings, robot: str, post: Post) -> None:
         self.robot = robot
         # Not by `secrets`: it brings OpenSSL along, 5 ms and 5 MB in each process.
         self.boot = int.from_bytes(os.urandom(8), "big") >> 1

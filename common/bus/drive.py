@@ -14,11 +14,11 @@ from common.bus.bus import Bus
 from common.bus.publisher import Publisher
 from common.bus.session import COMPLAIN_S, Opener, drive_config
 from common.drive_socket import prepare, socket_path
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import Topic
 from common.log import Logger
 from common.messages import Level, Message
-from common.settings import Bus as Settings
+from common.settings import BusSettings as Settings
 
 M = TypeVar("M", bound=Message)
 
@@ -107,7 +107,7 @@ class LinkWatch:
         self._was_up = up or (None if self._was_up is None else False)
         if up or self._since_ns is None:
             self._since_ns = now_ns
-        elif now_ns - self._since_ns >= COMPLAIN_S * S:
+        elif now_ns - self._since_ns >= COMPLAIN_S * NS_PER_S:
             self._since_ns = now_ns
             Logger().warning(
                 f"no {self._link.other} on the drive link; both must run as one user and with one "

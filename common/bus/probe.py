@@ -21,7 +21,7 @@ from common.bus.session import check_files, client_config
 from common.errors import LinkError
 from common.keys import ClassOfService
 from common.sample import Sample
-from common.settings import Bus
+from common.settings import BusSettings
 
 MATCH_S = 1.0  # until the router has told who is there for what was declared
 MOST = 20_000  # samples that may wait for a slow reader; the newest of more are left out
@@ -128,14 +128,14 @@ class Probe:
 
 
 @contextmanager
-def probe(where: Bus) -> Iterator[Probe]:
+def probe(where: BusSettings) -> Iterator[Probe]:
     """Join the bus while the context lasts; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
     with _opened(where) as session:
         yield Probe(session)
 
 
-def _opened(where: Bus) -> zenoh.Session:
+def _opened(where: BusSettings) -> zenoh.Session:
     for turn in range(len(where.endpoints)):
         with suppress(zenoh.ZError):
             return zenoh.open(client_config(where, turn))

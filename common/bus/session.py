@@ -13,7 +13,7 @@ import zenoh
 from common.bus.downsampling import thinned
 from common.errors import ConfigError, LinkError
 from common.log import Logger
-from common.settings import Bus, is_encrypted
+from common.settings import BusSettings, is_encrypted
 
 RETRY_S = 0.5  # between two tries to find a router
 COMPLAIN_S = 5.0  # between two lines that say so
@@ -43,7 +43,7 @@ class Opener:
     ``zenoh.open`` must not wait by itself (it ignores SIGINT then), so the waiting is done here.
     """
 
-    def __init__(self, where: Bus, adopt: Callable[[zenoh.Session], None]) -> None:
+    def __init__(self, where: BusSettings, adopt: Callable[[zenoh.Session], None]) -> None:
         check_files(where, where.endpoints)
         self._where = where
         self._adopt = adopt
@@ -90,7 +90,7 @@ class Opener:
         )
 
 
-def client_config(where: Bus, turn: int = 0) -> zenoh.Config:
+def client_config(where: BusSettings, turn: int = 0) -> zenoh.Config:
     """Return how a service joins: a client of one of these routers, never by scouting.
 
     Zenoh waits for the first endpoint, if it is silent, until there is no time left for the others:
@@ -104,7 +104,7 @@ def client_config(where: Bus, turn: int = 0) -> zenoh.Config:
     )
 
 
-def drive_config(where: Bus, socket: Path, *, listens: bool) -> zenoh.Config:
+def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Config:
     """Return the configuration of one end of the drive link: one socket and no other endpoint."""
     ends: dict[str, object] = {"listen": {"endpoints": []}, "connect": {"endpoints": []}}
     endpoint = [f"unixsock-stream/{socket}"]
@@ -117,7 +117,7 @@ def drive_config(where: Bus, socket: Path, *, listens: bool) -> zenoh.Config:
 
 
 def router_config(
-    where: Bus, access: Mapping[str, object] | None = None, robot: str = ""
+    where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
 ) -> dict[str, object]:
     """Return a router's whole configuration, as JSON.
 
@@ -143,7 +143,7 @@ def router_config(
 
 @contextlib.contextmanager
 def router(
-    where: Bus, access: Mapping[str, object] | None = None, robot: str = ""
+    where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
 ) -> Iterator[None]:
     """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen."""
     check_files(where, (*where.listen, *where.uplink))
@@ -161,7 +161,7 @@ def router(
         yield
 
 
-def check_files(where: Bus, endpoints: Iterable[str]) -> None:
+def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
     """Raise ``ConfigError`` for a file that these endpoints want and that cannot be read."""
     if not any(map(is_encrypted, endpoints)):
         return
@@ -173,7 +173,7 @@ def check_files(where: Bus, endpoints: Iterable[str]) -> None:
             raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
 
 
-def _common(where: Bus, **sending: object) -> dict[str, object]:
+def _common(where: BusSettings, **sending: object) -> dict[str, object]:
     link: dict[str, object] = {
         "tx": {
             "lease": round(where.lease * 1000),
@@ -195,7 +195,7 @@ def _common(where: Bus, **sending: object) -> dict[str, object]:
     }
 
 
-def _tls(where: Bus) -> dict[str, object]:
+def _tls(where: BusSettings) -> dict[str, object]:
     """Both ends show a certificate of the site's own CA, whoever dials."""
     return {
         "root_ca_certificate": where.ca,

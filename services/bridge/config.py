@@ -31,7 +31,7 @@ PROTECTIVE: settings.Limits = {
 class Bridge(settings.Section, frozen=True, kw_only=True):
     """How the bridge treats the board."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message holds
     silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s after which the board is lost
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port is taken
@@ -52,7 +52,7 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in PROTECTIVE}
-        settings.check_protections(given, PROTECTIVE, self.i_accept)
+        settings.check_protections(given, PROTECTIVE, self.unsafe_overrides)
         if self.failover >= self.silence:
             raise ValueError(f"failover {self.failover} s must be under silence {self.silence} s")
 

@@ -41,10 +41,10 @@ from enum import StrEnum
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Motion
 
-STOP_PERIOD_NS = S // 20
+STOP_PERIOD_NS = NS_PER_S // 20
 AT_ONCE = -STOP_PERIOD_NS  # as a send time: so long ago that the next STOP is due
 SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 90 decisions a second
 STANDING_MPS = 0.02

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from common.errors import MessageError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Motion, Velocity
 from common.wire.frame import Frame
 from common.wire.framing import Framing
@@ -15,7 +15,7 @@ from services.bridge.standstill import Standstill
 from services.bridge.translate import Translator, check_finite
 
 REPORTED_MAX = 20  # a sender that changes its boot all the time must not fill memory and events
-REST_NS = S  # how long a stopping bridge waits for the vehicle to stand
+REST_NS = NS_PER_S  # how long a stopping bridge waits for the vehicle to stand
 
 
 class MotionOutput:
@@ -42,12 +42,12 @@ class MotionOutput:
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
         self._reported: set[tuple[Refusal, int]] = set()  # refused senders that had an event
-        self._lease_ns = round(settings.lease * S)
-        self._silence_ns = round(settings.silence * S)
+        self._lease_ns = round(settings.lease * NS_PER_S)
+        self._silence_ns = round(settings.silence * NS_PER_S)
         self._standstill = Standstill(
             settings.deceleration,
             settings.angular_deceleration,
-            round(settings.coast * S),
+            round(settings.coast * NS_PER_S),
             self._silence_ns,
         )
 

@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import Struct
 
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.operator import Echoes
 from common.wire.commands import LedSet
 from services.bridge.output import Output
@@ -84,7 +84,7 @@ class Operator:
             self._switching = None
 
     def _waiting(self, caller: Any, now_ns: int) -> Waiting:
-        return Waiting(caller, now_ns + round(self._timeout_s * S))
+        return Waiting(caller, now_ns + round(self._timeout_s * NS_PER_S))
 
     def _refusal(self, busy: Waiting | None, what: str) -> str:
         if self._readiness.link.state != "up":

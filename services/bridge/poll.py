@@ -11,12 +11,12 @@ from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.frame import Frame
 from services.bridge.losses import Losses
 
 SLOWEST = 4  # times the period
-WINDOW_NS = S // 5  # of ``lost``
+WINDOW_NS = NS_PER_S // 5  # of ``lost``
 
 
 class Query(Struct):
@@ -44,9 +44,9 @@ class Poll:
     ) -> None:
         """Take name, frame and rate in Hz of each query, and the names of the steady ones."""
         self.queries = {
-            name: Query(name, frame, round(S / rate_hz)) for name, frame, rate_hz in queries
+            name: Query(name, frame, round(NS_PER_S / rate_hz)) for name, frame, rate_hz in queries
         }
-        self._timeout_ns = round(timeout_s * S)
+        self._timeout_ns = round(timeout_s * NS_PER_S)
         for name in steady:
             query = self.queries[name]
             query.losses = Losses(query.period_ns, self._timeout_ns, WINDOW_NS)
@@ -80,7 +80,7 @@ class Poll:
         trips = sorted(
             q.round_trip_ns for q in self.queries.values() if q.round_trip_ns is not None
         )
-        return trips[len(trips) // 2] / S if trips else None
+        return trips[len(trips) // 2] / NS_PER_S if trips else None
 
     def missed(self) -> dict[str, int]:
         """Return how many answers never came in time, by query."""

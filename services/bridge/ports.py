@@ -25,11 +25,11 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.frame import Frame
 from common.wire.reports import BumperReport, VelocityReport
 
-UNANSWERED_NS = S // 2
+UNANSWERED_NS = NS_PER_S // 2
 PERIODS = 2.5  # without a frame of its kind, until the other port is taken
 
 
@@ -51,7 +51,7 @@ class Ports:
         self._count = count
         self._failover_ns = failover_ns
         self._patience_ns = {
-            kind: max(failover_ns, round(PERIODS / rate_hz * S))
+            kind: max(failover_ns, round(PERIODS / rate_hz * NS_PER_S))
             for kind, rate_hz in rates_hz.items()
         }
         self._began_ns = now_ns

@@ -4,7 +4,7 @@ Each return of the board asks for the brakes anew; configuration is replayed, mo
 """
 
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.settings import Board
 from common.wire.frame import Frame
 from services.bridge import link as links
@@ -22,8 +22,8 @@ class Readiness:
         self.epoch = 0
         self.gap_ns = 0  # end of the last short silence (no lost link) of the board
         self._ports = ", ".join(map(str, board.listen_ports))
-        self._silence_ns = round(settings.silence * S)
-        self._echo_ns = round(settings.echo_timeout * S)
+        self._silence_ns = round(settings.silence * NS_PER_S)
+        self._echo_ns = round(settings.echo_timeout * NS_PER_S)
         self._required = settings.require_switches
         self._inhibited = False
 

@@ -1,6 +1,6 @@
 """What the board is asked, how often, and where its answers are expected. Pure."""
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
 from services.bridge.config import Bridge as Settings
@@ -40,4 +40,4 @@ def ports_of(config: BridgeConfig, now_ns: int) -> Ports:
         reports.BumperBrakeReport: ECHO_HZ,
     }
     count = len(config.board.listen_ports)
-    return Ports(count, round(bridge.failover * S), rates_hz, now_ns)
+    return Ports(count, round(bridge.failover * NS_PER_S), rates_hz, now_ns)

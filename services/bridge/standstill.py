@@ -25,7 +25,7 @@ import math
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
 from services.bridge.lease import STANDING_MPS, STANDING_RADPS, standing
 
@@ -84,7 +84,7 @@ class Standstill:
         if before is None or travel is None:
             self._travel = Travel() if standing(velocity.linear, velocity.angular) else None
             return
-        elapsed_s = min(now_ns - before[1], self._silence_ns) / S
+        elapsed_s = min(now_ns - before[1], self._silence_ns) / NS_PER_S
         kept = 1 - elapsed_s / LEAK_S
         linear = _steady(before[0].linear, velocity.linear, STANDING_MPS)
         angular = _steady(before[0].angular, velocity.angular, STANDING_RADPS)
@@ -102,7 +102,7 @@ class Standstill:
             return
         travel.counted_m += mileage.distance - before[0].distance
         turned = travel.counted_rad + math.remainder(mileage.heading - before[0].heading, math.tau)
-        drift = DRIFT_RADPS * (now_ns - before[1]) / S
+        drift = DRIFT_RADPS * (now_ns - before[1]) / NS_PER_S
         travel.counted_rad = math.copysign(max(0.0, abs(turned) - drift), turned)
         self._judge(travel.counted_m, travel.counted_rad)
 
@@ -112,7 +112,7 @@ class Standstill:
     def _stopping_ns(self, velocity: Velocity) -> int:
         linear_s = abs(velocity.linear) / self._deceleration
         angular_s = abs(velocity.angular) / self._angular_deceleration
-        return round((max(linear_s, angular_s) + SLACK_S) * S)
+        return round((max(linear_s, angular_s) + SLACK_S) * NS_PER_S)
 
 
 def _steady(before: float, after: float, threshold: float) -> float:

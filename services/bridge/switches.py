@@ -15,14 +15,14 @@ driven as long as both are commanded on and none has echoed "off".
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
 
-ASK_NS = S // 10
-AGAIN_NS = S // 5
+ASK_NS = NS_PER_S // 10
+AGAIN_NS = NS_PER_S // 5
 UNECHOED = 5  # sends in a row, one second: the echo before them no longer counts
-GAP_NS = 60 * S // 1000  # of silence; the velocity comes every 20 ms
+GAP_NS = 60 * NS_PER_S // 1000  # of silence; the velocity comes every 20 ms
 
 
 class Switches(Struct, frozen=True):

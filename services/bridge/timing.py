@@ -26,13 +26,13 @@ from itertools import accumulate, pairwise
 
 from msgspec import Struct, field
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Durations, Motion, Timing
 from services.bridge.rx_timestamp import Receipt
 
 # 10 us to 1 s, a third more each: nothing here is faster, and what is slower has failed.
 BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 8)) for step in range(41))
-LONGEST_NS = 10 * S  # a reaction that took longer is a clock that jumped
+LONGEST_NS = 10 * NS_PER_S  # a reaction that took longer is a clock that jumped
 
 Times = Sequence[int | None]  # ns on the monotonic clock; None for unknown
 
@@ -74,7 +74,7 @@ class Histogram(Struct):
 
     def message(self) -> Durations:
         """Return what is published."""
-        return Durations(counts=tuple(self.counts), worst=self.worst_ns / S)
+        return Durations(counts=tuple(self.counts), worst=self.worst_ns / NS_PER_S)
 
 
 class Timings:
@@ -125,7 +125,7 @@ class Timings:
     def message(self) -> Timing:
         """Return what goes into the health message."""
         return Timing(
-            bounds=tuple(bound / S for bound in BOUNDS_NS),
+            bounds=tuple(bound / NS_PER_S for bound in BOUNDS_NS),
             durations={name: one.message() for name, one in self._histograms.items()},
             not_counted=dict(self._not_counted),
         )

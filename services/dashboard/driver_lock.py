@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from common.codec import finite
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Direction
 
 PICTURES = 64  # whose times are kept, 3 s of them; an older one is too old for any setting
@@ -84,7 +84,7 @@ class Wheel:
         sent_ns = next((at_ns for number, at_ns in self._sent if number == picture), None)
         if viewer != self.driver or not finite(push.linear, push.angular) or sent_ns is None:
             return False
-        if self.grip is Grip.LAPSED or now_ns - sent_ns > self.round_trip_s * S:
+        if self.grip is Grip.LAPSED or now_ns - sent_ns > self.round_trip_s * NS_PER_S:
             return False
         if self.grip is Grip.HELD and sent_ns < self._seen_ns:
             return False  # overtaken by a newer one
@@ -104,7 +104,7 @@ class Wheel:
 
     def held(self, now_ns: int) -> Push | None:
         """Return what is held now; a hold whose round trip is overdue lapses."""
-        if self.grip is Grip.HELD and now_ns - self._seen_ns > self.round_trip_s * S:
+        if self.grip is Grip.HELD and now_ns - self._seen_ns > self.round_trip_s * NS_PER_S:
             self.lapse()
         return self.push if self.grip is Grip.HELD else None
 

@@ -16,7 +16,7 @@ import msgspec
 
 from common import keys
 from common.bus.bus import Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Level, SafetyState
 from common.service import Node
 from services.dashboard import client_messages as w
@@ -120,7 +120,7 @@ class Fleet:
         for name in {viewer.robot for viewer in self._viewers.values()}:
             self._draw(name, self._open(name), now_ns)
         for name, robot in list(self._robots.items()):
-            if now_ns - robot.wanted_ns > UNWANTED_S * S and robot.silent:
+            if now_ns - robot.wanted_ns > UNWANTED_S * NS_PER_S and robot.silent:
                 self._forget(name, robot)
 
     def _draw(self, name: str, robot: Robot, now_ns: int) -> None:

@@ -15,7 +15,7 @@ that does not is closed after two bursts.
 from dataclasses import dataclass, field
 from enum import Enum
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 
 class Verdict(Enum):
@@ -41,7 +41,7 @@ class RateLimit:
     def take(self, now_ns: int, cost: float = 1.0) -> Verdict:
         """Take tokens for one message."""
         if self._filled_ns is not None:
-            gained = self.rate * (now_ns - self._filled_ns) / S
+            gained = self.rate * (now_ns - self._filled_ns) / NS_PER_S
             self._tokens = min(self.burst, self._tokens + gained)
         self._filled_ns = now_ns
         self._tokens = max(-self.burst, self._tokens - cost)

@@ -14,7 +14,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.codec import finite
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.log import Logger
 from common.operator import CONFIRM_S, confirms, release_request, reset_request
@@ -184,7 +184,7 @@ class Robot:
         for reset in waiting:
             if state is not None and confirms(reset.seen, reset.done, state):
                 reset.tell("info", reset.done.text)
-            elif now_ns - reset.since_ns > CONFIRM_S * S:
+            elif now_ns - reset.since_ns > CONFIRM_S * NS_PER_S:
                 reset.tell("error", "reset_unconfirmed")
             else:
                 self._resets.append(reset)

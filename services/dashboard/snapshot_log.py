@@ -8,7 +8,7 @@ that came after it.
 from collections import deque
 from dataclasses import dataclass, field
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SafetyState
 
 KEPT = 64  # at 20 a second: 3 s, more than any round trip that is allowed
@@ -30,5 +30,5 @@ class Snapshots:
         """Return safety's state in a snapshot; None if it is unknown, too old or had none."""
         for known, sent_ns, state in reversed(self._sent):
             if known == number:
-                return state if now_ns - sent_ns <= limit_s * S else None
+                return state if now_ns - sent_ns <= limit_s * NS_PER_S else None
         return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from common import keys
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 from common.keys import Topic
 from common.messages import Event, Message
 
@@ -71,11 +71,11 @@ class Heard:
 
     def count(self, now_ns: int) -> None:
         """Take the rates anew; call it now and then."""
-        while len(self._counted) > 1 and now_ns - self._counted[1][0] >= COUNTED_S * S:
+        while len(self._counted) > 1 and now_ns - self._counted[1][0] >= COUNTED_S * NS_PER_S:
             self._counted.popleft()
         if self._counted:
             since_ns, before = self._counted[0]
-            past_s = (now_ns - since_ns) / S
+            past_s = (now_ns - since_ns) / NS_PER_S
             self.rates = {path: count / past_s for path, count in (self._counts - before).items()}
         self._counted.append((now_ns, self._counts.copy()))
 

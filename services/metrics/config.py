@@ -14,23 +14,25 @@ ROBOTS = r"^(|\*|(\$\*)?[A-Za-z0-9_.-]+(\$\*[A-Za-z0-9_.-]+)*(\$\*)?)\Z"
 class Metrics(settings.Section, frozen=True, kw_only=True):
     """Where Prometheus asks, and of which robots it is told."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     host: str = "127.0.0.1"  # Prometheus runs on the same machine; the bus crosses the network
     port: settings.Port = 9317
     robots: Annotated[str, Meta(pattern=ROBOTS)] = ""  # "berlin-$*", "*"; empty: robot.id alone
 
     def __post_init__(self) -> None:
-        unknown = set(self.i_accept) - {"host"}
+        unknown = set(self.unsafe_overrides) - {"host"}
         if unknown:
-            raise ValueError(f"i_accept names {min(unknown)!r}, which takes no protection away")
+            raise ValueError(
+                f"unsafe_overrides names {min(unknown)!r}, which takes no protection away"
+            )
         try:
             local = ip_address(self.host).is_loopback
         except ValueError:
             raise ValueError(f"host is {self.host!r}, allowed is an IP address") from None
-        if not local and "host" not in self.i_accept:
+        if not local and "host" not in self.unsafe_overrides:
             raise ValueError(
                 f"host {self.host} tells everybody who reaches it, without asking who they are; "
-                "allowed is this machine's 127.0.0.1, or name host in i_accept"
+                "allowed is this machine's 127.0.0.1, or name host in unsafe_overrides"
             )
 
 

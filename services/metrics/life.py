@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 
-from common.service import Node, run_behind
+from common.service import Node, run_optional_service
 from services.metrics.config import MetricsConfig
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Export until it is told to stop; return the exit code."""
-    return run_behind("metrics", MetricsConfig, _exporter, argv, extra="metrics")
+    return run_optional_service("metrics", MetricsConfig, _exporter, argv, extra="metrics")
 
 
 def _exporter() -> Callable[[Node[MetricsConfig]], object]:

@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from math import isfinite
 
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Event, Health, Link, Odometry, SafetyState
 
 WORTH_S = 3.0  # how long a value is told: the slowest streams come once a second
@@ -91,7 +91,7 @@ class Robot:
     def is_up(self, now_ns: int) -> bool:
         """Tell whether what runs on the robot itself is heard: others bear its id on laptops."""
         heard = [each.received_ns for each in (self.safety, self.link, self.odometry) if each]
-        lately = any(now_ns - received_ns <= WORTH_S * S for received_ns in heard)
+        lately = any(now_ns - received_ns <= WORTH_S * NS_PER_S for received_ns in heard)
         return lately or any(self.services[name].is_well(now_ns) for name in EXPECTED)
 
     def no_room(self) -> bool:
@@ -105,13 +105,13 @@ class Robot:
     def forget(self, now_ns: int) -> bool:
         """Forget services that are long gone; tell whether nothing is left of the robot."""
         for name, service in list(self.services.items()):
-            gone = not service.instances and now_ns - service.seen_ns > KEPT_S * S
+            gone = not service.instances and now_ns - service.seen_ns > KEPT_S * NS_PER_S
             if gone and name not in EXPECTED:
                 del self.services[name]
         streams = [each.received_ns for each in (self.safety, self.link, self.odometry) if each]
         seen_ns = max([*streams, *(each.seen_ns for each in self.services.values())])
         present = any(each.instances for each in self.services.values())
-        return not present and now_ns - seen_ns > KEPT_S * S
+        return not present and now_ns - seen_ns > KEPT_S * NS_PER_S
 
     def _service(self, name: str, now_ns: int) -> Service:
         service = self.services.setdefault(name, Service())

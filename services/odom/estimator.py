@@ -29,10 +29,10 @@ from msgspec.structs import replace
 
 from common import messages as m
 from common.codec import finite
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 from services.odom.arc_segments import Leg, fitted, halved, total
 from services.odom.config import Odom
-from services.odom.pose import Belief, Covariance, Pose, Spread
+from services.odom.pose import Covariance, Pose, PoseEstimate, ProcessNoise
 from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD, Comparison, Twist
 from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 
@@ -69,7 +69,7 @@ class Estimator:
     def __init__(self, settings: Odom) -> None:
         self.epoch = 0  # how often an operator has set the pose
         self._settings = settings
-        self._anchor = Belief(Pose(0.0, 0.0, 0.0), START)
+        self._anchor = PoseEstimate(Pose(0.0, 0.0, 0.0), START)
         self._lead = self._anchor
         self._legs: list[Leg] = []  # from anchor to lead
         self._at_ns: int | None = None  # the time of lead
@@ -119,8 +119,10 @@ class Estimator:
             pose.y + sin * dx + cos * dy,
             math.remainder(anchor.heading + turn, math.tau),
         )
-        self._anchor = Belief(moved, START)
-        self._lead = Belief(Pose(pose.x, pose.y, math.remainder(pose.heading, math.tau)), START)
+        self._anchor = PoseEstimate(moved, START)
+        self._lead = PoseEstimate(
+            Pose(pose.x, pose.y, math.remainder(pose.heading, math.tau)), START
+        )
         self.epoch += 1
 
     def estimate(self, now_ns: int) -> m.Odometry | None:
@@ -176,12 +178,12 @@ class Estimator:
         held_ns = start_ns
         legs = []
         if self._velocity is not None:
-            held_ns = self._velocity.received_ns + round(self._settings.hold * S)
+            held_ns = self._velocity.received_ns + round(self._settings.hold * NS_PER_S)
             held_ns = min(max(start_ns, held_ns), now_ns)
-            seen_s = (held_ns - start_ns) / S
+            seen_s = (held_ns - start_ns) / NS_PER_S
             velocity = self._velocity.value
             legs.append(Leg(velocity.linear * seen_s, velocity.angular * seen_s, seen_s, seen=True))
-        legs.append(Leg(0.0, 0.0, (now_ns - held_ns) / S, seen=False))
+        legs.append(Leg(0.0, 0.0, (now_ns - held_ns) / NS_PER_S, seen=False))
         return [leg for leg in legs if leg.time_s > 0]
 
     def _twist(self, now_ns: int) -> Twist | None:
@@ -192,21 +194,21 @@ class Estimator:
             return Twist(velocity.linear, velocity.angular, *variances)
         return self._comparison.twist(now_ns) if self._news else None
 
-    def _spread(self, leg: Leg) -> Spread:
+    def _spread(self, leg: Leg) -> ProcessNoise:
         """Return how well an arc is known by velocities alone, or while there was none."""
         of, way, gap_s = self._settings, self._spread_of_counters(leg), self._gap_s(leg)
-        return Spread(
+        return ProcessNoise(
             way.distance + of.velocity_noise**2 * leg.time_s,
             way.turn + of.angular_noise**2 * leg.time_s + of.gap_turn_noise**2 * gap_s,
             of.gap_noise**2 * gap_s,
         )
 
-    def _spread_of_counters(self, leg: Leg) -> Spread:
+    def _spread_of_counters(self, leg: Leg) -> ProcessNoise:
         """Return how well an arc is known that was counted: its ends, not its shape in a gap."""
         of, way = self._settings, abs(leg.distance)
         turn = of.turn_noise**2 * abs(leg.turn) + of.drift_noise**2 * way
         place = of.gap_noise**2 * way if self._gap_s(leg) else 0.0
-        return Spread(of.distance_noise**2 * way, turn, place)
+        return ProcessNoise(of.distance_noise**2 * way, turn, place)
 
     def _gap_s(self, leg: Leg) -> float:
         return 0.0 if leg.seen else max(0.0, leg.time_s - self._settings.hold)

@@ -9,7 +9,7 @@ from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.codec import finite
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.operator import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
@@ -17,7 +17,7 @@ from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
 from services.odom.pose import Pose
 from services.odom.trajectory import Path
 
-SILENT_NS = S // 2  # a pause this long is told; shorter ones are seen by the missing samples
+SILENT_NS = NS_PER_S // 2  # a pause this long is told; shorter ones are seen by the missing samples
 ECHOES = 64  # queued states of safety; a call that echoes a dropped one would be refused
 
 

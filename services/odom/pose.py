@@ -84,7 +84,7 @@ class Covariance(Struct, frozen=True):
         return (self.xx, self.xy, self.xh, self.xy, self.yy, self.yh, self.xh, self.yh, self.hh)
 
 
-class Spread(Struct, frozen=True):
+class ProcessNoise(Struct, frozen=True):
     """The variances of one arc: of its length, of its turn, and of its end in every direction."""
 
     distance: float
@@ -92,13 +92,13 @@ class Spread(Struct, frozen=True):
     place: float
 
 
-class Belief(Struct, frozen=True):
+class PoseEstimate(Struct, frozen=True):
     """A pose and how far it may be off."""
 
     pose: Pose
     covariance: Covariance
 
-    def moved(self, distance: float, turn: float, spread: Spread) -> "Belief":
+    def moved(self, distance: float, turn: float, spread: ProcessNoise) -> "PoseEstimate":
         """Return the belief after an arc that is itself known with this spread only."""
         after = self.pose.moved(distance, turn)
         ratio, slope = chord_ratio(turn)
@@ -112,4 +112,4 @@ class Belief(Struct, frozen=True):
             .plus(spread.place, 1.0, 0.0, 0.0)
             .plus(spread.place, 0.0, 1.0, 0.0)
         )
-        return Belief(after, covariance)
+        return PoseEstimate(after, covariance)

@@ -5,12 +5,14 @@ from collections import deque
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.odom.arc_segments import Leg
 from services.odom.config import Odom
 
-COMPARED_NS = S  # how far back counters and velocities are compared
-TWIST_NS = S // 5  # how far back the counters make a velocity: 1 mm and 0.1 deg are coarse steps
+COMPARED_NS = NS_PER_S  # how far back counters and velocities are compared
+TWIST_NS = (
+    NS_PER_S // 5
+)  # how far back the counters make a velocity: 1 mm and 0.1 deg are coarse steps
 TWIST_MIN_S = 0.05
 COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)

@@ -6,7 +6,7 @@ A file is written in slices: what is kept makes some seconds of work, and the bu
 from collections import deque
 from dataclasses import dataclass
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 from services.recorder.config import MB, Recorder
 from services.recorder.ring_buffer import Memory
@@ -31,8 +31,8 @@ class BlackBox:
     """Keeps, and writes one file at a time; the caller catches ``OSError``."""
 
     def __init__(self, settings: Recorder, begin: Begin, end: End) -> None:
-        self._span_ns = round(settings.black_box * S)
-        self._tail_ns = round(settings.tail * S)
+        self._span_ns = round(settings.black_box * NS_PER_S)
+        self._tail_ns = round(settings.tail * NS_PER_S)
         self._memory = Memory(self._span_ns, round(settings.black_box_size * MB))
         self._begin = begin
         self._end = end

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from common.codec import finite
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
 from common.settings import Vehicle
 from common.vehicle import sonar_mounts
@@ -31,7 +31,7 @@ class Views:
 
     def of(self, message: Message, service: str, log_ns: int) -> Iterator[View]:
         """Yield what is drawn of a message of a service, stamped with the file's own time."""
-        timestamp = {"sec": log_ns // S, "nsec": log_ns % S}
+        timestamp = {"sec": log_ns // NS_PER_S, "nsec": log_ns % NS_PER_S}
         match message:
             case Odometry() if finite(message.x, message.y, message.heading):
                 drawn = _odometry(message)

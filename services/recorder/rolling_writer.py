@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 from services.recorder.config import MB, Recorder
 from services.recorder.writer import Recording
@@ -16,7 +16,7 @@ class Tape:
 
     def __init__(self, settings: Recorder, begin: Begin, end: End) -> None:
         self._size_max = settings.roll_size * MB
-        self._time_max_ns = round(settings.roll_time * S)
+        self._time_max_ns = round(settings.roll_time * NS_PER_S)
         self._begin = begin
         self._end = end
         self._recording: Recording | None = None

@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.recorder.retention import KEEP, Stored, to_remove
 
 AGAIN = 1.1  # of the free space that must stay, until there is room again
-RETRY_NS = 10 * S  # after the disk has refused
+RETRY_NS = 10 * NS_PER_S  # after the disk has refused
 
 
 def free_bytes(folder: Path) -> int:
@@ -83,7 +83,7 @@ class Shelf:
 
     def path(self, robot: str, wall_ns: int, why: str = "") -> Path:
         """Return a name that no file has: robot, UTC, and why."""
-        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(wall_ns / S))
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(wall_ns / NS_PER_S))
         stem = "-".join(part for part in (robot, stamp, why) if part)
         names = (f"{stem}{f'-{n}' if n else ''}.mcap" for n in range(1_000_000))
         path = next(path for path in (self.folder / name for name in names) if not path.exists())

@@ -3,7 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Event, Health, Message, SafetyState
 from services.recorder.latches import Latches
 
@@ -22,7 +22,7 @@ class Stream:
     def hz(self) -> float | None:
         """Return how often it came; None for a single one."""
         past_ns = self.last_ns - self.first_ns
-        return (self.count - 1) * S / past_ns if past_ns > 0 else None
+        return (self.count - 1) * NS_PER_S / past_ns if past_ns > 0 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Summary:
     @property
     def duration_s(self) -> float:
         """Return the time from the first message to the last."""
-        return (self.end_ns - (self.begin_ns or self.end_ns)) / S
+        return (self.end_ns - (self.begin_ns or self.end_ns)) / NS_PER_S
 
     @property
     def messages(self) -> int:
@@ -68,7 +68,7 @@ class Summary:
         stream.raw += raw
         if kind and message is None:
             self.faulty[key] += 1
-        self._note(key, message, (log_ns - self.begin_ns) / S)
+        self._note(key, message, (log_ns - self.begin_ns) / NS_PER_S)
 
     def _note(self, key: str, message: Message | None, at_s: float) -> None:
         match message:

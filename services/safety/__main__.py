@@ -20,7 +20,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         readers.append(reader)
         Ports(node, reader)
         reader.open()
-        accepted = node.config.safety.i_accept
+        accepted = node.config.safety.unsafe_overrides
         if accepted:
             node.log.warning("protections taken away on purpose", settings=list(accepted))
 

@@ -25,14 +25,14 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common import codec
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
 from services.safety.config import Source
 from services.safety.inputs import Ask
 from services.safety.twist import STILL, Twist
 
-RIVAL_NS = S // 2  # only one publisher must be left for this long
+RIVAL_NS = NS_PER_S // 2  # only one publisher must be left for this long
 
 
 class Channel(Struct, frozen=True):
@@ -48,7 +48,7 @@ class Channel(Struct, frozen=True):
 
     def is_fresh(self, now_ns: int, lease_s: float) -> bool:
         """Tell whether the last request still holds."""
-        return self.received_ns is not None and now_ns - self.received_ns <= lease_s * S
+        return self.received_ns is not None and now_ns - self.received_ns <= lease_s * NS_PER_S
 
     def has_rival(self, now_ns: int) -> bool:
         """Tell whether two publishers have been heard of late."""

@@ -11,9 +11,9 @@ from collections.abc import Collection, Mapping
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
-SHOWN_NS = S  # time for an operator to read it
+SHOWN_NS = NS_PER_S  # time for an operator to read it
 
 
 class Blind(Struct, frozen=True):

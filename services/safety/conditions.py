@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Driver
 from services.safety.config import Safety
 from services.safety.inputs import Estop, Inputs
@@ -125,7 +125,7 @@ def _bumper_lossy(inputs: Inputs, held: bool, tick: Token) -> Observation:
 
 def _silent(inputs: Inputs, settings: Safety, decided_ns: int | None, now_ns: int) -> Observation:
     # A sample counts from its arrival, and what had to wait for us arrives when we go on.
-    if decided_ns is not None and now_ns - decided_ns > settings.bumper_age * S:
+    if decided_ns is not None and now_ns - decided_ns > settings.bumper_age * NS_PER_S:
         text = "Safety itself was held up: what was heard meanwhile may be old."
         return Observation("silent", True, (0, now_ns), text)
     too_old = {

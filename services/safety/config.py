@@ -10,8 +10,8 @@ from common import settings
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
-# Outside of these a protection is as good as gone. A setting there is refused unless ``i_accept``
-# names it. Zero never means "off".
+# Outside of these a protection is as good as gone. A setting there is refused unless
+# ``unsafe_overrides`` names it. Zero never means "off".
 PROTECTIVE: dict[str, tuple[float, float]] = {
     "margin": (0.05, 10.0),
     "react": (0.1, 10.0),
@@ -69,7 +69,7 @@ def _sources() -> dict[str, Source]:
 class Safety(settings.Section, frozen=True, kw_only=True):
     """When and how fast the vehicle may move; SI units."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     sources: dict[str, Source] = msgspec.field(default_factory=_sources)
 
     max_linear: Positive = 1.0  # m/s
@@ -119,7 +119,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
             allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
             given[f"sources.{name}.operator"] = source.operator
             allowed[f"sources.{name}.operator"] = (False, name in HELD)
-        settings.check_protections(given, allowed, self.i_accept)
+        settings.check_protections(given, allowed, self.unsafe_overrides)
         priorities = [source.priority for source in self.sources.values()]
         if len(set(priorities)) < len(priorities):
             raise ValueError(f"sources must have different priorities, not {sorted(priorities)}")

@@ -6,13 +6,13 @@ than it refills, and flapping trips although each single failure clears by itsel
 
 from msgspec import Struct
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 FAILURES = 5.0  # so many close together trip
 REFILL_PER_S = 0.1  # one failure is forgiven in ten good seconds
 
 
-class Credit(Struct, frozen=True):
+class FaultBudget(Struct, frozen=True):
     """How many failures are still forgiven."""
 
     left: float = FAILURES
@@ -23,7 +23,7 @@ class Credit(Struct, frozen=True):
         """Tell whether the next failure is no longer forgiven by itself."""
         return self.left <= 0
 
-    def after(self, now_ns: int, failed: bool, good: bool) -> "Credit":
+    def after(self, now_ns: int, failed: bool, good: bool) -> "FaultBudget":
         """Return the credit by now; ``failed`` when inputs have just gone from good to bad."""
-        refill = REFILL_PER_S * (now_ns - self.at_ns) / S if good and self.at_ns else 0.0
-        return Credit(max(0.0, min(FAILURES, self.left + refill) - failed), now_ns)
+        refill = REFILL_PER_S * (now_ns - self.at_ns) / NS_PER_S if good and self.at_ns else 0.0
+        return FaultBudget(max(0.0, min(FAILURES, self.left + refill) - failed), now_ns)

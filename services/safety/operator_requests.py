@@ -8,11 +8,11 @@ the release that frees the bumper for the reset. What is latched and not named s
 
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Direction
 from services.safety.causes import bars_motion
 from services.safety.config import Safety
-from services.safety.fault_budget import Credit
+from services.safety.fault_budget import FaultBudget
 from services.safety.inputs import Hold, Inputs, Reset
 from services.safety.latches import begun, latched, named, ordered, reset, still_there
 from services.safety.release import Release
@@ -56,7 +56,7 @@ def _reset(
     state: State, inputs: Inputs, call: Reset, settings: Safety, now_ns: int
 ) -> tuple[State, Reply]:
     reason = (
-        state.heartbeat.refusal(call.echo, now_ns, round(settings.max_call_age * S))
+        state.heartbeat.refusal(call.echo, now_ns, round(settings.max_call_age * NS_PER_S))
         or _not_named(state, call)
         or _no_reset(state, inputs, call, settings)
         or _not_at_rest(inputs, settings, now_ns)
@@ -67,7 +67,7 @@ def _reset(
         return state, Reply(False, reason)
     held = reset(state.latches, call.causes)
     cleared = tuple(one.id for name, one in state.latches.items() if name not in held)
-    credit = state.credit if "flapping" in held else Credit()
+    credit = state.credit if "flapping" in held else FaultBudget()
     after = replace(_let_go(state, None), latches=held, credit=credit)
     text = _remaining(after, inputs, settings)
     # Who was armed before the trip is not armed any more, by ``disarmed`` while it was held.
@@ -135,7 +135,7 @@ def _way_off(release: Release) -> str:
 def _hold(
     state: State, inputs: Inputs, call: Hold, settings: Safety, now_ns: int
 ) -> tuple[State, Reply]:
-    late = state.heartbeat.refusal(call.echo, now_ns, round(settings.max_echo_age * S))
+    late = state.heartbeat.refusal(call.echo, now_ns, round(settings.max_echo_age * NS_PER_S))
     if not late and call.echo is not None and call.echo <= state.release.let_go:
         late = "The release was ended after this call was made: hold it again."
     if late:

@@ -18,7 +18,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Command
 from common.messages import Verdict as VerdictName
 from common.settings import Vehicle
@@ -67,7 +67,7 @@ class Policy:
 
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, Verdict]:
         """Return the new memory and the verdict; the event in the inputs is taken once."""
-        step_s = min((now_ns - (state.decided_ns or now_ns)) / S, LONGEST_STEP_S)
+        step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
         state = replace(state, decision=state.decision + 1)
         state, refused = self._request(state, inputs, now_ns)
         state = self._sense(state, inputs, step_s, now_ns)
@@ -81,7 +81,7 @@ class Policy:
     def _request(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         if not isinstance(inputs.event, Ask):
             return state, ""
-        max_age_ns = round(self.settings.max_echo_age * S)
+        max_age_ns = round(self.settings.max_echo_age * NS_PER_S)
         arbiter, refused = state.arbiter.take(inputs.event, state.heartbeat, max_age_ns, now_ns)
         return replace(state, arbiter=arbiter), refused
 
@@ -121,7 +121,7 @@ class Policy:
         return self._supervisor.follow(state.standstill, commanded, seen, now_ns)
 
     def _guard(self, state: State, inputs: Inputs, now_ns: int) -> State:
-        settle_ns = round(self.settings.settle * S)
+        settle_ns = round(self.settings.settle * NS_PER_S)
         tick = (0, now_ns)
         bad_s = max(state.linear.bad_s, state.angular.bad_s)
         rivals = state.arbiter.rivals(now_ns)

@@ -14,13 +14,13 @@ after three clear answers of the board, so that a short gap in one press is no s
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Direction
 from services.safety.latches import Held
 from services.safety.trajectory import Counter, Trajectory
 from services.safety.twist import STILL, Twist
 
-COAST_NS = S // 2  # after the last motion, a press and the counter still belong to a release
+COAST_NS = NS_PER_S // 2  # after the last motion, a press and the counter still belong to a release
 SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
 
 
@@ -46,7 +46,7 @@ class Release(Struct, frozen=True):
 
     def is_held(self, now_ns: int, lease_s: float) -> bool:
         """Return whether the operator still holds."""
-        return self.held_ns is not None and now_ns - self.held_ns <= lease_s * S
+        return self.held_ns is not None and now_ns - self.held_ns <= lease_s * NS_PER_S
 
     def left(self, distance: float) -> float:
         """Return how many metres may still be travelled, of ``distance`` for each contact."""

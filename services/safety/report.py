@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
 from services.safety.causes import BY_NAME
 from services.safety.inputs import Ask, Hold, Inputs, Reset
@@ -66,7 +66,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         Cause(
             name=name,
             action=BY_NAME[name].action,
-            age=(now_ns - state.latches[name].since_ns) / S,
+            age=(now_ns - state.latches[name].since_ns) / NS_PER_S,
             text=state.latches[name].text,
             id=state.latches[name].id,
         )
@@ -154,7 +154,7 @@ def _release(policy: Policy, state: State, now_ns: int) -> Release:
     return Release(
         believed_free=free,
         travelled=came.net,
-        age=None if came.ended_ns is None else (now_ns - came.ended_ns) / S,
+        age=None if came.ended_ns is None else (now_ns - came.ended_ns) / NS_PER_S,
         forbidden=tuple(sorted(release.forbidden)),
         left=room(state, policy.settings),
     )

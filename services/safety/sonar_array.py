@@ -14,7 +14,7 @@ import math
 
 from msgspec import Struct
 
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import SONAR_NAMES, Ultrasonic
 from services.safety.latches import Token
 from services.safety.saturation import Saturation
@@ -79,7 +79,7 @@ class Ears(Struct, frozen=True):
         if token == heard.token:
             return heard
         moved = STILL if measured is None or measured.is_standing else measured
-        step_s = min((latest.received_ns - heard.at_ns) / S, LONGEST_STEP_S)
+        step_s = min((latest.received_ns - heard.at_ns) / NS_PER_S, LONGEST_STEP_S)
         readings = tuple(map(_shown, sample.ranges, sample.status))
         saturation = heard.saturation.after(readings)
         sonars = tuple(

@@ -34,15 +34,15 @@ from enum import Enum
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
 from services.safety.config import Safety
 from services.safety.twist import STANDING_MPS, STANDING_RADPS, STILL, Twist
 
-GRACE_NS = S // 2  # on top of v / a
-LONGEST_STOP_NS = 3 * S  # both together, whatever the settings
-BRIEF_NS = S // 2  # a shorter motion does not renew the time to stop
-CONFIRM_NS = S // 5  # of standstill until the place counts
+GRACE_NS = NS_PER_S // 2  # on top of v / a
+LONGEST_STOP_NS = 3 * NS_PER_S  # both together, whatever the settings
+BRIEF_NS = NS_PER_S // 2  # a shorter motion does not renew the time to stop
+CONFIRM_NS = NS_PER_S // 5  # of standstill until the place counts
 AWAY = 0.05  # m and rad
 LEAK_S = 5.0  # time constant of the integrated velocities
 DRIFT_RADPS = 0.001  # of the heading counter
@@ -148,7 +148,7 @@ class Supervisor(Struct, frozen=True):
         speed = known.value if known else self.fastest
         linear_s = abs(speed.linear) / self.deceleration
         angular_s = abs(speed.angular) / self.angular_deceleration
-        stop_ns = round(max(linear_s, angular_s) * S) + GRACE_NS
+        stop_ns = round(max(linear_s, angular_s) * NS_PER_S) + GRACE_NS
         return now_ns + min(stop_ns, LONGEST_STOP_NS)
 
 
@@ -203,7 +203,7 @@ def _integrate(standstill: Standstill, known: Latest[Twist] | None) -> Standstil
     if before.newest is None:
         return replace(standstill, velocities=Velocities(newest, known.received_ns, newest))
     steady = _steady(before.newest, newest)
-    gap_s = min((known.received_ns - before.received_ns) / S, LONGEST_GAP_S)
+    gap_s = min((known.received_ns - before.received_ns) / NS_PER_S, LONGEST_GAP_S)
     kept = 1 - gap_s / LEAK_S
     way = standstill.integrated
     return replace(
@@ -252,7 +252,7 @@ def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill
 def _gap_s(before: Latest[Mileage], newest: Latest[Mileage]) -> float:
     """Return the time between two readings of one bridge; after a stall they arrive together."""
     sent_ns = newest.value.mono_ns - before.value.mono_ns
-    return max(newest.received_ns - before.received_ns, sent_ns) / S
+    return max(newest.received_ns - before.received_ns, sent_ns) / NS_PER_S
 
 
 def _identity(counters: Mileage) -> tuple[int, int]:

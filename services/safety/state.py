@@ -7,7 +7,7 @@ from common.messages import Command
 from common.messages import Verdict as VerdictName
 from services.safety.arbiter import Arbiter
 from services.safety.blind import Blind
-from services.safety.fault_budget import Credit
+from services.safety.fault_budget import FaultBudget
 from services.safety.latches import Latches, Token
 from services.safety.release import Release
 from services.safety.runaway import Axis
@@ -50,7 +50,7 @@ class State(Struct, frozen=True):
     linear: Axis = Axis()
     angular: Axis = Axis()
     standstill: Standstill = Standstill()
-    credit: Credit = Credit()
+    credit: FaultBudget = FaultBudget()
     release: Release = Release()
     trajectory: Trajectory = Trajectory()
     decision: int = 0  # the number of the newest one; starts at random, see ``Held.id``

@@ -15,7 +15,7 @@ from textual.containers import Horizontal
 from textual.widgets import Static
 
 from common.bus.bus import Post
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.teleop import panels, table
 from services.teleop.config import Teleop
 from services.teleop.controller import Desk
@@ -156,7 +156,7 @@ class TeleopApp(App[None]):
 
     def _came_ns(self, event: events.Event) -> int:
         """Return when an event was read from the terminal."""
-        return self._clock() - round((time.monotonic() - event.time) * S)
+        return self._clock() - round((time.monotonic() - event.time) * NS_PER_S)
 
     def on_app_blur(self) -> None:
         """Let go when the terminal loses the focus: the repeats go elsewhere."""

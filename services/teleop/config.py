@@ -18,7 +18,7 @@ PROTECTIVE: settings.Limits = {"round_trip": (0.02, 0.3), "gamepad_silence": (0.
 class Teleop(settings.Section, frozen=True, kw_only=True):
     """How an operator's keys and sticks become requests; slow by default."""
 
-    i_accept: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "teleop"
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
@@ -38,7 +38,7 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in PROTECTIVE}
-        settings.check_protections(given, PROTECTIVE, self.i_accept)
+        settings.check_protections(given, PROTECTIVE, self.unsafe_overrides)
         for name in ("gears_linear", "gears_angular"):
             gears = getattr(self, name)
             if len(gears) != GEARS or list(gears) != sorted(gears):

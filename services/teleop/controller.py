@@ -8,7 +8,7 @@ import time
 
 from common import keys
 from common.bus.bus import Arrival
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Event
 from common.requests import Twist
 from common.service import Node
@@ -152,7 +152,7 @@ class Desk:
         stick = self._gamepad.read()
         if self._gamepad.words != before:
             self._node.event("gamepad", "info", f"gamepad: {self._gamepad.words}")
-        watched = now_ns - self._watched_ns <= WATCHED_S * S and not self._leaving
+        watched = now_ns - self._watched_ns <= WATCHED_S * NS_PER_S and not self._leaving
         return stick if watched else None
 
     def _notice_silence(self, now_ns: int) -> None:
@@ -201,7 +201,7 @@ class Desk:
             self._node.event("terminal_slow", "warning", f"keys ignored: {reason}; {ADVICE}")
 
     def _drop(self, press: Press, now_ns: int) -> None:
-        if self._dropped_ns is None or now_ns - self._dropped_ns > S:  # a held key repeats
+        if self._dropped_ns is None or now_ns - self._dropped_ns > NS_PER_S:  # a held key repeats
             self._dropped_ns = now_ns
             text = f"key {press.key.upper()} ignored: it waited {press.age_s(now_ns):.1f} s"
             self._logbook.add("teleop", "warning", text)

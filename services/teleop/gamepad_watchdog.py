@@ -18,7 +18,7 @@ every axis, hat and button counts. Full deflection is the fastest motion, so it 
 limit; the screen asks for a movement after half of it.
 """
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 
 class GamepadWatchdog:
@@ -38,7 +38,7 @@ class GamepadWatchdog:
 
     def quiet_s(self, now_ns: int) -> float:
         """Return how long ago the last event was."""
-        return (now_ns - self._event_ns) / S
+        return (now_ns - self._event_ns) / NS_PER_S
 
     def is_due(self, now_ns: int) -> bool:
         """Return whether the operator should move the stick to keep driving."""

@@ -13,7 +13,7 @@ is down when the gamepad is found, or after a stop, must be let go first.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SafetyState
 
 
@@ -27,15 +27,15 @@ class Press:
 
     def age_s(self, now_ns: int) -> float:
         """Return how long it has waited."""
-        return (now_ns - self.at_ns) / S
+        return (now_ns - self.at_ns) / NS_PER_S
 
 
 class Keys:
     """Which keys are held, by deadlines."""
 
     def __init__(self, first_s: float, repeat_s: float) -> None:
-        self._first_ns = round(first_s * S)
-        self._repeat_ns = round(repeat_s * S)
+        self._first_ns = round(first_s * NS_PER_S)
+        self._repeat_ns = round(repeat_s * NS_PER_S)
         self._until_ns: dict[str, int] = {}
         self._muted_until_ns: int | None = None
 

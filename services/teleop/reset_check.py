@@ -13,7 +13,7 @@ Any program on the bus may answer the call; only safety's own state shows that a
 """
 
 from common import operator
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import ResetDone, SafetyState
 
 
@@ -41,5 +41,5 @@ class ResetCheck:
         if state is not None and operator.confirms(self._seen, self._done, state):
             return True
         if self._until_ns is None:
-            self._until_ns = now_ns + round(operator.CONFIRM_S * S)
+            self._until_ns = now_ns + round(operator.CONFIRM_S * NS_PER_S)
         return False if now_ns > self._until_ns else None

@@ -25,7 +25,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 PROBE_S = 0.1  # between two questions
 RECOVER_S = 1.0  # that the terminal must be fast before its keys count again
@@ -54,7 +54,7 @@ class RoundTrip:
     """Decides whether a key that was read at some moment counts."""
 
     def __init__(self, limit_s: float, unmeasurable: str = "") -> None:
-        self._limit_ns = round(limit_s * S)
+        self._limit_ns = round(limit_s * NS_PER_S)
         self._unmeasurable = unmeasurable
         self._sent_ns: dict[int, int] = {}  # by number
         self._answers: deque[Answer] = deque(maxlen=NUMBERS)
@@ -77,16 +77,17 @@ class RoundTrip:
         before = [answer for answer in self._answers if answer.received_ns <= at_ns]
         if not before:
             return UNKNOWN
-        recent = [one.took_ns for one in before if at_ns - one.received_ns <= RECOVER_S * S]
+        recent = [one.took_ns for one in before if at_ns - one.received_ns <= RECOVER_S * NS_PER_S]
         took_ns = max([self._least_ns(before[-1], at_ns), *recent])
         if took_ns <= self._limit_ns:
             return ""
-        return f"terminal too slow: {took_ns / S:.2f} s, allowed {self._limit_ns / S:g} s"
+        took_s, limit_s = took_ns / NS_PER_S, self._limit_ns / NS_PER_S
+        return f"terminal too slow: {took_s:.2f} s, allowed {limit_s:g} s"
 
     @staticmethod
     def _least_ns(newest: Answer, at_ns: int) -> int:
         """Return how slow the terminal is at least, as it has not answered since."""
-        return round(at_ns - newest.sent_ns - 2 * PROBE_S * S)
+        return round(at_ns - newest.sent_ns - 2 * PROBE_S * NS_PER_S)
 
 
 def multiplexer(environ: Mapping[str, str], ancestors: Iterable[str]) -> str:

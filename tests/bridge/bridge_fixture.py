@@ -102,7 +102,7 @@ def bridge_command(made: Board, endpoint: str, *sets: str) -> list[str]:
         f"board.listen_ports={made.ports}",
         f"bus.connect={endpoint}",
         # Patient: these machines hold processes up for tenths of a second.
-        "bridge.i_accept=lease,silence,heartbeat",
+        "bridge.unsafe_overrides=lease,silence,heartbeat",
         "bridge.heartbeat=2.0",
         "bridge.lease=0.8",
         "bridge.silence=0.8",

@@ -3,15 +3,15 @@
 from msgspec.structs import replace
 from msgspec.structs import replace as replace_message
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Motion
 from services.bridge.lease import Lease, Order, on_motion
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 LEASE = 200 * MS
 COAST = 1000 * MS
 OWN_BOOT = 7
-NOW = 100 * S
+NOW = 100 * NS_PER_S
 
 ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
 HIT = replace(ARMED, hit=5)

@@ -6,7 +6,7 @@ from typing import Any
 
 from common import keys
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from tests.bridge.bridge_fixture import Rig
 from verification.harness.support import wait_until
 
@@ -68,7 +68,7 @@ def test_refusals_name_the_reason(rig: Rig) -> None:
 def test_switches_that_were_asked_late_are_refused(rig: Rig) -> None:
     ready(rig)
     late = switches(rig, bumper_brake=False)
-    due_ns = time.monotonic_ns() + round(1.1 * S)
+    due_ns = time.monotonic_ns() + round(1.1 * NS_PER_S)
     wait_until(lambda: time.monotonic_ns() > due_ns, "a late call")
     assert "allowed is 1 s" in ask(rig, keys.SET_SWITCHES, late)
     assert "no echo" in ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))

@@ -4,7 +4,7 @@ import pytest
 
 from common.config import Sources, load
 from common.errors import ConfigError
-from common.settings import Board, Bus
+from common.settings import Board, BusSettings
 from services.bridge.config import Bridge, BridgeConfig
 
 
@@ -14,7 +14,7 @@ def read(*sets: str) -> BridgeConfig:
 
 def test_the_file_holds_the_defaults() -> None:
     config = read()
-    assert (config.bridge, config.board, config.bus) == (Bridge(), Board(), Bus())
+    assert (config.bridge, config.board, config.bus) == (Bridge(), Board(), BusSettings())
 
 
 @pytest.mark.parametrize(
@@ -38,9 +38,9 @@ def test_what_takes_a_protection_away_must_be_owned_up_to(
 ) -> None:
     section, name = path.split(".")
     read(f"{path}={good}")
-    with pytest.raises(ConfigError, match=f"{section}: {name} = .* or name it in i_accept"):
+    with pytest.raises(ConfigError, match=f"{section}: {name} = .* or name it in unsafe_overrides"):
         read(f"{path}={bad}")
-    read(f"{path}={bad}", f"{section}.i_accept={name}")
+    read(f"{path}={bad}", f"{section}.unsafe_overrides={name}")
 
 
 @pytest.mark.parametrize(
@@ -52,8 +52,8 @@ def test_a_stricter_limit_wants_no_word(path: str) -> None:
 
 @pytest.mark.parametrize("section", ["bridge", "board", "bus"])
 def test_only_protections_can_be_given_up(section: str) -> None:
-    with pytest.raises(ConfigError, match="i_accept names 'port'"):
-        read(f"{section}.i_accept=port")
+    with pytest.raises(ConfigError, match="unsafe_overrides names 'port'"):
+        read(f"{section}.unsafe_overrides=port")
 
 
 def test_the_other_port_is_taken_before_the_board_counts_as_lost() -> None:

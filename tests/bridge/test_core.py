@@ -7,7 +7,7 @@ import pytest
 
 from common import messages as m
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame, Side
@@ -18,8 +18,8 @@ from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
 from services.bridge.output import Output
 
-MS = S // 1000
-NOW = 1_000 * S
+MS = NS_PER_S // 1000
+NOW = 1_000 * NS_PER_S
 BOOT, SAFETY = 7, 1
 
 FRAMING = Framing()
@@ -221,7 +221,7 @@ def test_what_no_vehicle_can_mean_is_dropped_and_counted(bench: Bench) -> None:
 
 
 def link_lost(bench: Bench) -> None:
-    out = bench.tick(S)
+    out = bench.tick(NS_PER_S)
     assert "link_lost" in events(out)
 
 
@@ -268,7 +268,7 @@ def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench
     for _ in range(5):
         assert bench.core.readiness.ready
         bench.receive(STANDS)
-        told += published(bench.tick(S // 5), "switches")
+        told += published(bench.tick(NS_PER_S // 5), "switches")
     assert not bench.core.readiness.ready
     assert told == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
 
@@ -292,7 +292,7 @@ def test_a_gap_of_some_velocity_periods_sends_the_brakes_again_at_once(bench: Be
 def test_a_firmware_without_echoes_is_driven_when_that_is_accepted(
     ultrasonic: bool | None, bumper: bool | None, ready: bool
 ) -> None:
-    bench = Bench("bridge.require_switches=false", "bridge.i_accept=require_switches")
+    bench = Bench("bridge.require_switches=false", "bridge.unsafe_overrides=require_switches")
     readiness = bench.core.readiness
     assert not readiness.ready
     bench.receive(STANDS)
@@ -350,7 +350,7 @@ def test_the_last_frame_brakes_unless_the_vehicle_stands(
     bench.answer(VelocityReport(speed, 0))
     assert bench.core.motions.is_stopped(bench.now_ns) is (speed == 0)
     assert motions(bench.core.exit(bench.now_ns)) == [kind]
-    assert bench.core.motions.is_stopped(bench.now_ns + S + MS), "it waits no longer"
+    assert bench.core.motions.is_stopped(bench.now_ns + NS_PER_S + MS), "it waits no longer"
 
 
 # --- calls --------------------------------------------------------------------------------------
@@ -369,7 +369,7 @@ def test_a_lamp_answers_with_the_boards_echo(bench: Bench) -> None:
 def test_a_lamp_that_the_board_does_not_echo_is_refused(bench: Bench) -> None:
     bench.arm()
     bench.core.led(m.LedRequest(channel=1, mode=0), "caller", bench.now_ns)
-    (answer,) = bench.tick(S).answers
+    (answer,) = bench.tick(NS_PER_S).answers
     assert answer.refusal == "the board did not echo within 0.5 s"
     (refused,) = bench.core.led(m.LedRequest(channel=1, mode=0), 2, bench.now_ns).answers
     assert refused.refusal == "the board is absent (link lost)"

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 from msgspec.structs import replace as replace_message
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Motion
 from services.bridge import lease as leases
 from services.bridge.lease import (
@@ -172,7 +172,7 @@ def test_a_brake_goes_on_when_the_lease_ends(waited: int) -> None:
     now = NOW + LEASE + 1
     over, order = on_tick(state, now, LEASE, COAST, True)
     assert order is Order.BRAKE
-    assert on_tick(over, now + 3600 * S, LEASE, COAST, True)[1] is Order.BRAKE
+    assert on_tick(over, now + 3600 * NS_PER_S, LEASE, COAST, True)[1] is Order.BRAKE
 
 
 @pytest.mark.parametrize("motion", [stop(12), run(seq=12), run(0.0, seq=12)])
@@ -191,10 +191,10 @@ def test_what_brakes_whether_it_stands_or_not() -> None:
 
 
 def test_an_old_run_behind_an_old_zero_is_not_obeyed() -> None:
-    after, _, _ = late(replace(ARMED, renewed_ns=NOW - S), run(0.0, seq=11), 3 * S)
-    after, order, refusal = late(after, run(seq=12), 3 * S)
+    after, _, _ = late(replace(ARMED, renewed_ns=NOW - NS_PER_S), run(0.0, seq=11), 3 * NS_PER_S)
+    after, order, refusal = late(after, run(seq=12), 3 * NS_PER_S)
     assert (order, refusal) == (None, Refusal.LATE)
-    assert on_tick(after, NOW + 3 * S, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(after, NOW + 3 * NS_PER_S, LEASE, COAST, True)[1] is Order.STOP
 
 
 def test_a_late_message_of_a_second_authority_is_that_of_a_second_authority() -> None:
@@ -203,7 +203,7 @@ def test_a_late_message_of_a_second_authority_is_that_of_a_second_authority() ->
 
 
 def test_moving_without_a_command_breaks_at_once_and_holds() -> None:
-    over = replace(ARMED, over_since_ns=NOW - S, neutral=False)
+    over = replace(ARMED, over_since_ns=NOW - NS_PER_S, neutral=False)
     moved, order = on_uncommanded(over, NOW, OWN_BOOT)
     held = replace(over, uncommanded=True, latched_by=OWN_BOOT, sent_ns=NOW)
     assert (order, moved) == (Order.BRAKE, held)
@@ -213,7 +213,7 @@ def test_moving_without_a_command_breaks_at_once_and_holds() -> None:
 
 @pytest.mark.parametrize("owed", [None, 1, 3])
 def test_moving_without_a_command_wants_a_reset_of_safety(owed: int | None) -> None:
-    over = replace(ARMED, over_since_ns=NOW - S, neutral=False, latched_by=owed)
+    over = replace(ARMED, over_since_ns=NOW - NS_PER_S, neutral=False, latched_by=owed)
     moved, _ = on_uncommanded(over, NOW, OWN_BOOT)
     back, order, _ = obey(moved, stop(seq=11))  # it has not heard of it yet
     assert (order, back.uncommanded, back.latched_by) == (Order.BRAKE, True, OWN_BOOT)
@@ -299,8 +299,8 @@ def test_tick_when_the_lease_ends(age: int, standing: bool, order: Order | None)
         (COAST, False, Order.STOP),
         (COAST + 1, False, Order.BRAKE),
         (COAST + 1, True, Order.STOP),
-        (60 * S, False, Order.BRAKE),
-        (3600 * S, True, Order.STOP),
+        (60 * NS_PER_S, False, Order.BRAKE),
+        (3600 * NS_PER_S, True, Order.STOP),
     ],
 )
 def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, order: Order) -> None:
@@ -331,9 +331,9 @@ def test_the_frame_of_a_message_counts_for_the_20_hz() -> None:
 def test_a_message_ends_the_stopping_of_a_lease_that_was_over() -> None:
     over, order = on_tick(ARMED, NOW + LEASE + 1, LEASE, COAST, True)
     assert (over.over_since_ns, over.neutral, order) == (NOW + LEASE + 1, False, Order.STOP)
-    alive, _, _ = obey(over, stop(), NOW + S)
-    assert (alive.renewed_ns, alive.over_since_ns, alive.neutral) == (NOW + S, None, True)
-    assert on_tick(alive, NOW + S + LEASE, LEASE, COAST, True) == (alive, None)
+    alive, _, _ = obey(over, stop(), NOW + NS_PER_S)
+    assert (alive.renewed_ns, alive.over_since_ns, alive.neutral) == (NOW + NS_PER_S, None, True)
+    assert on_tick(alive, NOW + NS_PER_S + LEASE, LEASE, COAST, True) == (alive, None)
 
 
 def test_it_says_what_it_waits_for() -> None:

@@ -1,11 +1,11 @@
 """Which query is due and which answer is overdue."""
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import BumperQuery, DistanceQuery
 from common.wire.frame import Frame
 from services.bridge.poll import SLOWEST, Poll
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 
 
 def poll() -> Poll:
@@ -55,18 +55,18 @@ def test_a_missed_answer_halves_the_rate_down_to_a_quarter_and_the_next_restores
 
 def test_a_late_answer_still_counts_and_an_unasked_one_changes_nothing() -> None:
     polled = poll()
-    polled.answered("bumper", S)
+    polled.answered("bumper", NS_PER_S)
     assert polled.round_trip_s() is None
-    polled.due(S)
-    polled.answered("bumper", S + 250 * MS)
+    polled.due(NS_PER_S)
+    polled.answered("bumper", NS_PER_S + 250 * MS)
     assert polled.round_trip_s() == 0.25
 
 
 def test_an_answer_is_no_older_than_its_question() -> None:
     polled = poll()
-    polled.due(S)
-    assert polled.answered("bumper", S + 300 * MS) == S
-    assert polled.answered("bumper", S + 310 * MS) == S + 310 * MS
+    polled.due(NS_PER_S)
+    assert polled.answered("bumper", NS_PER_S + 300 * MS) == NS_PER_S
+    assert polled.answered("bumper", NS_PER_S + 310 * MS) == NS_PER_S + 310 * MS
 
 
 def test_a_slow_query_that_is_never_answered_gets_slower_to_a_quarter() -> None:
@@ -79,9 +79,9 @@ def test_a_slow_query_that_is_never_answered_gets_slower_to_a_quarter() -> None:
 def test_the_round_trip_is_the_median_of_the_queries() -> None:
     names = "abcde"
     polled = Poll([(name, BumperQuery(), 1.0) for name in names], 0.1)
-    polled.due(S)
+    polled.due(NS_PER_S)
     for n, name in enumerate(names):
-        polled.answered(name, S + (n + 1) * MS)
+        polled.answered(name, NS_PER_S + (n + 1) * MS)
     assert polled.round_trip_s() == 0.003
 
 
@@ -117,7 +117,7 @@ def test_a_steady_query_keeps_its_rate_without_any_answer() -> None:
     assert polled.queries["bumper"].slowdown == 1
     assert (polled.lost("bumper", 1980 * MS), polled.missed()["bumper"]) == (11, 49)
     assert polled.queries["mileage"].losses is None
-    assert polled.lost("mileage", 2 * S) == 0
+    assert polled.lost("mileage", 2 * NS_PER_S) == 0
 
 
 def test_every_third_answer_lost_keeps_the_rate_and_shows() -> None:
@@ -152,14 +152,16 @@ def test_a_late_poll_is_not_followed_at_once_by_the_next() -> None:
 
 def test_an_answer_after_a_loss_may_be_that_of_the_poll_before() -> None:
     polled = steady()
-    polled.due(S)
-    polled.due(S + 20 * MS)
-    assert polled.answered("bumper", S + 22 * MS) == S
-    polled.due(S + 40 * MS)
-    assert polled.answered("bumper", S + 42 * MS) == S + 40 * MS
+    polled.due(NS_PER_S)
+    polled.due(NS_PER_S + 20 * MS)
+    assert polled.answered("bumper", NS_PER_S + 22 * MS) == NS_PER_S
+    polled.due(NS_PER_S + 40 * MS)
+    assert polled.answered("bumper", NS_PER_S + 42 * MS) == NS_PER_S + 40 * MS
     for tick in range(1060, 1180, 20):
         polled.due(tick * MS)
-    assert polled.answered("bumper", S + 162 * MS) == S + 160 * MS, "not beyond the timeout"
+    assert polled.answered("bumper", NS_PER_S + 162 * MS) == NS_PER_S + 160 * MS, (
+        "not beyond the timeout"
+    )
 
 
 def test_a_steady_query_counts_lost_polls_and_takes_a_late_answer_back() -> None:

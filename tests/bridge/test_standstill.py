@@ -2,13 +2,13 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
 from services.bridge.standstill import AWAY_M, AWAY_RAD, DRIFT_RADPS, Standstill
 
-MS = S // 1000
-COAST, SILENCE = S, 200 * MS
-NOW = 100 * S
+MS = NS_PER_S // 1000
+COAST, SILENCE = NS_PER_S, 200 * MS
+NOW = 100 * NS_PER_S
 
 
 def standstill(coast_ns: int = COAST) -> Standstill:
@@ -58,10 +58,10 @@ def test_it_must_stand_by_then(linear: float, angular: float, limit_s: float) ->
     moves(still, linear, angular, NOW - 1)
     assert still.limit_ns == COAST
     still.on_lease(NOW)
-    assert still.limit_ns == round(limit_s * S)
+    assert still.limit_ns == round(limit_s * NS_PER_S)
     moves(still, 0.0, 0.0, NOW + 1)
     still.on_lease(NOW)
-    assert still.limit_ns == round(limit_s * S), "by the velocity at the end of the lease"
+    assert still.limit_ns == round(limit_s * NS_PER_S), "by the velocity at the end of the lease"
     still.on_lease(None)
     assert still.limit_ns == COAST
 
@@ -71,7 +71,7 @@ def test_an_old_velocity_says_nothing(age: int, limit_s: float) -> None:
     still = standstill()
     moves(still, 0.0, 0.0, NOW - age)
     still.on_lease(NOW)
-    assert still.limit_ns == limit_s * S
+    assert still.limit_ns == limit_s * NS_PER_S
 
 
 def test_without_a_velocity_the_coast_limit_holds() -> None:
@@ -199,15 +199,15 @@ def test_the_integral_of_the_velocities_leaks(
 def test_the_heading_counter_may_drift(rate: float, away: bool, sign: int) -> None:
     still = stood()
     for number in range(60):
-        counts(still, 0.0, sign * rate * number, now_ns=NOW + number * S)
+        counts(still, 0.0, sign * rate * number, now_ns=NOW + number * NS_PER_S)
     assert left(still) is away
 
 
 def test_a_drift_of_the_past_is_no_credit_for_a_turn() -> None:
     still = stood()
     for number in range(600):
-        counts(still, 0.0, now_ns=NOW + number * S)
-    counts(still, 0.0, AWAY_RAD + DRIFT_RADPS, now_ns=NOW + 600 * S)
+        counts(still, 0.0, now_ns=NOW + number * NS_PER_S)
+    counts(still, 0.0, AWAY_RAD + DRIFT_RADPS, now_ns=NOW + 600 * NS_PER_S)
     assert left(still)
 
 
@@ -220,11 +220,11 @@ def test_the_offset_of_a_sensor_is_no_motion() -> None:
 
 def test_a_gap_counts_for_no_longer_than_a_velocity_holds() -> None:
     still = stood()
-    moves(still, 0.2, 0.0, NOW + S)
+    moves(still, 0.2, 0.0, NOW + NS_PER_S)
     assert not left(still)
-    moves(still, 0.2, 0.0, NOW + 2 * S)
+    moves(still, 0.2, 0.0, NOW + 2 * NS_PER_S)
     assert not left(still)
-    moves(still, 0.2, 0.0, NOW + 3 * S)
+    moves(still, 0.2, 0.0, NOW + 3 * NS_PER_S)
     assert left(still)
 
 
@@ -233,8 +233,8 @@ def test_what_it_did_before_it_stood_does_not_count() -> None:
     still.on_lease(NOW)
     for number in range(50):
         moves(still, 1.0, 1.0, NOW + number * 20 * MS)
-    moves(still, 0.0, 0.0, NOW + S)
-    moves(still, 0.1, 0.1, NOW + S + 20 * MS)
+    moves(still, 0.0, 0.0, NOW + NS_PER_S)
+    moves(still, 0.1, 0.1, NOW + NS_PER_S + 20 * MS)
     assert not left(still)
 
 
@@ -246,12 +246,12 @@ def test_a_living_lease_begins_anew() -> None:
     assert left(still)
     still.on_lease(None)
     assert not left(still)
-    moves(still, 0.5, 0.0, NOW + S)
+    moves(still, 0.5, 0.0, NOW + NS_PER_S)
     counts(still, 9.0)
     counts(still, 10.0)
     assert not left(still), "safety supervises it"
-    still.on_lease(NOW + 2 * S)
-    moves(still, 0.0, 0.0, NOW + 2 * S)
+    still.on_lease(NOW + 2 * NS_PER_S)
+    moves(still, 0.0, 0.0, NOW + 2 * NS_PER_S)
     counts(still, 11.0)
     assert not left(still)
     counts(still, 11.0)

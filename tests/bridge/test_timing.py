@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Durations, Motion
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import BOUNDS_NS, LONGEST_NS, Histogram, Timings, quantile
 
 MS = 1_000_000
-BOUNDS_S = [bound / S for bound in BOUNDS_NS]
+BOUNDS_S = [bound / NS_PER_S for bound in BOUNDS_NS]
 HIT = Receipt(kernel_ns=100 * MS, read_ns=101 * MS)
 # Asked at 10 ms, heard at 12, sent at 15.
 ANSWER = Motion(command="run", asked_ns=10 * MS, heard_ns=12 * MS, mono_ns=15 * MS)
@@ -35,13 +35,13 @@ def left_out(timings: Timings) -> dict[str, int]:
 
 
 def test_bounds_go_from_10_us_to_1_s_a_third_more_each() -> None:
-    assert (BOUNDS_NS[0], BOUNDS_NS[8], BOUNDS_NS[-1]) == (10_000, 100_000, S)
+    assert (BOUNDS_NS[0], BOUNDS_NS[8], BOUNDS_NS[-1]) == (10_000, 100_000, NS_PER_S)
     assert all(b / a == pytest.approx(10 ** (1 / 8), rel=1e-3) for a, b in pairwise(BOUNDS_NS))
 
 
 @pytest.mark.parametrize(
     ("duration_ns", "bucket"),
-    [(0, 0), (10_000, 0), (10_001, 1), (S, 40), (S + 1, 41), (9 * S, 41)],
+    [(0, 0), (10_000, 0), (10_001, 1), (NS_PER_S, 40), (NS_PER_S + 1, 41), (9 * NS_PER_S, 41)],
 )
 def test_a_duration_goes_into_the_first_bucket_whose_bound_it_keeps(
     duration_ns: int, bucket: int
@@ -51,7 +51,7 @@ def test_a_duration_goes_into_the_first_bucket_whose_bound_it_keeps(
     message = histogram.message()
     assert [n for n, count in enumerate(message.counts) if count] == [bucket]
     assert message.counts[bucket] == 1
-    assert message.worst == duration_ns / S
+    assert message.worst == duration_ns / NS_PER_S
 
 
 def test_the_worst_stays() -> None:
@@ -233,15 +233,19 @@ def test_a_quantile_is_its_buckets_bound_but_never_more_than_the_worst() -> None
     assert quantile(BOUNDS_S, of_100, 0.5) == 10e-6
     assert quantile(BOUNDS_S, of_100, 0.51) == quantile(BOUNDS_S, of_100, 0.99) == 100e-6
     assert quantile(BOUNDS_S, of_100, 1.0) == 0.012
-    assert quantile(BOUNDS_S, histogram(5 * S), 0.5) == 5.0
+    assert quantile(BOUNDS_S, histogram(5 * NS_PER_S), 0.5) == 5.0
 
 
-@given(st.lists(st.integers(0, 2 * S), min_size=1), st.sampled_from([0.5, 0.99]))
+@given(st.lists(st.integers(0, 2 * NS_PER_S), min_size=1), st.sampled_from([0.5, 0.99]))
 def test_a_quantile_is_never_too_small_and_at_most_one_bucket_too_large(
     durations_ns: list[int], part: float
 ) -> None:
     told = quantile(BOUNDS_S, histogram(*durations_ns), part)
     ranked = sorted(durations_ns)
-    true_s = next(d for n, d in enumerate(ranked, 1) if n >= part * len(ranked)) / S
+    true_s = next(d for n, d in enumerate(ranked, 1) if n >= part * len(ranked)) / NS_PER_S
     assert told is not None
-    assert true_s <= told <= max(10e-6, min(true_s * 1.34, ranked[-1] / S) if true_s <= 1 else told)
+    assert (
+        true_s
+        <= told
+        <= max(10e-6, min(true_s * 1.34, ranked[-1] / NS_PER_S) if true_s <= 1 else told)
+    )

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.settings import Board
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.udp import BREATH_S, BURST, Sockets, want_stamps
@@ -61,7 +61,7 @@ def test_a_datagram_came_when_the_kernel_got_it_not_when_it_was_read(peer: socke
             datagram, receipt = received(sockets)
             assert datagram == b"frame"
             assert receipt.kernel_ns is not None
-            assert receipt.read_ns >= after_ns + HELD_S * S
+            assert receipt.read_ns >= after_ns + HELD_S * NS_PER_S
             return before_ns - 1_000 <= receipt.kernel_ns <= after_ns + 1_000
 
         # The kernel turns stamping on a moment later than it is asked to.
@@ -92,7 +92,7 @@ def test_a_wall_clock_that_is_set_costs_stamps_and_nothing_else(
         peer.sendto(b"before", where)
         assert received(sockets)[1].kernel_ns is not None
         true_ns = time.time_ns
-        monkeypatch.setattr(time, "time_ns", lambda: true_ns() - 3 * S)
+        monkeypatch.setattr(time, "time_ns", lambda: true_ns() - 3 * NS_PER_S)
         # The kernel goes on by the clock of before: to us, its stamps are of the future.
         peer.sendto(b"after", where)
         datagram, receipt = received(sockets)

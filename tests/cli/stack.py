@@ -17,7 +17,7 @@ def ports() -> list[str]:
         f"board.listen_ports={first},{second}",
         f"bus.listen=tcp/127.0.0.1:{free_port()}",
         # These machines hold processes up: no bridge and no router is to be killed for it here.
-        "bridge.i_accept=heartbeat",
+        "bridge.unsafe_overrides=heartbeat",
         "bridge.heartbeat=5",
         "bus.probe_deadline=30",
     ]

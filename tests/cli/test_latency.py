@@ -16,7 +16,7 @@ from cli.latency import SILENCE, Watch, figures, print_line, table
 from common import keys
 from common.bus.bus import Arrival
 from common.cli_args import EXIT_LINK
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Durations, Health, Timing
 from tests.cli.processes import PATIENCE_S, sets, t2
@@ -123,18 +123,18 @@ def test_silence_is_said_once_and_again_after_the_next_word() -> None:
     begin_ns = time.monotonic_ns()
     watch.take(told(begin_ns))
     for seconds in (1, 4.9, 5.1, 6, 7):
-        watch.look(begin_ns + round(seconds * S))
+        watch.look(begin_ns + round(seconds * NS_PER_S))
     assert shown == [(health(), False), (health(), True)]
-    watch.take(told(begin_ns + 8 * S))
-    watch.look(begin_ns + 9 * S)
-    watch.look(begin_ns + 14 * S)
+    watch.take(told(begin_ns + 8 * NS_PER_S))
+    watch.look(begin_ns + 9 * NS_PER_S)
+    watch.look(begin_ns + 14 * NS_PER_S)
     assert shown[2:] == [(health(), False), (health(), True)]
     loop.close()
 
 
 def test_once_gives_up_without_showing_anything() -> None:
     watch, loop, shown = watched(once=True)
-    watch.look(time.monotonic_ns() + 6 * S)
+    watch.look(time.monotonic_ns() + 6 * NS_PER_S)
     loop.run()  # returns: it was stopped before
     assert (watch.silent, shown) == (True, [])
     loop.close()

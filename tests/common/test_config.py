@@ -176,7 +176,10 @@ def test_an_empty_table_takes_nothing_away(desk: Desk, empty: str) -> None:
         ("[safety.sources]\nweb = 'x'", "safety.sources.web = 'x': Expected `object`, got `str`"),
         ("[safety.sources.web]\npriority = 'a'", "sources.web.priority = 'a': Expected `int`"),
         ("[safety]\nmargin = 0.0", "over0.toml: safety: margin = 0.0 takes a protection away"),
-        ("[safety]\ni_accept = ['x']", "i_accept names 'x', which takes no protection away"),
+        (
+            "[safety]\nunsafe_overrides = ['x']",
+            "unsafe_overrides names 'x', which takes no protection away",
+        ),
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_refused_by_name_value_and_range(
@@ -222,5 +225,5 @@ def test_what_two_settings_break_together_names_both(desk: Desk) -> None:
 
 
 def test_a_protection_may_be_taken_away_when_owned_up_to(desk: Desk) -> None:
-    loaded = desk.load("[safety]\nmargin = 0.0\ni_accept = ['margin']")
+    loaded = desk.load("[safety]\nmargin = 0.0\nunsafe_overrides = ['margin']")
     assert loaded.config.safety.margin == 0.0

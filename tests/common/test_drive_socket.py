@@ -9,7 +9,7 @@ import pytest
 from common import drive_socket
 from common.drive_socket import prepare, socket_path
 from common.errors import ConfigError
-from common.settings import Bus
+from common.settings import BusSettings
 
 
 @pytest.fixture
@@ -21,12 +21,12 @@ def folder(tmp_path: Path) -> Path:
 
 def derived(robot: str = "001", *connect: str, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("TMPDIR", "/elsewhere")
-    return socket_path(Bus(connect=connect), robot)
+    return socket_path(BusSettings(connect=connect), robot)
 
 
 def test_both_ends_derive_one_path_and_two_stacks_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    listening = Bus(listen=("tcp/127.0.0.1:7448",))
-    dialling = Bus(connect=("tcp/127.0.0.1:7448",))
+    listening = BusSettings(listen=("tcp/127.0.0.1:7448",))
+    dialling = BusSettings(connect=("tcp/127.0.0.1:7448",))
     assert socket_path(listening, "001") == socket_path(dialling, "001")
     paths = {
         derived("001", monkeypatch=monkeypatch),
@@ -38,15 +38,15 @@ def test_both_ends_derive_one_path_and_two_stacks_two(monkeypatch: pytest.Monkey
 
 
 def test_another_network_is_another_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    here = socket_path(Bus(), "001")
+    here = socket_path(BusSettings(), "001")
     monkeypatch.setattr(drive_socket, "NETWORK", tmp_path)
-    there = socket_path(Bus(), "001")
+    there = socket_path(BusSettings(), "001")
     monkeypatch.setattr(drive_socket, "NETWORK", tmp_path / "missing")
-    assert len({here, there, socket_path(Bus(), "001")}) == 3
+    assert len({here, there, socket_path(BusSettings(), "001")}) == 3
 
 
 def test_the_setting_is_stronger() -> None:
-    where = Bus(drive="unixsock-stream//run/t2-drive/drive.sock")
+    where = BusSettings(drive="unixsock-stream//run/t2-drive/drive.sock")
     assert socket_path(where, "001") == Path("/run/t2-drive/drive.sock")
 
 
@@ -62,16 +62,16 @@ def test_the_setting_is_stronger() -> None:
 )
 def test_only_a_socket_with_an_absolute_path_will_do(endpoint: str) -> None:
     with pytest.raises(ValueError, match="should look like unixsock-stream//run"):
-        Bus(drive=endpoint)
+        BusSettings(drive=endpoint)
 
 
 def test_a_path_has_107_bytes_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
     fits = "/run/" + "x" * 102
-    assert socket_path(Bus(drive=f"unixsock-stream/{fits}"), "001") == Path(fits)
+    assert socket_path(BusSettings(drive=f"unixsock-stream/{fits}"), "001") == Path(fits)
     with pytest.raises(ValueError, match=r"at most 107 bytes, .* has 108"):
-        Bus(drive=f"unixsock-stream/{fits}x")
+        BusSettings(drive=f"unixsock-stream/{fits}x")
     with pytest.raises(ValueError, match="has 109"):
-        Bus(drive="unixsock-stream//run/" + "x" * 100 + "ää")
+        BusSettings(drive="unixsock-stream//run/" + "x" * 100 + "ää")
     with pytest.raises(ConfigError, match=r"bus\.drive: .* at most 107 bytes.*name a shorter one"):
         derived("x" * 100, monkeypatch=monkeypatch)
 

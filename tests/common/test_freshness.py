@@ -2,16 +2,22 @@
 
 import pytest
 
-from common.freshness import Latest, S, fresh
+from common.freshness import NS_PER_S, Latest, fresh
 
 
 @pytest.mark.parametrize(
     ("age_ns", "answer"),
-    [(0, True), (S // 2, True), (S, True), (S + 1, False), (5 * S, False)],
+    [
+        (0, True),
+        (NS_PER_S // 2, True),
+        (NS_PER_S, True),
+        (NS_PER_S + 1, False),
+        (5 * NS_PER_S, False),
+    ],
 )
 def test_a_value_is_fresh_up_to_its_limit(age_ns: int, answer: bool) -> None:
-    latest = Latest("value", received_ns=7 * S)
-    assert fresh(latest, 7 * S + age_ns, 1.0) is answer
+    latest = Latest("value", received_ns=7 * NS_PER_S)
+    assert fresh(latest, 7 * NS_PER_S + age_ns, 1.0) is answer
 
 
 def test_no_value_is_never_fresh() -> None:
@@ -19,4 +25,4 @@ def test_no_value_is_never_fresh() -> None:
 
 
 def test_age_is_in_seconds() -> None:
-    assert Latest(1, received_ns=S).age_s(S + S // 4) == 0.25
+    assert Latest(1, received_ns=NS_PER_S).age_s(NS_PER_S + NS_PER_S // 4) == 0.25

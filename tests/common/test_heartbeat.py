@@ -1,38 +1,38 @@
 """How old an echo may be, and what an operator is told about one that is refused."""
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.heartbeat import CAPACITY, Heartbeat
 
 START = Heartbeat(1000)
 
 
 def test_an_echo_counts_up_to_its_limit() -> None:
-    heartbeat = START.beat(5 * S)
+    heartbeat = START.beat(5 * NS_PER_S)
     assert heartbeat.number == 1001
-    assert not heartbeat.is_late(1001, 6 * S, S)
-    assert heartbeat.is_late(1001, 6 * S + 1, S)
-    assert heartbeat.refusal(1001, 6 * S, S) == ""
-    assert "1.5 s old, allowed is 1 s" in heartbeat.refusal(1001, 13 * S // 2, S)
+    assert not heartbeat.is_late(1001, 6 * NS_PER_S, NS_PER_S)
+    assert heartbeat.is_late(1001, 6 * NS_PER_S + 1, NS_PER_S)
+    assert heartbeat.refusal(1001, 6 * NS_PER_S, NS_PER_S) == ""
+    assert "1.5 s old, allowed is 1 s" in heartbeat.refusal(1001, 13 * NS_PER_S // 2, NS_PER_S)
 
 
 def test_an_unknown_or_missing_echo_is_refused() -> None:
-    heartbeat = START.beat(5 * S)
-    assert heartbeat.is_late(1000, 5 * S, S)
-    assert "unknown heartbeat" in heartbeat.refusal(1000, 5 * S, S)
-    assert "no echo" in heartbeat.refusal(None, 5 * S, S)
+    heartbeat = START.beat(5 * NS_PER_S)
+    assert heartbeat.is_late(1000, 5 * NS_PER_S, NS_PER_S)
+    assert "unknown heartbeat" in heartbeat.refusal(1000, 5 * NS_PER_S, NS_PER_S)
+    assert "no echo" in heartbeat.refusal(None, 5 * NS_PER_S, NS_PER_S)
 
 
 def test_a_receiver_notes_the_numbers_that_it_saw() -> None:
-    heartbeat = Heartbeat().noted(70, S).noted(72, 2 * S)
+    heartbeat = Heartbeat().noted(70, NS_PER_S).noted(72, 2 * NS_PER_S)
     assert heartbeat.number == 72
-    assert not heartbeat.is_late(70, S, S)
-    assert heartbeat.is_late(71, S, S)
+    assert not heartbeat.is_late(70, NS_PER_S, NS_PER_S)
+    assert heartbeat.is_late(71, NS_PER_S, NS_PER_S)
 
 
 def test_only_the_newest_are_kept() -> None:
     heartbeat = START
     for _ in range(CAPACITY + 1):
-        heartbeat = heartbeat.beat(S)
+        heartbeat = heartbeat.beat(NS_PER_S)
     assert len(heartbeat.sent) == CAPACITY
-    assert heartbeat.is_late(1001, S, S)
-    assert not heartbeat.is_late(1002, S, S)
+    assert heartbeat.is_late(1001, NS_PER_S, NS_PER_S)
+    assert not heartbeat.is_late(1002, NS_PER_S, NS_PER_S)

@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from common import loop as loop_module
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from verification.harness.support import running, wait_until
 
@@ -18,13 +18,13 @@ class Clock:
     """Time that passes when the test says so."""
 
     def __init__(self) -> None:
-        self.now_ns = 100 * S
+        self.now_ns = 100 * NS_PER_S
 
     def monotonic_ns(self) -> int:
         return self.now_ns
 
     def pass_s(self, seconds: float) -> None:
-        self.now_ns += round(seconds * S)
+        self.now_ns += round(seconds * NS_PER_S)
 
 
 @pytest.fixture
@@ -54,13 +54,13 @@ def test_a_timer_is_due_at_once_and_then_every_period(loop: Loop, clock: Clock) 
     calls: list[int] = []
     loop.every(1.0, calls.append)
     turn(loop)
-    assert calls == [100 * S]
+    assert calls == [100 * NS_PER_S]
     clock.pass_s(0.99)
     turn(loop)
     assert len(calls) == 1
     clock.pass_s(0.01)
     turn(loop)
-    assert calls == [100 * S, 101 * S]
+    assert calls == [100 * NS_PER_S, 101 * NS_PER_S]
 
 
 def test_a_late_timer_is_called_once_and_keeps_its_beat(loop: Loop, clock: Clock) -> None:
@@ -70,10 +70,13 @@ def test_a_late_timer_is_called_once_and_keeps_its_beat(loop: Loop, clock: Clock
     clock.pass_s(5.4)
     turn(loop)
     turn(loop)
-    assert calls == [100 * S, round(105.4 * S)]  # no burst for the four that were missed
+    assert calls == [
+        100 * NS_PER_S,
+        round(105.4 * NS_PER_S),
+    ]  # no burst for the four that were missed
     clock.pass_s(0.6)
     turn(loop)
-    assert calls[2:] == [106 * S]
+    assert calls[2:] == [106 * NS_PER_S]
 
 
 def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock) -> None:
@@ -84,10 +87,10 @@ def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock)
         clock.pass_s(0.9)
         timer.put_off(clock.now_ns)
         turn(loop)
-    assert calls == [100 * S]
+    assert calls == [100 * NS_PER_S]
     clock.pass_s(1.0)
     turn(loop)
-    assert calls[1:] == [round(103.7 * S)]
+    assert calls[1:] == [round(103.7 * NS_PER_S)]
 
 
 def test_who_is_put_off_too_late_was_late(loop: Loop, clock: Clock) -> None:

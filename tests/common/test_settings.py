@@ -6,13 +6,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from common.settings import Board, Bus, Robot, Section, Vehicle, Wire, check_protections
+from common.settings import Board, BusSettings, Robot, Section, Vehicle, Wire, check_protections
 
 LIMITS = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
 
 
 @pytest.mark.parametrize(
-    ("given", "i_accept"),
+    ("given", "unsafe_overrides"),
     [
         ({"margin": 0.05, "lease": 0.5}, ()),  # both ends are allowed
         ({"margin": 10.0, "lease": 0.0}, ()),
@@ -21,26 +21,26 @@ LIMITS = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
     ],
 )
 def test_protections_may_be_kept_or_owned_up_to(
-    given: dict[str, float], i_accept: tuple[str, ...]
+    given: dict[str, float], unsafe_overrides: tuple[str, ...]
 ) -> None:
-    check_protections(given, LIMITS, i_accept)
+    check_protections(given, LIMITS, unsafe_overrides)
 
 
 @pytest.mark.parametrize(
-    ("margin", "lease", "i_accept", "sentence"),
+    ("margin", "lease", "unsafe_overrides", "sentence"),
     [
         (0.04, 0.5, (), r"margin = 0.04 takes a protection away; allowed is 0.05\.\.10.0"),
         (0.2, 0.51, ("margin",), "lease = 0.51 takes a protection away"),
         (float("nan"), 0.5, (), "margin = nan takes a protection away"),
         (0.2, float("inf"), (), "lease = inf takes a protection away"),
-        (0.2, 0.5, ("speed",), "i_accept names 'speed', which takes no protection away"),
+        (0.2, 0.5, ("speed",), "unsafe_overrides names 'speed', which takes no protection away"),
     ],
 )
 def test_protections_are_not_taken_away_by_accident(
-    margin: float, lease: float, i_accept: tuple[str, ...], sentence: str
+    margin: float, lease: float, unsafe_overrides: tuple[str, ...], sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):
-        check_protections({"margin": margin, "lease": lease}, LIMITS, i_accept)
+        check_protections({"margin": margin, "lease": lease}, LIMITS, unsafe_overrides)
 
 
 CERTIFIED: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_key": "c.key"}
@@ -52,7 +52,7 @@ CERTIFIED: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_ke
      "tcp/127.0.0.1:7447?rel=1", "tcp/127.0.0.1:7447#iface=lo"],
 )  # fmt: skip
 def test_endpoints_that_zenoh_can_carry(endpoint: str) -> None:
-    assert Bus(connect=(endpoint,), **CERTIFIED).endpoints == (endpoint,)
+    assert BusSettings(connect=(endpoint,), **CERTIFIED).endpoints == (endpoint,)
 
 
 @pytest.mark.parametrize(
@@ -61,27 +61,27 @@ def test_endpoints_that_zenoh_can_carry(endpoint: str) -> None:
 )
 def test_other_endpoints_are_refused(endpoint: str) -> None:
     with pytest.raises(ValueError, match="should look like tcp/"):
-        Bus(connect=(endpoint,))
+        BusSettings(connect=(endpoint,))
     with pytest.raises(ValueError, match="should look like tcp/"):
-        Bus(listen=(endpoint,))
+        BusSettings(listen=(endpoint,))
 
 
 def test_a_bus_needs_an_endpoint() -> None:
     with pytest.raises(ValueError, match="one of listen and connect needs an endpoint"):
-        Bus(listen=(), connect=())
+        BusSettings(listen=(), connect=())
 
 
 def test_services_dial_the_embedded_router_where_they_can_reach_it() -> None:
     addresses = ("tcp/0.0.0.0:7447", "tcp/[::]:7448", "tcp/10.0.0.1:7449")
-    listening = Bus(listen=addresses, insecure=True)
+    listening = BusSettings(listen=addresses, insecure=True)
     assert listening.endpoints == ("tcp/127.0.0.1:7447", "tcp/[::1]:7448", "tcp/10.0.0.1:7449")
 
 
 def test_services_on_board_need_no_certificate() -> None:
     socket = "unixsock-stream//run/t2/bus.sock"
-    both = Bus(listen=("tls/0.0.0.0:7447", socket), members="members.json", **CERTIFIED)
+    both = BusSettings(listen=("tls/0.0.0.0:7447", socket), members="members.json", **CERTIFIED)
     assert both.endpoints == (socket,)
-    alone = Bus(listen=("tls/0.0.0.0:7447",), members="members.json", **CERTIFIED)
+    alone = BusSettings(listen=("tls/0.0.0.0:7447",), members="members.json", **CERTIFIED)
     assert alone.endpoints == ("tls/127.0.0.1:7447",)
 
 
@@ -90,8 +90,8 @@ def test_services_on_board_need_no_certificate() -> None:
 )
 def test_a_robot_is_not_opened_to_its_network_by_accident(endpoint: str) -> None:
     with pytest.raises(ValueError, match=r"lets everybody on the network drive; .*--insecure"):
-        Bus(listen=("tcp/127.0.0.1:7447", endpoint))
-    assert Bus(listen=(endpoint,), insecure=True).listen == (endpoint,)
+        BusSettings(listen=("tcp/127.0.0.1:7447", endpoint))
+    assert BusSettings(listen=(endpoint,), insecure=True).listen == (endpoint,)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_a_robot_is_not_opened_to_its_network_by_accident(endpoint: str) -> None
                  "unixsock-stream//run/t2/bus.sock"],
 )  # fmt: skip
 def test_what_only_this_machine_reaches_may_be_open(endpoint: str) -> None:
-    assert Bus(listen=(endpoint,)).listen == (endpoint,)
+    assert BusSettings(listen=(endpoint,)).listen == (endpoint,)
 
 
 @pytest.mark.parametrize("name", sorted(CERTIFIED))
@@ -112,37 +112,39 @@ def test_tls_wants_its_files(way: str, name: str) -> None:
         name: "",
     }
     with pytest.raises(ValueError, match=rf"^tls/10\.7\.5\.220:7447 wants {name}: a PEM file"):
-        Bus(**given)
+        BusSettings(**given)
 
 
 def test_a_router_on_tls_wants_to_know_its_members() -> None:
     with pytest.raises(ValueError, match="wants members: the list of `t2 keys`"):
-        Bus(listen=("quic/0.0.0.0:7447",), **CERTIFIED)
-    Bus(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # a client lets nobody in
+        BusSettings(listen=("quic/0.0.0.0:7447",), **CERTIFIED)
+    BusSettings(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # a client lets nobody in
 
 
 @pytest.mark.parametrize("endpoint", ["tcp/192.0.2.1:7447", "udp/[2001:db8::1]:1", "ws/site:1"])
 def test_a_robot_is_not_opened_by_what_it_dials(endpoint: str) -> None:
     with pytest.raises(ValueError, match=rf"^uplink {re.escape(endpoint)} lets everybody .*--inse"):
-        Bus(uplink=(endpoint,))
+        BusSettings(uplink=(endpoint,))
     with pytest.raises(ValueError, match="lets everybody on the network drive"):
-        Bus(uplink=(endpoint,), members="members.json")
-    assert Bus(uplink=(endpoint,), insecure=True).uplink == (endpoint,)
-    assert Bus(uplink=("tcp/127.0.0.1:7448",)).uplink == ("tcp/127.0.0.1:7448",)
+        BusSettings(uplink=(endpoint,), members="members.json")
+    assert BusSettings(uplink=(endpoint,), insecure=True).uplink == (endpoint,)
+    assert BusSettings(uplink=("tcp/127.0.0.1:7448",)).uplink == ("tcp/127.0.0.1:7448",)
 
 
 def test_an_uplink_by_tls_wants_to_know_its_members() -> None:
     uplink = ("tls/site.example:7447",)
     with pytest.raises(ValueError, match=r"^tls/site.example:7447 wants members: the list of"):
-        Bus(uplink=uplink, **CERTIFIED)
-    assert Bus(uplink=uplink, members="members.json", **CERTIFIED).onboard == ("tcp",)
+        BusSettings(uplink=uplink, **CERTIFIED)
+    assert BusSettings(uplink=uplink, members="members.json", **CERTIFIED).onboard == ("tcp",)
 
 
 def test_what_is_dialled_never_passes_for_a_service_on_board() -> None:
     for endpoint in ("tcp/127.0.0.1:7448", "tcp/localhost:7448"):
         with pytest.raises(ValueError, match=r"would pass for a service on board, as .* tcp/, too"):
-            Bus(uplink=(endpoint,), members="members.json")
-    Bus(uplink=(endpoint,), members="members.json", listen=("unixsock-stream//run/t2/bus.sock",))
+            BusSettings(uplink=(endpoint,), members="members.json")
+    BusSettings(
+        uplink=(endpoint,), members="members.json", listen=("unixsock-stream//run/t2/bus.sock",)
+    )
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "$*", "a b", "001\n", "@x", "a?b", "a#b"])
@@ -179,7 +181,7 @@ def test_a_crc_must_be_one_of_16_bits(name: str) -> None:
         Wire(crc=name)
 
 
-@pytest.mark.parametrize("section", [Robot, Bus, Board, Wire, Vehicle])
+@pytest.mark.parametrize("section", [Robot, BusSettings, Board, Wire, Vehicle])
 def test_sections_refuse_what_they_do_not_know(section: type[Section]) -> None:
     with pytest.raises(msgspec.ValidationError, match="unknown field `colour`"):
         msgspec.convert({"colour": "blue"}, section)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.systemd import BEATS, Systemd
 from tests.common.example_options import SPECIMEN, on
 from tests.common.program import program
@@ -35,7 +35,7 @@ def test_ready_is_said_once_and_beats_when_they_are_due(manager: Manager) -> Non
 
 
 def test_a_beat_alone_does_not_say_that_it_is_ready(manager: Manager) -> None:
-    Systemd(manager.environ).beat(S)
+    Systemd(manager.environ).beat(NS_PER_S)
     assert manager.hear() == ["WATCHDOG=1"]
 
 
@@ -59,7 +59,7 @@ def test_an_abstract_socket_is_found_by_its_name() -> None:
 def test_no_beat_where_nobody_waits_for_ours(manager: Manager, watchdog: dict[str, str]) -> None:
     systemd = Systemd({"NOTIFY_SOCKET": manager.environ["NOTIFY_SOCKET"]} | watchdog)
     systemd.ready(0)
-    systemd.ready(100 * S)
+    systemd.ready(100 * NS_PER_S)
     assert manager.hear() == ["READY=1"]
 
 
@@ -74,7 +74,7 @@ def test_without_systemd_nothing_is_said() -> None:
 def test_a_socket_that_is_full_holds_nobody_up(manager: Manager) -> None:
     systemd = Systemd(manager.environ)
     for n in range(2000):  # more than a queue takes
-        systemd.ready(n * S)
+        systemd.ready(n * NS_PER_S)
     systemd.stopping()
     heard = manager.hear()
     assert heard[:2] == ["READY=1", "WATCHDOG=1"]
@@ -89,9 +89,9 @@ def test_a_socket_that_is_gone_holds_nobody_up(manager: Manager) -> None:
     systemd.ready(0)
     place = Path(manager.environ["NOTIFY_SOCKET"])
     place.unlink()
-    systemd.ready(S)
+    systemd.ready(NS_PER_S)
     with contextlib.closing(Manager(str(place))) as successor:
-        systemd.ready(2 * S)
+        systemd.ready(2 * NS_PER_S)
         systemd.stopping()
         assert successor.hear() == ["READY=1", "WATCHDOG=1", "STOPPING=1"]
 
@@ -99,11 +99,11 @@ def test_a_socket_that_is_gone_holds_nobody_up(manager: Manager) -> None:
 def test_ready_is_said_again_until_a_full_queue_takes_it(manager: Manager) -> None:
     systemd = Systemd(manager.environ)
     for n in range(2000):
-        systemd.beat(n * S)
-    systemd.ready(3000 * S)
+        systemd.beat(n * NS_PER_S)
+    systemd.ready(3000 * NS_PER_S)
     assert "READY=1" not in manager.hear()
-    systemd.ready(3001 * S)
-    systemd.ready(3002 * S)
+    systemd.ready(3001 * NS_PER_S)
+    systemd.ready(3002 * NS_PER_S)
     assert manager.hear().count("READY=1") == 1
 
 

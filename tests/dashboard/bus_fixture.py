@@ -4,7 +4,7 @@ import time
 
 from common import keys
 from common.bus.bus import Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, Release
 from tests.teleop.support import safety_state
@@ -65,7 +65,7 @@ class World:
             nonlocal count, since_ns
             if len(self.estops) != count:
                 count, since_ns = len(self.estops), time.monotonic_ns()
-            return time.monotonic_ns() - since_ns > S
+            return time.monotonic_ns() - since_ns > NS_PER_S
 
         wait_until(over, "no more stops")
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.dashboard.driver_lock import PICTURES, Grip, Push, Wheel
 
 AHEAD = Push(1.0, 0.0)
@@ -14,7 +14,7 @@ LIMIT_S = 0.3
 
 
 def at(seconds: float) -> int:
-    return round(seconds * S)
+    return round(seconds * NS_PER_S)
 
 
 @pytest.fixture
@@ -100,10 +100,10 @@ def test_a_picture_of_long_ago_is_forgotten(wheel: Wheel) -> None:
 
 def test_every_round_trip_renews(wheel: Wheel) -> None:
     for number in range(2, 40):
-        now_ns = at(10) + number * S // 20
+        now_ns = at(10) + number * NS_PER_S // 20
         wheel.sent(number, now_ns)
         assert wheel.hold("a", number, AHEAD, now_ns)
-        assert wheel.held(now_ns + S // 4) == AHEAD
+        assert wheel.held(now_ns + NS_PER_S // 4) == AHEAD
 
 
 def test_what_was_overtaken_changes_nothing(wheel: Wheel) -> None:
@@ -172,7 +172,7 @@ class Play:
             case "hold" if self.wheel.hold(who, number, AHEAD, self.now_ns):
                 self.counted_ns[who] = self.now_ns
             case "wait":
-                self.now_ns += round(seconds * S)
+                self.now_ns += round(seconds * NS_PER_S)
 
 
 @given(STEPS)
@@ -184,4 +184,4 @@ def test_what_is_held_was_held_by_the_driver_within_the_round_trip(
         play.step(*step)
         if play.wheel.held(play.now_ns) is not None:
             assert play.wheel.driver is not None
-            assert play.now_ns - play.counted_ns[play.wheel.driver] <= LIMIT_S * S
+            assert play.now_ns - play.counted_ns[play.wheel.driver] <= LIMIT_S * NS_PER_S

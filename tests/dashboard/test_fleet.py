@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import pytest
 
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.dashboard import client_messages as w
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
@@ -56,7 +56,7 @@ def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
     fleet.take_in("1", w.Look("003"))
     assert fleet.knows("003")
     fleet.take_in("1", w.Look("002"))
-    fleet.tick(time.monotonic_ns() + round((UNWANTED_S + 1) * S))
+    fleet.tick(time.monotonic_ns() + round((UNWANTED_S + 1) * NS_PER_S))
     assert not fleet.knows("003")
     assert fleet.knows("002")
 
@@ -68,7 +68,7 @@ def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, M
     now_ns = time.monotonic_ns()
     fleet.tick(now_ns)
     fleet.take_in("1", w.Look("001"))
-    late_ns = now_ns + round((UNWANTED_S + 1) * S)
+    late_ns = now_ns + round((UNWANTED_S + 1) * NS_PER_S)
     buses["003"].connected = False  # it is still being looked for
     fleet.tick(late_ns)
     wait_until(lambda: buses["002"].close.called, "the end of its session")

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import (
     Bumper,
     Cause,
@@ -32,7 +32,7 @@ from services.dashboard.driver_lock import Grip, Wheel
 from services.dashboard.sectors import Protection
 from services.dashboard.telemetry_cache import Heard
 
-AT = 100 * S
+AT = 100 * NS_PER_S
 RELEASE = Release(
     believed_free="backward", travelled=0.41, age=2.0, forbidden=("forward",), left=0.1
 )
@@ -113,7 +113,7 @@ def test_who_drives() -> None:
 
 @pytest.mark.parametrize("heard", [Heard(), full()], ids=["never", "long ago"])
 def test_what_is_not_fresh_is_not_shown(heard: Heard) -> None:
-    seen = now(heard, at=AT + 10 * S)
+    seen = now(heard, at=AT + 10 * NS_PER_S)
     known = (seen.measured, seen.asked, seen.allowed, seen.pose, seen.bumper, seen.link)
     assert known == (None,) * 6
     assert seen.safety is None
@@ -155,7 +155,7 @@ def test_what_stands_still() -> None:
 
 def test_the_events() -> None:
     heard = full()
-    heard.note("safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * S))
+    heard.note("safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * NS_PER_S))
     assert snapshot.told(heard) == [snapshot.Told(2.0, "safety", "stop", "warning", "Stopped.")]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Bumper, Drive, Driver, Event, Health, Velocity
 from services.dashboard.telemetry_cache import (
     EVENTS_KEPT,
@@ -33,21 +33,21 @@ def test_nothing_is_known_before_it_was_heard() -> None:
 def test_the_newest_until_it_is_too_old() -> None:
     heard = Heard()
     heard.hear(BUMPER, Bumper(pressed=False), 0)
-    heard.hear(BUMPER, Bumper(pressed=True), S)
-    assert heard.newest(keys.BUMPER, S + S // 2) == Bumper(pressed=True)
-    assert heard.newest(keys.BUMPER, S + S // 2 + 1) is None
-    assert heard.ages_s(2 * S) == {BUMPER: 1.0}
+    heard.hear(BUMPER, Bumper(pressed=True), NS_PER_S)
+    assert heard.newest(keys.BUMPER, NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
+    assert heard.newest(keys.BUMPER, NS_PER_S + NS_PER_S // 2 + 1) is None
+    assert heard.ages_s(2 * NS_PER_S) == {BUMPER: 1.0}
 
 
 def test_names_that_anybody_makes_up_share_an_entry_and_push_nothing_out() -> None:
     heard = Heard()
     for number in range(1000):
         heard.hear(f"@cmd/drive/{number}", Drive(linear=0.0, angular=0.0, echo=0), number)
-    heard.hear("tel/bridge/driver/left", Driver(faults=("under_voltage",), bits=8), S)
-    heard.hear("tel/safety/health", HEALTH, S)
-    assert len(heard.ages_s(S)) == MADE_UP_KEPT + 3
-    assert heard.ages_s(1999)[OTHERS] == 1000 / S
-    assert heard.newest(keys.DRIVER, S, side="left") is not None
+    heard.hear("tel/bridge/driver/left", Driver(faults=("under_voltage",), bits=8), NS_PER_S)
+    heard.hear("tel/safety/health", HEALTH, NS_PER_S)
+    assert len(heard.ages_s(NS_PER_S)) == MADE_UP_KEPT + 3
+    assert heard.ages_s(1999)[OTHERS] == 1000 / NS_PER_S
+    assert heard.newest(keys.DRIVER, NS_PER_S, side="left") is not None
     assert heard.services() == ["safety"]
 
 
@@ -67,11 +67,11 @@ def test_rates_are_of_the_last_seconds() -> None:
     heard.count(0)
     for _ in range(20):
         heard.hear(BUMPER, Bumper(pressed=False), 0)
-    heard.count(S // 2)
+    heard.count(NS_PER_S // 2)
     assert heard.rates == {BUMPER: 40.0}
-    heard.count(3 * S)
+    heard.count(3 * NS_PER_S)
     assert heard.rates == {BUMPER: pytest.approx(20 / 3)}
-    heard.count(4 * S)
+    heard.count(4 * NS_PER_S)
     assert heard.rates == {}
 
 
@@ -80,7 +80,7 @@ def test_the_rate_of_a_slow_stream_stands_still() -> None:
     for tick in range(40):
         if tick % 2:
             heard.hear(BUMPER, Bumper(pressed=False), 0)
-        heard.count(tick * S // 2)
+        heard.count(tick * NS_PER_S // 2)
         if tick > 6:
             seen.add(heard.rates[BUMPER])
     assert seen == {1.0}

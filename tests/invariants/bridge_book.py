@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Motion
 from common.wire import reports as r
 from common.wire.frame import Frame
 
-LEASE_NS, SILENCE_NS = S // 5, S // 5
-SLACK_NS = S // 40  # the bridge looks every 10 ms
+LEASE_NS, SILENCE_NS = NS_PER_S // 5, NS_PER_S // 5
+SLACK_NS = NS_PER_S // 40  # the bridge looks every 10 ms
 CLEAR_SAMPLES = 3
 
 

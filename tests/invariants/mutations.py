@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from common import keys
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.frame import Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperReport
@@ -182,7 +182,7 @@ def successor(stack: Stack, hear: Callable[[Callable[[Letter], None], Letter], N
 
 def successor_hits_something(stack: Stack) -> None:
     """Let it latch a contact before it hears of the link, and creep off."""
-    deaf_until_ns = stack.net.now_ns + S
+    deaf_until_ns = stack.net.now_ns + NS_PER_S
 
     def late(take: Callable[[Letter], None], letter: Letter) -> None:
         if stack.net.now_ns > deaf_until_ns:

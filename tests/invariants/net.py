@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Protocol
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Message
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbours
 
 

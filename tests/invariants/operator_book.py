@@ -6,7 +6,7 @@ Limits are written down here a second time, from the safety case.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Bumper, Direction, Motion, ReleaseRequest, ResetRequest, SafetyState
 
 CALL_AGE_S, ECHO_AGE_S, HOLD_S = 1.0, 0.4, 0.3
@@ -45,7 +45,7 @@ class Operators:
 
     def on_trip(self, name: str, now_ns: int) -> None:
         """Note a trip, repeated or new."""
-        again_ns = round(AGAIN_S.get(name, 0.1) * S)
+        again_ns = round(AGAIN_S.get(name, 0.1) * NS_PER_S)
         if now_ns - self.seen.get(name, -again_ns - 1) > again_ns:
             self.began[name] = now_ns
         self.seen[name] = now_ns
@@ -59,14 +59,14 @@ class Operators:
             self.began["contact"] = now_ns
         if self.clears:
             self.hold = None
-            if self.moved and now_ns - self.moved[1] <= COAST_S * S:
+            if self.moved and now_ns - self.moved[1] <= COAST_S * NS_PER_S:
                 self.forbidden.add(self.moved[0])
         self.clears = 0
 
     def may_clear(self, request: ResetRequest, trip: str, now_ns: int) -> bool:
         """Return whether a reset may clear a trip: in time, seen before it was asked, and named."""
         sent_ns = self.beats.get(request.echo or 0)
-        if sent_ns is None or now_ns - sent_ns > CALL_AGE_S * S:
+        if sent_ns is None or now_ns - sent_ns > CALL_AGE_S * NS_PER_S:
             return False
         named = {self.names.get(one) for one in request.causes}
         return any(
@@ -86,13 +86,15 @@ class Operators:
         sent_ns = self.beats.get(request.echo or 0)
         if not request.held:
             self.hold = None
-        elif request.direction and sent_ns is not None and now_ns - sent_ns <= ECHO_AGE_S * S:
+        elif (
+            request.direction and sent_ns is not None and now_ns - sent_ns <= ECHO_AGE_S * NS_PER_S
+        ):
             self.hold = request.direction, now_ns
 
     def on_verdict(self, motion: Motion, now_ns: int) -> None:
         """Count the way that a release was commanded."""
         if self.stepped_ns is not None:
-            self.crept += self.speed * min((now_ns - self.stepped_ns) / S, LONGEST_STEP_S)
+            self.crept += self.speed * min((now_ns - self.stepped_ns) / NS_PER_S, LONGEST_STEP_S)
         self.stepped_ns = None
         if motion.command == "run" and motion.source == "release" and motion.linear:
             self.stepped_ns, self.speed = now_ns, abs(motion.linear)
@@ -100,7 +102,7 @@ class Operators:
 
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
         """Return why a release must not move the vehicle like this."""
-        if self.hold is None or now_ns - self.hold[1] > HOLD_S * S:
+        if self.hold is None or now_ns - self.hold[1] > HOLD_S * NS_PER_S:
             yield "nobody holds the release"
         elif direction_of(motion) != self.hold[0]:
             yield "a release the other way than the operator chose"

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
@@ -186,7 +186,7 @@ class Judge(Watch):
         if desk.reader_was_up and not self.reader_up:
             self.trip("estop_reader", desk.boot)
         desk.reader_was_up = desk.reader_was_up or self.reader_up
-        if desk.fast_ns is not None and self.now_ns - desk.fast_ns > FAST_S * S:
+        if desk.fast_ns is not None and self.now_ns - desk.fast_ns > FAST_S * NS_PER_S:
             self.trip("runaway", desk.boot)
         known = frozenset(self._held_by(desk.boot))
         desk.look(self.now_ns, self.reader_up, bool(known))

@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import (
     Bumper,
     Drive,
@@ -91,7 +91,7 @@ class Desk:
         finite = math.isfinite(drive.linear) and math.isfinite(drive.angular)
         if source not in LEASES_S or not finite or sent_ns is None:
             return
-        if now_ns - sent_ns > ECHO_AGE_S * S:
+        if now_ns - sent_ns > ECHO_AGE_S * NS_PER_S:
             return
         old = self.wishes.get(source)
         if old is not None and old.boot != drive.boot and self.is_fresh(source, now_ns):
@@ -125,7 +125,7 @@ class Desk:
     def _silent_since(self, now_ns: int) -> int | None:
         """Return since when all sonars are silent, None while they are not."""
         last_ns = self.ranges[-1][0] if self.ranges else 0
-        over_ns = last_ns + round(RANGES_AGE_S * S)
+        over_ns = last_ns + round(RANGES_AGE_S * NS_PER_S)
         return over_ns if now_ns > over_ns else None
 
     def _note_unseen(self, message: Ultrasonic, silent_ns: int | None, now_ns: int) -> None:
@@ -140,7 +140,7 @@ class Desk:
         since_ns = self.unseen.get(sonar)
         if source not in OPERATORS or since_ns is None or self._silent_since(now_ns) is not None:
             return False
-        return self.zeros.get(source, 0) - since_ns >= (SHOWN_S - STEP_S) * S
+        return self.zeros.get(source, 0) - since_ns >= (SHOWN_S - STEP_S) * NS_PER_S
 
     def _on_driver(self, side: str, message: Driver) -> None:
         _, before = self.samples.get(side, (0, None))
@@ -167,7 +167,7 @@ class Desk:
             self.fast_ns = None  # what is not measured is no runaway
         if self._what_is_bad(now_ns) or not reader:
             self.bad_ns = now_ns
-        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * S or tripped:
+        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S or tripped:
             self.neutral.clear()
             return
         for source, wish in self.wishes.items():
@@ -183,12 +183,12 @@ class Desk:
 
     def is_fresh(self, source: str, now_ns: int) -> bool:
         """Tell whether the newest request of a source still holds."""
-        return now_ns - self.wishes[source].at_ns <= LEASES_S[source] * S
+        return now_ns - self.wishes[source].at_ns <= LEASES_S[source] * NS_PER_S
 
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
         """Say why a motion must not run; trips are somebody else's."""
         yield from (f"bad input: {bad}" for bad in self._what_is_bad(now_ns))
-        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * S:
+        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S:
             yield "inputs have not settled"
         if abs(motion.linear) > MOST_MPS + ROUNDING or abs(motion.angular) > MOST_RADPS + ROUNDING:
             yield f"beyond the limits: {motion.linear} m/s, {motion.angular} rad/s"
@@ -201,7 +201,7 @@ class Desk:
     def may_reset(self, now_ns: int) -> bool:
         """Tell whether a reset may be granted at all: standing, nobody asking."""
         at_ns, velocity = self.samples.get("velocity", (0, None))
-        heard = now_ns - at_ns <= AGES_S["velocity"] * S
+        heard = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
         stands = heard and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
         asked = any(
             self.is_fresh(source, now_ns) and not wish.still for source, wish in self.wishes.items()
@@ -227,7 +227,7 @@ class Desk:
         for name, age_s in AGES_S.items():
             if name not in self.samples:
                 bad.append(f"no {name}")
-            elif now_ns - self.samples[name][0] > age_s * S:
+            elif now_ns - self.samples[name][0] > age_s * NS_PER_S:
                 bad.append(f"old {name}")
         for _, message in self.samples.values():
             if isinstance(message, Link) and (message.state != "up" or not message.armed):
@@ -245,13 +245,13 @@ class Desk:
             yield f"no fresh request of {source!r}"
             return
         wish = self.wishes[source]
-        if wish.still and now_ns - wish.still_ns > RAMP_S * S:
+        if wish.still and now_ns - wish.still_ns > RAMP_S * NS_PER_S:
             yield "nobody asks for motion"
         if better := self._better(source, now_ns):
             yield f"{better} go before {source}"
         if source not in self.neutral:
             yield f"{source} was not neutral since the last cause"
-        if any(now_ns - at_ns < RIVAL_S * S for at_ns in self.rivals.values()):
+        if any(now_ns - at_ns < RIVAL_S * NS_PER_S for at_ns in self.rivals.values()):
             yield "two publishers on one source"
 
     def _of_release(self, motion: Motion, now_ns: int) -> Iterator[str]:
@@ -275,7 +275,7 @@ class Desk:
 
     def _distance(self, sonar: int, now_ns: int) -> float:
         """Return what may be believed: the nearest of the last three samples, in metres."""
-        if len(self.ranges) < 3 or now_ns - self.ranges[-1][0] > RANGES_AGE_S * S:
+        if len(self.ranges) < 3 or now_ns - self.ranges[-1][0] > RANGES_AGE_S * NS_PER_S:
             return 0.0
         return min(shown(message, sonar) for _, message in self.ranges)
 

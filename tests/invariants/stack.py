@@ -11,7 +11,7 @@ import msgspec
 
 from common import keys
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.operator import release_request, reset_request
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
@@ -27,7 +27,7 @@ from tests.invariants.oracle import STEP_NS, Judge
 from tests.invariants.process import ROBOT, Process
 from tests.invariants.vehicle import Vehicle
 
-START_NS = 100 * S
+START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
 

@@ -5,7 +5,7 @@ As in ``safety_book.py``, nothing is taken from the code under test.
 
 from dataclasses import dataclass
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Motion, Velocity
 
 BRAKING_MPS2, BRAKING_RADPS2, GRACE_S = 0.6, 1.0, 0.5
@@ -31,7 +31,7 @@ class Rest:
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
         """Take a velocity in."""
         if rolls(velocity):
-            gap_s = min((now_ns - self.newest_ns) / S, GAP_S)
+            gap_s = min((now_ns - self.newest_ns) / NS_PER_S, GAP_S)
             before = self.newest is not None and rolls(self.newest)
             self.rolled += max(abs(velocity.linear), abs(velocity.angular)) * gap_s * before
         else:
@@ -44,9 +44,9 @@ class Rest:
             self.due_ns = None
             return ""
         if self.due_ns is None:
-            self.due_ns = now_ns + round(stopping_s(self.newest) * S)
-        late_s = (now_ns - self.due_ns) / S
-        known = now_ns - self.newest_ns <= FRESH_S * S
+            self.due_ns = now_ns + round(stopping_s(self.newest) * NS_PER_S)
+        late_s = (now_ns - self.due_ns) / NS_PER_S
+        known = now_ns - self.newest_ns <= FRESH_S * NS_PER_S
         if motion.command == "brake" or late_s < SLACK_S or not known:
             return ""
         rolled = self.rolled > AWAY + SLACK

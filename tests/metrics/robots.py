@@ -1,10 +1,10 @@
 """What robots say, for tests that look at what is made of it."""
 
 from common import messages as m
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from services.metrics.robot import Robot
 
-NOW_NS = 1_000_000 * S  # any time but zero
+NOW_NS = 1_000_000 * NS_PER_S  # any time but zero
 
 
 def health(

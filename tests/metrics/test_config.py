@@ -20,9 +20,11 @@ def test_as_shipped_it_tells_this_machine_alone() -> None:
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "10.7.5.220", "::"])
 def test_a_host_that_others_reach_must_be_owned_up_to(host: str) -> None:
-    with pytest.raises(ConfigError, match=r"metrics: host .* tells everybody .* in i_accept"):
+    with pytest.raises(
+        ConfigError, match=r"metrics: host .* tells everybody .* in unsafe_overrides"
+    ):
         given(f"host={host}")
-    assert given(f"host={host}", "i_accept=host").host == host
+    assert given(f"host={host}", "unsafe_overrides=host").host == host
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "::1"])
@@ -36,8 +38,10 @@ def test_a_name_is_no_host() -> None:
 
 
 def test_only_what_takes_a_protection_away_can_be_accepted() -> None:
-    with pytest.raises(ConfigError, match="i_accept names 'port', which takes no protection away"):
-        given("i_accept=port")
+    with pytest.raises(
+        ConfigError, match="unsafe_overrides names 'port', which takes no protection away"
+    ):
+        given("unsafe_overrides=port")
 
 
 @pytest.mark.parametrize("robots", ["", "*", "001", "berlin-$*", "$*-007", "a$*b"])

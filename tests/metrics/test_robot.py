@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from services.metrics.robot import EXPECTED, KEPT_S, NAMES, WORTH_S, Robot, Tally, prune
 from tests.metrics.robots import NOW_NS, event, health, link, whole
 
-LATE_NS = NOW_NS + round(WORTH_S * S) + 1
-LONG_NS = NOW_NS + round(KEPT_S * S) + 1
+LATE_NS = NOW_NS + round(WORTH_S * NS_PER_S) + 1
+LONG_NS = NOW_NS + round(KEPT_S * NS_PER_S) + 1
 
 
 def test_a_robot_of_which_nothing_was_heard_is_not_up() -> None:
@@ -129,7 +129,7 @@ def test_a_robot_is_forgotten_when_none_of_it_is_left(name: str) -> None:
     assert not robot.forget(LONG_NS)  # it hangs, and is there
     robot.on_live(name, "a", False, LONG_NS)
     assert not robot.forget(LONG_NS + 1)
-    assert robot.forget(LONG_NS + round(KEPT_S * S) + 1)
+    assert robot.forget(LONG_NS + round(KEPT_S * NS_PER_S) + 1)
 
 
 def test_a_robot_whose_streams_alone_are_heard_is_kept() -> None:

@@ -4,14 +4,14 @@ from itertools import pairwise
 
 import pytest
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Durations, Timing
 from services.metrics.robot import WORTH_S, Robot
 from services.metrics.samples import FAMILIES, sheet
 from tests.metrics.robots import NOW_NS, event, health, link, odometry, safety, whole
 from tests.metrics.values import Values, flat, names
 
-LATE_NS = NOW_NS + round(WORTH_S * S) + 1
+LATE_NS = NOW_NS + round(WORTH_S * NS_PER_S) + 1
 # What is told of a robot of which nothing is fresh.
 ALWAYS = {
     "t2_robot_up", "t2_stream_age_seconds", "t2_service_up", "t2_service_instances",

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import pytest
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Odometry, Velocity
 from services.odom.config import Odom
 from services.odom.estimator import Estimator, Outcome
 from services.odom.pose import Pose
 from services.odom.standstill import DISTANCE_WRAP_M
 
-TICK_NS = S // 50
+TICK_NS = NS_PER_S // 50
 EXACT = pytest.approx((0.0, 0.0), abs=1e-6)
 
 speeds = st.floats(-1.5, 1.5)
@@ -35,7 +35,7 @@ class Board:
     boot: int = 1
     seq: int = 0
     coarse: bool = False  # count in steps of 1 mm and 0.1 deg
-    now_ns: int = S
+    now_ns: int = NS_PER_S
 
     def __post_init__(self) -> None:
         self.truth = Pose(0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ class Board:
     def tick(self, ticks: int = 1) -> None:
         for _ in range(ticks):
             self.now_ns += TICK_NS
-            distance, turn = self.linear * TICK_NS / S, self.angular * TICK_NS / S
+            distance, turn = self.linear * TICK_NS / NS_PER_S, self.angular * TICK_NS / NS_PER_S
             self.distance += distance
             self.heading += turn
             self.truth = self.truth.moved(distance, turn)

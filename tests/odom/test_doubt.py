@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
 from services.odom.arc_segments import Leg
 from services.odom.config import Odom
 from services.odom.estimator import START, Estimator, Outcome
-from services.odom.pose import Belief, Covariance, Pose, Spread
+from services.odom.pose import Covariance, Pose, PoseEstimate, ProcessNoise
 from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 
 ODOM = Odom(
@@ -22,22 +22,22 @@ ODOM = Odom(
     gap_noise=0.2,
     gap_turn_noise=0.3,
 )
-ZERO = Belief(Pose(0.0, 0.0, 0.0), START)
+ZERO = PoseEstimate(Pose(0.0, 0.0, 0.0), START)
 
 
-def counted(distance: float, turn: float, gap: bool = False) -> Spread:
+def counted(distance: float, turn: float, gap: bool = False) -> ProcessNoise:
     """Return what the settings say of a way that was counted."""
-    return Spread(
+    return ProcessNoise(
         0.011**2 * abs(distance),
         0.023**2 * abs(turn) + 0.017**2 * abs(distance),
         0.2**2 * abs(distance) if gap else 0.0,
     )
 
 
-def followed(distance: float, turn: float, time_s: float, gap_s: float = 0.0) -> Spread:
+def followed(distance: float, turn: float, time_s: float, gap_s: float = 0.0) -> ProcessNoise:
     """Return what the settings say of a way that only velocities told."""
     known = counted(distance, turn)
-    return Spread(
+    return ProcessNoise(
         known.distance + 0.029**2 * time_s,
         known.turn + 0.031**2 * time_s + 0.3**2 * gap_s,
         0.2**2 * gap_s,
@@ -48,7 +48,7 @@ def mileage(seq: int, distance: float, heading: float) -> Mileage:
     return Mileage(distance=distance, heading=heading, epoch=0, boot=1, seq=seq)
 
 
-def close(belief: Belief, expected: Belief) -> None:
+def close(belief: PoseEstimate, expected: PoseEstimate) -> None:
     assert belief.covariance.rows() == pytest.approx(expected.covariance.rows(), rel=1e-9)
     pose, other = belief.pose, expected.pose
     assert (pose.x, pose.y, pose.heading) == pytest.approx((other.x, other.y, other.heading))
@@ -67,8 +67,10 @@ def test_by_counters_it_grows_with_the_way(
     distance: float, turn: float, time_s: float, gap: bool
 ) -> None:
     estimator = Estimator(ODOM)
-    estimator.on_mileage(mileage(1, 7.0, 1.0), S)
-    estimator.on_mileage(mileage(2, 7.0 + distance, 1.0 + turn), S + round(time_s * S))
+    estimator.on_mileage(mileage(1, 7.0, 1.0), NS_PER_S)
+    estimator.on_mileage(
+        mileage(2, 7.0 + distance, 1.0 + turn), NS_PER_S + round(time_s * NS_PER_S)
+    )
     expected = ZERO.moved(distance, turn, counted(distance, turn, gap))
     close(estimator._lead, expected)
     close(estimator._anchor, expected)
@@ -77,8 +79,8 @@ def test_by_counters_it_grows_with_the_way(
 @pytest.mark.parametrize(("linear", "angular"), [(0.5, 0.3), (-0.5, -0.3)])
 def test_by_velocities_it_grows_with_the_time_too(linear: float, angular: float) -> None:
     estimator = Estimator(ODOM)
-    estimator.on_velocity(Velocity(linear=linear, angular=angular), S)
-    now_ns = S + S // 20
+    estimator.on_velocity(Velocity(linear=linear, angular=angular), NS_PER_S)
+    now_ns = NS_PER_S + NS_PER_S // 20
     odometry = estimator.estimate(now_ns)
     assert odometry is not None
     way = linear * 0.05, angular * 0.05
@@ -95,8 +97,8 @@ def test_by_velocities_it_grows_with_the_time_too(linear: float, angular: float)
 @pytest.mark.parametrize("silence_s", [0.5, 1.3])
 def test_in_a_gap_it_grows_once_the_velocity_no_longer_holds(silence_s: float) -> None:
     estimator = Estimator(ODOM)
-    estimator.on_velocity(Velocity(linear=0.5, angular=0.3), S)
-    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), S + round(silence_s * S))
+    estimator.on_velocity(Velocity(linear=0.5, angular=0.3), NS_PER_S)
+    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), NS_PER_S + round(silence_s * NS_PER_S))
     held = ZERO.moved(0.05, 0.03, followed(0.05, 0.03, 0.1))
     unseen_s = silence_s - 0.1
     close(estimator._lead, held.moved(0.0, 0.0, followed(0.0, 0.0, unseen_s, unseen_s - 0.1)))
@@ -111,26 +113,26 @@ def test_a_long_leg_that_was_seen_is_no_gap() -> None:
 
 def test_before_any_velocity_all_time_is_unseen() -> None:
     estimator = Estimator(ODOM)
-    estimator.on_mileage(mileage(1, 0.0, 0.0), S)
-    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), 2 * S)
+    estimator.on_mileage(mileage(1, 0.0, 0.0), NS_PER_S)
+    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), 2 * NS_PER_S)
     close(estimator._lead, ZERO.moved(0.0, 0.0, followed(0.0, 0.0, 1.0, 0.9)))
 
 
 def test_counters_that_start_anew_keep_the_doubt_of_the_velocities() -> None:
     estimator = Estimator(ODOM)
-    estimator.on_mileage(mileage(1, 0.0, 0.0), S)
-    estimator.on_velocity(Velocity(linear=1.0, angular=0.0), S)
+    estimator.on_mileage(mileage(1, 0.0, 0.0), NS_PER_S)
+    estimator.on_velocity(Velocity(linear=1.0, angular=0.0), NS_PER_S)
     anew = Mileage(distance=0.0, heading=0.0, epoch=1, boot=1, seq=2)
-    assert estimator.on_mileage(anew, S + S // 20) is Outcome.BOARD_RESTARTED
+    assert estimator.on_mileage(anew, NS_PER_S + NS_PER_S // 20) is Outcome.BOARD_RESTARTED
     close(estimator._anchor, ZERO.moved(0.05, 0.0, followed(0.05, 0.0, 0.05)))
     assert estimator._legs == []
 
 
 def test_a_pose_that_is_set_carries_the_way_since_the_counters_along() -> None:
     estimator = Estimator(ODOM)
-    estimator.on_mileage(mileage(1, 0.0, 0.0), S)
-    estimator.on_velocity(Velocity(linear=1.0, angular=0.5), S)
-    estimator.place(Pose(3.0, -2.0, 4.0), S + S // 10)
+    estimator.on_mileage(mileage(1, 0.0, 0.0), NS_PER_S)
+    estimator.on_velocity(Velocity(linear=1.0, angular=0.5), NS_PER_S)
+    estimator.place(Pose(3.0, -2.0, 4.0), NS_PER_S + NS_PER_S // 10)
     lead, anchor = estimator._lead, estimator._anchor
     assert lead.covariance == anchor.covariance == START
     assert lead.pose == Pose(3.0, -2.0, 4.0 - math.tau)
@@ -138,5 +140,5 @@ def test_a_pose_that_is_set_carries_the_way_since_the_counters_along() -> None:
     back = anchor.pose.moved(0.1, 0.05)
     assert (back.x, back.y, back.heading) == pytest.approx((3.0, -2.0, 4.0 - math.tau))
     for epoch in (2, 3):
-        estimator.place(Pose(0.0, 0.0, 0.0), S + S // 10)
+        estimator.place(Pose(0.0, 0.0, 0.0), NS_PER_S + NS_PER_S // 10)
         assert estimator.epoch == epoch

@@ -5,7 +5,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Velocity
 from services.odom.estimator import LEGS_MAX
 from services.odom.pose import Pose
@@ -68,7 +68,7 @@ def test_after_lost_frames_distance_and_heading_are_those_of_the_counters(
     pose, board = listener.pose(), listener.board
     assert apart(pose, board.truth)[1] <= math.radians(0.05) + 1e-9
     fastest = sum(abs(linear) * len(heard) for linear, _, heard in way) + 1.5
-    assert math.hypot(pose.x, pose.y) <= fastest * TICK_NS / S + 0.001 * (len(way) + 1)
+    assert math.hypot(pose.x, pose.y) <= fastest * TICK_NS / NS_PER_S + 0.001 * (len(way) + 1)
 
 
 @given(st.lists(st.tuples(speeds, turnings, st.booleans()), max_size=40))
@@ -80,8 +80,8 @@ def test_counters_alone_make_arcs_of_what_was_not_lost(
     for linear, angular, heard in way:
         listener.board.linear, listener.board.angular = linear, angular
         listener.board.tick()
-        distance += linear * TICK_NS / S
-        turn += angular * TICK_NS / S
+        distance += linear * TICK_NS / NS_PER_S
+        turn += angular * TICK_NS / NS_PER_S
         if heard:
             listener.hear(velocity=False)
             expected, distance, turn = expected.moved(distance, turn), 0.0, 0.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.odom.pose import SMALL_TURN, Belief, Covariance, Pose, Spread, chord_ratio
+from services.odom.pose import SMALL_TURN, Covariance, Pose, PoseEstimate, ProcessNoise, chord_ratio
 
 distances = st.floats(-3.0, 3.0)
 turns = st.floats(-6.0, 6.0)
@@ -134,13 +134,13 @@ def derivative(start: Pose, distance: float, turn: float) -> Matrix:
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-@given(headings, distances, turns, st.builds(Spread, variances, variances, variances))
+@given(headings, distances, turns, st.builds(ProcessNoise, variances, variances, variances))
 def test_covariance_follows_the_derivatives(
-    heading: float, distance: float, turn: float, spread: Spread
+    heading: float, distance: float, turn: float, spread: ProcessNoise
 ) -> None:
     start = Pose(2.0, 3.0, heading)
     before = CERTAIN.plus(0.3, 1.0, 0.2, 0.1).plus(0.2, -0.3, 1.0, 0.5).plus(0.1, 0.0, 0.0, 1.0)
-    after = Belief(start, before).moved(distance, turn, spread)
+    after = PoseEstimate(start, before).moved(distance, turn, spread)
     whole = [[*row, 0.0, 0.0] for row in matrix(before)]
     whole += [[0.0, 0.0, 0.0, spread.distance, 0.0], [0.0, 0.0, 0.0, 0.0, spread.turn]]
     by = derivative(start, distance, turn)
@@ -153,5 +153,5 @@ def test_covariance_follows_the_derivatives(
 
 def test_an_error_of_heading_leads_aside() -> None:
     before = CERTAIN.plus(0.01, 0.0, 0.0, 1.0)
-    after = Belief(ORIGIN, before).moved(10.0, 0.0, Spread(0.0, 0.0, 0.0)).covariance
+    after = PoseEstimate(ORIGIN, before).moved(10.0, 0.0, ProcessNoise(0.0, 0.0, 0.0)).covariance
     assert (after.xx, after.yy, after.yh) == pytest.approx((0.0, 1.0, 0.1))

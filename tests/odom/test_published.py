@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
 from services.odom.config import Odom
 from services.odom.estimator import Estimator, Outcome
@@ -24,7 +24,7 @@ from tests.odom.drive import (
 
 
 def test_nothing_is_said_before_anything_is_heard() -> None:
-    assert Estimator(Odom()).estimate(S) is None
+    assert Estimator(Odom()).estimate(NS_PER_S) is None
 
 
 def test_one_counter_sample_makes_no_twist() -> None:
@@ -35,7 +35,7 @@ def test_one_counter_sample_makes_no_twist() -> None:
 
 def test_the_last_velocity_holds_and_then_there_is_silence() -> None:
     listener = driving()
-    hold_ns = round(Odom().hold * S)
+    hold_ns = round(Odom().hold * NS_PER_S)
     assert listener.odometry(hold_ns).linear == 0.8
     assert listener.estimator.estimate(listener.board.now_ns + hold_ns + 1) is None
 

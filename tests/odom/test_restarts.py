@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.odom.estimator import Outcome
 from services.odom.pose import Pose
 from tests.odom.drive import (
@@ -83,7 +83,7 @@ def test_the_host_starts_at_zero_wherever_the_counters_stand() -> None:
 def test_uncertainty_grows_over_a_restart() -> None:
     listener, other = driving(), driving()
     for each in (listener, other):
-        each.board.now_ns += S
+        each.board.now_ns += NS_PER_S
     restart_board(listener.board)
     listener.hear()
     other.hear()

@@ -2,12 +2,12 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.odom.arc_segments import Leg
 from services.odom.config import Odom
 from services.odom.slip_detector import Comparison
 
-TICK_NS = S // 50
+TICK_NS = NS_PER_S // 50
 
 
 def way(distance: float, turn: float = 0.0, time_s: float = 0.02, *, seen: bool = True) -> Leg:
@@ -39,7 +39,7 @@ def test_the_residual_is_what_the_counters_went_farther() -> None:
 def test_only_the_last_second_counts() -> None:
     comparison, now_ns = compared(500, way(0.02), way(0.019))
     assert comparison.residual == pytest.approx(0.051)
-    comparison.look_back(now_ns + 2 * S)
+    comparison.look_back(now_ns + 2 * NS_PER_S)
     assert comparison.residual is None
 
 
@@ -72,7 +72,7 @@ def test_slip_falls_under_half_of_its_limit_only() -> None:
     comparison, now_ns = compared(11, way(0.01), way(0.0))
     slips = [comparison.slip]
     for samples_left in (7, 4):  # 0.07 m, 0.04 m
-        comparison.look_back(now_ns + S - (samples_left - 1) * TICK_NS)
+        comparison.look_back(now_ns + NS_PER_S - (samples_left - 1) * TICK_NS)
         slips.append(comparison.slip)
     assert slips == [True, True, False]
     assert comparison.residual == pytest.approx(0.04)

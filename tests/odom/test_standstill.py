@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Mileage
 from services.odom.arc_segments import Leg
 from services.odom.config import Odom
@@ -33,11 +33,11 @@ def stand(listener: Listener, ticks: int, velocity: float = 0.0, steps: int = 0)
     board = listener.board
     distance, heading = board.distance, board.heading
     for _ in range(ticks):
-        board.now_ns += S // 100
+        board.now_ns += NS_PER_S // 100
         board.linear = dice.uniform(-velocity, velocity)
         board.angular = dice.uniform(-velocity, velocity)
         listener.hear(counters=False)
-        board.now_ns += S // 100
+        board.now_ns += NS_PER_S // 100
         board.distance = distance + dice.randint(0, steps) * COUNTER_STEP_M
         board.heading = heading + dice.randint(0, steps) * COUNTER_STEP_RAD
         listener.hear(velocity=False)

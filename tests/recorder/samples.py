@@ -2,12 +2,12 @@
 
 from common import codec
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 
 ROOT = "t2/v1/001"
-BEGIN_NS = 1_700_000_000 * S  # on the wall clock
-MONO_NS = 1000 * S
+BEGIN_NS = 1_700_000_000 * NS_PER_S  # on the wall clock
+MONO_NS = 1000 * NS_PER_S
 
 
 def sample(
@@ -31,7 +31,7 @@ def bare(
     deleted: bool = False,
 ) -> Sample:
     """Return any bytes as they would come."""
-    past_ns = round(at_s * S)
+    past_ns = round(at_s * NS_PER_S)
     return Sample(
         key=f"{ROOT}/{path}",
         payload=payload,

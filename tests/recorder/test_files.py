@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.blackbox import SLICE, BlackBox
@@ -43,7 +43,7 @@ class Desk:
 
 def times(path: Path) -> Iterator[float]:
     with Reader(path) as reader:
-        yield from ((each.log_ns - BEGIN_NS) / S for each in reader)
+        yield from ((each.log_ns - BEGIN_NS) / NS_PER_S for each in reader)
     assert not reader.cut
 
 
@@ -57,7 +57,7 @@ def at(second: float) -> Sample:
 
 
 def ns(second: float) -> int:
-    return MONO_NS + round(second * S)
+    return MONO_NS + round(second * NS_PER_S)
 
 
 def test_a_tape_goes_on_in_a_new_file_after_its_time(desk: Desk) -> None:

@@ -6,7 +6,7 @@ import pytest
 from mcap.reader import make_reader
 
 from common.errors import RobotError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Odometry, Velocity
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Translator
@@ -47,7 +47,7 @@ def test_what_was_written_is_read(path: Path) -> None:
     assert {(each.key, each.kind) for each in found} == {
         ("t2/v1/001/tel/bridge/velocity", "Velocity")
     }
-    assert [each.log_ns for each in found[:2]] == [BEGIN_NS, BEGIN_NS + S // 50]
+    assert [each.log_ns for each in found[:2]] == [BEGIN_NS, BEGIN_NS + NS_PER_S // 50]
     assert reader.about == {"robot": "001"}
     assert (reader.cut, reader.damaged, reader.readable) == (False, 0, path.stat().st_size)
 
@@ -125,7 +125,7 @@ def test_the_time_of_a_file_does_not_jump_with_the_clock(tmp_path: Path) -> None
     stepped = {name: getattr(second, name) for name in second.__struct_fields__} | {"wall_ns": 5}
     made.write(type(second)(**stepped))
     made.close()
-    assert [each.log_ns for each in read(made.path)[0]] == [BEGIN_NS, BEGIN_NS + S]
+    assert [each.log_ns for each in read(made.path)[0]] == [BEGIN_NS, BEGIN_NS + NS_PER_S]
 
 
 def test_a_file_that_is_there_is_not_written_over(path: Path) -> None:

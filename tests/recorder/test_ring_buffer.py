@@ -1,6 +1,6 @@
 """The last minutes, and what latched."""
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.recorder.latches import Latches
 from services.recorder.ring_buffer import OVERHEAD, Memory
 from tests.recorder import samples
@@ -12,7 +12,7 @@ def kept(memory: Memory) -> list[bytes]:
 
 
 def test_what_is_too_old_goes() -> None:
-    memory = Memory(2 * S, 1_000_000)
+    memory = Memory(2 * NS_PER_S, 1_000_000)
     for second in range(5):
         memory.add(bare("tel/x", b"%d" % second, at_s=second))
     assert kept(memory) == [b"2", b"3", b"4"]
@@ -20,14 +20,14 @@ def test_what_is_too_old_goes() -> None:
 
 
 def test_what_is_too_much_goes() -> None:
-    memory = Memory(100 * S, 3 * (OVERHEAD + 10))
+    memory = Memory(100 * NS_PER_S, 3 * (OVERHEAD + 10))
     for number in range(9):
         memory.add(bare("tel/x", b"12345", raw=b"%05d" % number))
     assert [each.raw for each in memory.samples()] == [b"00006", b"00007", b"00008"]
 
 
 def test_what_alone_is_too_much_is_not_kept() -> None:
-    memory = Memory(100 * S, OVERHEAD + 10)
+    memory = Memory(100 * NS_PER_S, OVERHEAD + 10)
     memory.add(bare("tel/x", bytes(11)))
     assert (kept(memory), memory.size) == ([], 0)
     memory.add(bare("tel/x", bytes(10)))
@@ -35,7 +35,7 @@ def test_what_alone_is_too_much_is_not_kept() -> None:
 
 
 def test_what_is_given_out_does_not_change() -> None:
-    memory = Memory(100 * S, 1_000_000)
+    memory = Memory(100 * NS_PER_S, 1_000_000)
     memory.add(bare("tel/x", b"1"))
     given = memory.samples()
     memory.add(bare("tel/x", b"2"))

@@ -17,7 +17,7 @@ import pytest
 from common import codec, keys
 from common import messages as m
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Event
 from common.service import Node
 from services.recorder.config import MB, RecorderConfig
@@ -213,7 +213,7 @@ def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
     assert len(found) > 200
     numbers_read = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
     assert numbers_read == list(range(int(numbers_read[0]), int(numbers_read[-1]) + 1))
-    assert (killed_ns - found[-1].log_ns) / S < 1.0 + 2 * held_up_s
+    assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * held_up_s
 
 
 def test_what_safety_says_wrongly_is_recorded_and_not_believed(rig: Rig, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Event, Health
 from services.recorder.summary import Note, Summary
 from tests.recorder import samples
@@ -19,10 +19,10 @@ def test_nothing_is_nothing() -> None:
 def test_keys_are_counted_with_their_rates() -> None:
     summary = Summary()
     for number in range(11):
-        at_ns = BEGIN_NS + number * S // 10
+        at_ns = BEGIN_NS + number * NS_PER_S // 10
         message = samples.velocity()
         summary.take(VELOCITY, "Velocity", message, at_ns, raw=number > 5)
-    summary.take("t2/v1/001/tel/mine", "", None, BEGIN_NS + 2 * S, raw=False)
+    summary.take("t2/v1/001/tel/mine", "", None, BEGIN_NS + 2 * NS_PER_S, raw=False)
     assert (summary.messages, summary.duration_s) == (12, 2.0)
     assert summary.streams[VELOCITY].hz == pytest.approx(10.0)
     assert (summary.streams[VELOCITY].count, summary.streams[VELOCITY].raw) == (11, 5)
@@ -44,7 +44,7 @@ def test_events_latches_and_versions_are_told() -> None:
     )
     event = Event(name="contact", level="error", text="the bumper is hit")
     state = f"{ROOT}/tel/safety/state"
-    at_ns = BEGIN_NS + S
+    at_ns = BEGIN_NS + NS_PER_S
     summary.take(f"{ROOT}/tel/odom/health", "Health", health, BEGIN_NS, raw=False)
     summary.take(state, "SafetyState", samples.state(), BEGIN_NS, raw=False)
     summary.take(f"{ROOT}/evt/bridge", "Event", event, at_ns, raw=False)

@@ -145,7 +145,7 @@ class Peers:
 def safety_process(
     endpoint: str, patient: Mapping[str, float] = PATIENT
 ) -> Iterator[subprocess.Popen[bytes]]:
-    sets = [f"bus.connect={endpoint}", f"safety.i_accept={','.join(patient)}"]
+    sets = [f"bus.connect={endpoint}", f"safety.unsafe_overrides={','.join(patient)}"]
     sets += [f"safety.{name}={value}" for name, value in patient.items()]
     options = [word for text in sets for word in ("--set", text)]
     command = [sys.executable, "-m", "services.safety", *options]

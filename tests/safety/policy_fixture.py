@@ -5,7 +5,7 @@ import math
 import msgspec
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import (
     SONAR_NAMES,
     Bumper,
@@ -57,7 +57,7 @@ class Scene:
     def __init__(self, settings: Safety | None = None) -> None:
         self.policy = Policy(settings or Safety(), Vehicle())
         self.state = self.policy.start()
-        self.now_ns = 10 * S
+        self.now_ns = 10 * NS_PER_S
         self.inputs = Inputs()
         self.verdict = Verdict()
         self.muted: set[str] = set()
@@ -112,7 +112,7 @@ class Scene:
     def tick(self, ticks: int = 1) -> Verdict:
         """Let time pass, with samples."""
         for _ in range(ticks):
-            self.now_ns += round(TICK_S * S)
+            self.now_ns += round(TICK_S * NS_PER_S)
             self.feed()
             self.state = replace(self.state, heartbeat=self.state.heartbeat.beat(self.now_ns))
             self.decide()

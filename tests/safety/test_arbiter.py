@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
 from services.safety.arbiter import RIVAL_NS, Arbiter, Channel
@@ -73,7 +73,7 @@ def test_unknown_sources_and_nonsense_are_refused() -> None:
 
 
 def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
-    lease_ns = round(SOURCES["teleop"].lease * S)
+    lease_ns = round(SOURCES["teleop"].lease * NS_PER_S)
     arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
     refused, reason = ask(arbiter, lease_ns, boot=2)
     assert reason == "second_publisher"
@@ -90,7 +90,7 @@ def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
 @pytest.mark.parametrize("seq", [0, 1, 9])
 def test_a_new_boot_counts_anew(seq: int) -> None:
     arbiter, _ = ask(Arbiter(SOURCES), 0, seq=5)
-    later = round(SOURCES["teleop"].lease * S) + 1
+    later = round(SOURCES["teleop"].lease * NS_PER_S) + 1
     arbiter, reason = ask(arbiter, later, boot=2, seq=seq)
     assert reason == ""
     assert ask(arbiter, later, boot=2, seq=seq)[1] == "seq_not_rising"
@@ -133,14 +133,14 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
     assert not arbiter.channels["web"].neutral
     arbiter = arbiter.disarmed()
     assert arbiter.channels["teleop"].neutral is False
-    assert not arbiter.armed(S).channels["teleop"].neutral
+    assert not arbiter.armed(NS_PER_S).channels["teleop"].neutral
     assert arbiter.asks_to_move(0)
-    assert not arbiter.asks_to_move(S)
+    assert not arbiter.asks_to_move(NS_PER_S)
 
 
 def test_a_lease_counts_from_the_reception() -> None:
     drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
-    lease_ns, late_ns = round(SOURCES["teleop"].lease * S), 100_000_000
+    lease_ns, late_ns = round(SOURCES["teleop"].lease * NS_PER_S), 100_000_000
     arbiter, _ = Arbiter(SOURCES).take(Ask("teleop", drive, 5), BEAT, AGE_NS, late_ns)
     assert arbiter.driver(5 + lease_ns) == "teleop"
     assert arbiter.driver(5 + lease_ns + 1) is None
@@ -170,7 +170,7 @@ def test_who_held_the_wheel_overrules_who_is_below_and_only_them() -> None:
     }  # fmt: skip
     assert {one.overruled_by for one in arbiter.channels.values()} == {""}
     assert neutral.channels["nav"].overruled_by == "web"
-    assert arbiter.overruled(S).channels == arbiter.channels  # nobody holds it
+    assert arbiter.overruled(NS_PER_S).channels == arbiter.channels  # nobody holds it
     again = neutral.armed(0)
     assert again.channels["nav"].neutral
     assert again.channels["nav"].overruled_by == ""
@@ -196,7 +196,7 @@ def test_the_best_fresh_source_drives_whatever_comes(
         assert refused == ("" if source in SOURCES else "unknown_source")
         if not refused:
             last[source] = (now_ns, linear)
-        fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * S]
+        fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * NS_PER_S]
         best = max(fresh, key=lambda n: SOURCES[n].priority, default=None)
         assert arbiter.driver(now_ns) == best
         if best:

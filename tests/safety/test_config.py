@@ -38,27 +38,29 @@ def test_the_file_holds_the_defaults() -> None:
 )
 def test_what_takes_a_protection_away_must_be_owned_up_to(name: str, value: object) -> None:
     given = f"safety.{name}={str(value).lower()}"
-    with pytest.raises(ConfigError, match=f"{name} = .* or name it in i_accept"):
+    with pytest.raises(ConfigError, match=f"{name} = .* or name it in unsafe_overrides"):
         read(given)
-    assert read(given, f"safety.i_accept={name}").i_accept == (name,)
+    assert read(given, f"safety.unsafe_overrides={name}").unsafe_overrides == (name,)
 
 
 def test_a_deceleration_near_zero_must_be_owned_up_to() -> None:
     given = ("safety.deceleration=0.09", "safety.max_linear=0.5")
-    with pytest.raises(ConfigError, match=r"deceleration = 0\.09 .* or name it in i_accept"):
+    with pytest.raises(
+        ConfigError, match=r"deceleration = 0\.09 .* or name it in unsafe_overrides"
+    ):
         read(*given)
-    assert read(*given, "safety.i_accept=deceleration").deceleration == 0.09
+    assert read(*given, "safety.unsafe_overrides=deceleration").deceleration == 0.09
 
 
 @pytest.mark.parametrize("name", ["bumper_age", "settle", "max_linear", "sources.teleop.lease"])
 def test_zero_never_means_off(name: str) -> None:
     with pytest.raises(ConfigError, match=name.split(".")[0]):
-        read(f"safety.{name}=0", f"safety.i_accept={name}")
+        read(f"safety.{name}=0", f"safety.unsafe_overrides={name}")
 
 
 def test_only_protections_can_be_given_up() -> None:
-    with pytest.raises(ConfigError, match="i_accept names 'sources'"):
-        read("safety.i_accept=sources")
+    with pytest.raises(ConfigError, match="unsafe_overrides names 'sources'"):
+        read("safety.unsafe_overrides=sources")
 
 
 def test_priorities_are_unique() -> None:

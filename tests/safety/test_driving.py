@@ -5,7 +5,7 @@ import math
 import pytest
 from msgspec.structs import replace as with_fields
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Drive, Switches
 from services.safety.config import Safety
 from services.safety.inputs import Ask
@@ -40,7 +40,7 @@ def test_after_a_pause_the_ramp_begins_at_what_is_left_of_the_motion() -> None:
 
 def test_a_request_holds_for_its_lease_and_not_longer() -> None:
     scene = Scene().running()
-    scene.now_ns += round(0.1 * S)
+    scene.now_ns += round(0.1 * NS_PER_S)
     scene.feed()
     scene.ask(0.5)
     assert scene.tick(15).command == "run"
@@ -102,7 +102,7 @@ def test_who_takes_the_wheel_from_below_needs_nothing_more() -> None:
 def test_an_old_request_behind_a_queued_zero_moves_nothing() -> None:
     scene = Scene().running()
     scene.tick(150)
-    received_ns = scene.now_ns - 3 * S
+    received_ns = scene.now_ns - 3 * NS_PER_S
     for linear in (0.0, 0.5):
         scene.driver_seq += 1
         drive = Drive(
@@ -331,7 +331,7 @@ def test_more_lost_bumper_polls_stop_until_half_a_second_and_a_neutral_request()
 
 
 def test_a_board_without_echoes_can_be_driven_where_that_is_accepted() -> None:
-    accepted = Safety(require_switches=False, i_accept=("require_switches",))
+    accepted = Safety(require_switches=False, unsafe_overrides=("require_switches",))
     for settings, command in ((accepted, "run"), (Safety(), "stop")):
         scene = Scene(settings)
         scene.muted = {"switches"}

@@ -62,4 +62,4 @@ def test_a_setting_that_takes_a_protection_away_ends_the_program() -> None:
     done = subprocess.run(command, capture_output=True, check=False, timeout=PATIENCE_S)
     assert done.returncode == 78
     assert b"margin" in done.stderr
-    assert b"i_accept" in done.stderr
+    assert b"unsafe_overrides" in done.stderr

@@ -3,10 +3,10 @@
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.safety import operator_requests
 from services.safety.config import Safety
-from services.safety.fault_budget import Credit
+from services.safety.fault_budget import FaultBudget
 from services.safety.inputs import Event, Hold, Inputs, Reset
 from services.safety.latches import Held, latched
 from services.safety.release import Release
@@ -39,7 +39,7 @@ def with_release(scene: Scene, **fields: object) -> Scene:
 
 def also(scene: Scene, name: str, text: str, *, good: int = 9) -> int:
     """Latch another cause, gone already unless ``good`` is small; return its identity."""
-    one = Held(scene.now_ns - S, scene.now_ns - S, good, (0, 1), text, id=len(name))
+    one = Held(scene.now_ns - NS_PER_S, scene.now_ns - NS_PER_S, good, (0, 1), text, id=len(name))
     scene.state = replace(scene.state, latches={**scene.state.latches, name: one})
     return one.id
 
@@ -120,10 +120,10 @@ def test_a_held_release_in_a_forbidden_direction_does_not_creep() -> None:
 
 
 def test_a_reset_earns_the_credit_back_unless_flapping_stays() -> None:
-    for stays, credit in ((False, Credit()), (True, Credit(0.5, 7))):
+    for stays, credit in ((False, FaultBudget()), (True, FaultBudget(0.5, 7))):
         scene = freed()
         (contact,) = (scene.state.latches[name].id for name in latched(scene.state.latches))
-        scene.state = replace(scene.state, credit=Credit(0.5, 7))
+        scene.state = replace(scene.state, credit=FaultBudget(0.5, 7))
         if stays:
             also(scene, "flapping", "Inputs failed.")
         state, reply = called(scene, Reset(scene.echo, (contact,)))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Limits, SafetyState, Switches
 from services.safety.causes import BY_NAME, Clears
 from services.safety.config import Safety
@@ -221,7 +221,7 @@ def test_an_input_is_too_old_one_nanosecond_after_its_age(
 ) -> None:
     scene = Scene().ready()
     scene.muted = {stream}
-    due_ns = scene.now_ns + round(limit_s * S)
+    due_ns = scene.now_ns + round(limit_s * NS_PER_S)
     scene.tick(round(limit_s / TICK_S) - 1)
     scene.now_ns = due_ns
     scene.feed()
@@ -264,7 +264,7 @@ def test_leaving_stops() -> None:
 
 
 def test_the_switches_may_be_accepted_as_missing() -> None:
-    settings = Safety(require_switches=False, i_accept=("require_switches",))
+    settings = Safety(require_switches=False, unsafe_overrides=("require_switches",))
     scene = Scene(settings)
     scene.switches = Switches()
     assert scene.ready().verdict.command == "run"
@@ -286,7 +286,7 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     assert scene.drive(0.3, seconds=0.18).command == "run"
     assert scene.drive(0.3, seconds=0.08).command == "stop"
     assert "the emergency stop passes" in scene.state.latches["silent"].text
-    scene.inputs = replace(scene.inputs, estop_path=Latest(state, scene.now_ns + 2 * S))
+    scene.inputs = replace(scene.inputs, estop_path=Latest(state, scene.now_ns + 2 * NS_PER_S))
     assert scene.drive(0.3, seconds=1.0).command == "stop"
     scene.drive()
     assert scene.drive(0.3).command == "run"

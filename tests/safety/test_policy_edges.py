@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES
 from services.safety.causes import RULES
 from services.safety.config import Safety
@@ -87,7 +87,7 @@ def test_the_first_bumper_sample_follows_none() -> None:
 def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
     scene = Scene().ready()
     before = scene.drive(0.5).twist.linear
-    scene.now_ns += S // 8
+    scene.now_ns += NS_PER_S // 8
     scene.feed()
     after = scene.ask(0.5).twist.linear
     assert after - before == pytest.approx(0.05)
@@ -98,7 +98,7 @@ def test_what_waited_for_a_stalled_process_is_not_taken_for_fresh(
     late_ns: int, command: str
 ) -> None:
     scene = Scene().running()
-    scene.now_ns += round(Safety().bumper_age * S) + late_ns
+    scene.now_ns += round(Safety().bumper_age * NS_PER_S) + late_ns
     scene.feed()
     scene.state = replace(scene.state, heartbeat=scene.state.heartbeat.beat(scene.now_ns))
     assert scene.ask(0.5).command == command
@@ -130,7 +130,7 @@ def test_flapping_knows_since_when() -> None:
         scene.tick(9)
         scene.muted = set()
     held = scene.state.latches["flapping"]
-    assert scene.now_ns - S // 10 < held.since_ns < held.bad_ns == scene.now_ns
+    assert scene.now_ns - NS_PER_S // 10 < held.since_ns < held.bad_ns == scene.now_ns
     assert held.token == (0, scene.now_ns)
 
 

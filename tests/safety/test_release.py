@@ -5,10 +5,10 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Direction, Mileage
 from services.safety.causes import BY_NAME
-from services.safety.fault_budget import Credit
+from services.safety.fault_budget import FaultBudget
 from services.safety.inputs import Hold
 from services.safety.latches import latched
 from services.safety.state import Reply
@@ -262,7 +262,7 @@ def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
 def test_touched_after_an_hour_the_age_is_told_and_nothing_moves_by_itself() -> None:
     scene = Scene().running()
     scene.drive(0.0, seconds=2)
-    scene.now_ns += 3600 * S
+    scene.now_ns += 3600 * NS_PER_S
     scene.tick(60)
     scene.pressed = True
     scene.tick(40)
@@ -483,7 +483,7 @@ def test_a_reset_lets_go_of_the_release() -> None:
 
 def test_flapping_that_is_not_gone_is_not_forgiven() -> None:
     scene = hit()
-    scene.state = replace(scene.state, credit=Credit(0.0, scene.now_ns))
+    scene.state = replace(scene.state, credit=FaultBudget(0.0, scene.now_ns))
     scene.muted = {"velocity"}
     scene.tick(12)
     scene.muted = set()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.safety.latches import Held
 from services.safety.release import COAST_NS, Release, sweep
 from services.safety.trajectory import Counter, Trajectory
@@ -39,8 +39,8 @@ def test_it_moves_straight_in_the_chosen_direction() -> None:
 def test_a_hold_is_a_lease() -> None:
     assert not Release().is_held(0, 0.3)
     held = Release().hold("forward", 0)
-    assert held.is_held(round(0.3 * S), 0.3)
-    assert not held.is_held(round(0.3 * S) + 1, 0.3)
+    assert held.is_held(round(0.3 * NS_PER_S), 0.3)
+    assert not held.is_held(round(0.3 * NS_PER_S) + 1, 0.3)
 
 
 def test_the_end_of_a_hold_asks_for_a_newer_heartbeat() -> None:

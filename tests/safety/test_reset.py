@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.safety.inputs import Reset
 from services.safety.latches import latched
 from services.safety.state import Reply
@@ -52,7 +52,7 @@ def test_a_reset_wants_a_velocity_that_is_young() -> None:
     scene.estop()
     scene.tick(20)
     scene.muted = {"velocity"}
-    scene.now_ns += round(0.2 * S) + 1
+    scene.now_ns += round(0.2 * NS_PER_S) + 1
     scene.feed()
     assert scene.reset() == UNKNOWN
     scene.now_ns -= 1

@@ -234,7 +234,7 @@ def test_the_program_opens_a_reader_and_closes_it(
         priority: int,
     ) -> int:
         assert priority == realtime.SAFETY
-        node = make_node(endpoint, "safety.margin=0.0", 'safety.i_accept=["margin"]')
+        node = make_node(endpoint, "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]')
         opened.append(node.open_bus())
         monkeypatch.setattr(node, "open_bus", lambda: opened[0])
         build(node)

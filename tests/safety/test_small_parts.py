@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.heartbeat import CAPACITY, Heartbeat
 from common.messages import Mileage, Velocity
-from services.safety.fault_budget import FAILURES, Credit
+from services.safety.fault_budget import FAILURES, FaultBudget
 from services.safety.inputs import Inputs
 from services.safety.ramp import ramp, start
 from services.safety.runaway import Axis, Bounds
@@ -136,14 +136,14 @@ def test_bad_time_is_forgiven_half_as_fast_and_never_piles_up() -> None:
 
 
 def test_credit_drains_faster_than_it_refills() -> None:
-    credit = Credit()
+    credit = FaultBudget()
     for n in range(int(FAILURES)):
         assert not credit.is_spent
-        credit = credit.after((n + 1) * S, failed=True, good=False)
+        credit = credit.after((n + 1) * NS_PER_S, failed=True, good=False)
     assert credit.is_spent
-    assert credit.after(99 * S, failed=False, good=False).is_spent
-    assert credit.after(6 * S, failed=False, good=True).left == pytest.approx(0.1)
-    assert Credit().after(99 * S, failed=False, good=True).left == FAILURES
+    assert credit.after(99 * NS_PER_S, failed=False, good=False).is_spent
+    assert credit.after(6 * NS_PER_S, failed=False, good=True).left == pytest.approx(0.1)
+    assert FaultBudget().after(99 * NS_PER_S, failed=False, good=True).left == FAILURES
 
 
 def test_a_velocity_is_unknown_until_it_is_a_number() -> None:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import SONAR_NAMES, Ultrasonic
 from common.settings import Vehicle
 from services.safety.config import Safety
@@ -15,7 +15,7 @@ from services.safety.zones import zones
 from tests.safety.policy_fixture import FREE, NO_ECHO
 
 EARS = Ears(zones(Vehicle(), Safety()), Rules(0.05, 0.5), age_s=0.3, creep_room=0.26)
-STEP_NS = S // 20
+STEP_NS = NS_PER_S // 20
 
 
 def sample(seq: int, front: float | None = None, boot: int = 1) -> Latest[Ultrasonic]:
@@ -48,7 +48,7 @@ def test_one_sample_is_taken_once() -> None:
 
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
     heard, old = hear(3), sample(3)
-    limit_ns = 3 * STEP_NS + round(0.3 * S)
+    limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
     assert EARS.hear(heard, old, Twist(), limit_ns).faults == ""
     heard = EARS.hear(heard, old, Twist(), limit_ns + 1)
     assert heard.distances == (0.0,) * 8
@@ -69,7 +69,7 @@ def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
 
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
     assert Heard().unseen == frozenset()
-    heard = EARS.hear(hear(2), sample(2), Twist(), S)
+    heard = EARS.hear(hear(2), sample(2), Twist(), NS_PER_S)
     assert heard.faults == "all silent"
     assert heard.unseen == frozenset()
 

@@ -5,13 +5,13 @@ import random
 
 import pytest
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
 from services.safety.standstill import Measured, Phase, Standstill, Supervisor, Velocities
 from services.safety.twist import Twist
 from tests.safety.policy_fixture import TICK_S
 
-TICK_NS = round(TICK_S * S)
+TICK_NS = round(TICK_S * NS_PER_S)
 SUPERVISOR = Supervisor(0.6, 1.0, Twist(1.0, 1.0))
 
 
@@ -20,7 +20,7 @@ class Board:
 
     def __init__(self, standstill: Standstill | None = None) -> None:
         self.state = standstill or Standstill()
-        self.now_ns = 10 * S
+        self.now_ns = 10 * NS_PER_S
         self.distance = self.heading = 0.0
         self.epoch, self.boot = 0, 1
         self.counts = True
@@ -82,8 +82,8 @@ def test_it_stands_within_the_time_that_its_speed_takes(
     began_ns = board.now_ns
     while not board.late():
         board.step(linear, angular)
-        assert board.now_ns < began_ns + 3 * S
-    took_s = (board.now_ns - began_ns) / S
+        assert board.now_ns < began_ns + 3 * NS_PER_S
+    took_s = (board.now_ns - began_ns) / NS_PER_S
     assert due_s < took_s <= due_s + 3 * TICK_S
 
 
@@ -119,13 +119,13 @@ def test_an_unknown_velocity_is_no_standstill_and_counts_as_the_fastest() -> Non
 def dither(board: Board, run_s: float, seconds: float, linear: float | None = 0.3) -> float | None:
     """Alternate short motions and 0.4 s of standstill commanded; return when it is late."""
     began_ns = board.now_ns
-    while board.now_ns - began_ns < seconds * S:
+    while board.now_ns - began_ns < seconds * NS_PER_S:
         for _ in range(round(run_s / TICK_S)):
             board.step(linear, commanded=False)
         for _ in range(20):
             board.step(linear)
             if board.late():
-                return (board.now_ns - began_ns) / S
+                return (board.now_ns - began_ns) / NS_PER_S
     return None
 
 
@@ -166,7 +166,7 @@ def test_a_motion_of_half_a_second_has_its_own_time_to_stop(ticks: int, renewed:
         board.step(0.9, commanded=False)
     after_ns = board.step(0.9).due_ns
     assert after_ns is not None
-    assert (after_ns - board.now_ns == round(0.9 / 0.6 * S) + S // 2) == renewed
+    assert (after_ns - board.now_ns == round(0.9 / 0.6 * NS_PER_S) + NS_PER_S // 2) == renewed
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
 
 
@@ -178,7 +178,7 @@ def test_a_vehicle_that_stood_has_a_new_time_to_stop() -> None:
     board.step(0.0, commanded=False)
     board.step(0.3, commanded=False)
     assert board.state.due_ns is None
-    assert board.step(0.3).due_ns == board.now_ns + S
+    assert board.step(0.3).due_ns == board.now_ns + NS_PER_S
 
 
 @pytest.mark.parametrize("slow", [Supervisor(0.1, 1.0, Twist(1.0)), Supervisor(1.0, 0.1, Twist())])
@@ -297,16 +297,16 @@ def test_counters_find_a_motion_during_a_stall(
     board = standing()
     setattr(board, field, away)
     if at_once:  # all that waited arrives together
-        board.mono_ns = S
+        board.mono_ns = NS_PER_S
     else:
-        board.now_ns += S - TICK_NS
+        board.now_ns += NS_PER_S - TICK_NS
     assert board.step().left == left
 
 
 @pytest.mark.parametrize("field", ["distance", "heading"])
 def test_counters_of_a_low_rate_find_a_motion(field: str) -> None:
     board = standing()
-    board.now_ns += S // 2 - TICK_NS
+    board.now_ns += NS_PER_S // 2 - TICK_NS
     setattr(board, field, 0.06)
     assert board.step().left
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from tests.safety.policy_fixture import TICK_S, Scene, hit
 
 
@@ -25,7 +25,7 @@ def test_a_stop_that_does_not_stop_becomes_a_brake(linear: float, angular: float
     until(scene, "stop")
     began_ns = scene.now_ns
     until(scene, "brake")
-    assert scene.now_ns - began_ns <= (bound_s + 3 * TICK_S) * S
+    assert scene.now_ns - began_ns <= (bound_s + 3 * TICK_S) * NS_PER_S
     assert f"{linear:.2f} m/s" in scene.state.latches["not_stopping"].text
     assert scene.tick(500).name == "brake"
     scene.linear, scene.angular = 0.0, 0.0

@@ -12,11 +12,11 @@ from itertools import combinations, product, starmap
 
 from msgspec.structs import replace
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Direction
 from services.safety.arbiter import Channel
 from services.safety.causes import RULES, Clears
-from services.safety.fault_budget import Credit
+from services.safety.fault_budget import FaultBudget
 from services.safety.inputs import Estop, Event, Hold, Reset
 from services.safety.latches import Held, latched, ordered
 from services.safety.release import Release
@@ -37,7 +37,7 @@ INHIBITING = {
 # Each one alone, with up to so many others: all sets of all causes would take four times as long.
 STANDSTILL, OTHERS = {"uncommanded_motion", "not_stopping"}, 3
 AHEAD = Twist(0.3, 0.0)
-HOUR_NS, STEP_NS = 3600 * S, S // 50
+HOUR_NS, STEP_NS = 3600 * NS_PER_S, NS_PER_S // 50
 
 Change = Callable[[Scene], None]
 
@@ -57,7 +57,9 @@ def aged(name: str, age_s: float) -> Change:
     """Return what makes the newest sample of a stream that old."""
 
     def change(scene: Scene) -> None:
-        old = replace(getattr(scene.inputs, name), received_ns=scene.now_ns - round(age_s * S))
+        old = replace(
+            getattr(scene.inputs, name), received_ns=scene.now_ns - round(age_s * NS_PER_S)
+        )
         scene.inputs = replace(scene.inputs, **{name: old})
 
     return change
@@ -72,7 +74,7 @@ def leaving(scene: Scene) -> None:
 
 
 def spent(scene: Scene) -> None:
-    scene.state = replace(scene.state, credit=Credit(0.0, scene.now_ns))
+    scene.state = replace(scene.state, credit=FaultBudget(0.0, scene.now_ns))
 
 
 def ran_away(scene: Scene) -> None:
@@ -184,7 +186,7 @@ def check_action(verdict: Verdict, raised: set[str]) -> None:
 def later(scene: Scene, raised: set[str]) -> None:
     """An hour later all is well again and somebody asks to drive: what latched still holds."""
     scene.now_ns += HOUR_NS
-    state = replace(scene.state, decided_ns=scene.now_ns, linear=Axis(), credit=Credit())
+    state = replace(scene.state, decided_ns=scene.now_ns, linear=Axis(), credit=FaultBudget())
     wished = {"teleop": replace(state.arbiter.channels["teleop"], received_ns=scene.now_ns)}
     scene.state = replace(state, arbiter=replace(state.arbiter, channels=wished))
     scene.reader = True
@@ -224,7 +226,7 @@ class Case:
     def prepare(self, scene: Scene, before: State) -> None:
         """Make it so."""
         now_ns = scene.now_ns
-        gone = Held(now_ns - S, now_ns - S, 3, (0, 0), "gone")
+        gone = Held(now_ns - NS_PER_S, now_ns - NS_PER_S, 3, (0, 0), "gone")
         latches = {name: replace(gone, id=IDS[name]) for name in self.held}
         if self.pressed and "contact" in self.held:
             latches["contact"] = replace(latches["contact"], good=0)  # the same press

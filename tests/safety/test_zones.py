@@ -28,7 +28,7 @@ def field() -> Zones:
 
 def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
     vehicle = Vehicle(length=1.2, width=0.8)
-    settings = Safety(margin=0.3, react=0.2, deceleration=0.5, i_accept=("deceleration",))
+    settings = Safety(margin=0.3, react=0.2, deceleration=0.5, unsafe_overrides=("deceleration",))
     field = zones(vehicle, settings)
     assert (field.margin, field.react, field.deceleration) == (0.3, 0.2, 0.5)
     assert [axis.swing for axis in field.axes] == [0.6, 0, 0, 0, 0.6, 0, 0, 0]

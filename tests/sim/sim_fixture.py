@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
@@ -19,7 +19,7 @@ from sim.trace import Line, Truth
 from sim.world import Plan
 
 PORTS = (4002, 4001)
-START_NS = 5 * S  # any time but zero
+START_NS = 5 * NS_PER_S  # any time but zero
 EMPTY = Plan(title="nothing")
 
 
@@ -67,10 +67,10 @@ class Rig:
 
     def after(self, seconds: float) -> list[Frame]:
         """Let time go by in ticks of 10 ms and return what the board said meanwhile."""
-        end_ns = self.now_ns + round(seconds * S)
+        end_ns = self.now_ns + round(seconds * NS_PER_S)
         said = []
         while self.now_ns < end_ns:
-            self.now_ns = min(end_ns, self.now_ns + S // 100)
+            self.now_ns = min(end_ns, self.now_ns + NS_PER_S // 100)
             self.injection.advance(self.now_ns)
             said += self._collect()
         return said

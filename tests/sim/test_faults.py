@@ -4,7 +4,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.requests import Wire
 
@@ -19,8 +19,8 @@ def through(datagrams: Sequence[Datagram] = MANY, seed: int = 1, **faults: Any) 
     for datagram in datagrams:
         cable.put(datagram, now_ns)
         arrived += cable.take(now_ns)
-        now_ns += S // 50
-    return arrived + cable.take(now_ns + 60 * S)
+        now_ns += NS_PER_S // 50
+    return arrived + cable.take(now_ns + 60 * NS_PER_S)
 
 
 def test_a_good_cable_delivers_all_at_once_and_in_order() -> None:
@@ -70,13 +70,13 @@ def test_foreign_ones_are_marked() -> None:
     assert all(datagram.foreign for datagram in through(foreign=1.0))
 
 
-@pytest.mark.parametrize("at_ns", [0, S // 2 - 1])
+@pytest.mark.parametrize("at_ns", [0, NS_PER_S // 2 - 1])
 def test_a_delayed_one_is_not_there_before_its_time(at_ns: int) -> None:
     cable = Cable(1)
     cable.faults = Wire(delay=0.5)
     cable.put(MANY[0], 0)
     assert cable.take(at_ns) == []
-    assert cable.take(S // 2) == [MANY[0]]
+    assert cable.take(NS_PER_S // 2) == [MANY[0]]
 
 
 def test_jitter_is_at_most_that_much_more() -> None:
@@ -84,10 +84,10 @@ def test_jitter_is_at_most_that_much_more() -> None:
     cable.faults = Wire(delay=0.1, jitter=0.1)
     for datagram in MANY:
         cable.put(datagram, 0)
-    assert cable.take(S // 10 - 1) == []
-    early = cable.take(3 * S // 20)
+    assert cable.take(NS_PER_S // 10 - 1) == []
+    early = cable.take(3 * NS_PER_S // 20)
     assert 400 < len(early) < 600
-    assert len(early) + len(cable.take(S // 5)) == len(MANY)
+    assert len(early) + len(cable.take(NS_PER_S // 5)) == len(MANY)
 
 
 def test_a_thin_cable_lets_one_after_the_other_through() -> None:
@@ -98,7 +98,7 @@ def test_a_thin_cable_lets_one_after_the_other_through() -> None:
     assert cable.take(1_003_000_000 - 1) == []
     assert cable.take(1_003_000_000) == [MANY[0]]
     assert cable.take(1_006_000_000) == [MANY[1]]
-    cable.put(MANY[2], 2 * S)  # it has been free meanwhile
+    cable.put(MANY[2], 2 * NS_PER_S)  # it has been free meanwhile
     assert cable.due_ns == 3_003_000_000
 
 
@@ -109,7 +109,7 @@ def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
     for datagram in big[:3]:
         cable.put(datagram, 0)
     cable.put(big[3], 1_000_000)  # a microsecond for a byte: one has left
-    assert cable.take(S) == [big[0], big[1], big[3]]
+    assert cable.take(NS_PER_S) == [big[0], big[1], big[3]]
 
 
 def test_the_same_seed_does_the_same() -> None:
@@ -132,6 +132,6 @@ def test_it_tells_when_the_next_one_arrives() -> None:
     cable.faults = Wire(delay=0.2)
     cable.put(Datagram(b"x", 4002), 5)
     cable.put(Datagram(b"y", 4002), 9)
-    assert cable.due_ns == 5 + S // 5
-    cable.take(5 + S // 5)
-    assert cable.due_ns == 9 + S // 5
+    assert cable.due_ns == 5 + NS_PER_S // 5
+    cable.take(5 + NS_PER_S // 5)
+    assert cable.due_ns == 9 + NS_PER_S // 5

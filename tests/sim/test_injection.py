@@ -4,7 +4,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands as c
 from common.wire import reports as r
 from sim import requests as q
@@ -127,18 +127,18 @@ def test_a_script_happens_in_order_and_in_time() -> None:
     assert rig.of(Disturbed) == []
     rig.after(1.0)
     assert [(line.request, line.mono_ns - START_NS) for line in rig.of(Disturbed)] == [
-        (q.Bumper(pressed=True), S // 2),
-        (q.Freeze(seconds=0.1), round(0.505 * S)),
-        (q.Bumper(pressed=False), S),
+        (q.Bumper(pressed=True), NS_PER_S // 2),
+        (q.Freeze(seconds=0.1), round(0.505 * NS_PER_S)),
+        (q.Bumper(pressed=False), NS_PER_S),
     ]
 
 
 def test_a_script_is_in_time_though_the_tick_is_late() -> None:
     rig = Rig(script=q.Script(steps=(q.Step(at=0.1, request=q.Freeze(seconds=0.1)),)))
-    rig.injection.advance(START_NS + S // 2)
-    assert rig.simulation.now_ns == START_NS + S // 2
+    rig.injection.advance(START_NS + NS_PER_S // 2)
+    assert rig.simulation.now_ns == START_NS + NS_PER_S // 2
     frozen = 4  # at 0.12, 0.14, 0.16 and 0.18 s
-    assert len(rig.simulation.take_sent(rig.now_ns + S)) == 2 * (25 - frozen)
+    assert len(rig.simulation.take_sent(rig.now_ns + NS_PER_S)) == 2 * (25 - frozen)
 
 
 @pytest.mark.parametrize(

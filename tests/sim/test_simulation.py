@@ -1,6 +1,6 @@
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
@@ -100,8 +100,8 @@ def test_a_power_cycle_stops_it_and_clears_counters_and_switches() -> None:
     assert rig.say(c.DistanceQuery()) == [r.DistanceReport(0, 0)]
     assert not rig.truth.bumper_brake
     assert [(line.on, line.mono_ns - START_NS) for line in rig.of(t.Power)] == [
-        (False, 2 * S),
-        (True, 3 * S),
+        (False, 2 * NS_PER_S),
+        (True, 3 * NS_PER_S),
     ]
 
 
@@ -116,8 +116,8 @@ def test_a_late_tick_is_caught_up() -> None:
 def test_a_hole_is_left_out() -> None:
     rig = Rig()
     rig.run(1.0)
-    rig.injection.advance(START_NS + 60 * S)
-    assert rig.simulation.now_ns == START_NS + 60 * S
+    rig.injection.advance(START_NS + 60 * NS_PER_S)
+    assert rig.simulation.now_ns == START_NS + 60 * NS_PER_S
     assert rig.simulation.counters["holes"] == 1
     assert rig.truth.x < 1.0
 

@@ -6,7 +6,7 @@ import math
 import msgspec
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire import commands as c
 from sim import trace as t
 from sim.requests import PowerCycle, Script, Step, Wire
@@ -26,7 +26,7 @@ def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
     assert [line["kind"] for line in lines] == ["run", "stop", "break"]
     assert lines[0] == {
         "event": "command",
-        "mono_ns": START_NS + S // 4,
+        "mono_ns": START_NS + NS_PER_S // 4,
         "kind": "run",
         "linear": -0.25,
         "angular": pytest.approx(math.pi / 2),
@@ -84,7 +84,7 @@ def test_truth_comes_at_20_hz() -> None:
     rig.after(1.0)
     lines = rig.of(t.Truth)
     assert len(lines) == 20
-    assert {b.mono_ns - a.mono_ns for a, b in itertools.pairwise(lines)} == {S // 20}
+    assert {b.mono_ns - a.mono_ns for a, b in itertools.pairwise(lines)} == {NS_PER_S // 20}
     assert lines[-1].clearance == pytest.approx(3.0 - 0.55)
 
 

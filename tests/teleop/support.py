@@ -9,7 +9,7 @@ from msgspec import Struct
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.config import Loaded
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Release, SafetyState
 from common.requests import Twist
@@ -171,5 +171,5 @@ def view(**fields: Any) -> View:
 
 def answer(desk: Desk, now_ns: int) -> None:
     """Let a desk know a terminal that answers at once."""
-    desk.terminal.sent(0, now_ns - S // 1000)
+    desk.terminal.sent(0, now_ns - NS_PER_S // 1000)
     desk.terminal.answered(0, now_ns)

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 
 from common import keys
 from common.bus.bus import Post
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
@@ -29,7 +29,7 @@ class Bench:
         self.node = FakeNode()
         self.desk = Desk(self.node, self.node.logbook)
         self.ended = False
-        self.now_ns = 100 * S
+        self.now_ns = 100 * NS_PER_S
         post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
         self.app = NearApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
         # However long this machine takes to hand a key over.
@@ -42,7 +42,7 @@ class Bench:
             before, _ = self.node.requests
             self.answer()
             self.desk.tick(self.now_ns)
-            self.now_ns += S // 20
+            self.now_ns += NS_PER_S // 20
             after, last = self.node.requests
             if after > before and last is not None:
                 sent.append(last.linear)
@@ -51,7 +51,7 @@ class Bench:
     def answer(self) -> None:
         """Let the terminal have been near, so that a key counts that the machine held up."""
         for ago in range(10, 0, -1):
-            answer(self.desk, self.now_ns - ago * S // 20)
+            answer(self.desk, self.now_ns - ago * NS_PER_S // 20)
 
     def words(self, name: str) -> str:
         """Return what a panel shows; nothing before it is there."""
@@ -146,7 +146,7 @@ def test_a_key_carries_the_time_when_it_came(bench: Bench) -> None:
     key = Key("w", "w")
     key.time = time.monotonic() - 3.0
     came_ns = NearApp._came_ns(bench.app, key)
-    assert (bench.now_ns - came_ns) / S == pytest.approx(3.0, abs=0.5)
+    assert (bench.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
 
 
 def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
@@ -156,7 +156,7 @@ def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
         bench.app._post = posted.append
         bench.app.draw()
         drawn_ns = bench.now_ns
-        bench.now_ns += 10 * S
+        bench.now_ns += 10 * NS_PER_S
         posted[0]()  # late
         assert bench.desk._watched_ns == drawn_ns
 
@@ -165,7 +165,7 @@ def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
 
 def test_the_terminal_is_asked_and_its_answer_counts(bench: Bench) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        bench.now_ns += 10 * S  # what was answered so far is old
+        bench.now_ns += 10 * NS_PER_S  # what was answered so far is old
         await until(lambda: not bench.desk.terminal.refusal(bench.now_ns), "an answer")
 
     play(bench, act)
@@ -189,7 +189,7 @@ def test_a_terminal_that_does_not_answer_is_asked_less_often(
 
 def test_keys_that_do_not_count_are_said_to(bench: Bench) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        bench.now_ns += 10 * S
+        bench.now_ns += 10 * NS_PER_S
         bench.desk.tick(bench.now_ns)
         await until(lambda: "KEYS OFF" in bench.words("hints"), "the refusal")
 

@@ -29,11 +29,11 @@ def test_the_shipped_file_says_the_defaults() -> None:
         {"round_trip": 0.0},
         {"round_trip": 0.31},
         {"round_trip": float("nan")},
-        {"round_trip": float("inf"), "i_accept": ["round_trip"]},
+        {"round_trip": float("inf"), "unsafe_overrides": ["round_trip"]},
         {"gamepad_silence": 0.0},
         {"gamepad_silence": 3.5},
-        {"gamepad_silence": 3.5, "i_accept": ["round_trip"]},
-        {"i_accept": ["hold"]},
+        {"gamepad_silence": 3.5, "unsafe_overrides": ["round_trip"]},
+        {"unsafe_overrides": ["hold"]},
     ],
 )
 def test_a_bad_setting_is_refused(settings: dict[str, Any]) -> None:
@@ -56,5 +56,5 @@ def test_a_refused_protection_says_what_is_allowed() -> None:
 
 
 def test_a_protection_may_be_given_up_by_name() -> None:
-    settings = {"round_trip": 2.0, "i_accept": ["round_trip"]}
+    settings = {"round_trip": 2.0, "unsafe_overrides": ["round_trip"]}
     assert msgspec.convert(settings, Teleop).round_trip == 2.0

@@ -8,7 +8,7 @@ from msgspec import structs
 
 from common import keys
 from common.bus.publisher import Publisher
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import (
     Bumper,
     Direction,
@@ -28,7 +28,7 @@ from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick
 from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
 
-PERIOD_NS = S // 20
+PERIOD_NS = NS_PER_S // 20
 
 
 class FakeGamepad:
@@ -47,18 +47,18 @@ class Operator:
     def __init__(self) -> None:
         self.node = FakeNode()
         self.desk = Desk(self.node, self.node.logbook)
-        self.now_ns = 100 * S
+        self.now_ns = 100 * NS_PER_S
         self.near = True  # the terminal answers at once
         self.shown: SafetyState | None = None
         answer(self.desk, self.now_ns)
 
     def press(self, key: str, waited_s: float = 0.0) -> None:
-        at_ns = self.now_ns - round(waited_s * S)
+        at_ns = self.now_ns - round(waited_s * NS_PER_S)
         self.desk.press(Press(key, at_ns, self.shown), self.now_ns)
 
     def wait(self, seconds: float) -> None:
         """Let time pass in which nothing at all happens; after that the terminal is near."""
-        self.now_ns += round(seconds * S)
+        self.now_ns += round(seconds * NS_PER_S)
         answer(self.desk, self.now_ns)
 
     def tell_safety(self, **fields: Any) -> None:
@@ -355,7 +355,7 @@ def test_a_press_that_waited_shortly_counts_from_when_it_came(operator: Operator
 def slow(operator: Operator, took_s: float = 0.42) -> None:
     """Let the terminal answer late from now on."""
     operator.near = False
-    operator.desk.terminal.sent(1, operator.now_ns - round(took_s * S))
+    operator.desk.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
     operator.desk.terminal.answered(1, operator.now_ns)
 
 
@@ -411,9 +411,9 @@ def test_a_terminal_that_no_longer_answers_lets_go_of_its_keys(operator: Operato
 def test_a_multiplexer_over_ssh_does_not_drive() -> None:
     node = FakeNode()
     desk = Desk(node, node.logbook, "tmux over ssh hides the terminal's delay")
-    answer(desk, S)
-    desk.press(Press("w", S), S)
-    desk.tick(S)
+    answer(desk, NS_PER_S)
+    desk.press(Press("w", NS_PER_S), NS_PER_S)
+    desk.tick(NS_PER_S)
     assert node.requests == (0, None)
     node.loop.close()
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.requests import STILL, Twist
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls
 from services.teleop.mapping import Deflection, Stick
 
-PERIOD_NS = S // 20
+PERIOD_NS = NS_PER_S // 20
 FIRST_GEAR = Twist(0.2, 0.0)
 UP = Stick(Deflection(1, 0), deadman=False, turbo=False)
 DOWN = Stick(Deflection(1, 0), deadman=True, turbo=False)

@@ -2,12 +2,12 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.teleop.hold import Deadman, Keys
 
 
 def at(seconds: float) -> int:
-    return round(seconds * S)
+    return round(seconds * NS_PER_S)
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import ResetDone
 from services.teleop.reset_check import ResetCheck
 from tests.teleop.support import contact_state, safety_state
@@ -32,13 +32,13 @@ def test_only_safetys_own_state_confirms(state: object, confirmed: bool) -> None
     check = ResetCheck(SEEN)
     check.answer(DONE)
     assert check.is_answered
-    assert check.outcome(None, 10 * S) is None
-    assert check.outcome(state, 11 * S) is (True if confirmed else None)  # type: ignore[arg-type]
-    assert check.outcome(state, 11 * S + 1) is confirmed  # type: ignore[arg-type]
+    assert check.outcome(None, 10 * NS_PER_S) is None
+    assert check.outcome(state, 11 * NS_PER_S) is (True if confirmed else None)  # type: ignore[arg-type]
+    assert check.outcome(state, 11 * NS_PER_S + 1) is confirmed  # type: ignore[arg-type]
 
 
 def test_an_answer_of_another_program_is_not_confirmed() -> None:
     check = ResetCheck(SEEN)
     check.answer(ResetDone(text="ok", boot=77, heartbeat=9, cleared=(42,)))
-    assert check.outcome(AFTER, 10 * S) is None
-    assert check.outcome(AFTER, 12 * S) is False
+    assert check.outcome(AFTER, 10 * NS_PER_S) is None
+    assert check.outcome(AFTER, 12 * NS_PER_S) is False

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.teleop.round_trip import (
     NUMBERS,
     PROBE_S,
@@ -21,7 +21,7 @@ SSH = {"SSH_CONNECTION": "10.0.0.1 5 10.0.0.2 22"}
 
 
 def at(seconds: float) -> int:
-    return round(seconds * S)
+    return round(seconds * NS_PER_S)
 
 
 @pytest.fixture

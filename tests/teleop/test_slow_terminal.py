@@ -7,7 +7,7 @@ import pytest
 
 from common import keys
 from common.bus.bus import Arrival, Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Drive, Event
 from verification.harness.support import bus_on, running, wait_until
@@ -39,7 +39,7 @@ class Listener:
     def moving_after_s(self, since_ns: int) -> float | None:
         """Return how long after a moment the last request to move came; None if none came."""
         late = [at for at, linear in self.asked if linear and at > since_ns]
-        return (late[-1] - since_ns) / S if late else None
+        return (late[-1] - since_ns) / NS_PER_S if late else None
 
 
 @pytest.fixture

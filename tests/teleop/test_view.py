@@ -1,7 +1,7 @@
 """A stream's newest value, while it is worth showing."""
 
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Bumper
 from services.teleop.view import Ear
 from tests.teleop.support import FakeBus
@@ -12,9 +12,9 @@ def test_a_value_is_shown_while_it_is_worth_it() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     ear = Ear(bus, keys.BUMPER, 0.5)
     assert ear.at(0) is None
-    bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * S)
-    assert ear.at(10 * S + S // 2) == Bumper(pressed=True)
-    assert ear.at(10 * S + S // 2 + 1) is None
+    bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
+    assert ear.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
+    assert ear.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
 
 
 def test_each_side_has_its_own_ear() -> None:

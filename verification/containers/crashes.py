@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from verification.containers.engine import docker
 from verification.containers.stack_fixture import Stage, held_run_s
 from verification.harness.stack import Witness
@@ -54,7 +54,7 @@ def is_not_needed(service: str, stage: Stage) -> str:
     stage.wheel.push(stage.speed)
     before = stage[service].began
     killed_ns = killed(stage, service)
-    wait_until(lambda: time.monotonic_ns() - killed_ns > S, "a second")
+    wait_until(lambda: time.monotonic_ns() - killed_ns > NS_PER_S, "a second")
     assert stage.holds() == "run", stage.holds()
     stop(stage)
     wait_until(lambda: stage[service].began != before, f"{service} is started again", RESTART_S)
@@ -68,7 +68,7 @@ def is_frozen(service: str, stage: Stage) -> str:
     container = stage[service]
     witness, paused_ns = Witness(), time.monotonic_ns()
     docker("pause", container.id)
-    docker_s = (time.monotonic_ns() - paused_ns) / S  # within which it took hold
+    docker_s = (time.monotonic_ns() - paused_ns) / NS_PER_S  # within which it took hold
     try:
         took_s, allowed_s = stands(stage, paused_ns, witness, REST_S + docker_s)
     finally:
@@ -85,7 +85,7 @@ def laptop_is_cut_off(stage: Stage) -> str:
     network = next(iter(router.about["NetworkSettings"]["Networks"]))
     witness, cut_ns = Witness(), time.monotonic_ns()
     docker("network", "disconnect", network, router.id)
-    docker_s = (time.monotonic_ns() - cut_ns) / S
+    docker_s = (time.monotonic_ns() - cut_ns) / NS_PER_S
     try:
         extra_s = stage.config.safety.sources["teleop"].lease + REST_S + docker_s
         took_s, allowed_s = stands(stage, cut_ns, witness, extra_s)

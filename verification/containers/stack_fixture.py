@@ -12,7 +12,7 @@ from cli.demo.score import Trace, read
 from cli.settings import Everything
 from common import settings
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.control import Control
 from sim.requests import Place
 from verification.containers.certificates import Keyring
@@ -82,7 +82,7 @@ def held_run_s(trace: Trace, since_ns: int) -> float:
         if moving and command.mono_ns > since_ns:
             held_ns = command.mono_ns
         moving = command.kind == "run" and bool(command.linear or command.angular)
-    return (held_ns - since_ns) / S
+    return (held_ns - since_ns) / NS_PER_S
 
 
 def override(sets: list[str], trace: Path) -> dict[str, object]:
@@ -142,9 +142,9 @@ def staged(
         )
 
 
-def dialled(ports: Ports, folder: Path) -> settings.Bus:
+def dialled(ports: Ports, folder: Path) -> settings.BusSettings:
     """Return how somebody with this folder of ``t2 keys`` comes in."""
-    return settings.Bus(
+    return settings.BusSettings(
         connect=(f"tls/127.0.0.1:{ports.router}",),
         ca=str(folder / "ca.pem"),
         certificate=str(folder / "certificate.pem"),

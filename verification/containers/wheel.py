@@ -22,7 +22,7 @@ LAP_S = 180.0  # a lap takes a third of that
 class Wheel:
     """Asks 20 times a second: for what the lap wants while one is driven, else for ``linear``."""
 
-    def __init__(self, where: settings.Bus, robot: str, loop: Loop) -> None:
+    def __init__(self, where: settings.BusSettings, robot: str, loop: Loop) -> None:
         self.linear = 0.0  # m/s
         self.bus = Bus(where, robot, loop.post)
         self.driver = Driver(self.bus, Lap(()), lambda _: None)
@@ -84,7 +84,7 @@ class Wheel:
 
 
 @contextmanager
-def wheel(where: settings.Bus, robot: str) -> Iterator[Wheel]:
+def wheel(where: settings.BusSettings, robot: str) -> Iterator[Wheel]:
     """Sit at the wheel while the context lasts."""
     with running(Loop()) as loop:
         made = Wheel(where, robot, loop)

@@ -13,7 +13,7 @@ from common import keys, log
 from common import messages as m
 from common.bus import bus as buses
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.service import Node
 from common.settings import Shared
 from common.wire import commands, reports
@@ -31,7 +31,7 @@ from services.safety.config import SafetyConfig
 from services.safety.service import Ports
 from verification.cost.stand_ins import BOOT, Cable, Clock, Paper, Session
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 MOMENT_NS = 10_000  # between two frames, when the replay must not grow old
 ROBOT = "001"
 C = TypeVar("C", bound=Shared)

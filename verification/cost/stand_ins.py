@@ -16,13 +16,13 @@ import zenoh
 
 from common import codec
 from common.bus.bus import Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Message
 from services.bridge.rx_timestamp import SO_TIMESTAMPNS, TIMESPEC
 
-START_NS = 1_000 * S
-WALL_NS = 1_700_000_000 * S  # ahead of the monotonic clock
+START_NS = 1_000 * NS_PER_S
+WALL_NS = 1_700_000_000 * NS_PER_S  # ahead of the monotonic clock
 CABLE_NS = 50_000  # from the kernel's stamp to our read
 BOOT = 2**62 + 1  # always as long in MessagePack and in memory
 
@@ -112,7 +112,7 @@ class Cable(socket.socket):
         """Return what waits, stamped by the kernel."""
         if not self.inbox:
             raise BlockingIOError
-        stamp = TIMESPEC.pack(*divmod(WALL_NS + self._clock.now_ns - CABLE_NS, S))
+        stamp = TIMESPEC.pack(*divmod(WALL_NS + self._clock.now_ns - CABLE_NS, NS_PER_S))
         return self.inbox.popleft(), [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], 0, self._board
 
     def sendto(self, datagram: bytes, *_: object) -> None:  # type: ignore[override]

@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Self
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.trace import BumperSent, Command, read
 
 SPEED = 0.8  # m/s, of every fault
@@ -60,10 +60,10 @@ def first_stop_s(
 ) -> float | None:
     """Return how long after the fault the first STOP or BREAK came; None if none came."""
     stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= fault_ns]
-    return (stops[0] - fault_ns) / S if stops else None
+    return (stops[0] - fault_ns) / NS_PER_S if stops else None
 
 
 def last_move_s(commands: Sequence[Command], fault_ns: int) -> float:
     """Return how long after the fault the last command to move came; 0 if none came."""
     moving = [c.mono_ns for c in commands if moves(c) and c.mono_ns >= fault_ns]
-    return (moving[-1] - fault_ns) / S if moving else 0.0
+    return (moving[-1] - fault_ns) / NS_PER_S if moving else 0.0

@@ -15,7 +15,7 @@ import zenoh
 
 from common import keys
 from common.bus.session import client_config
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.operator import release_request, reset_request
 from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
 from verification.faults.stack_fixture import Lane, until
@@ -53,7 +53,7 @@ def kill(name: str, number: signal.Signals) -> Callable[[Lane], int]:
         signal.pidfd_send_signal(process, number)
         if number == signal.SIGKILL:
             select.select([process], [], [], DEATH_S)
-            lane.death_s = (time.monotonic_ns() - at_ns) / S
+            lane.death_s = (time.monotonic_ns() - at_ns) / NS_PER_S
         os.close(process)
         return at_ns
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 WITNESS = """
 import sys, time
@@ -62,9 +62,10 @@ class HoldUps:
 
     def worst_s(self, since_ns: int, seconds: float) -> float:
         """Return the longest hold-up that touches this time, in seconds."""
-        until_ns = since_ns + round(seconds * S)
+        until_ns = since_ns + round(seconds * NS_PER_S)
         return max(
-            ((b - a) / S for a, b in list(self._gaps) if b > since_ns and a < until_ns), default=0.0
+            ((b - a) / NS_PER_S for a, b in list(self._gaps) if b > since_ns and a < until_ns),
+            default=0.0,
         )
 
     def _read(self) -> None:

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Literal
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 Need = Literal[
     "nothing", "a teleop", "a far driver", "a small disk", "other clocks", "a memory group"
@@ -83,4 +83,4 @@ def clock(file: Path) -> dict[str, str]:
 def step_clock(file: Path, seconds: int) -> None:
     """Step the time of day of all that run by this file: to so much beside the machine's."""
     with file.open("r+b" if file.exists() else "wb") as it:  # in place: it is mapped
-        it.write((seconds * S).to_bytes(8, sys.byteorder, signed=True))
+        it.write((seconds * NS_PER_S).to_bytes(8, sys.byteorder, signed=True))

@@ -26,7 +26,7 @@ from pathlib import Path
 import msgspec
 
 from common.bus.host import BOOT_ID
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.requests import Wire
 
@@ -96,7 +96,7 @@ class Line:
 
     def _wait_s(self) -> float:
         due = [cable.due_ns for cable in (self.to_far, self.to_near) if cable.due_ns is not None]
-        return max(0.0, (min(due) - time.monotonic_ns()) / S) if due else IDLE_S
+        return max(0.0, (min(due) - time.monotonic_ns()) / NS_PER_S) if due else IDLE_S
 
 
 def net(port: int) -> str:

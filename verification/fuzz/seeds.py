@@ -72,7 +72,7 @@ SETS = (
     "bus.connect=",
     "safety.sources={new={priority=5,lease=0.2}}",
     "safety.sources.web.lease=99",
-    "safety.i_accept=margin\0safety.margin=0",
+    "safety.unsafe_overrides=margin\0safety.margin=0",
     "odom.hold=5e-2\0log.level=debug",
     "sim.drive.coast=nan",
     "robot.id=t2 \0robot=5",

@@ -10,7 +10,7 @@ from cli.__main__ import main
 from cli.keys.access import access_control
 from common import members
 from common.bus.session import router
-from common.settings import Bus
+from common.settings import BusSettings
 from verification.harness.support import free_port
 
 ADDRESS = "127.0.0.1"
@@ -27,15 +27,15 @@ class Site:
         """Run ``t2 keys`` on this site's folder."""
         assert main(["keys", *words, "--folder", str(self.folder)]) == 0
 
-    def member(self, role: str, name: str, *options: str) -> Bus:
+    def member(self, role: str, name: str, *options: str) -> BusSettings:
         """Issue a certificate, and return the settings that use it; they dial nothing yet."""
         self.keys("issue", role, name, *options)
         return self.settings(role, name)
 
-    def settings(self, role: str, name: str) -> Bus:
+    def settings(self, role: str, name: str) -> BusSettings:
         """Return the settings that use a certificate."""
         mine = self.folder / f"{role}.{name}"
-        return Bus(
+        return BusSettings(
             ca=str(mine / "ca.pem"),
             certificate=str(mine / "certificate.pem"),
             private_key=str(mine / "private.key"),
@@ -43,7 +43,7 @@ class Site:
         )
 
     @contextlib.contextmanager
-    def router(self, of: Bus, *uplink: str) -> Iterator[tuple[str, str]]:
+    def router(self, of: BusSettings, *uplink: str) -> Iterator[tuple[str, str]]:
         """Run a router with this certificate; yield its TLS endpoint, and the one for its board."""
         secured = f"tls/{ADDRESS}:{free_port()}"
         onboard = f"unixsock-stream/{self.folder}/bus-{free_port()}.sock"
@@ -53,6 +53,6 @@ class Site:
             yield secured, onboard
 
 
-def dialling(member: Bus, endpoint: str) -> Bus:
+def dialling(member: BusSettings, endpoint: str) -> BusSettings:
     """Return the settings of a member that dials an endpoint."""
     return msgspec.structs.replace(member, connect=(endpoint,))

@@ -17,7 +17,7 @@ from cli.demo.score import Trace, read
 from cli.run.up import commands
 from cli.settings import Everything
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.control import Control
 from verification.harness.support import free_port, wait_until
 
@@ -166,4 +166,4 @@ while True:
 def until_still_s(trace: Trace, since_ns: int) -> float:
     """Return how long after a moment the board last received a command to move, in seconds."""
     moving = [c.mono_ns for c in trace.commands if c.kind == "run" and (c.linear or c.angular)]
-    return max(0.0, (moving[-1] - since_ns) / S) if moving else 0.0
+    return max(0.0, (moving[-1] - since_ns) / NS_PER_S) if moving else 0.0

@@ -69,14 +69,14 @@ def wait_until(true: Callable[[], T], what: str, patience_s: float = PATIENCE_S)
     return found
 
 
-def at(*endpoints: str, lease: float = 1.0) -> settings.Bus:
+def at(*endpoints: str, lease: float = 1.0) -> settings.BusSettings:
     """Return the settings of who dials these."""
-    return settings.Bus(connect=endpoints, lease=lease)
+    return settings.BusSettings(connect=endpoints, lease=lease)
 
 
-def listening(endpoint: str, *uplink: str) -> settings.Bus:
+def listening(endpoint: str, *uplink: str) -> settings.BusSettings:
     """Return the settings of a router there, which dials these."""
-    return settings.Bus(listen=(endpoint,), uplink=uplink)
+    return settings.BusSettings(listen=(endpoint,), uplink=uplink)
 
 
 @contextlib.contextmanager
@@ -121,7 +121,7 @@ def bus_on(endpoint: str, loop: Loop, declare: Callable[[Bus], None]) -> Iterato
 
 @contextlib.contextmanager
 def joined(
-    where: settings.Bus, robot: str, loop: Loop, declare: Callable[[Bus], object]
+    where: settings.BusSettings, robot: str, loop: Loop, declare: Callable[[Bus], object]
 ) -> Iterator[Bus]:
     """Open a bus with these declarations, connected when the context begins.
 

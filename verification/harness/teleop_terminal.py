@@ -17,7 +17,7 @@ from pathlib import Path
 
 # A machine that runs tests holds up terminals, too, for longer than a vehicle may accept.
 PATIENT = (
-    "--set", 'teleop.i_accept=["round_trip"]', "--set", "teleop.round_trip=2.0",
+    "--set", 'teleop.unsafe_overrides=["round_trip"]', "--set", "teleop.round_trip=2.0",
 )  # fmt: skip
 STRICT = ("services.teleop", "--no-gamepad")
 TELEOP = (*STRICT, *PATIENT)

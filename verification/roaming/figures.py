@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.trace import Command
 from verification.faults.frames import moves
 from verification.faults.table import rank
@@ -47,9 +47,9 @@ class Drive:
 def stream(notes: Sequence[Note], key: str, since_ns: int, until_ns: int) -> Stream:
     """Return how a key arrived in this time."""
     mine = [note for note in notes if note.key == key]
-    ages = [(note.at_ns - note.sent_ns) / S for note in mine] or [float("inf")]
+    ages = [(note.at_ns - note.sent_ns) / NS_PER_S for note in mine] or [float("inf")]
     gap_s = longest_s([note.at_ns for note in mine], since_ns, until_ns)
-    rate_hz = len(mine) * S / (until_ns - since_ns)
+    rate_hz = len(mine) * NS_PER_S / (until_ns - since_ns)
     sent = mine[-1].seq - mine[0].seq + 1 if mine else 0
     return Stream(rate_hz, gap_s, (rank(ages, 0.5), max(ages)), sent - len(mine))
 
@@ -60,8 +60,8 @@ def chain(notes: Sequence[Note], since_ns: int, until_ns: int) -> Chain:
     return Chain(
         bumper=stream(notes, BUMPER, since_ns, until_ns),
         odometry=stream(notes, ODOMETRY, since_ns, until_ns),
-        verdict_s=_ranks([(m.sent_ns - m.heard_ns) / S for m in motions if m.heard_ns]),
-        input_s=_ranks([(m.sent_ns - m.judged_ns) / S for m in motions if m.judged_ns]),
+        verdict_s=_ranks([(m.sent_ns - m.heard_ns) / NS_PER_S for m in motions if m.heard_ns]),
+        input_s=_ranks([(m.sent_ns - m.judged_ns) / NS_PER_S for m in motions if m.judged_ns]),
     )
 
 
@@ -90,7 +90,7 @@ def stops(commands: Sequence[Command]) -> int:
 def longest_s(times_ns: Sequence[int], since_ns: int, until_ns: int) -> float:
     """Return the longest time without any of these."""
     edges = [since_ns, *sorted(times_ns), until_ns]
-    return max(b - a for a, b in pairwise(edges)) / S
+    return max(b - a for a, b in pairwise(edges)) / NS_PER_S
 
 
 def _ranks(values: Sequence[float]) -> tuple[float, float]:

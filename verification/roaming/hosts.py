@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.settings import Bus
+from common.settings import BusSettings
 from sim.requests import Wire
 from verification.faults.namespaces import clock, step_clock
 from verification.faults.remote_host import net
@@ -107,7 +107,7 @@ def site(
             yield it
 
 
-def words_of(member: Bus) -> list[str]:
+def words_of(member: BusSettings) -> list[str]:
     """Return the settings that use a certificate."""
     named = {
         name: getattr(member, name) for name in ("ca", "certificate", "private_key", "members")

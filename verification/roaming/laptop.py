@@ -18,7 +18,7 @@ from pathlib import Path
 from common import keys
 from common.bus.publisher import Publisher
 from common.config import Sources, load
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Drive
 from common.service import Node
 from services.teleop.config import TeleopConfig
@@ -46,7 +46,7 @@ class Operator:
             one for one in node.bus.publishers if one.topic is keys.DRIVE
         )
         self._noted = 0
-        self._notebook = Notebook(file, node.loop, AHEAD_S * S if OFFSETS.exists() else 0)
+        self._notebook = Notebook(file, node.loop, AHEAD_S * NS_PER_S if OFFSETS.exists() else 0)
         self._notebook.listen(node.bus, keys.SAFETY)
         self._notebook.listen(node.bus, keys.ODOMETRY)
         self._notebook.listen(node.bus, keys.BUMPER)

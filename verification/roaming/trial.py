@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.requests import Wire
 from verification.faults.frames import SPEED, first_stop_s, last_move_s, moves
 from verification.faults.remote_host import Address
@@ -74,13 +74,13 @@ def steady(it: Site, weather: Steady, seconds: float) -> Went:
     return Went(
         drive=figures.drive(robot, laptop, commands, since_ns, until_ns),
         hands=hands,
-        speed=(ended_m - began_m) * S / (until_ns - since_ns),
+        speed=(ended_m - began_m) * NS_PER_S / (until_ns - since_ns),
         state=figures.stream(laptop, STATE, since_ns, until_ns),
         odometry=figures.stream(laptop, figures.ODOMETRY, since_ns, until_ns),
         chain=figures.chain(robot, since_ns, until_ns),
         braked_s=braked_s,
         told_s=told_s,
-        load_bps=8 * carried * S / (until_ns - since_ns),
+        load_bps=8 * carried * NS_PER_S / (until_ns - since_ns),
         since_ns=since_ns,
         until_ns=until_ns,
     )
@@ -172,7 +172,7 @@ def _drives_again(it: Site, back_ns: int) -> tuple[float | None, int]:
             commands = it.lane.frames.commands
             stood = [c.mono_ns for c in commands if not moves(c)]
             drove = [c.mono_ns for c in commands if c.mono_ns > max(stood, default=0)]
-            return max(0.0, (drove[0] - back_ns) / S) if stood else 0.0, hands
+            return max(0.0, (drove[0] - back_ns) / NS_PER_S) if stood else 0.0, hands
         elif not moving and now_s - since_s > PATIENCE_S:
             it.press_again(SPEED)
             hands, since_s = hands + 1, time.monotonic()
@@ -181,4 +181,4 @@ def _drives_again(it: Site, back_ns: int) -> tuple[float | None, int]:
 
 
 def _after_s(times_ns: list[int], since_ns: int) -> float | None:
-    return (min(times_ns) - since_ns) / S if times_ns else None
+    return (min(times_ns) - since_ns) / NS_PER_S if times_ns else None

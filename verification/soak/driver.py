@@ -21,14 +21,14 @@ from common.bus.bus import Bus
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import LinkError, MessageError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Done, PoseRequest
 from sim.control import Control
 from sim.requests import Place
 
-OLD_NS = S // 2  # an older pose is nothing to drive by
-TRY_NS = S // 2  # between two attempts to set things right
+OLD_NS = NS_PER_S // 2  # an older pose is nothing to drive by
+TRY_NS = NS_PER_S // 2  # between two attempts to set things right
 STEP_S = {QUICK: 30.0, PATIENT: 75.0}  # a step takes a third of that; a lap has none longer
 
 
@@ -39,7 +39,7 @@ class Operator:
         self._bus, self._control, self._pace = bus, control, pace
         self._driver = Driver(bus, self._new_lap(), lambda _: None)
         self._log = log.Logger()
-        self._patience_ns = round(STEP_S[pace] * S)
+        self._patience_ns = round(STEP_S[pace] * NS_PER_S)
         self._mend: Callable[[], PoseRequest | None] | None = self._put_back
         self._tried_ns = 0
         self._step_ns = 0  # when the step began; 0 when it has yet to

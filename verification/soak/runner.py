@@ -13,7 +13,7 @@ from cli.run.supervisor import Child, Supervisor
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.errors import LinkError, MessageError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Health
 from sim import trace as t
 from sim.control import Control
@@ -52,7 +52,7 @@ class Yard:
         self._held: Child | None = None  # left dead until the fault is over
         self._budget_s = budget_s
         self._began_ns = time.monotonic_ns()
-        self._next_ns = self._began_ns + round(FIRST_S * S)
+        self._next_ns = self._began_ns + round(FIRST_S * NS_PER_S)
         self._since_ns = 0
         self._end_ns = 0
         self._late_s = 0.0  # at worst since the fault began
@@ -88,7 +88,7 @@ class Yard:
         self._see_lateness()
         self._read_trace()
         self._fault, self._runs, self._late_s = fault, [], 0.0
-        self._since_ns, self._end_ns = since_ns, since_ns + round(seconds * S)
+        self._since_ns, self._end_ns = since_ns, since_ns + round(seconds * NS_PER_S)
         self._record.faults.append((self._at_s(since_ns), name))
         self._tell(f"{name}, {seconds:.1f} s")
 
@@ -101,7 +101,7 @@ class Yard:
         if self._held is not None:
             self._held.due_s = 0.0
             self._held = None
-        self._fault, self._next_ns = None, now_ns + round(self._faults.pause_s() * S)
+        self._fault, self._next_ns = None, now_ns + round(self._faults.pause_s() * NS_PER_S)
 
     def _judge(self, fault: Fault) -> None:
         """Look for commands that moved the vehicle although it had to stand.
@@ -111,7 +111,7 @@ class Yard:
         """
         self._see_lateness()
         self._read_trace()
-        from_ns = self._since_ns + round((self._budget_s + self._late_s) * S)
+        from_ns = self._since_ns + round((self._budget_s + self._late_s) * NS_PER_S)
         window = Window(fault.name, from_ns, time.monotonic_ns())
         self._record.windows.append(window)
         self._record.moved += too_late(self._runs, window)
@@ -204,4 +204,4 @@ class Yard:
         self._seen = now
 
     def _at_s(self, now_ns: int) -> float:
-        return (now_ns - self._began_ns) / S
+        return (now_ns - self._began_ns) / NS_PER_S

@@ -12,7 +12,7 @@ from itertools import pairwise
 from statistics import median
 
 from cli.demo.score import Result
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim import trace as t
 from verification.soak.record import Life, Record, Sample, Window
 
@@ -70,7 +70,7 @@ def moves(command: t.Command) -> bool:
 def too_late(runs: Iterable[t.Command], window: Window) -> list[tuple[str, float]]:
     """Return what moves the vehicle when nothing may: the fault, and how late in seconds."""
     return [
-        (window.name, (run.mono_ns - window.from_ns) / S)
+        (window.name, (run.mono_ns - window.from_ns) / NS_PER_S)
         for run in runs
         if moves(run) and window.from_ns <= run.mono_ns < window.to_ns
     ]

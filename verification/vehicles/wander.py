@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import (
     Bumper,
     Drive,
@@ -42,7 +42,7 @@ from sim.vehicle import Twist, go, next_twist
 from sim.world import Plan, World
 
 OFFICE = Path(__file__).parents[2] / "sim/worlds/office.toml"
-TICK_NS, SONAR_TICKS, ASK_TICKS = S // 100, 5, 5
+TICK_NS, SONAR_TICKS, ASK_TICKS = NS_PER_S // 100, 5, 5
 BACK_TICKS = 100  # of the way that a contact takes back
 KINDS = {"run": MotionKind.RUN, "stop": MotionKind.STOP, "brake": MotionKind.BREAK}
 LINK = Link(
@@ -82,7 +82,7 @@ class Walk:
         self.state = self.policy.start()
         self.translator = Translator(Wire(), vehicle, 1.0, 1.0)
         self.inputs = Inputs(reader=True)
-        self.now_ns, self.ticks = 10 * S, 0
+        self.now_ns, self.ticks = 10 * NS_PER_S, 0
         self.distance = self.turn = self.metres = 0.0
         self.before = deque([self.pose], maxlen=BACK_TICKS)
         self.asked, self.until_ns, self.blocked_ns = STILL, 0, 0
@@ -108,7 +108,7 @@ class Walk:
 
     def wander(self, seconds: float) -> float:
         """Wander about; return the share of the time in motion."""
-        ticks = round(seconds * S / TICK_NS)
+        ticks = round(seconds * NS_PER_S / TICK_NS)
         return sum(self.tick(self._choose()) for _ in range(ticks)) / ticks
 
     def is_immobile(self) -> bool:
@@ -124,8 +124,8 @@ class Walk:
         """Keep the motion for a while; when blocked, choose another one soon."""
         blocked = "blocked" in self.state.latches
         self.blocked_ns = self.blocked_ns + TICK_NS if blocked else 0
-        if self.now_ns >= self.until_ns or self.blocked_ns > S // 2:
-            self.until_ns = self.now_ns + round(self.random.uniform(1.0, 4.0) * S)
+        if self.now_ns >= self.until_ns or self.blocked_ns > NS_PER_S // 2:
+            self.until_ns = self.now_ns + round(self.random.uniform(1.0, 4.0) * NS_PER_S)
             self.blocked_ns = 0
             linear = self.random.choice((0.7, 0.5, 0.3, 0.0, -0.3))
             self.asked = Asked(linear, self.random.choice((0.0, self.random.uniform(-0.8, 0.8))))
@@ -133,7 +133,7 @@ class Walk:
         return self.asked
 
     def _move(self) -> None:
-        verdict, dt = self.state.verdict, TICK_NS / S
+        verdict, dt = self.state.verdict, TICK_NS / NS_PER_S
         target = Twist(verdict.twist.linear, verdict.twist.angular)
         twist = next_twist(self.twist, KINDS[verdict.command], target, Motors(), dt)
         way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))

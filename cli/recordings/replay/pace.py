@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 LOOK_S = 1.0
 
@@ -25,7 +25,7 @@ class Pace:
         if self._began is None:
             self._began = time.monotonic(), log_ns
         begin_s, begin_ns = self._began
-        due_s = begin_s + (log_ns - begin_ns) / S / self._rate
+        due_s = begin_s + (log_ns - begin_ns) / NS_PER_S / self._rate
         while True:
             now_s = time.monotonic()
             if now_s - self._looked_s >= LOOK_S:

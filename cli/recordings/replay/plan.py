@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 Aim = Literal["bus", "simulator", "board"]
 
@@ -58,7 +58,7 @@ class Choice:
         """Tell whether a message is played; the first one that is asked about is the beginning."""
         if self._begin_ns is None:
             self._begin_ns = log_ns
-        at_s = (log_ns - self._begin_ns) / S
+        at_s = (log_ns - self._begin_ns) / NS_PER_S
         if at_s < self.from_s or (self.to_s is not None and at_s > self.to_s):
             return False
         if path not in self._known:
@@ -69,7 +69,7 @@ class Choice:
         """Tell whether nothing follows that would be played."""
         if self.to_s is None or self._begin_ns is None:
             return False
-        return log_ns - self._begin_ns > self.to_s * S
+        return log_ns - self._begin_ns > self.to_s * NS_PER_S
 
     def _aimed(self, path: str) -> bool:
         if self.aim == "simulator":

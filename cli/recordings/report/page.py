@@ -11,7 +11,7 @@ from cli.recordings.report import figures
 from cli.recordings.report.reactions import Reaction, reactions
 from cli.recordings.report.story import Story
 from cli.recordings.report.streams import Stream
-from common.freshness import S
+from common.freshness import NS_PER_S
 from services.recorder.reader import Reader
 
 TEMPLATE = Path(__file__).with_name("page.html")
@@ -49,12 +49,12 @@ def page(story: Story, reader: Reader) -> str:
 
 def facts(story: Story, reader: Reader) -> dict[str, str]:
     """Return what stands at the top, by name."""
-    began = datetime.fromtimestamp((story.began_ns or 0) / S, UTC)
+    began = datetime.fromtimestamp((story.began_ns or 0) / NS_PER_S, UTC)
     robots = sorted({robot for key in story.streams if (robot := chunks(key)[0])})
     versions = ", ".join(f"{name} {version}" for name, version in sorted(story.versions.items()))
     return {
         "robot": ", ".join(robots),
-        "began": f"{began:%Y-%m-%d %H:%M:%S} UTC",
+        "began": f"{began:%Y-%m-%d %H:%M:%NS_PER_S} UTC",
         "lasted": clock(story.lasted_s),
         "driven": f"{story.distance:.1f} m",
         "stops": f"{len(story.stops)}, {sum(stop.was_driving for stop in story.stops)} of them "

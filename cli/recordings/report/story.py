@@ -12,7 +12,7 @@ from itertools import pairwise
 from cli.recordings.report.phases import Phases
 from cli.recordings.report.stops import Stop, stops
 from cli.recordings.report.streams import Stream
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import (
     SONAR_NAMES,
     Bumper,
@@ -104,7 +104,7 @@ class Story:
     def hear(self, key: str, message: Message | None, log_ns: int) -> None:
         """Take what came on a key, None for what could not be read."""
         self.began_ns = log_ns if self.began_ns is None else self.began_ns
-        at_s = (log_ns - self.began_ns) / S
+        at_s = (log_ns - self.began_ns) / NS_PER_S
         self.lasted_s = max(self.lasted_s, at_s)
         self.streams.setdefault(key, Stream(key)).take(at_s, message)
         if message is not None:

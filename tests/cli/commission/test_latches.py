@@ -5,20 +5,20 @@ from dataclasses import replace
 import pytest
 
 from cli.commission.latches import PROMPT_S, Reset, Trip, judge_bumper, judge_estop
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Command, Motion, SafetyState
 from tests.cli.demo.lap_fixture import safety
 
-T = 100 * S
-RESET = Reset(T + 2 * S, True, "Reset.", ())
+T = 100 * NS_PER_S
+RESET = Reset(T + 2 * NS_PER_S, True, "Reset.", ())
 
 
 def state(after_s: float, *latched: str) -> Latest[SafetyState]:
-    return Latest(safety(latched=latched), T + round(after_s * S))
+    return Latest(safety(latched=latched), T + round(after_s * NS_PER_S))
 
 
 def motion(after_s: float, command: Command) -> Latest[Motion]:
-    return Latest(Motion(command=command), T + round(after_s * S))
+    return Latest(Motion(command=command), T + round(after_s * NS_PER_S))
 
 
 def trip(cause: str = "estop") -> Trip:

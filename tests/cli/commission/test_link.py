@@ -15,7 +15,7 @@ from cli.commission.link import (
     rejected,
 )
 from cli.commission.verdict import Verdict
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Link, Switches
 
 SETTINGS = {
@@ -50,8 +50,8 @@ class Heard:
     fields: dict[str, Any] = field(default_factory=dict)
 
     def messages(self) -> list[Link]:
-        good = [link(mono_ns=round(i * 0.2 * S)) for i in range(25)]
-        return [*good, link(mono_ns=5 * S, **self.fields)]
+        good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(25)]
+        return [*good, link(mono_ns=5 * NS_PER_S, **self.fields)]
 
 
 def judge(switches: Switches | None = ON, ports: Ports = BOTH, **last: Any) -> Verdict:

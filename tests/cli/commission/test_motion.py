@@ -17,13 +17,13 @@ from cli.commission.motion import (
     unit_of,
 )
 from cli.commission.verdict import Verdict
-from common.freshness import Latest, S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, Velocity
 from services.safety.twist import Twist
 from tests.cli.demo.lap_fixture import safety
 
 FORWARD, LEFT = Twist(linear=0.1), Twist(angular=0.2)
-PERIOD_NS = S // 50
+PERIOD_NS = NS_PER_S // 50
 MRAD = 0.001 / math.radians(0.1)  # 0.573: what a firmware in milliradians makes of our command
 
 
@@ -40,15 +40,15 @@ class Vehicle:
     stands_after_s: float = 0.2
 
     def run(self, asked: Twist, unit: str = "decidegree", feedback: str = "decidegree") -> Run:
-        end_ns = round(self.driven_s * S)
-        times = range(0, end_ns + S, PERIOD_NS)
+        end_ns = round(self.driven_s * NS_PER_S)
+        times = range(0, end_ns + NS_PER_S, PERIOD_NS)
         released = [t <= end_ns for t in times]
-        moving = [t <= end_ns + self.stands_after_s * S for t in times]
+        moving = [t <= end_ns + self.stands_after_s * NS_PER_S for t in times]
         linear, angular = asked.linear * self.let_through, asked.angular * self.let_through
         turns = asked.angular != 0
         speed = (angular if turns else linear) * self.counted
-        way = [speed * min(t, end_ns) / S for t in times]
-        aside = [self.across * min(t, end_ns) / S for t in times]
+        way = [speed * min(t, end_ns) / NS_PER_S for t in times]
+        aside = [self.across * min(t, end_ns) / NS_PER_S for t in times]
         distances, headings = (aside, way) if turns else (way, aside)
         return Run(
             asked=asked,
@@ -195,14 +195,14 @@ def test_a_unit_must_match(ratio: float, unit: str | None) -> None:
 
 
 def test_the_window_must_be_long_enough() -> None:
-    shortest_s = (SETTLE_NS + WINDOW_NS) / S
+    shortest_s = (SETTLE_NS + WINDOW_NS) / NS_PER_S
     assert measure(Vehicle(driven_s=shortest_s).run(FORWARD)) is not None
     assert measure(Vehicle(driven_s=shortest_s - 0.02).run(FORWARD)) is None
 
 
 def test_a_pause_in_between_is_not_measured_over() -> None:
     run = Vehicle().run(FORWARD)
-    pause = Latest(Motion(command="stop"), S)
+    pause = Latest(Motion(command="stop"), NS_PER_S)
     motions = sorted([*run.motions, pause], key=lambda motion: motion.received_ns)
     assert measure(replace(run, motions=motions)) is None
 

@@ -16,18 +16,18 @@ from cli.commission.watchdog_plan import (
     Trial,
     judge_trial,
 )
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.wire.commands import MotionCommand, MotionKind
 
-START_NS = 50 * S
-STEP_NS = S // 100
+START_NS = 50 * NS_PER_S
+STEP_NS = NS_PER_S // 100
 Sent = list[tuple[int, MotionCommand]]
 Board = Callable[[int, Sent], float | None]  # the speed at a time, None while it is silent
 
 
 def since_s(now_ns: int, sent: Sent, kind: MotionKind) -> float:
     times = [at for at, command in sent if command.kind is kind]
-    return (now_ns - times[-1]) / S if times else float("inf")
+    return (now_ns - times[-1]) / NS_PER_S if times else float("inf")
 
 
 def driven_on(now_ns: int, sent: Sent) -> float:
@@ -45,7 +45,7 @@ def watched(limit_s: float) -> Board:
 
 def played(board: Board, limit_s: float = 5.0) -> tuple[Trial, Sent]:
     trial, sent, now_ns = Trial(START_NS), Sent(), START_NS
-    while trial.phase != "over" and now_ns < START_NS + limit_s * S:
+    while trial.phase != "over" and now_ns < START_NS + limit_s * NS_PER_S:
         trial, command = trial.tick(now_ns)
         if command is not None:
             sent.append((now_ns, command))
@@ -64,7 +64,7 @@ def test_a_board_without_one_drives_on_and_is_braked() -> None:
     runs = [at for at, command in sent if command == RUN]
     brakes = [at for at, command in sent if command == BREAK]
     assert runs == [START_NS + i * PERIOD_NS for i in range(20)]
-    assert brakes[0] - runs[-1] == S
+    assert brakes[0] - runs[-1] == NS_PER_S
     assert {b - a for a, b in pairwise(brakes)} == {PERIOD_NS}
     assert len(runs) + len(brakes) == len(sent)
 
@@ -77,7 +77,7 @@ def test_a_board_with_one_stops_by_itself_and_that_ends_the_silence(limit_s: flo
     assert f"Stops by itself after {limit_s:.2f} s" in verdict.text
     first_brake = next(at for at, command in sent if command == BREAK)
     last_run = max(at for at, command in sent if command == RUN)
-    assert (first_brake - last_run) / S == pytest.approx(limit_s + 0.21, abs=0.011)
+    assert (first_brake - last_run) / NS_PER_S == pytest.approx(limit_s + 0.21, abs=0.011)
     assert trial.phase == "over"
 
 
@@ -117,7 +117,7 @@ def test_a_board_that_falls_silent_in_the_silence_is_braked_at_once() -> None:
 
     trial, sent = played(board)
     first_brake = next(at for at, command in sent if command == BREAK)
-    assert first_brake - (START_NS + S - PERIOD_NS) <= 0.3 * S + DEAF_NS + 2 * STEP_NS
+    assert first_brake - (START_NS + NS_PER_S - PERIOD_NS) <= 0.3 * NS_PER_S + DEAF_NS + 2 * STEP_NS
     assert judge_trial(trial).outcome == "failed"
     assert trial.phase == "over"
 
@@ -126,7 +126,7 @@ def test_it_brakes_until_the_vehicle_stands_and_says_so() -> None:
     trial, sent = played(lambda now_ns, sent: LINEAR_MPS)
     assert trial.phase == "break"
     assert sent[-1][1] == BREAK
-    assert sent[-1][0] > START_NS + 4.9 * S
+    assert sent[-1][0] > START_NS + 4.9 * NS_PER_S
     assert (
         judge_trial(trial).outcome == "passed"
     )  # what was asked is known; the shell says the rest
@@ -137,7 +137,7 @@ def test_a_board_that_is_silent_while_braked_never_counts_as_standing() -> None:
         return None if sent[-1][1] == BREAK else LINEAR_MPS
 
     assert played(board)[0].phase == "break"
-    assert replace(Trial(START_NS), phase="break").tick(START_NS + S)[0].phase == "break"
+    assert replace(Trial(START_NS), phase="break").tick(START_NS + NS_PER_S)[0].phase == "break"
 
 
 @pytest.mark.parametrize("phase", ["run", "silence"])
@@ -150,13 +150,13 @@ def test_an_end_from_outside_brakes_with_the_next_tick(phase: str) -> None:
 
 
 def test_a_silence_without_a_sample_tells_nothing() -> None:
-    trial = Trial(START_NS, "over", last_run_ns=START_NS, broken_ns=START_NS + S)
+    trial = Trial(START_NS, "over", last_run_ns=START_NS, broken_ns=START_NS + NS_PER_S)
     heard = trial.hear(Sample(LINEAR_MPS, 0.0, START_NS))
     assert "No velocity was heard in the silence" in judge_trial(heard).text
 
 
 def test_who_stands_from_the_first_sample_stands_from_there() -> None:
-    trial = Trial(START_NS, "over", last_run_ns=START_NS, broken_ns=START_NS + S)
-    for speed, after_ns in ((LINEAR_MPS, 0), (0.0, S // 10), (0.0, S // 2)):
+    trial = Trial(START_NS, "over", last_run_ns=START_NS, broken_ns=START_NS + NS_PER_S)
+    for speed, after_ns in ((LINEAR_MPS, 0), (0.0, NS_PER_S // 10), (0.0, NS_PER_S // 2)):
         trial = trial.hear(Sample(speed, 0.0, START_NS + after_ns))
     assert judge_trial(trial).text == ("Stops by itself after 0.10 s, slowing down from 0.10 s on.")

@@ -4,11 +4,11 @@ from typing import Any
 
 from cli.demo.score import Trace
 from cli.demo.script import View
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Cause, Limits, Odometry, SafetyState
 from sim import trace as t
 
-TICK_NS = S // 20  # the simulator writes down the truth 20 times a second
+TICK_NS = NS_PER_S // 20  # the simulator writes down the truth 20 times a second
 
 
 def odometry(**fields: Any) -> Odometry:
@@ -83,7 +83,10 @@ def hit_lap(stands: bool = True, brakes: bool = True) -> Trace:
     driving = [truth(n, x=n * 0.04, distance=n * 0.04, linear=0.8) for n in range(51)]
     still = [truth(51 + n, x=2.04, distance=2.04, linear=0.0, contact=True) for n in range(40)]
     on = [truth(51 + n, x=2.0 + n * 0.04, distance=2.0 + n * 0.04, linear=0.8) for n in range(40)]
-    commands = [command(0, "run", 0.8), *([command(hit_ns + S // 50, "break")] if brakes else [])]
+    commands = [
+        command(0, "run", 0.8),
+        *([command(hit_ns + NS_PER_S // 50, "break")] if brakes else []),
+    ]
     bumper = [
         t.BumperSent(mono_ns=0, pressed=False),
         t.BumperSent(mono_ns=hit_ns, pressed=True),

@@ -10,7 +10,7 @@ from cli.demo.script import STILL, Lap, Step, View, lap, still
 from common import keys
 from common import messages as m
 from common.bus.bus import Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from tests.cli.demo.lap_fixture import odometry, safety
 from verification.harness.support import at
 
@@ -92,38 +92,38 @@ def test_after_the_end_zero_is_asked(desk: Desk) -> None:
 
 def test_a_button_is_pressed_again_in_time_for_a_held_release(desk: Desk) -> None:
     driver, _ = driver_of(desk, RELEASE)
-    for now_ns in (S, S + PRESS_NS - 1, S + PRESS_NS):
+    for now_ns in (NS_PER_S, NS_PER_S + PRESS_NS - 1, NS_PER_S + PRESS_NS):
         driver.on_beat(now_ns)
     assert [path for path, _, _ in desk.asked] == [keys.RELEASE.path] * 2
-    assert PRESS_NS < 0.3 * S
+    assert PRESS_NS < 0.3 * NS_PER_S
 
 
 def test_a_refusal_moves_on_the_step_that_waits_for_it(desk: Desk) -> None:
     driver, told = driver_of(desk, RESET, DRIVE)
-    driver.on_beat(S)
+    driver.on_beat(NS_PER_S)
     ((path, _, refuse),) = desk.asked
     assert path == keys.RESET.path
     refuse("still pressed")
-    driver.on_beat(2 * S)
+    driver.on_beat(2 * NS_PER_S)
     assert told == ["reset", "drive"]
     assert driver.answers == [("reset", "reset", False, "still pressed")]
 
 
 def test_an_answer_that_comes_after_its_step_is_kept_and_moves_nothing(desk: Desk) -> None:
     driver, told = driver_of(desk, RESET, RESET, DRIVE)
-    driver.on_beat(S)
+    driver.on_beat(NS_PER_S)
     refuse = desk.asked[0][2]
     refuse("still pressed")
-    driver.on_beat(2 * S)
+    driver.on_beat(2 * NS_PER_S)
     refuse("late")
-    driver.on_beat(3 * S)
+    driver.on_beat(3 * NS_PER_S)
     assert told == ["reset", "reset"]
     assert [words for _, _, _, words in driver.answers] == ["still pressed", "late"]
 
 
 def test_the_same_answer_again_is_told_once(desk: Desk) -> None:
     driver, _ = driver_of(desk, RELEASE)
-    driver.on_beat(S)
+    driver.on_beat(NS_PER_S)
     for _ in range(2):
         desk.asked[0][1](m.Done(text="creeping"))
     assert driver.answers == [("release", "release", True, "creeping")]

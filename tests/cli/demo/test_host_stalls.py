@@ -51,11 +51,11 @@ def test_what_is_measured_is_what_a_sleep_took_too_long(monkeypatch: pytest.Monk
 def test_what_is_accepted_for_the_machine_leaves_what_the_caller_accepts() -> None:
     sets = host_stalls.with_accepted_joined(
         [
-            "safety.i_accept=linear_acceleration",
+            "safety.unsafe_overrides=linear_acceleration",
             "safety.linear_acceleration=5",
             *host_stalls.settings(0.5),
         ]
     )
     safety = load(Everything, Sources(environ={}, sets=sets)).config.safety
     assert safety.linear_acceleration == 5
-    assert {"linear_acceleration", *host_stalls.AGES} <= set(safety.i_accept)
+    assert {"linear_acceleration", *host_stalls.AGES} <= set(safety.unsafe_overrides)

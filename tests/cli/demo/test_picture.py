@@ -13,7 +13,7 @@ from cli.demo.score import Trace
 from cli.demo.script import Lap, lap
 from cli.demo.show import Show
 from common.bus.bus import Bus
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Ultrasonic, Velocity
 from common.settings import Vehicle
 from sim.files import load_plan
@@ -67,7 +67,7 @@ def test_the_room_stands_before_anything_is_known(driver: Driver) -> None:
 
 
 def test_vehicle_verdict_and_reasons_are_in_it(driver: Driver) -> None:
-    shown = text(picture(Canvas(PLAN, COLUMNS), seen(driver), 3 * S))
+    shown = text(picture(Canvas(PLAN, COLUMNS), seen(driver), 3 * NS_PER_S))
     assert "→" in shown
     for words in (
         "✓ wait for safety",
@@ -88,7 +88,7 @@ def test_vehicle_verdict_and_reasons_are_in_it(driver: Driver) -> None:
 
 @pytest.mark.parametrize("columns", [80, 100, 160])
 def test_it_fits_the_terminal(driver: Driver, columns: int) -> None:
-    shown = text(picture(Canvas(PLAN, columns), seen(driver), S), columns)
+    shown = text(picture(Canvas(PLAN, columns), seen(driver), NS_PER_S), columns)
     lines = shown.splitlines()
     assert max(map(len, lines)) <= columns
     assert lines[0].startswith("╭")
@@ -131,7 +131,7 @@ def test_without_a_terminal_steps_and_answers_are_lines(
     with show(tmp_path) as it:
         it.say("A sentence [in brackets].")
         it.step(driver.lap.steps[0])
-        it.draw(seen(driver), S)
+        it.draw(seen(driver), NS_PER_S)
     it.results([("lap finished", "9 of 9", True)], driver)
     shown = capsys.readouterr().out
     assert shown.startswith("starting simulator, router")
@@ -152,7 +152,7 @@ def test_on_a_terminal_the_picture_is_live(
     monkeypatch.setenv("TERM", "xterm-256color")
     with show(tmp_path) as it:
         it.step(driver.lap.steps[0])
-        it.draw(seen(driver), S)
+        it.draw(seen(driver), NS_PER_S)
     shown = capsys.readouterr().out
     assert "T2 drives a lap" in shown
     assert "starting simulator" not in shown

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from cli.demo.script import PATIENT, QUICK, STILL, Ask, Lap, Step, View, lap, still, wrap
-from common.freshness import S
+from common.freshness import NS_PER_S
 from tests.cli.demo.lap_fixture import odometry, safety, view
 
 STEPS = lap(fast=False)
@@ -133,21 +133,21 @@ def test_angles_are_wrapped(angle: float, wrapped: float) -> None:
 
 def test_a_step_begins_where_the_vehicle_is_and_its_time_is_kept() -> None:
     it = Lap(lap(fast=True))
-    assert it.seconds(S) == 0.0
-    assert it.advance(view(verdict="stop"), 5 * S) == Ask()
-    assert it.advance(view(), 6 * S) == Ask()  # over: the next begins at the next beat
-    assert (it.index, it.began, it.times_ns) == (1, None, [5 * S])
-    assert it.advance(view(x=0.1), 7 * S) == Ask((0.8, 0.0))
+    assert it.seconds(NS_PER_S) == 0.0
+    assert it.advance(view(verdict="stop"), 5 * NS_PER_S) == Ask()
+    assert it.advance(view(), 6 * NS_PER_S) == Ask()  # over: the next begins at the next beat
+    assert (it.index, it.began, it.times_ns) == (1, None, [5 * NS_PER_S])
+    assert it.advance(view(x=0.1), 7 * NS_PER_S) == Ask((0.8, 0.0))
     assert it.began == odometry(x=0.1)
-    assert it.times_ns == [5 * S, 7 * S]
-    assert it.seconds(9 * S) == 4.0
+    assert it.times_ns == [5 * NS_PER_S, 7 * NS_PER_S]
+    assert it.seconds(9 * NS_PER_S) == 4.0
 
 
 def test_the_end_is_the_end() -> None:
     it = Lap((Step("only", still, lambda *_: True),))
     it.advance(view(), 0)
     assert it.step is None
-    assert it.advance(view(), S) == Ask()
+    assert it.advance(view(), NS_PER_S) == Ask()
     assert it.index == 1
 
 

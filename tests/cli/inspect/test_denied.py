@@ -12,7 +12,7 @@ from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
 from common.messages import Drive, ResetDone, ResetRequest
-from common.settings import Bus as Where
+from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.teleop.support import safety_state
 from verification.harness.certificates import Site, dialling

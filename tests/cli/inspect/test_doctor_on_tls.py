@@ -8,7 +8,7 @@ import pytest
 
 from cli.inspect import remedies
 from cli.inspect.doctor import findings
-from common.settings import Bus, Shared
+from common.settings import BusSettings, Shared
 from verification.harness.certificates import Site, dialling
 
 
@@ -18,42 +18,44 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Site:
 
 
 @pytest.fixture(scope="module")
-def stranger(tmp_path_factory: pytest.TempPathFactory) -> Bus:
+def stranger(tmp_path_factory: pytest.TempPathFactory) -> BusSettings:
     """Return a certificate of another site."""
     elsewhere = Site(tmp_path_factory.mktemp("theirs") / "keys")
     return elsewhere.member("driver", "mallory", "--robot", "001")
 
 
 @pytest.fixture(scope="module")
-def driver(site: Site) -> Bus:
+def driver(site: Site) -> BusSettings:
     return site.member("driver", "anna", "--robot", "001")
 
 
 @pytest.fixture(scope="module")
-def endpoint(site: Site, driver: Bus) -> Iterator[str]:
+def endpoint(site: Site, driver: BusSettings) -> Iterator[str]:
     with site.router(site.member("robot", "001", "--address", "127.0.0.1")) as (secured, _):
         yield secured
 
 
-def found(member: Bus, endpoint: str) -> list[tuple[str, str, str]]:
+def found(member: BusSettings, endpoint: str) -> list[tuple[str, str, str]]:
     """Return where something is, how it is, and what is said of it."""
     config = Shared(bus=dialling(member, endpoint))
     return [(each.where, each.level, each.text) for each in findings(config, 0.5)]
 
 
-def test_a_certificate_that_is_taken(driver: Bus, endpoint: str) -> None:
+def test_a_certificate_that_is_taken(driver: BusSettings, endpoint: str) -> None:
     first, *rest = found(driver, endpoint)
     assert first[:2] == ("network", "ok")
     assert ("router", "ok") in {each[:2] for each in rest}
 
 
-def test_a_router_of_another_site(stranger: Bus, endpoint: str) -> None:
+def test_a_router_of_another_site(stranger: BusSettings, endpoint: str) -> None:
     (where, level, text), *_ = found(stranger, endpoint)
     assert (where, level) == ("network", "wrong")
     assert f"{endpoint}: the router's certificate is not to be trusted: " in text
 
 
-def test_a_certificate_of_another_site(stranger: Bus, driver: Bus, endpoint: str) -> None:
+def test_a_certificate_of_another_site(
+    stranger: BusSettings, driver: BusSettings, endpoint: str
+) -> None:
     mixed = msgspec.structs.replace(stranger, ca=driver.ca)
     config = Shared(bus=dialling(mixed, endpoint))
     first, *_ = findings(config, 0.5)
@@ -63,14 +65,14 @@ def test_a_certificate_of_another_site(stranger: Bus, driver: Bus, endpoint: str
 
 
 def test_a_router_at_an_address_that_its_certificate_does_not_name(
-    driver: Bus, endpoint: str
+    driver: BusSettings, endpoint: str
 ) -> None:
     (_, level, text), *_ = found(driver, endpoint.replace("127.0.0.1", "127.0.0.2"))
     assert level == "wrong"
     assert "127.0.0.2" in text
 
 
-def test_files_that_are_of_no_use(driver: Bus, endpoint: str, tmp_path: Path) -> None:
+def test_files_that_are_of_no_use(driver: BusSettings, endpoint: str, tmp_path: Path) -> None:
     missing = msgspec.structs.replace(driver, private_key=str(tmp_path / "no.key"))
     (_, level, text), *_ = found(missing, endpoint)
     assert level == "wrong"

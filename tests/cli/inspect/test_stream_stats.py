@@ -3,7 +3,7 @@
 import pytest
 
 from cli.inspect.stream_stats import Meter, Taken, quantile
-from common.freshness import S
+from common.freshness import NS_PER_S
 
 
 def metered(*samples: Taken, window: int = 100) -> Meter:
@@ -14,7 +14,7 @@ def metered(*samples: Taken, window: int = 100) -> Meter:
 
 
 def at(seconds: float, seq: int | None = None, boot: int = 1, size: int = 10) -> Taken:
-    return Taken(round(seconds * S), size, seq, boot)
+    return Taken(round(seconds * NS_PER_S), size, seq, boot)
 
 
 def test_the_rate_and_the_gaps() -> None:

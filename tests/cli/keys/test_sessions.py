@@ -21,7 +21,7 @@ from common.bus.session import client_config, router
 from common.config import Sources, load
 from common.errors import LinkError
 from common.members import Members
-from common.settings import Bus, Shared
+from common.settings import BusSettings, Shared
 from verification.harness.support import free_port, wait_until
 
 KEY = "t2/v1/001/tel/bridge/velocity"
@@ -38,7 +38,7 @@ class Site:
         with locked(folder, create=True) as self.folder:
             self.folder.found(self.authority, Members(site="berlin"), b"")
 
-    def bus(self, who: Profile, begins_s: float = -60, ends_s: float = 3600) -> Bus:
+    def bus(self, who: Profile, begins_s: float = -60, ends_s: float = 3600) -> BusSettings:
         """Return the settings of somebody whose certificate is good from then on until then."""
         valid = Span(self.now_s + begins_s, self.now_s + ends_s)
         issued = self.authority.issue(who, valid)
@@ -59,7 +59,7 @@ def stranger(tmp_path_factory: pytest.TempPathFactory) -> Site:
 
 
 @contextlib.contextmanager
-def listening(bus: Bus) -> Iterator[str]:
+def listening(bus: BusSettings) -> Iterator[str]:
     """Run a router with these files, on loopback; yield its endpoint."""
     endpoint = f"tls/127.0.0.1:{free_port()}"
     with router(msgspec.structs.replace(bus, listen=(endpoint,))):
@@ -72,7 +72,7 @@ def endpoint(site: Site) -> Iterator[str]:
         yield where
 
 
-def dial(bus: Bus, endpoint: str, **tls: Any) -> zenoh.Session:
+def dial(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
     """Open a session, with other TLS settings if told; raise ``ZError`` if that cannot be."""
     config = client_config(msgspec.structs.replace(bus, connect=(endpoint,)))
     if tls:

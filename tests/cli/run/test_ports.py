@@ -57,7 +57,7 @@ def test_each_process_has_its_own() -> None:
 def test_a_routers_endpoints_in_every_form() -> None:
     listen = ("tcp/127.0.0.1:7447", "tls/[::1]:7448#iface=lo", "quic/localhost:9?a=b",
               "unixsock-stream//run/t2/bus.sock")  # fmt: skip
-    bus = settings.Bus(listen=listen, ca="a", certificate="b", private_key="c", members="d")
+    bus = settings.BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
     assert [(port.kind, port.host, port.number) for port in routers(bus)] == [
         ("tcp", "127.0.0.1", 7447),
         ("tcp", "::1", 7448),
@@ -139,7 +139,7 @@ def test_a_second_stack_starts_nothing_and_the_first_goes_on(tmp_path: Path) -> 
 
 
 def test_the_shipped_ports_are_what_the_services_bind() -> None:
-    config = replace(Everything(), bus=settings.Bus())
+    config = replace(Everything(), bus=settings.BusSettings())
     assert [str(port) for port in wanted(config, ALL)] == [
         "TCP 127.0.0.1:7447 (bus.listen)",
         "UDP 127.0.0.1:4002 (board.listen_ports)",

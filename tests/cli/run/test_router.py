@@ -11,7 +11,7 @@ from cli.__main__ import main
 from cli.run.router import open_to
 from common.bus.session import client_config
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.settings import Bus
+from common.settings import BusSettings
 from tests.cli.processes import PATIENCE_S, ran, sets
 from verification.harness.support import at, free_port, router_process, wait_until
 
@@ -83,19 +83,21 @@ def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("bus", "words"),
     [
-        (Bus(), "every program on this machine"),
-        (Bus(insecure=True), "everybody on the network, without a certificate"),
+        (BusSettings(), "every program on this machine"),
+        (BusSettings(insecure=True), "everybody on the network, without a certificate"),
         (
-            Bus(listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"),
+            BusSettings(
+                listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"
+            ),
             "this machine, and members with a certificate",
         ),
         (
-            Bus(uplink=("tcp/127.0.0.1:1",)),
+            BusSettings(uplink=("tcp/127.0.0.1:1",)),
             "every program on this machine, and whom the router tcp/127.0.0.1:1 lets in",
         ),
     ],
 )
-def test_it_says_whom_it_lets_in(bus: Bus, words: str) -> None:
+def test_it_says_whom_it_lets_in(bus: BusSettings, words: str) -> None:
     assert open_to(bus) == words
 
 

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from cli.run.router_watch import Watch
 from common.bus import answering
 from common.bus.session import client_config, router
-from common.settings import Bus, Log
+from common.settings import BusSettings, Log
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
 from verification.harness.support import at, free_port, listening, router_process, wait_until
@@ -142,7 +142,7 @@ def test_nobody_there_is_no_answer(endpoint: str) -> None:
 
 
 def test_the_router_itself_is_dialled_whatever_services_dial() -> None:
-    bus = Bus(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
+    bus = BusSettings(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
               insecure=True)  # fmt: skip
     assert answering.router_at(bus).endpoints == ("tcp/127.0.0.1:1",)
     tls = replace(bus, listen=("tls/0.0.0.0:1", "unixsock-stream//x"), ca="a", certificate="b",
@@ -153,7 +153,7 @@ def test_the_router_itself_is_dialled_whatever_services_dial() -> None:
 def test_a_probe_that_cannot_be_started_does_not_end_the_router(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    watch = Watch(Bus(), Log())
+    watch = Watch(BusSettings(), Log())
     tried = threading.Event()
 
     def refused(*_: object, **__: object) -> None:

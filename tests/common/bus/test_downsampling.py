@@ -10,7 +10,7 @@ from common import keys
 from common.bus.downsampling import thinned
 from common.bus.session import router_config
 from common.keys import COMMAND, FAST, TOPICS
-from common.settings import Bus
+from common.settings import BusSettings
 
 
 def rules(rate_hz: float) -> dict[str, float]:
@@ -48,13 +48,13 @@ def test_a_rate_that_no_stream_exceeds_thins_nothing() -> None:
 
 
 def test_a_router_of_a_robot_thins_what_goes_out_by_tls_and_nothing_on_board() -> None:
-    config = router_config(Bus(), robot="007")
+    config = router_config(BusSettings(), robot="007")
     zenoh.Config.from_json5(json.dumps(config))  # which refuses what it does not know
-    (thin,) = thinned("007", Bus().laptop_rate)["downsampling"]
+    (thin,) = thinned("007", BusSettings().laptop_rate)["downsampling"]
     assert config["downsampling"] == [thin]
     assert (thin["flows"], thin["messages"]) == (["egress"], ["put"])
     assert not {"tcp", "unixsock-stream"} & set(thin["link_protocols"])
 
 
 def test_a_router_of_no_robot_thins_nothing() -> None:
-    assert "downsampling" not in router_config(Bus())
+    assert "downsampling" not in router_config(BusSettings())

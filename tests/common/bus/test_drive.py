@@ -10,9 +10,9 @@ from common import codec, keys
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink, DriveOpener, LinkWatch
 from common.errors import ConfigError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Bumper, Motion
-from common.settings import Bus as Settings
+from common.settings import BusSettings as Settings
 from tests.common.bus_fixture import Rig, rising, until_heard
 from verification.harness.support import Lines, at, wait_until
 
@@ -201,17 +201,17 @@ def test_a_link_that_is_missing_lost_or_back_is_reported(lines: Lines) -> None:
     link, events = FakeLink(), []
     watch = LinkWatch(link, lambda name, level, text: events.append((name, level, text)))  # type: ignore[arg-type]
     for second in range(12):
-        watch.look(second * S)
+        watch.look(second * NS_PER_S)
     assert [line[1].split(";")[0] for line in lines] == ["no safety on the drive link"] * 2
     link.connected = True
-    watch.look(12 * S)
+    watch.look(12 * NS_PER_S)
     assert events == []  # it came for the first time
     link.connected = False
     for second in range(13, 19):
-        watch.look(second * S)
+        watch.look(second * NS_PER_S)
     assert len(lines) == 3
     link.connected = True
-    watch.look(19 * S)
+    watch.look(19 * NS_PER_S)
     assert [event[:2] for event in events] == [
         ("drive_link_lost", "error"), ("drive_link_up", "info"),
     ]  # fmt: skip

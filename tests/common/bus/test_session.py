@@ -29,7 +29,7 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Let the tries follow each other quickly, and tell when each was."""
     made: list[float] = []
 
-    def config(where: settings.Bus, turn: int) -> zenoh.Config:
+    def config(where: settings.BusSettings, turn: int) -> zenoh.Config:
         made.append(time.monotonic())
         quick = client_config(where, turn)
         quick.insert_json5("connect/timeout_ms", "50")

@@ -13,7 +13,7 @@ import zenoh
 
 from common import keys
 from common.bus.session import client_config, router_config
-from common.settings import Bus
+from common.settings import BusSettings
 from tests.common.bus_fixture import until_heard
 from verification.harness.support import at, free_port, listening, wait_until
 
@@ -36,7 +36,7 @@ class Tree:
     stops: set[str] = field(default_factory=set)
 
 
-def routing(where: Bus, more: dict[str, object]) -> zenoh.Session:
+def routing(where: BusSettings, more: dict[str, object]) -> zenoh.Session:
     return zenoh.open(zenoh.Config.from_json5(json.dumps(router_config(where) | more)))
 
 

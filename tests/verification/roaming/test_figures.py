@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.trace import Command, Kind
 from verification.roaming import figures, page
 from verification.roaming.conditions import Outage
@@ -13,7 +13,7 @@ from verification.roaming.figures import ASKED, BUMPER, MOTION, Chain, Stream
 from verification.roaming.notes import Note
 from verification.roaming.trial import Back
 
-MS = S // 1000
+MS = NS_PER_S // 1000
 GOOD = Stream(50.0, 0.02, (0.001, 0.002), 0)
 
 
@@ -33,12 +33,12 @@ def back(**rest: object) -> Back:
 
 def test_a_stream_has_a_rate_an_age_a_longest_gap_and_losses() -> None:
     notes = [note(BUMPER, 100, 7), note(BUMPER, 400, 8), note(BUMPER, 500, 10), note(MOTION, 600)]
-    stream = figures.stream(notes, BUMPER, 0, S)
+    stream = figures.stream(notes, BUMPER, 0, NS_PER_S)
     assert stream == Stream(3.0, 0.5, (pytest.approx(0.002), pytest.approx(0.002)), 1)  # type: ignore[arg-type]
 
 
 def test_a_stream_that_did_not_come_is_never_there() -> None:
-    stream = figures.stream([], BUMPER, 0, S)
+    stream = figures.stream([], BUMPER, 0, NS_PER_S)
     assert (stream.rate_hz, stream.gap_s, stream.lost) == (0.0, 1.0, 0)
     assert stream.age_s == (math.inf, math.inf)
 
@@ -46,7 +46,7 @@ def test_a_stream_that_did_not_come_is_never_there() -> None:
 def test_a_request_counts_once_its_verdict_tells_of_it() -> None:
     robot = [note(MOTION, 100, heard_ns=99 * MS), note(MOTION, 120), note(BUMPER, 130)]
     laptop = [note(ASKED, 90), note(ASKED, 140)]
-    drive = figures.drive(robot, laptop, [command(100), command(300, "stop", 0.0)], 0, S)
+    drive = figures.drive(robot, laptop, [command(100), command(300, "stop", 0.0)], 0, NS_PER_S)
     assert (drive.asked, drive.taken, drive.stops) == (2, 1, 1)
     assert drive.gap_s == pytest.approx(0.901)
 
@@ -64,10 +64,10 @@ def test_stopping_twice_is_two_stops_and_standing_is_none() -> None:
 
 
 def test_a_verdict_and_its_input_have_an_age() -> None:
-    chain = figures.chain([note(MOTION, 100, heard_ns=97 * MS, judged_ns=90 * MS)], 0, S)
+    chain = figures.chain([note(MOTION, 100, heard_ns=97 * MS, judged_ns=90 * MS)], 0, NS_PER_S)
     assert chain.verdict_s == pytest.approx((0.001, 0.001))
     assert chain.input_s == pytest.approx((0.008, 0.008))
-    assert figures.chain([], 0, S).verdict_s == (math.inf, math.inf)
+    assert figures.chain([], 0, NS_PER_S).verdict_s == (math.inf, math.inf)
 
 
 @pytest.mark.parametrize(

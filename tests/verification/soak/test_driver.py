@@ -11,7 +11,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Bus
 from common.errors import LinkError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim.control import Control
 from sim.requests import Asked, Place
 from sim.trace import Truth
@@ -19,7 +19,7 @@ from tests.cli.demo.lap_fixture import odometry, safety, truth
 from verification.harness.support import at
 from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
 
-BEAT_NS = S // 20
+BEAT_NS = NS_PER_S // 20
 
 
 class Desk(Bus):
@@ -64,14 +64,14 @@ class Scene:
     """An operator, his bus and his vehicle, at a clock of their own."""
 
     def __init__(self) -> None:
-        self.desk, self.vehicle, self.now_ns = Desk(), Vehicle(), 100 * S
+        self.desk, self.vehicle, self.now_ns = Desk(), Vehicle(), 100 * NS_PER_S
         self.operator = Operator(self.desk, cast("Control", self.vehicle), QUICK)
         self.driver = self.operator._driver
         self.driver.safety = safety("neutral")
 
     def beat(self, seconds: float = 0.0, boot: int = 5, verdict: m.Verdict = "run") -> None:
         """Beat for so long, at least once, with a pose that is always young."""
-        end_ns = self.now_ns + round(seconds * S)
+        end_ns = self.now_ns + round(seconds * NS_PER_S)
         while True:
             self.now_ns += BEAT_NS
             self.driver.safety = safety(verdict=verdict)
@@ -115,7 +115,7 @@ def test_what_cannot_be_set_right_is_tried_again(scene: Scene) -> None:
     scene.vehicle.there = True
     scene.beat(1.0)
     scene.desk.refuse("there is no router")
-    scene.beat(2 * TRY_NS / S)
+    scene.beat(2 * TRY_NS / NS_PER_S)
     assert len(scene.desk.asked) >= 3
     assert not scene.drives()
 

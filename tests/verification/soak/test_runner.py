@@ -13,7 +13,7 @@ import pytest
 
 from cli.run.supervisor import Supervisor
 from common.errors import LinkError
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim import trace as t
 from sim.control import Control
 from sim.requests import Asked, Driver
@@ -63,10 +63,10 @@ class Scene:
     def begin(self, fault: Fault) -> None:
         """Let this fault be the next one, and begin it."""
         self.yard._faults.next = lambda kills: fault  # type: ignore[method-assign]
-        self.yard.disturb(time.monotonic_ns() + round(FIRST_S * S), kills=True)
+        self.yard.disturb(time.monotonic_ns() + round(FIRST_S * NS_PER_S), kills=True)
 
     def finish(self) -> None:
-        self.yard.disturb(time.monotonic_ns() + S, kills=True)
+        self.yard.disturb(time.monotonic_ns() + NS_PER_S, kills=True)
 
     def runs(self) -> None:
         """Let the board take a command that moves the vehicle, now."""

@@ -3,7 +3,7 @@
 import pytest
 
 from cli.demo.score import Result
-from common.freshness import S
+from common.freshness import NS_PER_S
 from sim import trace as t
 from verification.soak.record import Life, Progress, Record, Sample, Window
 from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, moves, results, too_late
@@ -31,7 +31,7 @@ def well(seconds: int = 300) -> Record:
             Progress(s, what) for s in range(0, seconds, 10) for what in ("step", "lap finished")
         ],
         log=[(float(s), 500 * s) for s in range(seconds)],
-        windows=[Window("kill safety", 0, S)],
+        windows=[Window("kill safety", 0, NS_PER_S)],
         health={"safety": [float(s) for s in range(seconds)]},
         faults=[(20.0, "kill safety")],
         seconds=float(seconds),
@@ -184,7 +184,7 @@ def test_what_broke_down_is_wrong() -> None:
 def command(
     at_s: float, kind: t.Kind = "run", linear: float = 0.5, angular: float = 0
 ) -> t.Command:
-    return t.Command(mono_ns=round(at_s * S), kind=kind, linear=linear, angular=angular)
+    return t.Command(mono_ns=round(at_s * NS_PER_S), kind=kind, linear=linear, angular=angular)
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_what_moves(one: t.Command, moving: bool) -> None:
     ("at_s", "late_s"), [(1.99, None), (2.0, 0.0), (2.5, 0.5), (2.999, 0.999), (3.0, None)]
 )
 def test_a_run_is_too_late_within_the_window_only(at_s: float, late_s: float | None) -> None:
-    found = too_late([command(at_s)], Window("kill safety", 2 * S, 3 * S))
+    found = too_late([command(at_s)], Window("kill safety", 2 * NS_PER_S, 3 * NS_PER_S))
     assert [name for name, _ in found] == ([] if late_s is None else ["kill safety"])
     assert [late for _, late in found] == pytest.approx([] if late_s is None else [late_s])
 

@@ -7,7 +7,7 @@ from verification.outside.clients import LINK, STATE
 from verification.outside.stack import free_port, wait_for
 from verification.outside.testbed import Result, Testbed, scenario, seconds
 
-NO_SWITCHES = ("safety.require_switches=false", "safety.i_accept=require_switches")
+NO_SWITCHES = ("safety.require_switches=false", "safety.unsafe_overrides=require_switches")
 
 
 @scenario(
@@ -87,7 +87,7 @@ def restart(bed: Testbed) -> Result:
     "the board echoes no switch; require_switches = false is accepted",
     "drives",
     sets=NO_SWITCHES,
-    sets_if_known=("bridge.require_switches=false", "bridge.i_accept=require_switches"),
+    sets_if_known=("bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"),
     faults=lambda: Faults(switch_echo=False),
     armed=False,
 )

@@ -6,9 +6,9 @@ import pytest
 
 from cli.recordings.replay.plan import Aim, Choice, moves, refusal, speaker
 from common import keys
-from common.freshness import S
+from common.freshness import NS_PER_S
 
-BEGIN_NS = 1000 * S
+BEGIN_NS = 1000 * NS_PER_S
 PATHS = [topic.path.format(service="odom", side="left", source="web") for topic in keys.TOPICS]
 
 
@@ -55,7 +55,7 @@ def test_keys_are_picked_and_left_out() -> None:
 def test_times_are_from_the_beginning_of_the_recording() -> None:
     chosen = choice(from_s=1.0, to_s=2.0)
     assert not chosen.is_over(BEGIN_NS)
-    moments = [BEGIN_NS + n * S // 2 for n in range(6)]
+    moments = [BEGIN_NS + n * NS_PER_S // 2 for n in range(6)]
     assert [chosen.takes("tel/x", at) for at in moments] == [False, False, True, True, True, False]
     assert [chosen.is_over(at) for at in moments] == [False] * 5 + [True]
     assert not choice().is_over(BEGIN_NS)

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 from common import messages as m
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.keys import ROOT
 
-BEGIN_NS = 1_700_000_000 * S
+BEGIN_NS = 1_700_000_000 * NS_PER_S
 HIT_S, RESET_S, END_S = 4.0, 7.0, 10.0
 CONTACT = m.Cause(name="contact", action="brake", age=0.0, text="The bumper was hit.")
 IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="Nobody asks to move.")
@@ -37,7 +37,7 @@ def drive() -> Iterator[Told]:
 
 def at(path: str, message: m.Message, at_s: float) -> Told:
     """Return a message as it came so many seconds after the beginning."""
-    return f"{ROOT}/001/{path}", message, BEGIN_NS + round(at_s * S)
+    return f"{ROOT}/001/{path}", message, BEGIN_NS + round(at_s * NS_PER_S)
 
 
 def state(held: bool, number: int = 0) -> m.SafetyState:

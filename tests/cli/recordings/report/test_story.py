@@ -9,7 +9,7 @@ from cli.recordings.report.reactions import reactions
 from cli.recordings.report.story import Series, Story
 from cli.recordings.report.streams import Stream
 from cli.recordings.report.downsampling import thinned
-from common.freshness import S
+from common.freshness import NS_PER_S
 from common.messages import Durations, Health, Timing, Velocity
 from tests.cli.recordings.report import drive_fixture
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, HIT_S, RESET_S, drive
@@ -144,5 +144,5 @@ def test_without_a_reaction_there_are_no_figures() -> None:
 def test_time_runs_from_the_first_message() -> None:
     story = Story()
     story.hear("t2/v1/001/tel/mine", None, BEGIN_NS)
-    story.hear("t2/v1/001/tel/mine", None, BEGIN_NS + 3 * S)
+    story.hear("t2/v1/001/tel/mine", None, BEGIN_NS + 3 * NS_PER_S)
     assert (story.lasted_s, story.streams["t2/v1/001/tel/mine"].times) == (3.0, [0.0, 3.0])

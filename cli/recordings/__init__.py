@@ -1,0 +1,1 @@
+"""Recordings: made, shown, played back, reported and sent to Foxglove."""
