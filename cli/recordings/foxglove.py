@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import EVERYTHING, expression
 from cli.inspect.shell import add_end, add_options, quietly, seated
+from common.cli_args import sources
 from common.config import load
 from common.errors import LinkError, RobotError
-from common.cli_args import sources
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Channel, Entry, Translator
 

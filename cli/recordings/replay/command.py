@@ -14,8 +14,8 @@ from cli.recordings.replay.pace import Pace
 from cli.recordings.replay.plan import Choice
 from cli.recordings.replay.targets import BoardTarget, BusTarget, SimulatorTarget, Target
 from common.bus.probe import intersects, valid
-from common.config import load
 from common.cli_args import sources
+from common.config import load
 from services.bridge.config import BridgeConfig
 
 

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from cli.recordings.report.downsampling import thinned
 from cli.recordings.report.stops import Stop
 from cli.recordings.report.story import Motions, Series, Story
 from cli.recordings.report.streams import Stream
-from cli.recordings.report.downsampling import thinned
 
 WIDE = 11.0  # inches
 ASKED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#e6eaee"

@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from cli.__main__ import main
 from common.messages import Event, Health
 from common.settings import Vehicle
-from services.recorder.writer import Recording
 from services.recorder.mcap_codec import Translator
+from services.recorder.writer import Recording
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 

@@ -13,8 +13,8 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.settings import Vehicle
-from services.recorder.writer import Recording
 from services.recorder.mcap_codec import Translator
+from services.recorder.writer import Recording
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import Rig
 from tests.recorder import samples
@@ -80,9 +80,7 @@ def test_it_comes_to_the_byte_without_what_moves(
     result = tool("replay", str(path), *FAST)
     assert (result.code, result.err) == (0, "played 6 messages\n")
     wait_until(lambda: len(came) >= 6, "six messages")
-    whole = [
-        sample("tel/bridge/velocity", samples.velocity(second), second) for second in range(5)
-    ]
+    whole = [sample("tel/bridge/velocity", samples.velocity(second), second) for second in range(5)]
     assert shown(came) == [
         *(("tel/bridge/velocity", one.payload, b"%d" % n) for n, one in enumerate(whole)),
         ("tel/mine", b"last", b""),

@@ -11,8 +11,8 @@ from common import codec
 from common.keys import ROOT
 from common.sample import Sample
 from common.settings import Vehicle
-from services.recorder.writer import Recording
 from services.recorder.mcap_codec import Translator
+from services.recorder.writer import Recording
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
 
 

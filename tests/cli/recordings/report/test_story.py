@@ -5,10 +5,10 @@ import math
 import msgspec
 import pytest
 
+from cli.recordings.report.downsampling import thinned
 from cli.recordings.report.reactions import reactions
 from cli.recordings.report.story import Series, Story
 from cli.recordings.report.streams import Stream
-from cli.recordings.report.downsampling import thinned
 from common.freshness import NS_PER_S
 from common.messages import Durations, Health, Timing, Velocity
 from tests.cli.recordings.report import drive_fixture
