@@ -1,140 +1,199 @@
-"""Structured logs on standard error: readable on a terminal, JSON lines otherwise.
+"""Structured logs on standard error: text on a terminal, JSON lines otherwise.
 
-A line is an event in words, with what it is about in fields: ``Logger().warning("link lost",
-epoch=2)``. Where the lines of a process go is said once, by ``configure`` or ``hand_to``; without
-that they are text.
+``Logger().warning("link lost", epoch=2)`` logs an event with fields. It goes through the standard
+library's ``logging``, so warnings and errors of libraries arrive in the same form. ``configure``
+puts a queue between the callers and standard error: when a dead parent's pipe or a terminal after
+ctrl-S takes no more lines, lines are lost and the service goes on.
 """
 
 import atexit
 import contextlib
 import json
+import logging
 import os
 import queue
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from typing import TextIO, TypeAlias
+from logging.handlers import QueueHandler, QueueListener
+from typing import Any, TextIO, TypeAlias
 
 from common.settings import Log, LogLevel
 
-WAITING_MAX = 1000  # lines
-LAST_LINES_S = 0.5  # how long the end of a program waits for its last lines
-LEVELS: tuple[LogLevel, ...] = ("debug", "info", "warning", "error")
+NAME = "t2"  # of the logger of all our lines; others are of libraries
+QUEUE_MAX = 1000  # lines
+DRAIN_S = 0.5  # how long the end of a program waits for its last lines
 COLOURS = {"debug": 2, "info": 32, "warning": 33, "error": 31}  # of a terminal, by ECMA-48
 
-About: TypeAlias = Mapping[str, object]
-Take: TypeAlias = Callable[[LogLevel, str, About], None]
+Fields: TypeAlias = Mapping[str, object]
+Receiver: TypeAlias = Callable[[LogLevel, str, Fields], None]
 
 
 class Logger:
-    """Says what happens; each line carries what the logger itself is about, too."""
+    """Logs events with fields; each line carries the logger's own fields, too."""
 
-    def __init__(self, **about: object) -> None:
-        self._about = about
+    def __init__(self, **fields: object) -> None:
+        self._fields = fields
 
-    def debug(self, event: str, /, **about: object) -> None:
-        """Say what only a developer wants to know."""
-        self._say("debug", event, about)
+    def debug(self, event: str, /, **fields: object) -> None:
+        """Log what a developer wants to know."""
+        self._log(logging.DEBUG, event, fields)
 
-    def info(self, event: str, /, **about: object) -> None:
-        """Say what happens in a good life."""
-        self._say("info", event, about)
+    def info(self, event: str, /, **fields: object) -> None:
+        """Log a normal transition."""
+        self._log(logging.INFO, event, fields)
 
-    def warning(self, event: str, /, **about: object) -> None:
-        """Say what somebody should look at."""
-        self._say("warning", event, about)
+    def warning(self, event: str, /, **fields: object) -> None:
+        """Log what an operator should look at."""
+        self._log(logging.WARNING, event, fields)
 
-    def error(self, event: str, /, **about: object) -> None:
-        """Say what has failed."""
-        self._say("error", event, about)
+    def error(self, event: str, /, **fields: object) -> None:
+        """Log a failure."""
+        self._log(logging.ERROR, event, fields)
 
-    def _say(self, level: LogLevel, event: str, about: About) -> None:
-        least, take = _outlet
-        if LEVELS.index(level) >= least:
-            take(level, event, {**self._about, **about})
+    def _log(self, level: int, event: str, fields: Fields) -> None:
+        _logger.log(level, event, extra={"fields": {**self._fields, **fields}})
 
 
-class Lossy:
-    """A file that may be gone or not be read: a dead parent's pipe, a terminal after ctrl-S.
+class JsonFormatter(logging.Formatter):
+    """One JSON object a line, with the time in UTC."""
 
-    A thread writes, so that a line may be lost and never hold up the service that said it.
-    """
+    def __init__(self, service: str) -> None:
+        super().__init__()
+        self._service = service
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line, without its end."""
+        at = datetime.fromtimestamp(record.created, UTC).replace(tzinfo=None)
+        line = {
+            "service": self._service,
+            **fields_of(record),
+            "event": record.getMessage(),
+            "level": record.levelname.lower(),
+            "timestamp": f"{at.isoformat(timespec='microseconds')}Z",
+        }
+        return json.dumps(line, default=repr)
+
+
+class TextFormatter(logging.Formatter):
+    """A line for people, with the local time."""
+
+    def __init__(self, service: str = "", *, coloured: bool = False) -> None:
+        super().__init__()
+        self._service, self._coloured = service, coloured
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line, without its end."""
+        at = datetime.fromtimestamp(record.created).isoformat(timespec="milliseconds")
+        level = record.levelname.lower()
+        colour = COLOURS.get(level, COLOURS["error"])
+        word = f"\x1b[{colour}m{level:7}\x1b[0m" if self._coloured else f"{level:7}"
+        named = fields_of(record)
+        if self._service:
+            named = {"service": self._service, **named}
+        fields = " ".join(f"{name}={_shown(value)}" for name, value in named.items())
+        event = record.getMessage()
+        return f"{at} [{word}] {event if event.isprintable() else repr(event):30} {fields}".rstrip()
+
+
+class Output(logging.Handler):
+    """Writes to a file that may be closed or blocked; only the queue's thread uses it."""
 
     def __init__(self, file: TextIO) -> None:
+        super().__init__()
         self._file = file
-        self._lines: queue.Queue[str] = queue.Queue(WAITING_MAX)
-        self._thread = threading.Thread(target=self._run, name="log", daemon=True)
-        self._thread.start()
 
-    def write(self, text: str) -> None:
-        """Take a line; it is lost when too many wait already."""
-        with contextlib.suppress(queue.Full):
-            self._lines.put_nowait(text)
+    def createLock(self) -> None:  # noqa: N802 - logging's name
+        """Take no lock: ``logging`` would wait for it at exit while a write blocks."""
+        self.lock = None
 
-    def drain(self, patience_s: float = LAST_LINES_S) -> None:
-        """Wait until all lines are written, but no longer than this."""
-        deadline_s = time.monotonic() + patience_s
-        while self._lines.unfinished_tasks and time.monotonic() < deadline_s:
-            time.sleep(0.001)
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line and its end at once: the processes of `t2 up` share one standard error."""
+        with contextlib.suppress(OSError, ValueError):
+            self._write(f"{record.getMessage()}\n")
 
-    def _run(self) -> None:
-        while True:
-            line = self._lines.get()
-            with contextlib.suppress(OSError, ValueError):
-                self._pass_on(line)
-            self._lines.task_done()
-
-    def _pass_on(self, line: str) -> None:
+    def _write(self, line: str) -> None:
         try:
             self._file.write(line)
             self._file.flush()
         except BrokenPipeError:
-            # Nobody reads any more. Python would write what is left once more on its way out, and
-            # make its failure the exit code.
+            # The reader is gone. Python would write the rest once more on its way out, and make
+            # its failure the exit code.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self._file.fileno())
 
 
-def configure(settings: Log, service: str) -> Lossy:
-    """Set the level and the form of every line, put the service's name on it; return the file."""
+class LossyQueue(QueueHandler):
+    """Queue of formatted lines on their way to a file: a line is lost when too many wait."""
+
+    def __init__(self, file: TextIO, formatter: logging.Formatter) -> None:
+        self._lines: queue.Queue[logging.LogRecord] = queue.Queue(QUEUE_MAX)
+        super().__init__(self._lines)
+        self.setFormatter(formatter)
+        QueueListener(self._lines, Output(file)).start()
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Append a record, or drop it."""
+        with contextlib.suppress(queue.Full):
+            self._lines.put_nowait(record)
+
+    def drain(self, patience_s: float = DRAIN_S) -> None:
+        """Wait until all lines are written, at most this long."""
+        deadline_s = time.monotonic() + patience_s
+        while self._lines.unfinished_tasks and time.monotonic() < deadline_s:
+            time.sleep(0.001)
+
+
+class Callback(logging.Handler):
+    """Passes each line to a function, in the thread that logs it."""
+
+    def __init__(self, receive: Receiver) -> None:
+        super().__init__()
+        self._receive = receive
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Pass on level, event and fields."""
+        level: Any = "error" if record.levelno > logging.ERROR else record.levelname.lower()
+        self._receive(level, record.getMessage(), fields_of(record))
+
+
+def configure(settings: Log, service: str) -> LossyQueue:
+    """Send lines of the set level to standard error, with the service's name; return their queue.
+
+    Of libraries, only warnings and errors are logged.
+    """
     terminal = sys.stderr.isatty()
     text = settings.format == "text" or (settings.format == "auto" and terminal)
     coloured = terminal and "NO_COLOR" not in os.environ
-    lossy = Lossy(sys.stderr)
-    atexit.register(lossy.drain)
-
-    def take(level: LogLevel, event: str, about: About) -> None:
-        named = {"service": service, **about}
-        # A line and its end in one write: the processes of `t2 up` share one standard error.
-        lossy.write(
-            as_text(level, event, named, coloured) if text else as_json(level, event, named)
-        )
-
-    hand_to(take, settings.level)
-    return lossy
+    lines = LossyQueue(
+        sys.stderr, TextFormatter(service, coloured=coloured) if text else JsonFormatter(service)
+    )
+    atexit.register(lines.drain)
+    _install(lines, settings.level)
+    return lines
 
 
-def hand_to(take: Take, level: LogLevel) -> None:
-    """Hand each line of this level or a graver one to ``take``, in the thread that says it."""
-    global _outlet
-    _outlet = LEVELS.index(level), take
+def redirect(receive: Receiver, level: LogLevel) -> None:
+    """Send every line of this level or above to a function instead of standard error."""
+    _install(Callback(receive), level)
 
 
-def as_json(level: LogLevel, event: str, about: About) -> str:
-    """Return a line for machines, with its time in UTC."""
-    stamp = datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="microseconds")
-    line = {**about, "event": event, "level": level, "timestamp": f"{stamp}Z"}
-    return f"{json.dumps(line, default=repr)}\n"
+def fields_of(record: logging.LogRecord) -> dict[str, object]:
+    """Return the fields of a line: our own, or the name of the library that logged it."""
+    fields = dict(getattr(record, "fields", {} if record.name == NAME else {"logger": record.name}))
+    if record.exc_info and record.exc_info[0]:
+        fields["exception"] = logging.Formatter().formatException(record.exc_info)
+    return fields
 
 
-def as_text(level: LogLevel, event: str, about: About, coloured: bool = False) -> str:
-    """Return a line for people, with the local time."""
-    stamp = datetime.now().isoformat(timespec="milliseconds")
-    word = f"\x1b[{COLOURS[level]}m{level:7}\x1b[0m" if coloured else f"{level:7}"
-    fields = " ".join(f"{name}={_shown(value)}" for name, value in about.items())
-    said = event if event.isprintable() else repr(event)
-    return f"{stamp} [{word}] {said:30} {fields}".rstrip() + "\n"
+def _install(handler: logging.Handler, level: LogLevel) -> None:
+    root, least = logging.getLogger(), logging.getLevelNamesMapping()[level.upper()]
+    for old in root.handlers[:]:
+        if isinstance(old, LossyQueue | Callback):
+            root.removeHandler(old)
+    root.addHandler(handler)
+    root.setLevel(max(least, logging.WARNING))
+    _logger.setLevel(least)
 
 
 def _shown(value: object) -> str:
@@ -143,8 +202,6 @@ def _shown(value: object) -> str:
     return repr(value)
 
 
-def _write_plainly(level: LogLevel, event: str, about: About) -> None:
-    sys.stderr.write(as_text(level, event, about))
-
-
-_outlet: tuple[int, Take] = (0, _write_plainly)
+_logger = logging.getLogger(NAME)
+if logging.lastResort:  # before ``configure``: warnings and errors, as text
+    logging.lastResort.setFormatter(TextFormatter())

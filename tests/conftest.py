@@ -1,5 +1,6 @@
 """Fixtures of the integration tests."""
 
+import logging
 import os
 from collections.abc import Iterator
 
@@ -17,9 +18,16 @@ os.environ.setdefault("T2__ROBOT__REALTIME", "false")
 
 
 @pytest.fixture(autouse=True)
-def _own_logs(monkeypatch: pytest.MonkeyPatch) -> None:
+def _own_logs() -> Iterator[None]:
     """Undo what a service or command that ran in this process has set for its logs."""
-    monkeypatch.setattr(log, "_outlet", log._outlet)
+    root, ours = logging.getLogger(), logging.getLogger(log.NAME)
+    before = root.handlers[:], root.level, ours.level
+    yield
+    for handler in root.handlers[:]:
+        if isinstance(handler, log.LossyQueue | log.Callback) and handler not in before[0]:
+            root.removeHandler(handler)
+    root.setLevel(before[1])
+    ours.setLevel(before[2])
 
 
 @pytest.fixture

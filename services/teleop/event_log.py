@@ -38,7 +38,7 @@ class Logbook:
 
     def take_log(self, settings: Log) -> None:
         """Let every log line of this process end here and nowhere else."""
-        log.hand_to(self._keep, settings.level)
+        log.redirect(self._keep, settings.level)
 
-    def _keep(self, level: LogLevel, event: str, _: log.About) -> None:
+    def _keep(self, level: LogLevel, event: str, _: log.Fields) -> None:
         self.add("teleop", "info" if level == "debug" else level, event)

@@ -24,7 +24,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     for name in COMMANDS:
         assert re.search(rf"^  {name}\s", shown, re.MULTILINE), name
     titles = re.findall(r"^([A-Z]\w+):$", shown, re.MULTILINE)
-    assert titles == ["Run", "Inspect", "Record", "Commission", "Administer", "Develop"]
+    assert titles == ["Run", "Inspect", "Record", "Commission", "Administer"]
     assert max(map(len, shown.splitlines())) <= 80
 
 

@@ -30,7 +30,7 @@ def rig(shared_router: str) -> Iterator[Rig]:
 def lines() -> Lines:
     """Collect what is logged."""
     said: Lines = []
-    log.hand_to(lambda *line: said.append(line), "debug")
+    log.redirect(lambda *line: said.append(line), "debug")
     return said
 
 

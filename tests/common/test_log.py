@@ -3,7 +3,10 @@
 import contextlib
 import io
 import json
+import logging
 import os
+import re
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -34,9 +37,9 @@ def written(
 ) -> str:
     screen = Screen(tty)
     monkeypatch.setattr(sys, "stderr", screen)
-    lossy = log.configure(settings, "bridge")
+    lines = log.configure(settings, "bridge")
     getattr(log.Logger(), level)("link lost", epoch=2)
-    lossy.drain(PATIENCE_S)
+    lines.drain(PATIENCE_S)
     return screen.getvalue()
 
 
@@ -80,17 +83,59 @@ def test_the_level_decides(
     assert bool(written(monkeypatch, settings, tty=False, level=given)) is shown
 
 
-def test_what_is_no_json_is_told_in_words() -> None:
-    entry = json.loads(log.as_json("info", "Größe × 2", {"at": Path("a"), "values": (1, None)}))
-    assert (entry["event"], entry["at"]) == ("Größe × 2", repr(Path("a")))
+def record(level: int, event: str, **fields: object) -> logging.LogRecord:
+    made = logging.LogRecord(log.NAME, level, "file", 1, event, None, None)
+    made.fields = fields
+    return made
+
+
+def test_what_json_cannot_hold_is_written_as_its_repr() -> None:
+    line = log.JsonFormatter("up").format(
+        record(logging.INFO, "Größe × 2 %s", at=Path("a"), values=(1, None))
+    )
+    entry = json.loads(line)
+    assert (entry["event"], entry["at"]) == ("Größe × 2 %s", repr(Path("a")))
     assert entry["values"] == [1, None]
 
 
-def test_the_text_holds_what_it_is_about() -> None:
-    about = {"service": "up", "code": 1, "why": "no room", "world": ""}
-    stamp, line = log.as_text("error", "ended", about).split(" ", 1)
+def test_the_text_holds_the_fields() -> None:
+    made = record(logging.ERROR, "ended", code=1, why="no room", world="")
+    stamp, line = log.TextFormatter("up").format(made).split(" ", 1)
     assert datetime.fromisoformat(stamp).tzinfo is None
-    assert line == "[error  ] ended" + 26 * " " + "service=up code=1 why='no room' world=''\n"
+    assert line == "[error  ] ended" + 26 * " " + "service=up code=1 why='no room' world=''"
+
+
+def test_an_event_that_is_not_printable_is_written_as_its_repr() -> None:
+    line = log.TextFormatter("up").format(record(logging.INFO, "a\x1b[2J"))
+    assert "'a\\x1b[2J'" in line
+
+
+@pytest.mark.parametrize(("level", "shown"), [("info", False), ("warning", True), ("error", True)])
+def test_lines_of_libraries_arrive_from_warnings_on(
+    monkeypatch: pytest.MonkeyPatch, level: str, shown: bool
+) -> None:
+    screen = Screen(tty=False)
+    monkeypatch.setattr(sys, "stderr", screen)
+    lines = log.configure(Log(level="debug"), "dashboard")
+    getattr(logging.getLogger("uvicorn.error"), level)("%d connections", 3)
+    lines.drain(PATIENCE_S)
+    assert bool(screen.getvalue()) is shown
+    if shown:
+        entry = json.loads(screen.getvalue())
+        assert entry["service"] == "dashboard"
+        assert (entry["event"], entry["logger"]) == ("3 connections", "uvicorn.error")
+
+
+def test_an_exception_is_one_field_of_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Screen(tty=False)
+    monkeypatch.setattr(sys, "stderr", screen)
+    lines = log.configure(Log(), "dashboard")
+    try:
+        raise ValueError("broken")
+    except ValueError:
+        logging.getLogger("asyncio").exception("Task failed")
+    lines.drain(PATIENCE_S)
+    assert json.loads(screen.getvalue())["exception"].endswith("ValueError: broken")
 
 
 @pytest.mark.parametrize(("refused", "coloured"), [(False, True), (True, False)])
@@ -110,13 +155,11 @@ def test_a_logger_says_what_it_is_about_itself(lines: Lines) -> None:
     assert lines == [("info", "stopped", {"robot": "007", "asked_by": "hall"})]
 
 
-def test_before_it_is_told_where_it_is_text_on_standard_error(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    log.Logger().warning("early")
-    told = capsys.readouterr()
-    assert "[warning] early\n" in told.err
-    assert not told.out
+def test_before_it_is_configured_warnings_are_text_on_standard_error() -> None:
+    code = "from common.log import Logger; Logger().warning('early', epoch=2)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert re.search(r"\[warning\] early +epoch=2\n$", done.stderr)
+    assert not done.stdout
 
 
 @pytest.fixture
@@ -135,10 +178,10 @@ def test_a_file_that_nobody_reads_holds_up_nobody(pipe: tuple[int, TextIO]) -> N
     said = threading.Event()
 
     def say() -> None:
-        lossy = log.Lossy(pipe[1])
-        for _ in range(10 * log.WAITING_MAX):
-            lossy.write("x" * 100 + "\n")
-        lossy.drain(0.0)
+        lines = log.LossyQueue(pipe[1], logging.Formatter())
+        for _ in range(10 * log.QUEUE_MAX):
+            lines.handle(record(logging.INFO, "x" * 100))
+        lines.drain(0.0)
         said.set()
 
     threading.Thread(target=say, daemon=True).start()
@@ -147,10 +190,10 @@ def test_a_file_that_nobody_reads_holds_up_nobody(pipe: tuple[int, TextIO]) -> N
 
 def test_a_file_that_is_gone_loses_lines_only(pipe: tuple[int, TextIO]) -> None:
     os.close(pipe[0])
-    lossy = log.Lossy(pipe[1])
-    lossy.write("nobody reads this\n")
-    lossy.drain(PATIENCE_S)
-    lossy.write("nor this\n")
-    lossy.drain(PATIENCE_S)
+    lines = log.LossyQueue(pipe[1], logging.Formatter())
+    lines.handle(record(logging.INFO, "nobody reads this"))
+    lines.drain(PATIENCE_S)
+    lines.handle(record(logging.INFO, "nor this"))
+    lines.drain(PATIENCE_S)
     assert not pipe[1].closed
     pipe[1].flush()  # as Python does on its way out: what is left there would be its exit code

@@ -29,7 +29,7 @@ from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
 from services.safety.service import Ports
-from verification.cost.stand_ins import BOOT, Cable, Clock, Paper, Session
+from verification.cost.stand_ins import BOOT, Cable, Clock, DroppedLines, Session
 
 MS = NS_PER_S // 1000
 MOMENT_NS = 10_000  # between two frames, when the replay must not grow old
@@ -51,7 +51,7 @@ def node(name: str, root: type[C]) -> Node[C]:
     """Return a service's node with the shipped settings, on nobody's bus and the same each time."""
     loaded = load(root, Sources(environ={}))
     with (
-        patch.object(log, "Lossy", Paper),
+        patch.object(log, "LossyQueue", DroppedLines),
         patch.object(buses, "host_id", lambda: BOOT),
         patch("os.urandom", lambda size: (BOOT << 1).to_bytes(size, "big")),
     ):

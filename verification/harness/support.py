@@ -18,7 +18,7 @@ from common.loop import Loop
 from common.messages import Limits, SafetyState
 
 PATIENCE_S = 20.0
-Lines = list[tuple[settings.LogLevel, str, log.About]]  # of a log
+Lines = list[tuple[settings.LogLevel, str, log.Fields]]  # of a log
 WORKERS = 8  # whose ports do not meet
 T = TypeVar("T")
 
