@@ -2,10 +2,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+DEMO := .venv/.demo
 # uv installs in seconds what takes pip most of a minute. It does not read pip's settings: where it
 # finds nothing, pip has the last word.
 UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --python $(BIN)/python
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
+CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
+  "T2 needs Python 3.11 or newer: make PYTHON=/path/to/python3.11")
 
 .DEFAULT_GOAL := help
 .PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
@@ -17,7 +20,7 @@ help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 $(STAMP): requirements.lock pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "T2 needs Python 3.11 or newer; say make PYTHON=/path/to/python3.11")'
+	$(PYTHON) -c '$(CHECK_PYTHON)'
 	$(PYTHON) -m venv --clear .venv
 	awk '/^[^ #]/{on = /^uv==/} on' requirements.lock > .venv/uv.lock
 	$(PIP_INSTALL) --require-hashes -r .venv/uv.lock
@@ -26,21 +29,32 @@ $(STAMP): requirements.lock pyproject.toml
 	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
 
-demo: $(STAMP) ## a simulated T2 drives a lap through the real services
-	$(BIN)/t2 demo
+# The demo needs a fourth of what the tests need; with all of it there, it takes that.
+$(DEMO): requirements-demo.lock
+	$(PYTHON) -c '$(CHECK_PYTHON)'
+	$(PYTHON) -m venv --clear .venv
+	$(PIP_INSTALL) --require-hashes -r requirements-demo.lock
+	touch $@
+
+demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap through the real services
+	$(BIN)/python -m cli demo
 
 up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c
 	$(BIN)/t2 up
 
 # Most tests wait for other processes most of the time; some measure, and no other may run then.
-TOGETHER = -n 4 --dist worksteal -m "not alone"
+TOGETHER = -n 4 --dist worksteal -m "not alone and not campaign"
+
+# Millions of steps of the cores: tracing them would take three times as long and show nothing new.
+SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
+WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
 # What fails runs a second time, alone: docs/adr/0026-second-run.md.
 TESTS = $(BIN)/python -m tools.run_tests
 
-test: $(STAMP) ## all tests
-	$(TESTS) $(TOGETHER)
-	$(TESTS) -m alone
+test: $(STAMP) ## all tests but the campaigns and the search, which `make check` adds
+	$(TESTS) $(WITHOUT_SEARCH) $(TOGETHER)
+	$(TESTS) $(WITHOUT_SEARCH) -m alone
 
 fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
@@ -80,16 +94,13 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
 
-# Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
-
 search: $(STAMP) ## the search for holes in the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
 cover: $(STAMP) ## all tests but the search, with what those cover that do not measure
 	$(BIN)/coverage erase
-	$(TESTS) --cov --cov-report= $(addprefix --ignore=,$(SEARCH)) $(TOGETHER)
-	$(TESTS) $(addprefix --ignore=,$(SEARCH)) -m alone
+	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(TOGETHER)
+	$(TESTS) $(WITHOUT_SEARCH) -m "alone or campaign"
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 
@@ -116,9 +127,10 @@ LAPTOP = teleop dashboard record report foxglove keys
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
-lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, dashboard, laptop, bench
+lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, demo, dashboard, laptop, bench
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
+	$(LOCK) --constraint requirements.lock --extra demo -o requirements-demo.lock
 	$(LOCK) --constraint requirements.lock --extra record --extra dashboard -o requirements-dashboard.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 	$(subst pyproject.toml,,$(LOCK)) --constraint requirements.lock --group bench -o requirements-bench.lock

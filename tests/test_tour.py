@@ -32,7 +32,7 @@ TRIES = 3  # the doctor is right to complain of a machine that holds processes u
 KEY_S = 0.05  # between two repeats of a held key
 PAUSE_S = 1.0  # a "-" among the keys
 
-pytestmark = [pytest.mark.alone, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.campaign, pytest.mark.timeout(300)]
 
 
 class Newcomer:

@@ -41,7 +41,7 @@ def test_where_a_curve_bends(points: Sequence[Point], at: float | None) -> None:
     assert bend(points) == at
 
 
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_what_goes_from_one_to_the_other_is_timed() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with (
@@ -57,7 +57,7 @@ def test_what_goes_from_one_to_the_other_is_timed() -> None:
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_consumers_and_sizes_are_measured_at_a_real_bridge(tmp_path: Path) -> None:
     with curves.robot(compiled(tmp_path)) as it:
         made = curves.consumers(it, (1, 2), 0.5)
@@ -68,7 +68,7 @@ def test_consumers_and_sizes_are_measured_at_a_real_bridge(tmp_path: Path) -> No
         assert page.points(by_name, name, "bridge")
 
 
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_robots_are_measured_at_a_real_router() -> None:
     made = {one.name: one for one in curves.robots((2,), 1.0)}
     assert len(made[page.ROBOTS, "2", "delay"].samples_ns) > 10

@@ -90,7 +90,7 @@ def test_the_two_by_hand_ask_read_and_drive(sock: socket.socket) -> None:
 
 
 @CC
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_frames_are_counted_through_the_bridge(program: Path) -> None:
     made = {one.name: one for one in throughput.measure(program, [2], [100], 0.3)}
     name = "frames", "2", "100"
@@ -99,7 +99,7 @@ def test_frames_are_counted_through_the_bridge(program: Path) -> None:
 
 
 @CC
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_both_are_measured_in_turns(program: Path) -> None:
     by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.3)}
     chain = {name[2] for name in by_name if name[0] == page.CHAIN}

@@ -46,7 +46,7 @@ def test_a_stamp_is_nine_bytes_as_the_vehicle_reads_them() -> None:
 
 
 @wants_cc
-@pytest.mark.alone
+@pytest.mark.campaign
 @pytest.mark.parametrize(("part", "row"), EACH, ids=[f"{part}: {row.name}" for part, row in EACH])
 def test_each_carries_what_it_is_given(part: str, row: turns.Row, tmp_path: Path) -> None:
     if row.lacks:
@@ -58,7 +58,7 @@ def test_each_carries_what_it_is_given(part: str, row: turns.Row, tmp_path: Path
 
 
 @wants_cc
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_a_round_that_is_lost_is_told_and_another_follows(tmp_path: Path) -> None:
     ports = free_ports(asks=False)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -87,7 +87,7 @@ def overhear(sock: socket.socket, witness: int) -> None:
 
 
 @wants_cc
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_the_ages_are_those_of_a_stack_that_runs() -> None:
     made = telemetry.ages("quiet", 20)
     assert [one.name for one in made] == [(name, AGE, "quiet") for name, _, __ in STREAMS]

@@ -29,7 +29,7 @@ def test_the_one_process_speaks_as_the_bridge_does() -> None:
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-@pytest.mark.alone
+@pytest.mark.campaign
 @pytest.mark.parametrize("responder", RESPONDERS, ids=lambda each: each.name)
 def test_each_answers_every_hit(responder: Responder, tmp_path: Path) -> None:
     if responder.lacks:

@@ -30,7 +30,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
 
 @LINUX
-@pytest.mark.alone
+@pytest.mark.campaign
 def test_each_is_started_and_seen() -> None:
     with site() as here:
         times = {name: ns for row in ROWS for name, ns in row(here).items()}

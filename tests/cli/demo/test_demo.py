@@ -34,7 +34,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- one real lap -----------------------------------------------------------------------------
 
 
-@pytest.mark.alone
+@pytest.mark.campaign
 @pytest.mark.timeout(LAP_S + 40)
 def test_a_lap(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"

@@ -16,7 +16,7 @@ from verification.faults.stack_fixture import Lane, lane
 from verification.faults.table import Row
 from verification.faults.trial import tried
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.campaign
 
 CORE = (
     "contact in one sample", "estop", "bridge SIGKILL", "bridge SIGSTOP", "guard SIGKILL",

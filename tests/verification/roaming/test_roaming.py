@@ -9,7 +9,7 @@ import pytest
 
 from verification.roaming.__main__ import CANNOT
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.campaign
 
 NAMES = ("1 % lost", "down for 1 s")
 

@@ -21,7 +21,7 @@ def soak_command(*words: str) -> list[str]:
     return [sys.executable, "-m", "verification.soak", *words]
 
 
-@pytest.mark.alone
+@pytest.mark.campaign
 @pytest.mark.timeout(PATIENCE_S + 20)
 def test_a_short_soak(tmp_path: Path) -> None:
     """Half a minute of life says nothing of growth, so that alone may be called wrong."""

@@ -12,7 +12,7 @@ from verification.harness.support import wait_until
 LAP = Path(__file__).parents[3] / "recorder" / "lap.mcap"
 MOVING_MPS = 0.1
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.campaign
 
 
 def test_a_simulated_vehicle_drives_as_it_was_driven(tmp_path: Path) -> None:
