@@ -21,6 +21,9 @@ from typing import Any, TextIO, TypeAlias
 
 from common.settings import Log, LogLevel
 
+# What no line shows need not be collected for each.
+logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
+
 NAME = "t2"  # of the logger of all our lines; others are of libraries
 QUEUE_MAX = 1000  # lines
 DRAIN_S = 0.5  # how long the end of a program waits for its last lines
@@ -111,7 +114,7 @@ class Output(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line and its end at once: the processes of `t2 up` share one standard error."""
         with contextlib.suppress(OSError, ValueError):
-            self._write(f"{record.getMessage()}\n")
+            self._write(f"{self.format(record)}\n")
 
     def _write(self, line: str) -> None:
         try:
@@ -124,13 +127,18 @@ class Output(logging.Handler):
 
 
 class LossyQueue(QueueHandler):
-    """Queue of formatted lines on their way to a file: a line is lost when too many wait."""
+    """Queue of lines on their way to a file: a line is lost when too many wait."""
 
     def __init__(self, file: TextIO, formatter: logging.Formatter) -> None:
         self._lines: queue.Queue[logging.LogRecord] = queue.Queue(QUEUE_MAX)
         super().__init__(self._lines)
-        self.setFormatter(formatter)
-        QueueListener(self._lines, Output(file)).start()
+        output = Output(file)
+        output.setFormatter(formatter)
+        QueueListener(self._lines, output).start()
+
+    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
+        """Return the record as it is: the queue's thread formats it."""
+        return record
 
     def enqueue(self, record: logging.LogRecord) -> None:
         """Append a record, or drop it."""

@@ -124,15 +124,13 @@ class Cable(socket.socket):
 
 
 class DroppedLines(logging.Handler):
-    """A log without a file and without a thread."""
+    """A log without a file and without a thread, which formats nothing."""
 
-    def __init__(self, _: object, formatter: logging.Formatter) -> None:
+    def __init__(self, *_: object) -> None:
         super().__init__()
-        self.setFormatter(formatter)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Format a line and drop it."""
-        self.format(record)
+        """Drop a line."""
 
     def drain(self) -> None:
         """Return at once: no line waits."""
