@@ -5,6 +5,6 @@
 set -eu
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
-debootstrap --variant=minbase --include=python3-venv "${SUITE:-bookworm}" "$root" ${2:+"$2"}
+debootstrap --variant=minbase --include=python3-venv,binutils "${SUITE:-bookworm}" "$root" ${2:+"$2"}
 rm -rf "$root"/var/cache/apt/* "$root"/var/lib/apt/lists/*
 tar -C "$root" -c . | docker import --message "Debian ${SUITE:-bookworm} by debootstrap" - "$1"

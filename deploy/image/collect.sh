@@ -19,7 +19,16 @@ find "$library" \( -name test -o -name tests -o -name idlelib -o -name tkinter -
     -o -name '_tkinter*' -o -name '_test*' -o -name '_ctypes_test*' -o -name 'xxlimited*' \
     -o -name 'nis.*' -o -name '_dbm.*' -o -name '_gdbm.*' \) -prune \
   -o ! -type d -print >/opt/files
-find /opt/venv \( -name __pycache__ -o -path '*/zstandard/_cffi*' \) -prune -o ! -type d -print >>/opt/files
+# Tests, manuals, examples and stubs of packages; fonts of PDF; AVIF, which no picture of ours is.
+find /opt/venv \( -name __pycache__ -o -name tests -o -name '*.pyi' -o -path '*/zstandard/_cffi*' \
+    -o -path '*/pygame/docs' -o -path '*/pygame/examples' -o -path '*/mpl-data/sample_data' \
+    -o -path '*/mpl-data/fonts/afm' -o -path '*/mpl-data/fonts/pdfcorefonts' \
+    -o -name 'libavif*' -o -name '_avif.*' \) -prune -o ! -type d -print >>/opt/files
+# Symbols are for debuggers; a base without binutils keeps them. strip breaks what auditwheel patched,
+# so only extensions without libraries of their own are stripped.
+if command -v strip >/dev/null; then
+  grep -E '^/opt/venv/.*(\.abi3\.so|/zstandard/.*\.so)$' /opt/files | xargs -r strip --strip-unneeded
+fi
 # A library stands under the name that it is asked for by, whatever that is a link to.
 grep '\.so' /opt/files | xargs ldd "$python" 2>/dev/null \
   | sed -n 's/^\t\(.* => \)\{0,1\}\(\/[^ ]*\) (0x.*/\2/p' | sort -u | grep -v '^/opt/venv/' >/opt/links
