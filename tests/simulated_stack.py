@@ -161,7 +161,7 @@ class Clockwork:
 
     def _wish(self, wish: Wish, echo: int) -> None:
         self._seq["drive"] += 1
-        linear, angular = wish.twist
+        linear, angular = wish.twist.linear, wish.twist.angular
         request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)
         self._decide(Ask("demo", request, self.now_ns))
         assert self._told is not None

@@ -28,9 +28,9 @@ from common import codec
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
+from common.motion import STILL, Twist
 from services.safety.config import Source
 from services.safety.inputs import Ask
-from services.safety.twist import STILL, Twist
 
 RIVAL_NS = NS_PER_S // 2  # only one publisher must be left for this long
 

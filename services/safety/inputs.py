@@ -16,8 +16,8 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
+from common.motion import Twist
 from services.safety.trajectory import Counter
-from services.safety.twist import Twist
 
 
 class Ask(Struct, frozen=True):

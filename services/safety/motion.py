@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from common.messages import SONAR_NAMES
+from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle
 from services.safety.causes import wants_neutral
 from services.safety.config import Safety
@@ -13,7 +14,6 @@ from services.safety.latches import Latches, Observation
 from services.safety.ramp import ramp, start
 from services.safety.release import sweep
 from services.safety.state import RELEASE, State
-from services.safety.twist import STILL, Twist
 from services.safety.zones import zones
 
 
@@ -79,7 +79,7 @@ class Planner:
         limit = self.zones.limit(wish.twist, distances)
         target = wish.twist.scaled(limit.factor)
         sent = state.verdict
-        current = sent.twist if sent.command == "run" else start(measured, target)
+        current = sent.twist if sent.command is RUN else start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
         here = self.zones.limit(ramped, distances)
         for tightest in (limit, here):

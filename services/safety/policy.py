@@ -19,8 +19,8 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Command
 from common.messages import Verdict as VerdictName
+from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
 from services.safety.arbiter import Arbiter
 from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
@@ -35,7 +35,6 @@ from services.safety.sonar import Rules
 from services.safety.sonar_array import Ears
 from services.safety.standstill import Measured, Standstill, supervisor
 from services.safety.state import RELEASE, State, Verdict
-from services.safety.twist import STILL, Twist
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not leap
 AGAINST_MPS = 0.1  # against the command, more than noise and lag
@@ -95,7 +94,7 @@ class Policy:
             trajectory = trajectory.follow(counter, inputs.mileage.received_ns)
         release = state.release
         if "contact" in state.latches:
-            moved = sent.twist if sent.source == RELEASE and sent.command == "run" else None
+            moved = sent.twist if sent.source == RELEASE and sent.command is RUN else None
             reach = self.planner.reach
             release = release.moving(moved, known, counter, reach=reach, dt_s=step_s, now_ns=now_ns)
         return replace(
@@ -115,7 +114,7 @@ class Policy:
         self, state: State, inputs: Inputs, known: Twist | None, now_ns: int
     ) -> Standstill:
         sent, velocity = state.verdict, inputs.velocity
-        commanded = sent.command != "run" or sent.twist.rounds_to_zero
+        commanded = sent.command is not RUN or sent.twist.rounds_to_zero
         latest = Latest(known, velocity.received_ns) if known and velocity else None
         seen = Measured(latest, inputs.mileage if inputs.counter else None)
         return self._supervisor.follow(state.standstill, commanded, seen, now_ns)
@@ -171,18 +170,23 @@ class Policy:
         held = observe(state.latches, seen, now_ns, decision=state.decision)
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
-        command: Command = "run" if worst in ("run", "slow") else _COMMANDS[worst]
+        command = _COMMANDS[worst]
         verdict = Verdict(
             name=_name(worst, held),
             command=command,
-            twist=plan.twist if command == "run" else STILL,
+            twist=plan.twist if command is RUN else STILL,
             source=wish.source if wish else None,
             judged=_judged(inputs),
         )
         return state, verdict
 
 
-_COMMANDS: dict[str, Command] = {"stop": "stop", "brake": "brake"}
+_COMMANDS: dict[VerdictName, Command] = {
+    "run": RUN,
+    "slow": RUN,
+    "stop": STOP,
+    "brake": BRAKE,
+}
 
 
 def _worst(names: Iterable[str]) -> VerdictName:

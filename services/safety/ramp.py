@@ -1,6 +1,6 @@
 """How fast a request may change the velocity; a stop of safety never comes through here."""
 
-from services.safety.twist import Twist
+from common.motion import Twist, clamp
 
 
 def ramp(current: Twist, target: Twist, up: Twist, down: Twist, dt_s: float) -> Twist:
@@ -19,7 +19,7 @@ def _step(current: float, target: float, up: float, down: float) -> float:
     if current * target < 0:
         target = 0.0
     step = up if abs(target) > abs(current) else down
-    return current + max(-step, min(step, target - current))
+    return current + clamp(target - current, step)
 
 
 def start(measured: Twist, target: Twist) -> Twist:

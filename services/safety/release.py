@@ -16,9 +16,9 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction
+from common.motion import STILL, Twist
 from services.safety.latches import Held
 from services.safety.trajectory import Counter, Trajectory
-from services.safety.twist import STILL, Twist
 
 COAST_NS = NS_PER_S // 2  # after the last motion, a press and the counter still belong to a release
 SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}

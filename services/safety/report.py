@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
+from common.motion import RUN, Twist
 from services.safety.causes import BY_NAME
 from services.safety.inputs import Ask, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
@@ -15,7 +16,6 @@ from services.safety.operator_requests import room
 from services.safety.policy import Policy
 from services.safety.state import State
 from services.safety.trajectory import OPPOSITE
-from services.safety.twist import Twist
 
 MOVING = ("run", "slow")
 # What operators know a cause by, where its own name is too fine.
@@ -87,7 +87,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
 def sentence(state: State) -> str:
     """Say why the vehicle does or does not move."""
     names = ordered(state.latches)
-    if state.verdict.command == "run":
+    if state.verdict.command is RUN:
         who = f"Driving as {state.verdict.source} asks."
         slowing = [state.latches[n].text for n in names if BY_NAME[n].action == "slow"]
         return " ".join([*slowing[:1], who])

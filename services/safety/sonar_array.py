@@ -16,10 +16,10 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import SONAR_NAMES, Ultrasonic
+from common.motion import STILL, Twist
 from services.safety.latches import Token
 from services.safety.saturation import Saturation
 from services.safety.sonar import Moved, Rules, Sonar, read
-from services.safety.twist import STILL, Twist
 from services.safety.zones import Zones
 
 SILENT = tuple(Sonar() for _ in SONAR_NAMES)

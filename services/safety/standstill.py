@@ -36,8 +36,8 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
+from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
 from services.safety.config import Safety
-from services.safety.twist import STANDING_MPS, STANDING_RADPS, STILL, Twist
 
 GRACE_NS = NS_PER_S // 2  # on top of v / a
 LONGEST_STOP_NS = 3 * NS_PER_S  # both together, whatever the settings

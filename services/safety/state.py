@@ -3,8 +3,8 @@
 from msgspec import Struct
 
 from common.heartbeat import Heartbeat
-from common.messages import Command
 from common.messages import Verdict as VerdictName
+from common.motion import STILL, STOP, Command, Twist
 from services.safety.arbiter import Arbiter
 from services.safety.blind import Blind
 from services.safety.fault_budget import FaultBudget
@@ -14,7 +14,6 @@ from services.safety.runaway import Axis
 from services.safety.sonar_array import Heard
 from services.safety.standstill import Standstill
 from services.safety.trajectory import Trajectory
-from services.safety.twist import STILL, Twist
 
 RELEASE = "release"  # stands where a source stands while the vehicle creeps off its bumper
 
@@ -31,7 +30,7 @@ class Verdict(Struct, frozen=True):
     """What the bridge is told, and what became of the event that came with the inputs."""
 
     name: VerdictName = "inhibited"
-    command: Command = "stop"
+    command: Command = STOP
     twist: Twist = STILL  # still unless the command is to run
     source: str | None = None  # who drives, or would if safety let it
     judged: Token = (0, 0)  # boot and seq of the newest bumper sample that was judged

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from common.motion import Twist
 from common.settings import Vehicle
 from common.vehicle import Mount, sonar_mounts
 from services.safety.config import Safety
-from services.safety.twist import Twist
 
 GRAZING_MPS = 1e-6  # less is rounding: cos(90 deg) is no zero in floating point
 MEASURED_EXCESS_MPS = 0.2  # what lag and noise may put on top of the allowed speed

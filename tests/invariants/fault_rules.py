@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from common import keys
 from common import messages as m
+from common.motion import Twist
 from common.wire.frame import Side
-from sim.vehicle import Twist
 from tests.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Letter, Weather
 from tests.invariants.process import ROBOT
 from tests.invariants.stack import Stack

@@ -10,22 +10,21 @@ from msgspec.structs import replace
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.motion import Command, Twist
 from common.wire.frame import Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperReport
 from services.bridge import lease as leases
 from services.bridge import link as links
 from services.bridge.core import Core
-from services.bridge.lease import Lease, Order
+from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
 from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
 from services.safety.service import Ports
-from services.safety.twist import Twist
 from services.safety.zones import Zones
-from sim.vehicle import Twist as Rolling
 from tests.invariants.net import Letter, Weather
 from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
@@ -189,7 +188,7 @@ def successor_hits_something(stack: Stack) -> None:
             take(letter)
 
     successor(stack, late)
-    stack.vehicle.measured = Rolling(0.2)  # still, so that a way off is known
+    stack.vehicle.measured = Twist(0.2)  # still, so that a way off is known
     stack.run(40)
     stack.vehicle.pressed, stack.vehicle.measured = True, None
     stack.sticks["teleop"].asks = None
@@ -233,8 +232,8 @@ def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
     return replace(EXPIRE(lease, now_ns, lease_ns), neutral=lease.neutral)
 
 
-def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
-    return replace(lease, sent_ns=now_ns), Order.BRAKE
+def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=now_ns), Command.BRAKE
 
 
 def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
@@ -244,7 +243,7 @@ def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: 
 
 def authority_is_copied(stack: Stack) -> None:
     hand = stack.hand
-    copy = m.Motion(command="run", linear=0.9, seq=2**19, boot=stack.safety.boot)
+    copy = m.Motion(command=Command.RUN, linear=0.9, seq=2**19, boot=stack.safety.boot)
     hand.send(Letter(keys.MOTION.on(ROBOT), copy, hand.boot, stack.net.now_ns))
 
 

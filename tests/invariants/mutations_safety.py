@@ -3,24 +3,24 @@
 from collections.abc import Callable
 from typing import Any
 
+from common.motion import Twist
 from services.safety.arbiter import Arbiter
 from services.safety.blind import Blind
 from services.safety.standstill import Standstill, Supervisor
-from sim.vehicle import Twist as Rolling
 from tests.invariants.stack import Stack
 
 FAULT_MM = 0xFFFF
 
 
 def never_stops(stack: Stack) -> None:
-    stack.vehicle.measured = Rolling(0.28)
+    stack.vehicle.measured = Twist(0.28)
     stack.sticks["teleop"].asks = None
 
 
 def pushed(stack: Stack) -> None:
     stack.sticks["teleop"].asks = None
     stack.run(2500)
-    stack.vehicle.measured = Rolling(0.28)
+    stack.vehicle.measured = Twist(0.28)
 
 
 def nav_goes_on(stack: Stack) -> None:

@@ -5,6 +5,7 @@ import math
 from hypothesis import strategies as st
 
 from common import messages as m
+from common.motion import Command
 from tests.invariants.net import CLEAR, Weather
 from tests.invariants.vehicle import NO_ECHO_MM
 
@@ -40,6 +41,6 @@ HOSTILE = {
     "rival zero": m.Drive(linear=0.0, angular=0.0, echo=0, boot=6),
 }
 FORGED = [
-    [m.Motion(command="stop", boot=666), m.Motion(command="run", linear=0.7, boot=666)],
-    [m.Motion(command="run", linear=math.nan, boot=666)],
+    [m.Motion(command=Command.STOP, boot=666), m.Motion(command=Command.RUN, linear=0.7, boot=666)],
+    [m.Motion(command=Command.RUN, linear=math.nan, boot=666)],
 ]

@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Direction
-from sim.vehicle import Twist as Rolling
+from common.motion import Twist
 from tests.invariants.mutations import BREAKAGES, driver_blinks, driving, hold
 from tests.invariants.mutations_operator import OPERATOR_BREAKAGES
 from tests.invariants.mutations_safety import SAFETY_BREAKAGES
@@ -77,7 +77,7 @@ def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
     stack.run(1500)
     stack.kill("safety", 3000)
     stack.run(1000)
-    stack.vehicle.measured = Rolling(0.3)
+    stack.vehicle.measured = Twist(0.3)
     stack.run(600)
     stack.vehicle.measured = None
     stack.run(3000)

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from common.motion import Twist
 from common.settings import Wire
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Side
@@ -10,7 +11,7 @@ from common.wire.framing import Framing, Received
 from common.wire.reports import VelocityReport
 from sim.board import Board
 from sim.config import Drive, Sim
-from sim.vehicle import Twist, next_twist
+from sim.vehicle import next_twist
 from tests.invariants.net import MS, Net
 
 STEP_NS, STREAM_NS = 10 * MS, 20 * MS

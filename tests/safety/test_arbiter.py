@@ -10,10 +10,10 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
+from common.motion import Twist
 from services.safety.arbiter import RIVAL_NS, Arbiter, Channel
 from services.safety.config import Safety
 from services.safety.inputs import Ask
-from services.safety.twist import Twist
 
 SOURCES = Safety().sources
 AGE_NS = 400_000_000

@@ -5,11 +5,11 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES
+from common.motion import STILL
 from services.safety.causes import RULES
 from services.safety.config import Safety
 from services.safety.fault_budget import FAILURES
 from services.safety.latches import Held
-from services.safety.twist import STILL
 from tests.safety.policy_fixture import TICK_S, Scene, hit
 
 

@@ -3,10 +3,10 @@
 import pytest
 
 from common.freshness import NS_PER_S
+from common.motion import STILL, Twist
 from services.safety.latches import Held
 from services.safety.release import COAST_NS, Release, sweep
 from services.safety.trajectory import Counter, Trajectory
-from services.safety.twist import STILL, Twist
 
 REACH = 0.65
 BACK = Twist(-0.1)

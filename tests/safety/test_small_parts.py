@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S, Latest
 from common.heartbeat import CAPACITY, Heartbeat
 from common.messages import Mileage, Velocity
+from common.motion import STILL, Twist
 from services.safety.fault_budget import FAILURES, FaultBudget
 from services.safety.inputs import Inputs
 from services.safety.ramp import ramp, start
 from services.safety.runaway import Axis, Bounds
 from services.safety.trajectory import Counter
-from services.safety.twist import STILL, Twist
 
 UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
 BOUNDS = Bounds(deceleration=0.6, tolerance=0.3, against=0.1, patience_s=0.3)

@@ -6,11 +6,11 @@ import pytest
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import SONAR_NAMES, Ultrasonic
+from common.motion import Twist
 from common.settings import Vehicle
 from services.safety.config import Safety
 from services.safety.sonar import Rules
 from services.safety.sonar_array import Ears, Heard
-from services.safety.twist import Twist
 from services.safety.zones import zones
 from tests.safety.policy_fixture import FREE, NO_ECHO
 

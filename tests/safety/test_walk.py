@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Direction
+from common.motion import STILL, Command, Twist
 from services.safety.arbiter import Channel
 from services.safety.causes import RULES, Clears
 from services.safety.fault_budget import FaultBudget
@@ -23,7 +24,6 @@ from services.safety.release import Release
 from services.safety.runaway import Axis
 from services.safety.standstill import Phase, Standstill
 from services.safety.state import RELEASE, State, Verdict
-from services.safety.twist import STILL, Twist
 from tests.safety.policy_fixture import NO_ECHO, Scene
 
 BRAKING = {
@@ -361,7 +361,12 @@ def test_every_set_of_blocked_sonars_under_every_way_to_move() -> None:
             scene.tick()
             standing = scene.state
             for twist in TWISTS:
-                fresh(scene, replace(standing, verdict=Verdict("run", "run")), twist, armed=True)
+                fresh(
+                    scene,
+                    replace(standing, verdict=Verdict("run", Command.RUN)),
+                    twist,
+                    armed=True,
+                )
                 verdict = scene.decide()
                 walked += 1
                 blocked = any(closes_in(name, twist) for name in bad)

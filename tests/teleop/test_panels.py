@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Bumper, Cause, Direction
-from common.requests import Twist
+from common.motion import Twist
 from services.teleop import panels
 from services.teleop.round_trip import UNKNOWN, multiplexer
 from services.teleop.view import Line

@@ -151,7 +151,7 @@ def stops_in_order(m: Machine) -> str:
     last = [line for line in lines if line["event"] == "command"][-1]
     truth = [line for line in lines if line["event"] == "truth"][-1]
     # BREAK, where the machine holds processes up and the vehicle was not seen to stand.
-    assert last["kind"] in ("stop", "break"), last
+    assert last["kind"] in ("stop", "brake"), last
     results = {m.unit(name)["Result"] for name in UNITS}
     assert results == {"success"}, results
     held = f"{last['kind'].upper()} is the last command, at {truth['linear']:.2f} m/s it ends"

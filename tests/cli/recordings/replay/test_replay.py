@@ -12,6 +12,7 @@ from cli.recordings.replay import targets
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.motion import Command
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Translator
 from services.recorder.writer import Recording
@@ -37,7 +38,7 @@ def path(tmp_path: Path) -> Path:
         made.write(
             sample("tel/bridge/velocity", samples.velocity(second), second, raw=b"%d" % second)
         )
-        made.write(sample("@cmd/motion", m.Motion(command="run", linear=1.0), second))
+        made.write(sample("@cmd/motion", m.Motion(command=Command.RUN, linear=1.0), second))
         made.write(
             sample("@cmd/drive/demo", m.Drive(linear=second / 10, angular=0, echo=1), second)
         )

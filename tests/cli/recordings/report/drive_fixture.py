@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.keys import ROOT
+from common.motion import Command
 
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HIT_S, RESET_S, END_S = 4.0, 7.0, 10.0
@@ -52,8 +53,8 @@ def state(held: bool, number: int = 0) -> m.SafetyState:
 def motion(held: bool, number: int) -> m.Motion:
     """Return what safety lets through."""
     if held:
-        return m.Motion(seq=number, boot=3, command="brake", latched=True)
-    return m.Motion(seq=number, boot=3, command="run", linear=0.5, angular=0.1)
+        return m.Motion(seq=number, boot=3, command=Command.BRAKE, latched=True)
+    return m.Motion(seq=number, boot=3, command=Command.RUN, linear=0.5, angular=0.1)
 
 
 def ultrasonic(number: int) -> m.Ultrasonic:
