@@ -23,7 +23,7 @@ class Vehicle:
     """Hears datagrams with the complaints about them, and says its own."""
 
     def __init__(self, net: Net) -> None:
-        self.heard = 0  # frames
+        self.received = 0  # frames
         self.ranges = [NO_ECHO_MM] * 8
         self.board = Board(Wire(), Sim(), self._measure())
         self.twist = Twist()
@@ -67,7 +67,7 @@ class Vehicle:
         if not self.silent:
             self._net.later("from_board", lambda: self.inbox.append(datagram))
 
-    def hear(self, datagram: bytes, complaints: Complaints) -> None:
+    def receive(self, datagram: bytes, complaints: Complaints) -> None:
         """Let a datagram travel to the board."""
         moves = any(isinstance(frame, MotionCommand) for frame in frames(self._framing, datagram))
         kind = "motion" if moves else "query"  # or all that is lost might be of one kind
@@ -87,7 +87,7 @@ class Vehicle:
         if self.silent:
             return
         for frame in frames(self._framing, datagram):
-            self.heard += 1
+            self.received += 1
             answer = self.board.answer(frame)
             if isinstance(frame, MotionCommand):
                 self.on_motion(frame, complaints)
@@ -110,7 +110,7 @@ class Vehicle:
     def _measure(self) -> tuple[int, int, int, int, int, int, int, int]:
         a, b, c, d, e, f, g, h = (
             # A wall that stays the same to the millimetre would be a stuck sensor.
-            mm + (self.heard % 5 if 60 < mm < NO_ECHO_MM else 0)
+            mm + (self.received % 5 if 60 < mm < NO_ECHO_MM else 0)
             for mm in self.ranges
         )
         return a, b, c, d, e, f, g, h

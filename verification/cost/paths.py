@@ -29,7 +29,7 @@ from services.bridge.translate import BumperFilter
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
-from services.safety.service import Ports
+from services.safety.service import SafetyService
 from verification.cost.stand_ins import BOOT, Cable, Clock, DroppedLines, Session
 
 MS = NS_PER_S // 1000
@@ -157,7 +157,7 @@ class SafetyPaths:
         clock.install()
         self._node = node("safety", SafetyConfig)
         reader = self._node.open_bus()
-        Ports(self._node, reader)
+        SafetyService(self._node, reader)
         self._session = Session(self._node.bus, self._node.loop)
         self._link = Session(self._node.drive, self._node.loop)
         Session(reader, self._node.loop)

@@ -32,7 +32,7 @@ from common.wire.commands import MotionKind
 from common.wire.reports import UltrasonicReport
 from services.bridge.translate import Translator
 from services.safety.config import Safety
-from services.safety.inputs import Ask, Event, Inputs
+from services.safety.inputs import DriveRequest, Event, Inputs
 from services.safety.policy import Policy
 from sim.config import Drive as Motors
 from sim.geometry import Rectangle, wrapped
@@ -84,7 +84,7 @@ class Walk:
         self.policy = Policy(Safety(), vehicle)
         self.state = self.policy.start()
         self.translator = Translator(Wire(), vehicle, 1.0, 1.0)
-        self.inputs = Inputs(reader=True)
+        self.inputs = Inputs(estop_session_up=True)
         self.now_ns, self.ticks = 10 * NS_PER_S, 0
         self.distance = self.turn = self.metres = 0.0
         self.before = deque([self.pose], maxlen=BACK_TICKS)
@@ -106,7 +106,7 @@ class Walk:
                 seq=self.ticks,
                 boot=1,
             )
-            self._decide(Ask("teleop", drive, self.now_ns))
+            self._decide(DriveRequest("teleop", drive, self.now_ns))
         return abs(self.twist.linear) > 0.02 or abs(self.twist.angular) > 0.05
 
     def wander(self, seconds: float) -> float:

@@ -10,7 +10,7 @@ from common.motion import Command
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HIT_S, RESET_S, END_S = 4.0, 7.0, 10.0
 CONTACT = m.Cause(name="contact", action="brake", age=0.0, text="The bumper was hit.")
-IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="Nobody asks to move.")
+IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="No source requests motion.")
 
 Told = tuple[str, m.Message, int]  # key, message, time of its arrival
 
