@@ -1,4 +1,4 @@
-"""``t2 config``: what is in force and where each value came from."""
+"""``t2 config``: show the effective configuration and the source of each value."""
 
 import argparse
 import json
@@ -15,14 +15,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print every setting with its value and origin."""
+    """Print every setting with its value and source."""
     loaded = load(Everything, sources(options))
     print(as_json(loaded) if options.json else as_table(loaded))
     return 0
 
 
 def as_json(loaded: Loaded[Everything]) -> str:
-    """Return path to value and origin."""
+    """Return value and source of each setting, by path."""
     settings = {
         path: {"value": setting.value, "origin": setting.origin}
         for path, setting in loaded.settings.items()
@@ -31,12 +31,12 @@ def as_json(loaded: Loaded[Everything]) -> str:
 
 
 def as_table(loaded: Loaded[Everything]) -> str:
-    """Return a line for each setting: path, value, origin."""
+    """Return one line per setting: path, value, source."""
     rows = [
         (path, json.dumps(setting.value, ensure_ascii=False), setting.origin)
         for path, setting in loaded.settings.items()
     ]
-    wide = max(len(path) for path, _, _ in rows), max(len(value) for _, value, _ in rows)
+    widths = max(len(path) for path, _, _ in rows), max(len(value) for _, value, _ in rows)
     return "\n".join(
-        f"{path:{wide[0]}}  {value:{wide[1]}}  {origin}" for path, value, origin in rows
+        f"{path:{widths[0]}}  {value:{widths[1]}}  {origin}" for path, value, origin in rows
     )

@@ -1,4 +1,4 @@
-"""Every section of every service, as one configuration."""
+"""The configuration of the whole stack: the sections of all services."""
 
 from common import settings
 from services.bridge.config import Bridge
@@ -12,7 +12,7 @@ from sim.config import Sim
 
 
 class Everything(settings.Shared, frozen=True, kw_only=True):
-    """What may stand in ``config/``."""
+    """All sections that a file in ``config/`` may have."""
 
     board: settings.Board = settings.Board()
     wire: settings.Wire = settings.Wire()

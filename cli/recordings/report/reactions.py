@@ -1,8 +1,8 @@
-"""How fast the bridge reacted while the recording ran, from its histograms. Pure.
+"""Reaction times of the bridge during a recording, from its histograms. Pure.
 
-The bridge tells figures since its start. What lies before the recording is taken off; only the
-worst cannot be, unless it rose meanwhile: then it happened in the recording, else ``worst`` is None
-and the bound of the slowest bucket stands for it.
+The bridge publishes histograms since its start, so the counts before the recording are subtracted.
+The worst value belongs to the recording only if it rose meanwhile. Otherwise the bound of the
+slowest bucket replaces it.
 """
 
 from collections import Counter
@@ -17,7 +17,7 @@ EMPTY = Timing(bounds=(), durations={}, not_counted={})
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """A way or one of its hops; durations in s, None where nothing was measured."""
+    """A reaction or one of its hops; durations in s, None if nothing was measured."""
 
     name: str
     count: int
@@ -26,18 +26,18 @@ class Reaction:
     worst: float | None
 
 
-def reactions(lives: Iterable[tuple[Health, Health]]) -> list[Reaction]:
-    """Return what all lives of the bridge add up to, from the first and the last word of each."""
+def reactions(processes: Iterable[tuple[Health, Health]]) -> list[Reaction]:
+    """Return the sum over all bridge processes, from the first and last health of each."""
     bounds: tuple[float, ...] = ()
     sums: dict[str, Counter[int]] = {}
     worst: dict[str, float] = {}
-    for first, last in lives:
+    for first, last in processes:
         early, late = first.timing or EMPTY, last.timing or EMPTY
         bounds = late.bounds or bounds
         for name, each in late.durations.items():
             before = early.durations.get(name)
-            took = _since(before, each)
-            sums.setdefault(name, Counter()).update(dict(enumerate(took)))
+            counts = _since(before, each)
+            sums.setdefault(name, Counter()).update(dict(enumerate(counts)))
             if before is None or each.worst > before.worst:
                 worst[name] = max(worst.get(name, 0.0), each.worst)
     return [_reaction(name, bounds, counts, worst.get(name)) for name, counts in sums.items()]
@@ -56,10 +56,10 @@ def _reaction(
     if not total:
         return Reaction(name, 0, None, None, None)
     slowest = max(bucket for bucket, count in counts.items() if count)
-    known = bounds[slowest] if slowest < len(bounds) else bounds[-1]
-    told = Durations(
+    bound = bounds[slowest] if slowest < len(bounds) else bounds[-1]
+    durations = Durations(
         counts=tuple(counts[bucket] for bucket in range(len(bounds) + 1)),
-        worst=worst if worst is not None else known,
+        worst=worst if worst is not None else bound,
     )
-    p50, p99 = (quantile(bounds, told, share) for share in (0.5, 0.99))
-    return Reaction(name, total, p50, p99, told.worst)
+    p50, p99 = (quantile(bounds, durations, share) for share in (0.5, 0.99))
+    return Reaction(name, total, p50, p99, durations.worst)

@@ -1,4 +1,4 @@
-"""``t2 foxglove``: what a viewer gets over its web socket."""
+"""``t2 foxglove``: messages that a viewer receives over its WebSocket."""
 
 import json
 import struct
@@ -23,7 +23,7 @@ MESSAGE_DATA = 1
 
 
 class Viewer(threading.Thread):
-    """Asks for one topic, as soon as it is there, and keeps the first message of it."""
+    """Subscribes to one topic as soon as it is advertised, and keeps its first message."""
 
     def __init__(self, port: int, topic: str) -> None:
         super().__init__(daemon=True)
@@ -56,7 +56,7 @@ class Viewer(threading.Thread):
             if channel["topic"] == self._topic:
                 self.channel = channel
                 self._ask(socket)
-        # The server tells of a channel a moment before it lets anybody subscribe to it.
+        # The server advertises a channel shortly before it accepts subscriptions.
         if "Unknown channel" in said.get("message", ""):
             self._ask(socket)
 
@@ -72,7 +72,9 @@ class Viewer(threading.Thread):
         ("t2/v1/{robot}/tel/odom/odometry", "t2.v1.Odometry", "residual"),
     ],
 )
-def test_a_viewer_sees_it_live(rig: Rig, tool: Tool, topic: str, schema: str, field: str) -> None:
+def test_a_viewer_receives_live_messages(
+    rig: Rig, tool: Tool, topic: str, schema: str, field: str
+) -> None:
     port = free_port()
     pretend(rig, "odom", {keys.ODOMETRY: samples.odometry})
     viewer = Viewer(port, topic.format(robot=rig.robot))
@@ -85,7 +87,7 @@ def test_a_viewer_sees_it_live(rig: Rig, tool: Tool, topic: str, schema: str, fi
     assert field in json.loads(viewer.channel["schema"])["properties"]
 
 
-def test_a_taken_port_is_told(tool: Tool) -> None:
+def test_a_taken_port_is_an_error(tool: Tool) -> None:
     import socket
 
     with socket.socket() as taken:

@@ -1,4 +1,4 @@
-"""``t2 info``: whole files and cut ones, for people and for programs."""
+"""``t2 info``: complete and truncated files, as text and as JSON."""
 
 import json
 from pathlib import Path
@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from cli.__main__ import main
 from common.messages import Event, Health
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Translator
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 
@@ -19,7 +19,7 @@ from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     about = {"robot": "007", "version": "1.2.3", "why": "latch-contact"}
-    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), about)
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), about)
     health = Health(
         service="odom", version="1.2", uptime=0, rates={}, counters={}, lateness=0, rss=0
     )
@@ -41,7 +41,7 @@ def as_json(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, dict[s
     return code, told
 
 
-def test_for_programs(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, told = as_json(capsys, path)
     assert code == 0
     assert told["keys"][f"{ROOT}/tel/bridge/velocity"] == {
@@ -57,7 +57,7 @@ def test_for_programs(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [each["text"] for each in told["latched"]] == ["contact"]
 
 
-def test_a_cut_file_is_told_as_far_as_it_goes(
+def test_a_truncated_file_is_summarized_up_to_its_end(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with path.open("rb") as file:
@@ -71,14 +71,14 @@ def test_a_cut_file_is_told_as_far_as_it_goes(
     assert 0 < told["readable"] <= told["bytes"]
     assert told["messages"] == 13
     assert main(["info", "--text", str(path)]) == 1
-    assert f"cut short, {told['readable']} bytes can be read" in capsys.readouterr().out
+    assert f"truncated, {told['readable']} bytes are readable" in capsys.readouterr().out
 
 
-def test_for_people(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "--text", str(path)]) == 0
     shown = capsys.readouterr().out
     for said in (
-        "whole", "robot 007, recorded by T2 1.2.3", "because of: latch-contact",
+        "complete", "robot 007, recorded by T2 1.2.3", "reason: latch-contact",
         "16 messages in 2.0 s",
         "versions: odom 1.2", "001/tel/bridge/velocity", "10.0", "latched:", "contact: hit",
     ):  # fmt: skip
@@ -86,12 +86,12 @@ def test_for_people(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_an_empty_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), {})
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
     made.close()
     assert main(["info", "--text", str(made.path)]) == 0
     assert "no messages" in capsys.readouterr().out
 
 
-def test_no_such_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(tmp_path / "gone.mcap")]) == 1
     assert "gone.mcap: cannot be read: No such file" in capsys.readouterr().err
