@@ -1,4 +1,4 @@
-"""The exporter with a viewer's certificate: it needs no right to say anything."""
+"""The exporter with a viewer's certificate."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,7 +28,7 @@ def loop() -> Iterator[Loop]:
         yield it
 
 
-def test_a_viewer_is_told_all_that_it_exports(loop: Loop, tmp_path: Path) -> None:
+def test_a_viewer_certificate_is_sufficient(loop: Loop, tmp_path: Path) -> None:
     site = Site(tmp_path / "keys")
     own = site.member("robot", ROBOT, "--address", "127.0.0.1")
     viewer = site.member("viewer", "prometheus")
