@@ -50,7 +50,7 @@ def desk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Desk:
     return made
 
 
-def test_the_life_of_a_certificate(desk: Desk) -> None:
+def test_life_cycle_of_a_certificate(desk: Desk) -> None:
     assert "driver.anna." in desk.keys("issue", "driver", "anna", "--robot", "001")
     assert desk.states() == {"driver.anna.0": "valid"}
     first = (desk.folder / "driver.anna" / "private.key").read_bytes()
@@ -58,7 +58,7 @@ def test_the_life_of_a_certificate(desk: Desk) -> None:
     assert f"t2 keys revoke driver anna --serial {desk.serials()[0]}" in said
     assert (desk.folder / "driver.anna" / "private.key").read_bytes() != first
     assert desk.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
-    assert "driver anna ends in 19 days" in desk.keys("list")
+    assert "driver anna expires in 19 days" in desk.keys("list")
     desk.keys("revoke", "driver", "anna", "--serial", desk.serials()[0])
     assert desk.states() == {"driver.anna.0": "revoked", "driver.anna.1": "expires soon"}
     desk.keys("revoke", "driver", "anna")
@@ -67,7 +67,7 @@ def test_the_life_of_a_certificate(desk: Desk) -> None:
     assert desk.states()["driver.anna.2"] == "valid"
 
 
-def test_a_driver_gets_the_sources_of_a_person_unless_told_and_keeps_them(desk: Desk) -> None:
+def test_sources_of_a_driver(desk: Desk) -> None:
     assert "drives as teleop or web or checkout;" in desk.keys(
         "issue", "driver", "anna", "--robot", "001"
     )
@@ -78,7 +78,7 @@ def test_a_driver_gets_the_sources_of_a_person_unless_told_and_keeps_them(desk: 
     desk.keys("issue", "viewer", "hall", "--source", "nav", code=EXIT_CONFIG)
 
 
-def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
+def test_renewal_keeps_rights_and_addresses(desk: Desk) -> None:
     desk.keys("issue", "site", "berlin", "--address", "site.example", "--address", "10.0.0.9")
     desk.keys("issue", "robot", "001")
     desk.keys("issue", "driver", "anna", "--robot", "001", "--robot", "002")
@@ -87,13 +87,13 @@ def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
     members = read(desk.folder / "members.json")
     assert members.members[2].robots == members.members[5].robots == ("001", "002")
     said = desk.keys("renew", "site", "berlin")
-    assert "found at site.example, 10.0.0.9, localhost, 127.0.0.1;" in said
-    assert "found at 10.1.1.1, localhost" in desk.keys(
+    assert "addresses site.example, 10.0.0.9, localhost, 127.0.0.1;" in said
+    assert "addresses 10.1.1.1, localhost" in desk.keys(
         "renew", "robot", "001", "--address", "10.1.1.1"
     )
 
 
-def test_a_router_is_known_when_its_folder_is_with_it(desk: Desk, tmp_path: Path) -> None:
+def test_routers_are_known_without_their_folders(desk: Desk, tmp_path: Path) -> None:
     desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
     desk.keys("issue", "driver", "anna", "--robot", "002")
     (desk.folder / "robot.002").rename(tmp_path / "away")
@@ -102,19 +102,19 @@ def test_a_router_is_known_when_its_folder_is_with_it(desk: Desk, tmp_path: Path
     assert f"/robot.002/. {target}\n" in desk.keys("renew", "robot", "002")
 
 
-def test_of_a_list_without_addresses_they_are_asked(desk: Desk) -> None:
+def test_renewal_without_addresses_is_an_error(desk: Desk) -> None:
     desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
     listed = desk.folder / "members.json"
     table = json.loads(listed.read_bytes())
     del table["members"][0]["addresses"]
     listed.write_text(json.dumps(table), encoding="utf-8")
     said = desk.keys("renew", "robot", "002", code=1)
-    assert "`t2 keys renew robot 002 --address HOST` says so" in said
+    assert "`t2 keys renew robot 002 --address HOST`" in said
     desk.keys("renew", "robot", "002", "--address", "192.168.1.3")
-    assert "found at 192.168.1.3, localhost" in desk.keys("renew", "robot", "002")
+    assert "addresses 192.168.1.3, localhost" in desk.keys("renew", "robot", "002")
 
 
-def test_the_settings_are_valid_wherever_the_folder_is_put(
+def test_settings_are_independent_of_the_folder_path(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     desk.keys("issue", "robot", "007")
@@ -130,23 +130,23 @@ def test_the_settings_are_valid_wherever_the_folder_is_put(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("init",), 1, "is there already: another CA would lock everybody out"),
-        (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is no name"),
+        (("init",), 1, "exists: another CA would invalidate all certificates"),
+        (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is not a name"),
         (("issue", "driver", "anna"), EXIT_CONFIG, "a driver needs --robot ID"),
-        (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router wants --address"),
+        (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router needs --address"),
         (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
-        (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such is not there, and only it"),
+        (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such not found: it is needed"),
         (("renew", "driver", "ben"), 1, "driver ben has no certificate, or a revoked one"),
         (("revoke", "driver", "ben"), 1, "driver ben has no certificate that could be revoked"),
     ],
 )
-def test_refusals(desk: Desk, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors(desk: Desk, words: tuple[str, ...], code: int, said: str) -> None:
     before = (desk.folder / "members.json").read_bytes()
     assert said in desk.keys(*words, code=code)
     assert (desk.folder / "members.json").read_bytes() == before
 
 
-def test_nobody_gets_a_second_certificate_by_mistake(desk: Desk) -> None:
+def test_issue_refuses_a_second_certificate(desk: Desk) -> None:
     desk.keys("issue", "viewer", "guest")
     assert "viewer guest has a certificate until" in desk.keys("issue", "viewer", "guest", code=1)
 
@@ -163,7 +163,7 @@ def test_an_empty_serial_revokes_nothing(desk: Desk, capsys: pytest.CaptureFixtu
     with pytest.raises(SystemExit) as end:
         desk.keys("revoke", "viewer", "guest", "--serial", "")
     assert end.value.code == 2
-    assert "--serial: it is empty; `t2 keys list` shows serials" in capsys.readouterr().err
+    assert "--serial: is empty; `t2 keys list` shows serials" in capsys.readouterr().err
     assert desk.states() == {"viewer.guest.0": "valid"}
 
 
@@ -175,11 +175,11 @@ def test_without_an_authority(
     words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = Desk(tmp_path / "none", capsys).keys(*words, code=1)
-    assert "none has no CA; `t2 keys init` makes one" in said
+    assert "none has no CA; `t2 keys init` creates one" in said
     assert not (tmp_path / "none").exists()
 
 
-def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_expired_authority(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     later_s = time.time() + CA_DAYS * DAY_S
 
     class Later:
@@ -188,11 +188,11 @@ def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) ->
             return later_s
 
     monkeypatch.setattr("cli.keys.operations.time", Later)
-    assert "the CA has reached its end" in desk.keys("issue", "viewer", "v", code=1)
-    assert "the CA has ended: make another" in desk.keys("list")
+    assert "the CA has expired" in desk.keys("issue", "viewer", "v", code=1)
+    assert "the CA has expired: create another" in desk.keys("list")
 
 
-def test_a_list_that_is_none(desk: Desk) -> None:
+def test_an_invalid_member_list(desk: Desk) -> None:
     (desk.folder / "members.json").write_text("[]", encoding="utf-8")
     assert "is no list of members" in desk.keys("list", code=EXIT_CONFIG)
 
@@ -211,18 +211,18 @@ def test_a_passphrase_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[
     desk.keys("init", "--passphrase-file", str(secret))
     assert b"ENCRYPTED" in (desk.folder / "ca.key").read_bytes()
     issue = ("issue", "viewer", "v", "--passphrase-file")
-    assert "a wrong passphrase" in desk.keys(*issue, str(wrong), code=1)
+    assert "wrong passphrase" in desk.keys(*issue, str(wrong), code=1)
     assert "cannot be read" in desk.keys(*issue, str(tmp_path / "none"), code=EXIT_CONFIG)
     assert "viewer.v." in desk.keys(*issue, str(secret))
 
 
-def test_without_a_terminal_nobody_is_asked(tmp_path: Path) -> None:
+def test_no_passphrase_prompt_without_a_terminal(tmp_path: Path) -> None:
     asked = subprocess.run(
         t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys")),
         stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert asked.returncode == 1
-    assert "give --passphrase-file FILE" in asked.stderr
+    assert "use --passphrase-file FILE" in asked.stderr
     assert not (tmp_path / "keys").exists()
 
 
@@ -230,11 +230,11 @@ def test_without_a_terminal_nobody_is_asked(tmp_path: Path) -> None:
     ("typed", "code", "said"),
     [
         ("horse\nhorse\n", 0, "holds the certificate authority"),
-        ("horse\nhouse\n", EXIT_CONFIG, "two different ones; nothing was made"),
-        ("\n", EXIT_CONFIG, "an empty one protects nothing"),
+        ("horse\nhouse\n", EXIT_CONFIG, "the two passphrases differ; nothing was created"),
+        ("\n", EXIT_CONFIG, "an empty passphrase does not protect the key"),
     ],
 )
-def test_a_passphrase_is_asked_twice_and_not_shown(
+def test_the_passphrase_prompt_repeats_and_hides_the_input(
     typed: str, code: int, said: str, tmp_path: Path
 ) -> None:
     command = t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys"))

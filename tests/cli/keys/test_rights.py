@@ -169,7 +169,7 @@ def alive(session: zenoh.Session) -> set[str]:
 
 
 @pytest.mark.parametrize(("speaker", "hearer"), [("on board", "viewer"), ("viewer", "on board")])
-def test_who_comes_late_gets_the_events_that_are_kept(
+def test_late_subscribers_get_cached_events(
     sessions: Mapping[str, zenoh.Session], speaker: str, hearer: str
 ) -> None:
     key = keys.EVENTS.on(MINE, service="dashboard")

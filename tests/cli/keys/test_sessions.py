@@ -14,7 +14,7 @@ import msgspec
 import pytest
 import zenoh
 
-from cli.keys.ca import Authority
+from cli.keys.ca import CertificateAuthority
 from cli.keys.profile import DAY_S, Profile, Span, profile
 from cli.keys.store import locked
 from common.bus.session import client_config, router
@@ -34,16 +34,18 @@ class Site:
 
     def __init__(self, folder: Path) -> None:
         self.now_s = time.time()
-        self.authority = Authority.found("berlin", Span(self.now_s - DAY_S, self.now_s + DAY_S))
+        self.authority = CertificateAuthority.create(
+            "berlin", Span(self.now_s - DAY_S, self.now_s + DAY_S)
+        )
         with locked(folder, create=True) as self.folder:
-            self.folder.found(self.authority, Members(site="berlin"), b"")
+            self.folder.create_authority(self.authority, Members(site="berlin"), b"")
 
     def bus(self, who: Profile, begins_s: float = -60, ends_s: float = 3600) -> BusSettings:
         """Return the settings of somebody whose certificate is good from then on until then."""
         valid = Span(self.now_s + begins_s, self.now_s + ends_s)
         issued = self.authority.issue(who, valid)
         listed = Members(site="berlin", members=(*self.folder.read().members, issued.member))
-        target = self.folder.hand_out(who, issued, listed, settings=True)
+        target = self.folder.write_machine(who, issued, listed, settings=True)
         self.folder.write(listed)
         return load(Shared, Sources(files=(target / "bus.toml",), environ={})).config.bus
 
@@ -81,7 +83,7 @@ def dial(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
     return zenoh.open(config)
 
 
-def test_a_member_gets_in_and_is_heard(site: Site, endpoint: str) -> None:
+def test_a_member_can_connect_and_publish(site: Site, endpoint: str) -> None:
     with dial(site.bus(DRIVER), endpoint) as one, dial(site.bus(ROBOT), endpoint) as other:
         heard = other.declare_subscriber(KEY, zenoh.handlers.RingChannel(1))
 
@@ -95,9 +97,7 @@ def test_a_member_gets_in_and_is_heard(site: Site, endpoint: str) -> None:
 
 
 @pytest.mark.parametrize("where", ["127.0.0.1", "localhost"])
-def test_a_router_is_believed_at_each_of_its_addresses(
-    where: str, site: Site, endpoint: str
-) -> None:
+def test_a_router_is_valid_at_each_of_its_addresses(where: str, site: Site, endpoint: str) -> None:
     port = endpoint.rpartition(":")[2]
     with dial(site.bus(DRIVER), f"tls/{where}:{port}") as session:
         assert list(session.info.routers_zid())
@@ -134,7 +134,7 @@ def of_another_key(site: Site, _: Site, endpoint: str) -> zenoh.Session:
     [without_a_certificate, of_a_foreign_authority, ended, not_yet_good, of_another_key],
     ids=lambda tried: tried.__name__,
 )
-def test_who_is_kept_out(
+def test_rejected_clients(
     tried: Callable[[Site, Site, str], zenoh.Session], site: Site, stranger: Site, endpoint: str
 ) -> None:
     with pytest.raises(zenoh.ZError), tried(site, stranger, endpoint):
@@ -143,7 +143,7 @@ def test_who_is_kept_out(
         pass
 
 
-def test_a_laptop_believes_no_router_of_a_foreign_authority(site: Site, stranger: Site) -> None:
+def test_a_client_rejects_a_router_of_another_authority(site: Site, stranger: Site) -> None:
     with listening(stranger.bus(ROBOT)) as endpoint:
         with pytest.raises(zenoh.ZError):
             dial(site.bus(DRIVER), endpoint)
@@ -151,7 +151,7 @@ def test_a_laptop_believes_no_router_of_a_foreign_authority(site: Site, stranger
             pass
 
 
-def test_a_laptop_believes_no_driver_who_pretends_to_be_a_router(site: Site) -> None:
+def test_a_client_rejects_a_driver_as_router(site: Site) -> None:
     guest = site.bus(profile("viewer", "guest", (), ()))
     pretending = msgspec.structs.replace(site.bus(DRIVER), members="unused")
     # At any address: a driver's certificate names none, but it is also for dialling only.
@@ -164,7 +164,7 @@ def test_a_laptop_believes_no_driver_who_pretends_to_be_a_router(site: Site) -> 
         pass  # nothing else was in the way
 
 
-def test_a_laptop_believes_a_router_at_its_own_addresses_only(site: Site) -> None:
+def test_a_client_rejects_a_router_at_another_address(site: Site) -> None:
     elsewhere = profile("robot", "002", (), ("192.0.2.7",))
     issued = Profile("robot", "002", ("002",), elsewhere.addresses[:1])
     with listening(site.bus(issued)) as endpoint:
@@ -174,7 +174,7 @@ def test_a_laptop_believes_a_router_at_its_own_addresses_only(site: Site) -> Non
             pass  # nothing else was in the way
 
 
-def test_a_link_ends_with_its_certificate(site: Site, endpoint: str) -> None:
+def test_a_link_ends_when_its_certificate_expires(site: Site, endpoint: str) -> None:
     brief = Site.__new__(Site)
     brief.now_s, brief.authority, brief.folder = time.time(), site.authority, site.folder
     with dial(brief.bus(DRIVER, ends_s=3.0), endpoint) as session:
@@ -182,7 +182,7 @@ def test_a_link_ends_with_its_certificate(site: Site, endpoint: str) -> None:
         wait_until(lambda: not list(session.info.routers_zid()), "the end of the link")
 
 
-def test_a_router_without_its_files_says_so(site: Site, tmp_path: Path) -> None:
+def test_missing_certificate_files_are_an_error(site: Site, tmp_path: Path) -> None:
     broken = tmp_path / "broken.pem"
     broken.write_text("no certificate", encoding="utf-8")
     bus = msgspec.structs.replace(site.bus(ROBOT), certificate=str(broken))

@@ -92,7 +92,7 @@ WAYS: dict[str, Callable[[int], None]] = {
 @pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
 @pytest.mark.parametrize("way", WAYS)
-def test_no_run_follows_a_kill_of(way: str, tmp_path: Path) -> None:
+def test_no_run_after_a_kill_of(way: str, tmp_path: Path) -> None:
     with driven(tmp_path) as (pid, frames):
         frames.forget()
         at_ns = time.monotonic_ns()
