@@ -1,4 +1,4 @@
-"""A router for all tests of this folder, and for each test a robot id and a recordings folder."""
+"""A router for all tests of this folder; for each test a robot id and a recordings folder."""
 
 from tests.cli.inspect.conftest import rig, shared_router, tool
 from tests.recorder.files_fixture import files

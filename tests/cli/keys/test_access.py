@@ -1,4 +1,4 @@
-"""Rights as rules: what each role is granted, without a router."""
+"""Access rules by role, without a router."""
 
 from datetime import UTC, datetime
 from typing import Any

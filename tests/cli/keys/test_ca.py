@@ -1,4 +1,4 @@
-"""What is in a certificate, read back; what is done about a key that does not fit."""
+"""Content of certificates, and keys that do not match."""
 
 from datetime import timedelta
 from ipaddress import ip_address

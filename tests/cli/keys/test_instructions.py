@@ -1,4 +1,4 @@
-"""What is said after something was done: the commands to run next, with the paths as they are."""
+"""Instructions after an operation: next commands with actual paths."""
 
 import msgspec
 import pytest

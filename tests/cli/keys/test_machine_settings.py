@@ -1,4 +1,4 @@
-"""The settings that go to a machine: valid ones, and the way to its router."""
+"""Settings file of a machine."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The list of members, as it is changed."""
+"""Changes of the member list."""
 
 import pytest
 
@@ -57,8 +57,8 @@ def test_added() -> None:
 
 
 def test_revoke_all_certificates_of_a_member() -> None:
-    left, struck = member_list.revoked(SITE, "driver", "anna", None)
-    assert struck == [OLD, NEW]
+    left, revoked = member_list.revoked(SITE, "driver", "anna", None)
+    assert revoked == [OLD, NEW]
     assert [each.common_name for each in left.welcome] == [
         "driver.ann.00000001",
         "viewer.anna.00000001",
@@ -67,8 +67,8 @@ def test_revoke_all_certificates_of_a_member() -> None:
 
 
 def test_revoke_one_certificate_of_a_member() -> None:
-    left, struck = member_list.revoked(SITE, "driver", "anna", "00000001")
-    assert struck == [OLD]
+    left, revoked = member_list.revoked(SITE, "driver", "anna", "00000001")
+    assert revoked == [OLD]
     assert left.welcome == (NEW, OTHER, SAME_NAME)
 
 

@@ -1,4 +1,4 @@
-"""Whom a certificate can be for, and for how long."""
+"""Profiles and validity of certificates."""
 
 from collections.abc import Sequence
 from typing import cast

@@ -1,4 +1,4 @@
-"""What the list shows, and when it says that something has to be done."""
+"""Output of ``t2 keys list``."""
 
 import msgspec
 import pytest

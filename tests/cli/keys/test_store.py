@@ -1,4 +1,4 @@
-"""The folder: who may read what, that a file is whole or not there, and that no member is lost."""
+"""The authority's folder: file modes, atomic writes and locking."""
 
 import os
 import stat
@@ -183,6 +183,6 @@ def test_concurrent_commands_wait_for_the_lock(folder: Folder) -> None:
 
 
 def waits_for_a_lock() -> bool:
-    """Tell whether somebody in this process waits for a lock on a file."""
+    """Return whether a thread of this process waits for a file lock."""
     lines = Path("/proc/locks").read_text(encoding="ascii").splitlines()
     return any("->" in line and f" {os.getpid()} " in line for line in lines)

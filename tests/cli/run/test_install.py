@@ -1,4 +1,4 @@
-"""``t2 install`` into a folder: what it writes, keeps, refuses and takes away."""
+"""``t2 install`` into a folder: files written, kept, rejected and removed."""
 
 from configparser import ConfigParser
 from pathlib import Path
@@ -21,13 +21,13 @@ def t2_install(root: Path, *words: str) -> int:
 
 
 def files(root: Path) -> dict[str, str]:
-    """Return every file under a folder, by its name there."""
+    """Return the text of every file in a folder, by relative path."""
     found = (path for path in root.rglob("*") if path.is_file())
     return {str(path.relative_to(root)): path.read_text() for path in found}
 
 
 def unit(text: str) -> ConfigParser:
-    """Read a unit; of a key that is given more than once the last counts."""
+    """Parse a unit; the last value of a repeated key counts."""
     parser = ConfigParser(strict=False, interpolation=None, delimiters=("=",))
     parser.optionxform = str  # type: ignore[assignment, method-assign]
     parser.read_string(text)
@@ -226,7 +226,7 @@ def test_the_target_wants_every_service(name: str) -> None:
 def test_every_service_has_a_watchdog(name: str) -> None:
     service = unit(install.template(name))["Service"]
     assert service["Type"] == "notify"
-    assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # these machines hold processes up
+    assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # hosts with scheduling stalls
 
 
 @pytest.mark.parametrize("name", REAL)

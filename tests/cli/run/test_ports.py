@@ -1,4 +1,4 @@
-"""What ``t2 up`` listens on: which ports those are, and that nothing starts while one is taken."""
+"""Ports of ``t2 up``, and the check that they are free."""
 
 import contextlib
 import socket
@@ -43,7 +43,7 @@ def tcp(number: int) -> Port:
     return Port("tcp", "127.0.0.1", number, "router", "bus.listen")
 
 
-# --- which ---------------------------------------------------------------------------------------
+# --- ports by process ----------------------------------------------------------------------------
 
 
 def test_ports_by_process() -> None:
@@ -80,7 +80,7 @@ def test_a_taken_port_is_named_with_advice(
     said = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in said
     assert "is a stack already running?" in said
-    claimed([port], 0.0).close()  # and now it is free
+    claimed([port], 0.0).close()  # free again
 
 
 def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:

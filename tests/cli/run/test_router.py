@@ -1,4 +1,4 @@
-"""``t2 router``: it listens or says why not, and leaves when told."""
+"""``t2 router``: start, errors, printed configuration and exit."""
 
 import json
 import signal
@@ -60,7 +60,7 @@ def test_print_the_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) 
     assert main(["router", "--print", "--insecure", *sets("bus.listen=tcp/0.0.0.0:7447")]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["mode"], printed["listen"]) == ("router", {"endpoints": ["tcp/0.0.0.0:7447"]})
-    zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
+    zenoh.Config.from_json5(json.dumps(printed))  # rejects unknown settings
 
 
 def test_write_the_configuration_to_a_file(

@@ -1,4 +1,4 @@
-"""When a router counts as hung: attempts and their ends on a clock of the test's."""
+"""Hang detection with a simulated clock."""
 
 from cli.run.router_attempts import MISSES, STALL_NS, Attempts
 
@@ -7,8 +7,8 @@ DEADLINE_NS = 1_000_000_000
 PERIOD_NS = DEADLINE_NS // 2
 
 
-def looked(attempts: Attempts, begin_ns: int, end_ns: int) -> int | None:
-    """Check at every tick, begin due attempts; return when the router counts as hung."""
+def hung_at(attempts: Attempts, begin_ns: int, end_ns: int) -> int | None:
+    """Check at every tick, begin due attempts; return the time of the detected hang."""
     for now_ns in range(begin_ns, end_ns, TICK_NS):
         attempts.begin(now_ns)
         if attempts.hung(now_ns):
@@ -27,7 +27,7 @@ def test_an_attempt_begins_every_period() -> None:
 
 def test_no_answer_is_a_hang_within_two_seconds() -> None:
     attempts = Attempts(0, DEADLINE_NS)
-    hung_ns = looked(attempts, 0, 10 * DEADLINE_NS)
+    hung_ns = hung_at(attempts, 0, 10 * DEADLINE_NS)
     assert hung_ns == DEADLINE_NS + (MISSES - 1) * PERIOD_NS
     assert hung_ns + PERIOD_NS <= 2_000_000_000  # the hang may begin right after an attempt
 
@@ -62,7 +62,7 @@ def test_refusals_count_at_once() -> None:
 
 def test_a_late_answer_does_not_count() -> None:
     attempts = Attempts(0, DEADLINE_NS)
-    looked(attempts, 0, DEADLINE_NS + 1)
+    hung_at(attempts, 0, DEADLINE_NS + 1)
     assert not attempts.end(1, True)
     assert not attempts.end(99, True)
 
@@ -86,7 +86,7 @@ def test_a_stalled_probe_forgives_once() -> None:
     after_ns = PERIOD_NS + STALL_NS + DEADLINE_NS
     assert not attempts.hung(after_ns)
     assert not attempts.end(1, True), "begun before the stall: it counts neither way"
-    assert looked(attempts, after_ns, after_ns + 10 * DEADLINE_NS) is not None
+    assert hung_at(attempts, after_ns, after_ns + 10 * DEADLINE_NS) is not None
 
 
 def test_a_starved_probe_still_acts() -> None:
@@ -125,5 +125,5 @@ def test_a_longer_deadline() -> None:
     attempts = Attempts(0, 10 * DEADLINE_NS)
     assert attempts.begin(0) == 1
     assert attempts.begin(10 * PERIOD_NS - 1) is None
-    hung_ns = looked(attempts, TICK_NS, 30 * DEADLINE_NS)
+    hung_ns = hung_at(attempts, TICK_NS, 30 * DEADLINE_NS)
     assert hung_ns == 15 * DEADLINE_NS

@@ -1,4 +1,4 @@
-"""``t2 router`` and its probe: ready when it answers, killed when it hangs."""
+"""``t2 router`` and its probe: readiness, watchdog, and the kill of a hung router."""
 
 import contextlib
 import os
@@ -21,7 +21,7 @@ from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
 from verification.harness.support import at, free_port, listening, router_process, wait_until
 
-# Matching these two takes Zenoh 1.10.2 a minute: long enough to be found, and it ends by itself.
+# Zenoh 1.10.2 needs a minute to match these two: longer than the deadline, but finite.
 EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"
 LONG = "t2/v1/001/evt/dashboard/@adv/" + "/".join("a" * 40)
 DEADLINE_S = 1.0
@@ -43,13 +43,13 @@ def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Manager
 
 
 def probe_of(router: "subprocess.Popen[bytes]") -> int:
-    """Return the process of a router's probe, once there is one."""
+    """Wait for the probe of a router and return its process id."""
     path = Path(f"/proc/{router.pid}/task/{router.pid}/children")
     return int(wait_until(lambda: path.read_text().split(), "a probe")[0])
 
 
 def successor(router: "subprocess.Popen[bytes]", first: int) -> int:
-    """Return the process of a router's next probe; 0 while there is none, or a dead one."""
+    """Return the process id of the next probe; 0 while there is none or it is dead."""
     probe = probe_of(router)
     return probe if probe != first and alive(probe) else 0
 
@@ -61,7 +61,7 @@ def explode(endpoint: str) -> None:
         zenoh.open(client_config(at(endpoint))) as writer,
     ):
         reader.declare_subscriber(EXPLODES, lambda _: None)
-        time.sleep(0.2)  # the router knows it
+        time.sleep(0.2)  # until the router has the declaration
         writer.put(LONG, b"")
         time.sleep(0.1)
 
@@ -113,7 +113,7 @@ def _command(pid: int) -> bytes:
 
 
 def test_a_router_with_an_uplink_answers(endpoint: str) -> None:
-    where = listening(endpoint, "tcp/127.0.0.1:1")  # and no router there
+    where = listening(endpoint, "tcp/127.0.0.1:1")  # without a router there
     with router(where):
         assert answering.answers(answering.router_at(where))
 

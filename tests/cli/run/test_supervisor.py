@@ -1,4 +1,4 @@
-"""Processes that belong together: restarts on an injected clock, real ends of real processes."""
+"""Supervisor: restarts with a simulated clock, and the stop of real processes."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ SLEEP = ["sleep", "1000"]
 
 @pytest.fixture
 def supervised() -> Iterator[list[Supervisor]]:
-    """Collect supervisors and end what they have started."""
+    """Collects supervisors and kills their processes at the end."""
     made: list[Supervisor] = []
     yield made
     for supervisor in made:
@@ -39,7 +39,7 @@ def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]
 
 
 def kill(child: Child) -> None:
-    """Kill the child's process, without a look of the supervisor's."""
+    """Kill the child's process and reap it."""
     process = child.process
     assert process is not None
     process.kill()
@@ -97,11 +97,11 @@ def test_a_stopped_supervisor_starts_nothing(supervised: list[Supervisor]) -> No
     assert child.process is None
 
 
-# --- the end ----------------------------------------------------------------------------------
+# --- stop ----------------------------------------------------------------------------------
 
 
 def reporter(name: str, file: Path, on_term: str = "exit 0") -> tuple[str, list[str]]:
-    """Return a process that writes down its start and its SIGTERM."""
+    """Return a process that logs its start and its SIGTERM."""
     script = f'trap "echo -{name} >> {file}; {on_term}" TERM; echo +{name} >> {file}; '
     return name, ["sh", "-c", script + "while :; do sleep 0.05; done"]
 
@@ -132,7 +132,7 @@ def test_a_process_that_ignores_sigterm_is_killed(
 
 
 def test_a_child_has_its_own_process_group(supervised: list[Supervisor]) -> None:
-    # Ctrl-c goes to the terminal's group: it must not reach the bridge before its turn.
+    # Ctrl-C goes to the terminal's process group and must not reach the bridge directly.
     supervisor, child = one(supervised, *SLEEP)
     supervisor.look(0.0)
     assert child.process is not None

@@ -1,4 +1,4 @@
-"""A killed ``t2 up`` at speed: the frames that the board received after it, which outlives it."""
+"""A killed ``t2 up`` at speed: the frames that the board receives afterwards."""
 
 import contextlib
 import os
@@ -25,7 +25,7 @@ UP_S = 60.0
 
 @contextlib.contextmanager
 def driven(folder: Path) -> Iterator[tuple[int, Frames]]:
-    """Drive a stack of ``t2 up`` on a board of its own; yield the supervisor and the frames."""
+    """Drive a stack of ``t2 up`` on a separate board; yield the supervisor's pid and the frames."""
     board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     words = sets(

@@ -1,4 +1,4 @@
-"""``t2 up`` as a process: it comes up, mends itself, and leaves nothing behind."""
+"""``t2 up`` as a process: start, restart of killed services, and clean exit."""
 
 import os
 import signal
@@ -26,7 +26,7 @@ def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
         first = children(up.pid)
         assert set(first) == STACK
 
-        # The router's port and the bridge's two come back though their holders were killed.
+        # The ports of the killed router and bridge are bound again.
         for victim in ("router", "bridge"):
             os.kill(first[victim], signal.SIGKILL)
         wait_until(lambda: starts(log, "router") == starts(log, "bridge") == 2, "both", PATIENCE_S)
@@ -41,7 +41,7 @@ def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
         wait_gone(list(second.values()))
     said = log.read_text()
     assert "Traceback" not in said
-    # In reverse order: the bridge stops the vehicle while its board is still there.
+    # In reverse order: the bridge stops the vehicle while the board still runs.
     assert said.rindex('"service": "odom", "event": "stopped"') < said.rindex(
         '"service": "bridge", "event": "stopped"'
     )
@@ -83,7 +83,7 @@ def test_an_invalid_setting_starts_nothing(
     assert said in error
 
 
-# --- what is run ------------------------------------------------------------------------------
+# --- commands ---------------------------------------------------------------------------------
 
 
 def options(**given: object) -> Namespace:
