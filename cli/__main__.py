@@ -70,6 +70,7 @@ INSPECT = (
 )  # fmt: skip
 PLACES = {
     "checkout": "commission.command",
+    "config": "settings",
     "dashboard": "run.services:dashboard",
     "demo": "demo.command",
     "drive": "run.services:drive",

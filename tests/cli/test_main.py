@@ -127,7 +127,7 @@ def test_error_messages_and_exit_codes(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("cli.config.run", raising(error))
+    monkeypatch.setattr("cli.settings.run", raising(error))
     assert main(["config"]) == code
     assert capsys.readouterr().err == f"t2 config: {error}\n"
 
@@ -135,7 +135,7 @@ def test_error_messages_and_exit_codes(
 def test_an_early_ctrl_c_exits_silently(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("cli.config.run", raising(KeyboardInterrupt()))
+    monkeypatch.setattr("cli.settings.run", raising(KeyboardInterrupt()))
     assert main(["config"]) == 130
     assert capsys.readouterr().err == ""
 

@@ -11,8 +11,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from cli.recordings.report.stops import Stop
-from cli.recordings.report.streams import Stream
 from cli.recordings.report.timeline import Series, Timeline, VelocitySeries, downsampled
+from cli.recordings.report.timing import Stream
 
 WIDTH = 11.0  # inches
 REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#e6eaee"

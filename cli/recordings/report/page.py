@@ -8,9 +8,8 @@ from jinja2 import Environment, StrictUndefined
 from cli.inspect.addressing import chunks
 from cli.latency import NAMES
 from cli.recordings.report import figures
-from cli.recordings.report.reactions import Reaction, reactions
-from cli.recordings.report.streams import Stream
 from cli.recordings.report.timeline import Timeline
+from cli.recordings.report.timing import Reaction, Stream, reactions
 from common.freshness import NS_PER_S
 from services.recorder.reader import Reader
 

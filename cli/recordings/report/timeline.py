@@ -11,7 +11,7 @@ from functools import singledispatchmethod
 from itertools import pairwise
 
 from cli.recordings.report.stops import Phases, Stop, stops
-from cli.recordings.report.streams import Stream
+from cli.recordings.report.timing import Stream
 from common.freshness import NS_PER_S
 from common.messages import (
     SONAR_NAMES,
