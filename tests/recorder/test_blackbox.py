@@ -120,3 +120,12 @@ def test_abort_discards_pending_samples(files: Files) -> None:
     assert [len(each) for each in files.read()] == [SLICE]
     box.write(ns(9))
     assert len(files.closed) == 1
+
+
+def test_a_dump_without_samples_writes_no_file(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.trigger(["contact"], ns(0))
+    box.flush()
+    for second in (1, 5):
+        box.write(ns(second))
+    assert files.closed == []
