@@ -8,7 +8,6 @@ import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from cli.run.up import passed_on
 from common.cli_args import add_sources
 
 Main = Callable[[Sequence[str]], int]
@@ -16,7 +15,7 @@ Main = Callable[[Sequence[str]], int]
 
 @dataclass(frozen=True, slots=True)
 class ServiceCommand:
-    """The functions that a module of a command has."""
+    """A command, with the same functions as a command's module."""
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
@@ -38,9 +37,9 @@ def drive() -> ServiceCommand:
 
 def sim() -> ServiceCommand:
     """Return ``t2 sim``."""
-    from sim import __main__ as sim
+    from sim import __main__ as simulator
 
-    return ServiceCommand(sim.add_arguments, sim.run)
+    return ServiceCommand(simulator.add_arguments, simulator.run)
 
 
 def metrics() -> ServiceCommand:
@@ -84,6 +83,8 @@ def _with_settings(
         add_sources(parser)
 
     def run(given: argparse.Namespace) -> int:
+        from cli.run.up import passed_on
+
         values = {path: vars(given)[path] for path, _ in options.values()}
         sets = [f"{path}={value}" for path, value in values.items() if value is not None]
         given.sets = [*defaults, *given.sets, *fixed, *sets]
