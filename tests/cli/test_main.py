@@ -87,7 +87,7 @@ def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "printed"),
     [
         (["fly"], "unknown command 'fly'; \"t2 --help\" lists the commands"),
         (["eco", "safety/state"], "unknown command 'eco'; did you mean \"t2 echo\"?"),
@@ -98,12 +98,12 @@ def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixt
     ],
 )
 def test_invalid_command_lines(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], printed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
         main(words)
     assert end.value.code == 2
-    assert said in capsys.readouterr().err
+    assert printed in capsys.readouterr().err
 
 
 def raising(error: BaseException) -> Callable[[Namespace], int]:

@@ -68,7 +68,7 @@ def test_the_table_has_a_line_per_setting(file: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--set", "board.port=0"], "board.port = 0"),
         (["--set", "board.prot=1"], "did you mean 'port'?"),
@@ -81,10 +81,10 @@ def test_the_table_has_a_line_per_setting(file: Path, capsys: pytest.CaptureFixt
     ],
 )
 def test_invalid_settings_are_named(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["config", *words]) == EXIT_CONFIG
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err.startswith("t2 config: ")
-    assert said in shown.err
+    assert message in shown.err

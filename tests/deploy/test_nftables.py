@@ -34,21 +34,21 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
     sock.bind((sys.argv[1], int(sys.argv[2])))
     sock.settimeout(20)
     print("listening", flush=True)
-    said = ""
-    while said != "end":
-        said = sock.recv(100).decode()
-        print(said, flush=True)
+    message = ""
+    while message != "end":
+        message = sock.recv(100).decode()
+        print(message, flush=True)
 """
 # Sends from any source address.
 SEND = """
 import socket, sys
-source, to, port, said = sys.argv[1:]
+source, to, port, message = sys.argv[1:]
 IP_TRANSPARENT = 19
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
     sock.setsockopt(socket.SOL_IP, IP_TRANSPARENT, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
     sock.bind((source, 0))
-    sock.sendto(said.encode(), (to, int(port)))
+    sock.sendto(message.encode(), (to, int(port)))
 """
 SERVE = """
 import socket, sys
@@ -102,8 +102,10 @@ class Listener:
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "listening\n"
 
-    def send(self, name: str, source: str, said: str) -> None:
-        subprocess.run(python(name, SEND, source, *self._to, said), timeout=PATIENCE_S, check=True)
+    def send(self, name: str, source: str, message: str) -> None:
+        subprocess.run(
+            python(name, SEND, source, *self._to, message), timeout=PATIENCE_S, check=True
+        )
 
     def received(self, name: str, source: str) -> list[str]:
         """Stop it with an accepted datagram, and return the earlier ones."""
@@ -122,8 +124,8 @@ def board_and_others(port: int) -> list[str]:
 
 
 def passed(counter: str) -> int:
-    said = within(PC, "nft", "list", "counter", "inet", "t2", counter).stdout
-    return int(said.split("packets ")[1].split()[0])
+    message = within(PC, "nft", "list", "counter", "inet", "t2", counter).stdout
+    return int(message.split("packets ")[1].split()[0])
 
 
 @pytest.mark.usefixtures("network")

@@ -15,10 +15,10 @@ PARTS = ("", "_bucket", "_count", "_sum")
 
 
 def test_alerts_use_existing_metrics() -> None:
-    told = {family.name + part for family in FAMILIES for part in PARTS}
-    call_in_loop = set(re.findall(r"\bt2_\w+", ALERTS.read_text(encoding="utf-8")))
-    assert len(call_in_loop) > 8
-    assert call_in_loop <= told
+    exported = {family.name + part for family in FAMILIES for part in PARTS}
+    used = set(re.findall(r"\bt2_\w+", ALERTS.read_text(encoding="utf-8")))
+    assert len(used) > 8
+    assert used <= exported
 
 
 @pytest.fixture
@@ -30,8 +30,8 @@ def promtool() -> str:
 
 
 def test_promtool_accepts_configuration_and_alerts(promtool: str) -> None:
-    said = checked(promtool, "check", "config", str(FOLDER / "prometheus.yml"))
-    assert "SUCCESS" in said
+    message = checked(promtool, "check", "config", str(FOLDER / "prometheus.yml"))
+    assert "SUCCESS" in message
 
 
 def test_promtool_rule_tests_pass(promtool: str) -> None:

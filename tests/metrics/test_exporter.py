@@ -94,7 +94,7 @@ def test_all_robots_of_a_site_are_exported(rig: Rig, tmp_path: Path) -> None:
 
 def test_events_are_counted_and_set_disk_full(rig: Rig, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
-    told = {"event": "disk_full", "level": "error", "service": "recorder"}
+    labels = {"event": "disk_full", "level": "error", "service": "recorder"}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         made: list[m.Health] = []
 
@@ -106,7 +106,7 @@ def test_events_are_counted_and_set_disk_full(rig: Rig, tmp_path: Path) -> None:
         events = bus.publisher(keys.EVENTS, service="recorder")
         until_heard(
             lambda: events.put(event("disk_full")),
-            lambda: value(port, "t2_events_total", **told, **robot),
+            lambda: value(port, "t2_events_total", **labels, **robot),
             "the event",
         )
         assert value(port, "t2_recorder_disk_full", **robot) == 1
@@ -130,12 +130,12 @@ def test_certificates_are_read_from_the_member_list(rig: Rig, tmp_path: Path) ->
     end = datetime(2030, 1, 1, tzinfo=UTC)
     one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
     members.write_bytes(msgspec.json.encode(Members(site="berlin", members=(one,))))
-    told = {"role": "driver", "name": "anna"}
+    labels = {"role": "driver", "name": "anna"}
     name = "t2_certificate_expiry_timestamp_seconds"
     with running(rig.endpoint, tmp_path, f"bus.members={members}") as port:
-        assert value(port, name, **told) == end.timestamp()
+        assert value(port, name, **labels) == end.timestamp()
     with running(rig.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
-        assert value(port, name, **told) is None
+        assert value(port, name, **labels) is None
     assert "cannot read the member list" in (tmp_path / "metrics.log").read_text()
 
 

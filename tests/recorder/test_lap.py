@@ -72,7 +72,7 @@ def test_every_raw_frame_is_valid() -> None:
 
 
 @pytest.fixture
-def heard(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]]]]:
+def published(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]]]]:
     """A real bridge, and the messages that it publishes on each stream."""
     found: dict[str, list[dict[str, Any]]] = defaultdict(list)
     board, links = Board(), list[Message]()
@@ -97,9 +97,9 @@ def heard(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]
 
 
 def test_replayed_frames_yield_the_same_messages(
-    heard: tuple[Board, dict[str, list[dict[str, Any]]]],
+    published: tuple[Board, dict[str, list[dict[str, Any]]]],
 ) -> None:
-    board, found = heard
+    board, found = published
     ports = f"board.listen_ports={board.ports}"
     where = ["--set", f"board.port={board.address[1]}", "--set", ports]
     assert main(["replay", str(KEPT), "--frames", "--rate", "2", *where]) == 0

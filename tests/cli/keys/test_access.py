@@ -73,9 +73,9 @@ def test_a_member_cannot_publish_as_an_on_board_service(role: str, service: str)
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
 @pytest.mark.parametrize("verb", ["write", "serve", "live"])
 def test_members_write_only_keys_of_fixed_length(role: str, verb: Verb) -> None:
-    said = ROLES[role].get(verb, ())
-    assert said
-    assert not [expression for expression in said if "**" in expression]
+    printed = ROLES[role].get(verb, ())
+    assert printed
+    assert not [expression for expression in printed if "**" in expression]
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])

@@ -28,8 +28,8 @@ class Keys:
 
     def run(self, *words: str, code: int = 0) -> str:
         assert main(["keys", *words, "--folder", str(self.folder)]) == code
-        said = self._capsys.readouterr()
-        return said.err if code else said.out
+        message = self._capsys.readouterr()
+        return message.err if code else message.out
 
     def states(self) -> dict[str, str]:
         table = json.loads(self.run("list", "--json"))
@@ -54,8 +54,8 @@ def test_life_cycle_of_a_certificate(keys: Keys) -> None:
     assert "driver.anna." in keys.run("issue", "driver", "anna", "--robot", "001")
     assert keys.states() == {"driver.anna.0": "valid"}
     first = (keys.folder / "driver.anna" / "private.key").read_bytes()
-    said = keys.run("renew", "driver", "anna", "--days", "20")
-    assert f"t2 keys revoke driver anna --serial {keys.serials()[0]}" in said
+    message = keys.run("renew", "driver", "anna", "--days", "20")
+    assert f"t2 keys revoke driver anna --serial {keys.serials()[0]}" in message
     assert (keys.folder / "driver.anna" / "private.key").read_bytes() != first
     assert keys.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
     assert "driver anna expires in 19 days" in keys.run("list")
@@ -86,8 +86,8 @@ def test_renewal_keeps_rights_and_addresses(keys: Keys) -> None:
         keys.run("renew", *who)
     members = read(keys.folder / "members.json")
     assert members.members[2].robots == members.members[5].robots == ("001", "002")
-    said = keys.run("renew", "site", "berlin")
-    assert "addresses site.example, 10.0.0.9, localhost, 127.0.0.1;" in said
+    message = keys.run("renew", "site", "berlin")
+    assert "addresses site.example, 10.0.0.9, localhost, 127.0.0.1;" in message
     assert "addresses 10.1.1.1, localhost" in keys.run(
         "renew", "robot", "001", "--address", "10.1.1.1"
     )
@@ -108,8 +108,8 @@ def test_renewal_without_addresses_is_an_error(keys: Keys) -> None:
     table = json.loads(listed.read_bytes())
     del table["members"][0]["addresses"]
     listed.write_text(json.dumps(table), encoding="utf-8")
-    said = keys.run("renew", "robot", "002", code=1)
-    assert "`t2 keys renew robot 002 --address HOST`" in said
+    message = keys.run("renew", "robot", "002", code=1)
+    assert "`t2 keys renew robot 002 --address HOST`" in message
     keys.run("renew", "robot", "002", "--address", "192.168.1.3")
     assert "addresses 192.168.1.3, localhost" in keys.run("renew", "robot", "002")
 
@@ -128,7 +128,7 @@ def test_settings_are_independent_of_the_folder_path(
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         (("init",), 1, "exists: another CA would invalidate all certificates"),
         (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is not a name"),
@@ -140,9 +140,9 @@ def test_settings_are_independent_of_the_folder_path(
         (("revoke", "driver", "ben"), 1, "driver ben has no certificate that could be revoked"),
     ],
 )
-def test_errors(keys: Keys, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors(keys: Keys, words: tuple[str, ...], code: int, message: str) -> None:
     before = (keys.folder / "members.json").read_bytes()
-    assert said in keys.run(*words, code=code)
+    assert message in keys.run(*words, code=code)
     assert (keys.folder / "members.json").read_bytes() == before
 
 
@@ -174,8 +174,8 @@ def test_an_empty_serial_revokes_nothing(keys: Keys, capsys: pytest.CaptureFixtu
 def test_without_an_authority(
     words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = Keys(tmp_path / "none", capsys).run(*words, code=1)
-    assert "none has no CA; `t2 keys init` creates one" in said
+    message = Keys(tmp_path / "none", capsys).run(*words, code=1)
+    assert "none has no CA; `t2 keys init` creates one" in message
     assert not (tmp_path / "none").exists()
 
 
@@ -227,7 +227,7 @@ def test_no_passphrase_prompt_without_a_terminal(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("typed", "code", "said"),
+    ("typed", "code", "message"),
     [
         ("horse\nhorse\n", 0, "holds the certificate authority"),
         ("horse\nhouse\n", EXIT_CONFIG, "the two passphrases differ; nothing was created"),
@@ -235,11 +235,11 @@ def test_no_passphrase_prompt_without_a_terminal(tmp_path: Path) -> None:
     ],
 )
 def test_the_passphrase_prompt_repeats_and_hides_the_input(
-    typed: str, code: int, said: str, tmp_path: Path
+    typed: str, code: int, message: str, tmp_path: Path
 ) -> None:
     command = t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys"))
     got, shown = on_a_terminal(command, typed)
-    assert (got, said in shown) == (code, True), shown
+    assert (got, message in shown) == (code, True), shown
     assert "horse" not in shown
     assert (tmp_path / "keys").exists() is (code == 0)
 

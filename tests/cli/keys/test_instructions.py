@@ -14,66 +14,66 @@ ANNA = profile("driver", "anna", ("001", "002"), ())
 
 
 @pytest.mark.parametrize(
-    ("encrypted", "said"), [(False, "it is not encrypted"), (True, "it is encrypted")]
+    ("encrypted", "message"), [(False, "it is not encrypted"), (True, "it is encrypted")]
 )
-def test_a_new_authority(encrypted: bool, said: str) -> None:
-    told = "\n".join(instructions.authority_created("keys", "berlin", "2036-11-18", encrypted))
-    assert "keys holds the certificate authority of site berlin, until 2036-11-18" in told
-    assert said in told
-    assert "t2 keys issue robot 001" in told
+def test_a_new_authority(encrypted: bool, message: str) -> None:
+    printed = "\n".join(instructions.authority_created("keys", "berlin", "2036-11-18", encrypted))
+    assert "keys holds the certificate authority of site berlin, until 2036-11-18" in printed
+    assert message in printed
+    assert "t2 keys issue robot 001" in printed
 
 
 def test_a_robots_certificate() -> None:
-    told = list(
+    printed = list(
         instructions.certificate_issued(
             ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT, SITE]
         )
     )
-    assert told[0] == "robot.001.00000001, valid until 2027-09-17"
-    assert "addresses 192.168.201.1, 10.7.5.220, localhost, 127.0.0.1" in told[1]
-    assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in told
-    assert "     t2 router --config /etc/t2/keys/bus.toml" in told
+    assert printed[0] == "robot.001.00000001, valid until 2027-09-17"
+    assert "addresses 192.168.201.1, 10.7.5.220, localhost, 127.0.0.1" in printed[1]
+    assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in printed
+    assert "     t2 router --config /etc/t2/keys/bus.toml" in printed
     assert (
         "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin"
-        in told
+        in printed
     )
 
 
 def test_the_first_router_needs_no_list_update() -> None:
-    told = list(
+    printed = list(
         instructions.certificate_issued(ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT])
     )
-    assert not [line for line in told if "members.json" in line]
+    assert not [line for line in printed if "members.json" in line]
 
 
 def test_a_drivers_certificate() -> None:
-    told = list(
+    printed = list(
         instructions.certificate_issued(
             ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]
         )
     )
-    assert "  may move robot 001, robot 002" in told
-    assert "     t2 drive --config driver.anna/bus.toml" in told
+    assert "  may move robot 001, robot 002" in printed
+    assert "     t2 drive --config driver.anna/bus.toml" in printed
     assert (
         "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001"
-        in told
+        in printed
     )
 
 
 def test_a_drivers_sources() -> None:
     who = msgspec.structs.replace(member("driver", "anna"), sources=("nav",))
-    told = list(
+    printed = list(
         instructions.certificate_issued(
             Profile("driver", "anna", ("001",), (), ("nav",)), who, "k/d", []
         )
     )
-    assert "  drives as nav; no other source is allowed" in told
-    told = list(
+    assert "  drives as nav; no other source is allowed" in printed
+    printed = list(
         instructions.certificate_issued(
             ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]
         )
     )
-    assert not [line for line in told if "drives as" in line]
+    assert not [line for line in printed if "drives as" in line]
 
 
 def test_a_driver_of_every_robot() -> None:
@@ -85,38 +85,38 @@ def test_a_driver_of_every_robot() -> None:
 
 
 def test_a_viewers_certificate_without_routers() -> None:
-    told = list(
+    printed = list(
         instructions.certificate_issued(
             Profile("viewer", "v"), member("viewer", "v"), "viewer.v", []
         )
     )
-    assert "     t2 dashboard --config viewer.v/bus.toml" in told
-    assert "3. Copy ./members.json to each router and restart it." in told
+    assert "     t2 dashboard --config viewer.v/bus.toml" in printed
+    assert "3. Copy ./members.json to each router and restart it." in printed
 
 
 def test_the_previous_certificate() -> None:
-    told = list(
+    printed = list(
         instructions.certificate_renewed("driver", "anna", member("driver", "anna", "3f2a91bc", 10))
     )
-    assert "until 2026-12-01" in told[0]
-    assert told[1] == "     t2 keys revoke driver anna --serial 3f2a91bc"
+    assert "until 2026-12-01" in printed[0]
+    assert printed[1] == "     t2 keys revoke driver anna --serial 3f2a91bc"
 
 
 def test_a_revocation_needs_every_router() -> None:
-    told = list(
+    printed = list(
         instructions.certificates_revoked([member("driver", "anna")], "keys/driver.anna", [ROBOT])
     )
-    assert told[0] == "driver.anna.00000001 is revoked"
-    assert "takes effect when every router" in told[1]
-    assert told[3].startswith("     scp -p keys/members.json ")
+    assert printed[0] == "driver.anna.00000001 is revoked"
+    assert "takes effect when every router" in printed[1]
+    assert printed[3].startswith("     scp -p keys/members.json ")
 
 
 @pytest.mark.parametrize("routers", [[], [ROBOT]])
 def test_a_router_in_a_container_needs_new_settings(routers: list[Profile]) -> None:
-    told = list(
+    printed = list(
         instructions.certificates_revoked([member("driver", "anna")], "keys/driver.anna", routers)
     )
-    assert told[-1].strip() == instructions.IN_CONTAINERS
+    assert printed[-1].strip() == instructions.IN_CONTAINERS
     compose = (DOCS.parent / "compose.yaml").read_text(encoding="utf-8")
     for service in instructions.IN_CONTAINERS.partition("--force-recreate ")[2].split():
         assert f"\n  {service}:\n" in compose
@@ -126,7 +126,7 @@ def test_a_router_in_a_container_needs_new_settings(routers: list[Profile]) -> N
 
 def test_a_router_without_an_address_is_named() -> None:
     lost = Profile("robot", "002")
-    told = list(
+    printed = list(
         instructions.certificates_revoked(
             [member("driver", "anna")], "keys/driver.anna", [ROBOT, lost]
         )
@@ -134,9 +134,11 @@ def test_a_router_without_an_address_is_named() -> None:
     assert (
         "     scp -p keys/members.json HOST:/etc/t2/keys/members.json"
         "  # robot 002; its address is not in the member list"
-    ) in told
+    ) in printed
 
 
 def test_a_stolen_router_has_a_warning() -> None:
-    told = list(instructions.certificates_revoked([member("robot", "001")], "keys/robot.001", []))
-    assert told[-1].startswith("Clients still accept")
+    printed = list(
+        instructions.certificates_revoked([member("robot", "001")], "keys/robot.001", [])
+    )
+    assert printed[-1].startswith("Clients still accept")

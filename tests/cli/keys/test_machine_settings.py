@@ -64,7 +64,7 @@ def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen:
 
 
 @pytest.mark.parametrize(
-    ("sources", "told"),
+    ("sources", "expected"),
     [
         ((), {}),
         (("teleop", "web", "checkout"), {}),
@@ -73,15 +73,15 @@ def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen:
     ],
 )
 def test_screens_use_an_allowed_source(
-    sources: tuple[str, ...], told: dict[str, object], tmp_path: Path
+    sources: tuple[str, ...], expected: dict[str, object], tmp_path: Path
 ) -> None:
     who = Profile("driver", "b", ("001",), (), sources)
     table = tomllib.loads(bus_toml(who, [ROBOT]))
-    assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == told
+    assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == expected
     file = tmp_path / "bus.toml"
     file.write_text(bus_toml(who, [ROBOT]))
     config = load(Everything, Sources(files=(file,))).config
-    assert config.teleop.source == (sources[0] if "teleop" in told else "teleop")
+    assert config.teleop.source == (sources[0] if "teleop" in expected else "teleop")
     load(Shared, Sources(files=(file,)))  # other programs accept it
 
 

@@ -73,7 +73,7 @@ def test_revoke_one_certificate_of_a_member() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "serial", "said"),
+    ("name", "serial", "message"),
     [
         ("ben", None, "driver ben has no certificate that could be revoked"),
         ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
@@ -81,6 +81,6 @@ def test_revoke_one_certificate_of_a_member() -> None:
         ("anna", "", "has no certificate with the serial '' that could be"),
     ],
 )
-def test_nothing_to_revoke(name: str, serial: str | None, said: str) -> None:
-    with pytest.raises(RobotError, match=said):
+def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
+    with pytest.raises(RobotError, match=message):
         member_list.revoked(SITE, "driver", name, serial)

@@ -23,8 +23,8 @@ from common.members import ROLES, Role
 
 def test_default_addresses_of_a_robot() -> None:
     assert profile("robot", "001", (), ()) == Profile("robot", "001", ("001",), VEHICLE + LOCAL)
-    told = profile("robot", "001", (), ("robot.example", "fd00::1", "robot.example"))
-    assert told.addresses == ("robot.example", "fd00::1", *LOCAL)
+    custom = profile("robot", "001", (), ("robot.example", "fd00::1", "robot.example"))
+    assert custom.addresses == ("robot.example", "fd00::1", *LOCAL)
 
 
 def test_addresses_of_a_site() -> None:
@@ -67,7 +67,7 @@ def test_routers_listen(role: Role) -> None:
 
 
 @pytest.mark.parametrize(
-    ("role", "name", "robots", "addresses", "said"),
+    ("role", "name", "robots", "addresses", "message"),
     [
         ("driver", "anna", (), (), "a driver needs --robot ID"),
         ("viewer", "guest", ("001",), (), "are for drivers, not for a viewer"),
@@ -82,11 +82,11 @@ def test_routers_listen(role: Role) -> None:
     ],
 )
 def test_invalid_profiles(
-    role: str, name: str, robots: Sequence[str], addresses: Sequence[str], said: str
+    role: str, name: str, robots: Sequence[str], addresses: Sequence[str], message: str
 ) -> None:
     with pytest.raises(ConfigError) as caught:
         profile(cast(Role, role), name, robots, addresses)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -76,9 +76,9 @@ def test_renewed_certificates_need_no_advice() -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "said"),
+    ("left", "message"),
     [(365, []), (364.5, ["the CA expires in 364 days"]), (-1, ["the CA has expired"])],
 )
-def test_advice_for_an_expiring_authority(left: float, said: list[str]) -> None:
+def test_advice_for_an_expiring_authority(left: float, message: list[str]) -> None:
     lines = list(report.advice(members(), NOW_S + left * DAY_S, NOW_S))
-    assert [line.partition(":")[0] for line in lines] == said
+    assert [line.partition(":")[0] for line in lines] == message

@@ -78,8 +78,8 @@ def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
                 mine.delete(key, congestion_control=BLOCK)
         mine.put(marker, "end", congestion_control=BLOCK)
         wait_until(lambda: (marker, "end") in came, "the last put")
-        told = {key for key, text in came if text == (role if kind == "put" else "")}
-        assert told == granted(role, "write"), kind
+        passed_keys = {key for key, text in came if text == (role if kind == "put" else "")}
+        assert passed_keys == granted(role, "write"), kind
     for each in subscribers:
         each.undeclare()
 

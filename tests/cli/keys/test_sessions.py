@@ -87,11 +87,11 @@ def test_a_member_can_connect_and_publish(site: Site, endpoint: str) -> None:
     with connect(site.bus(DRIVER), endpoint) as one, connect(site.bus(ROBOT), endpoint) as other:
         heard = other.declare_subscriber(KEY, zenoh.handlers.RingChannel(1))
 
-        def said() -> zenoh.Sample | None:
+        def received() -> zenoh.Sample | None:
             one.put(KEY, b"hello")
             return heard.try_recv()
 
-        sample = wait_until(said, "a sample through the router")
+        sample = wait_until(received, "a sample through the router")
         assert sample is not None
         assert sample.payload.to_bytes() == b"hello"
 

@@ -126,7 +126,7 @@ def test_a_missing_folder_is_not_created(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("trouble", "raised", "said"),
+    ("trouble", "raised", "message"),
     [
         (OSError(28, "No space left"), RobotError, "members.json: No space left"),
         (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
@@ -135,7 +135,7 @@ def test_a_missing_folder_is_not_created(tmp_path: Path) -> None:
 def test_a_full_disk_or_ctrl_c_keeps_the_old_list(
     trouble: BaseException,
     raised: type[BaseException],
-    said: str,
+    message: str,
     folder: Folder,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -146,7 +146,7 @@ def test_a_full_disk_or_ctrl_c_keeps_the_old_list(
         raise trouble
 
     monkeypatch.setattr("cli.keys.store.os.fsync", stopped)
-    with pytest.raises(raised, match=said):
+    with pytest.raises(raised, match=message):
         folder.write(Members(site="berlin"))
     assert folder.members.read_bytes() == kept
     assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]

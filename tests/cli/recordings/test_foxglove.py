@@ -38,12 +38,12 @@ class Viewer(threading.Thread):
         assert socket is not None
         with socket:
             while not self.message:
-                said = socket.recv(PATIENCE_S)
-                if isinstance(said, str):
-                    self._on_text(socket, json.loads(said))
-                elif said[0] == MESSAGE_DATA:
+                printed = socket.recv(PATIENCE_S)
+                if isinstance(printed, str):
+                    self._on_text(socket, json.loads(printed))
+                elif printed[0] == MESSAGE_DATA:
                     # opcode, subscription, log time
-                    self.message = json.loads(said[struct.calcsize("<BIQ") :])
+                    self.message = json.loads(printed[struct.calcsize("<BIQ") :])
 
     def _connected(self) -> ClientConnection | None:
         try:
@@ -51,13 +51,13 @@ class Viewer(threading.Thread):
         except OSError:
             return None
 
-    def _on_text(self, socket: ClientConnection, said: dict[str, Any]) -> None:
-        for channel in said.get("channels", []):
+    def _on_text(self, socket: ClientConnection, printed: dict[str, Any]) -> None:
+        for channel in printed.get("channels", []):
             if channel["topic"] == self._topic:
                 self.channel = channel
                 self._ask(socket)
         # The server advertises a channel shortly before it accepts subscriptions.
-        if "Unknown channel" in said.get("message", ""):
+        if "Unknown channel" in printed.get("message", ""):
             self._ask(socket)
 
     def _ask(self, socket: ClientConnection) -> None:

@@ -37,24 +37,28 @@ def path(tmp_path: Path) -> Path:
 
 def as_json(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, dict[str, Any]]:
     code = main(["info", "-o", "json", str(path)])
-    told: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return code, told
+    printed: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return code, printed
 
 
 def test_json_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, told = as_json(capsys, path)
+    code, printed = as_json(capsys, path)
     assert code == 0
-    assert told["keys"][f"{ROOT}/tel/bridge/velocity"] == {
+    assert printed["keys"][f"{ROOT}/tel/bridge/velocity"] == {
         "type": "Velocity", "count": 11, "hz": pytest.approx(10.0), "raw": 11, "faulty": 0,
     }  # fmt: skip
-    assert told["keys"][f"{ROOT}/tel/mine"]["type"] == ""
-    assert (told["cut"], told["damaged_chunks"], told["bytes"]) == (False, 0, told["readable"])
-    assert (told["begin_ns"], told["duration"], told["messages"]) == (BEGIN_NS, 2.0, 16)
-    assert told["about"]["robot"] == "007"
-    assert told["versions"] == {"odom": "1.2"}
+    assert printed["keys"][f"{ROOT}/tel/mine"]["type"] == ""
+    assert (printed["cut"], printed["damaged_chunks"], printed["bytes"]) == (
+        False,
+        0,
+        printed["readable"],
+    )
+    assert (printed["begin_ns"], printed["duration"], printed["messages"]) == (BEGIN_NS, 2.0, 16)
+    assert printed["about"]["robot"] == "007"
+    assert printed["versions"] == {"odom": "1.2"}
     event = {"at": 1.5, "who": "bridge", "level": "error", "text": "contact: hit"}
-    assert told["events"] == [event]
-    assert [each["text"] for each in told["latched"]] == ["contact"]
+    assert printed["events"] == [event]
+    assert [each["text"] for each in printed["latched"]] == ["contact"]
 
 
 def test_a_truncated_file_is_summarized_up_to_its_end(
@@ -65,24 +69,24 @@ def test_a_truncated_file_is_summarized_up_to_its_end(
     assert summary is not None
     second = summary.chunk_indexes[1]
     path.write_bytes(path.read_bytes()[: second.chunk_start_offset + second.chunk_length // 2])
-    code, told = as_json(capsys, path)
+    code, printed = as_json(capsys, path)
     assert code == 1
-    assert told["cut"]
-    assert 0 < told["readable"] <= told["bytes"]
-    assert told["messages"] == 13
+    assert printed["cut"]
+    assert 0 < printed["readable"] <= printed["bytes"]
+    assert printed["messages"] == 13
     assert main(["info", "--text", str(path)]) == 1
-    assert f"truncated, {told['readable']} bytes are readable" in capsys.readouterr().out
+    assert f"truncated, {printed['readable']} bytes are readable" in capsys.readouterr().out
 
 
 def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "--text", str(path)]) == 0
     shown = capsys.readouterr().out
-    for said in (
+    for message in (
         "complete", "robot 007, recorded by T2 1.2.3", "reason: latch-contact",
         "16 messages in 2.0 s",
         "versions: odom 1.2", "001/tel/bridge/velocity", "10.0", "latched:", "contact: hit",
     ):  # fmt: skip
-        assert said in shown, said
+        assert message in shown, message
 
 
 def test_an_empty_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

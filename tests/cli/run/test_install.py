@@ -46,9 +46,9 @@ def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFi
         in (written[f"{UNITS}/t2-safety.service"])
     )
     assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
-    said = capsys.readouterr().out
-    assert "write   /etc/t2/t2.toml" in said
-    assert said.endswith("systemctl enable --now t2.target\n")
+    message = capsys.readouterr().out
+    assert "write   /etc/t2/t2.toml" in message
+    assert message.endswith("systemctl enable --now t2.target\n")
 
 
 def test_initial_settings_are_valid(tmp_path: Path) -> None:
@@ -102,11 +102,11 @@ def test_install_again_keeps_edited_settings(
     capsys.readouterr()
     assert t2_install(tmp_path) == 0
     assert files(tmp_path) == before
-    said = capsys.readouterr().out
-    assert "keep    /etc/t2/t2.toml" in said
-    assert "write" not in said
-    assert "replace" not in said
-    assert "systemctl restart t2.target" in said
+    message = capsys.readouterr().out
+    assert "keep    /etc/t2/t2.toml" in message
+    assert "write" not in message
+    assert "replace" not in message
+    assert "systemctl restart t2.target" in message
 
 
 def test_old_units_are_replaced_and_unusable_ones_removed(
@@ -117,10 +117,10 @@ def test_old_units_are_replaced_and_unusable_ones_removed(
     monkeypatch.setattr(install, "find_spec", lambda name: None if name == "uvicorn" else True)
     capsys.readouterr()
     t2_install(tmp_path)
-    said = capsys.readouterr().out
-    assert "without t2-dashboard.service: uvicorn is not installed" in said
-    assert f"remove  /{UNITS}/t2-dashboard.service" in said
-    assert f"replace /{UNITS}/t2-odom.service" in said
+    message = capsys.readouterr().out
+    assert "without t2-dashboard.service: uvicorn is not installed" in message
+    assert f"remove  /{UNITS}/t2-dashboard.service" in message
+    assert f"replace /{UNITS}/t2-odom.service" in message
     assert f"{UNITS}/t2-dashboard.service" not in files(tmp_path)
 
 
@@ -191,15 +191,15 @@ def test_install_needs_root(
 
 
 @pytest.mark.parametrize(
-    ("said", "version"),
+    ("message", "version"),
     [("systemd 252 (252.39-1)\n+PAM", 252), ("systemd 257~rc1", 257), ("busybox", 0)],
 )
 def test_the_backoff_needs_a_recent_systemd(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, version: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, version: int
 ) -> None:
     tool = tmp_path / "bin" / "systemctl"
     tool.parent.mkdir()
-    tool.write_text(f"#!/bin/sh\necho '{said}'\n")
+    tool.write_text(f"#!/bin/sh\necho '{message}'\n")
     tool.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tool.parent}:/bin")
     assert install.systemd_version() == version

@@ -77,9 +77,9 @@ def test_a_taken_port_is_named_with_advice(
         port = of(number)
         with pytest.raises(LinkError) as raised:
             claimed([port], 0.0)
-    said = str(raised.value)
-    assert f"127.0.0.1:{number} ({port.setting}): used by another program" in said
-    assert "is a stack already running?" in said
+    message = str(raised.value)
+    assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
+    assert "is a stack already running?" in message
     claimed([port], 0.0).close()  # free again
 
 

@@ -39,10 +39,10 @@ def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
         up.send_signal(signal.SIGINT)
         assert up.wait(PATIENCE_S) == 0
         wait_gone(list(second.values()))
-    said = log.read_text()
-    assert "Traceback" not in said
+    message = log.read_text()
+    assert "Traceback" not in message
     # In reverse order: the bridge stops the vehicle while the board still runs.
-    assert said.rindex('"service": "odom", "event": "stopped"') < said.rindex(
+    assert message.rindex('"service": "odom", "event": "stopped"') < message.rindex(
         '"service": "bridge", "event": "stopped"'
     )
 
@@ -55,15 +55,15 @@ def test_a_taken_port_starts_nothing(tmp_path: Path) -> None:
         words = sets(*ports(), f"board.listen_ports={port}", f"recorder.folder={tmp_path}")
         with running(t2("up", "--no-sim", *words), log) as up:
             assert up.wait(PATIENCE_S) == EXIT_LINK
-    said = log.read_text()
-    assert f"127.0.0.1:{port}" in said
-    assert "used by another program" in said
-    assert "Traceback" not in said
-    assert '"started"' not in said, "nothing may start before all ports are free"
+    message = log.read_text()
+    assert f"127.0.0.1:{port}" in message
+    assert "used by another program" in message
+    assert "Traceback" not in message
+    assert '"started"' not in message, "nothing may start before all ports are free"
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (sets("board.port=0"), "board.port = 0"),
         (sets("safety.margin=0"), "margin"),
@@ -72,7 +72,7 @@ def test_a_taken_port_starts_nothing(tmp_path: Path) -> None:
 )
 def test_an_invalid_setting_starts_nothing(
     words: list[str],
-    said: str,
+    message: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -80,7 +80,7 @@ def test_an_invalid_setting_starts_nothing(
     assert main(["up", *words]) == EXIT_CONFIG
     error = capsys.readouterr().err
     assert error.startswith("t2 up: ")
-    assert said in error
+    assert message in error
 
 
 # --- commands ---------------------------------------------------------------------------------

@@ -72,15 +72,15 @@ def test_times_are_relative_to_the_start_of_the_recording() -> None:
 
 
 @pytest.mark.parametrize(
-    ("alive", "said"),
+    ("alive", "message"),
     [
         ({"bridge"}, "bridge of robot 007 is running"),
         ({"odom", "safety"}, "safety of robot 007 is running"),
         ({"bridge", "safety"}, "bridge and safety of robot 007 is running"),
     ],
 )
-def test_replay_is_refused_while_bridge_or_safety_run(alive: set[str], said: str) -> None:
-    assert refusal("007", alive).startswith(said)
+def test_replay_is_refused_while_bridge_or_safety_run(alive: set[str], message: str) -> None:
+    assert refusal("007", alive).startswith(message)
     assert "--robot" in refusal("007", alive)
 
 

@@ -151,11 +151,11 @@ def state(heartbeat: int) -> Callable[[], m.SafetyState]:
 
 
 @pytest.mark.parametrize(
-    ("board", "said"),
+    ("board", "printed"),
     [(None, "no bridge of robot"), ("10.7.5.224:4002", "is at 10.7.5.224:4002: a real one")],
 )
 def test_a_real_vehicle_is_refused(
-    path: Path, rig: Rig, tool: Tool, board: str | None, said: str
+    path: Path, rig: Rig, tool: Tool, board: str | None, printed: str
 ) -> None:
     asked: list[m.Drive] = []
     rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
@@ -163,7 +163,7 @@ def test_a_real_vehicle_is_refused(
         pretend(rig, "bridge", {keys.LINK: lambda: link(board)})
     result = tool("replay", str(path), "--simulator", *FAST)
     assert result.code == 1
-    assert said in result.err
+    assert printed in result.err
     assert asked == []
 
 
