@@ -43,7 +43,7 @@ def installs(m: Machine) -> str:
     m.said(*INSTALL, "--sim")
     took_s = time.monotonic() - started_s
     again = m.said(*INSTALL)
-    assert "is there already" in again, again
+    assert "exists already" in again, again
     assert "keep    /etc/t2/t2.toml" in again, again
     m.write(SETTINGS, m.said("cat", SETTINGS) + "\n[sim]\ncontrol_port = 4009\n")
     m.write("/etc/systemd/system/t2-sim.service.d/trace.conf", TRACE)
