@@ -13,9 +13,8 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NoReturn
 
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.errors import ConfigError, LinkError, RobotError
-from common.version import VERSION
 
 GROUPS = {
     "Run": {

@@ -1,4 +1,4 @@
-"""What every program of T2 takes on its command line, and the exit codes that tell something."""
+"""Command-line options, exit codes and version that all programs of T2 share."""
 
 import argparse
 from functools import partial
@@ -6,15 +6,18 @@ from pathlib import Path
 
 from common.config import DEFAULT_FILE, Sources
 
-EXIT_CONFIG = 78  # EX_CONFIG: a restart will not help
+# As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
+VERSION = "0.1.0"
+
+EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
 EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
-HOPELESS = (EXIT_CONFIG, EXIT_LINK)
-WIDTH = 100  # of a service's help, in characters
+NO_RESTART = (EXIT_CONFIG, EXIT_LINK)
+WIDTH = 100  # characters, of a service's help
 
 
 def arguments(name: str) -> argparse.ArgumentParser:
-    """Return the options that every service takes."""
-    # A width is given: to ask the terminal for it, argparse takes 4 ms of each start (`shutil`).
+    """Return a parser with the options of every service."""
+    # A fixed width: detecting the terminal's takes argparse 4 ms of each start (`shutil`).
     form = partial(argparse.HelpFormatter, width=WIDTH)
     parser = argparse.ArgumentParser(prog=name, formatter_class=form)
     add_sources(parser)
@@ -22,17 +25,17 @@ def arguments(name: str) -> argparse.ArgumentParser:
 
 
 def add_sources(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where settings come from."""
+    """Add the options that name sources of settings."""
     parser.add_argument(
         "--config", action="append", type=Path, metavar="FILE", default=None,
-        help="a TOML file over config/t2.toml; may be repeated, the later wins",
+        help="TOML file on top of config/t2.toml; may be repeated, the last one wins",
     )  # fmt: skip
     parser.add_argument(
         "--set", action="append", dest="sets", metavar="PATH=VALUE", default=[],
-        help="one setting, such as board.port=4002; wins over files and environment",
+        help="one setting, such as board.port=4002; overrides files and environment",
     )  # fmt: skip
 
 
 def sources(options: argparse.Namespace) -> Sources:
-    """Return where the settings come from, by the options."""
+    """Return the sources of settings named by the options."""
     return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)

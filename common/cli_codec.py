@@ -1,7 +1,7 @@
 """``zenoh --decoder t2 --encoder t2``: our messages as JSON on zenoh-cli's command line.
 
-Decoding needs nothing of ours but MessagePack, so that it shows what is there, right or wrong.
-Encoding fills in the header that a hand-typed message lacks; requests to srv/ have none.
+Decoding needs only MessagePack, so it also shows invalid messages. Encoding adds the header to
+hand-typed messages; requests to srv/ have none.
 """
 
 import json
@@ -16,7 +16,7 @@ _seq = count(1)
 
 
 def decode(key: object, value: bytes) -> str:
-    """Return a payload as one line of JSON; empty ones and others say what they are."""
+    """Return a payload as one line of JSON: ``null`` if empty, hex if it is not MessagePack."""
     if not value:
         return "null"
     try:
@@ -26,7 +26,7 @@ def decode(key: object, value: bytes) -> str:
 
 
 def encode(key: str, value: str) -> bytes:
-    """Return a JSON object as a message, with header; raise ``ValueError`` for anything else."""
+    """Return a JSON object as a message with header; raise ``ValueError`` for other JSON."""
     message = json.loads(value)
     if not isinstance(message, dict):
         raise ValueError('a message is a JSON object, such as {"linear": 0.1, "angular": 0}')

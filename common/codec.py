@@ -1,4 +1,4 @@
-"""Messages to MessagePack and back; ``msgspec`` checks every type on the way in."""
+"""MessagePack encoding and type-checked decoding of messages."""
 
 import math
 from functools import cache
@@ -13,7 +13,7 @@ S = TypeVar("S", bound=Struct)
 
 ENCODING = "application/msgpack"
 PREFIX = f"{ENCODING};t2.v1."
-EMPTY = b"\x80"  # an empty map: every field at its default
+EMPTY = b"\x80"  # an empty map: all fields have their defaults
 
 _encoder = msgspec.msgpack.Encoder()
 
@@ -24,7 +24,7 @@ def encode(message: Struct) -> bytes:
 
 
 def decode(payload: bytes, kind: type[S]) -> S:
-    """Read a MessagePack map; raise ``MessageError`` naming the field when it is no ``kind``."""
+    """Decode a MessagePack map; raise ``MessageError`` naming the field that does not fit."""
     try:
         message: S = _decoder(kind).decode(payload)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -33,17 +33,17 @@ def decode(payload: bytes, kind: type[S]) -> S:
 
 
 def encoding(kind: type[Struct]) -> str:
-    """Return the encoding string that goes with a message, ``application/msgpack;t2.v1.Kind``."""
+    """Return the encoding string of a type, ``application/msgpack;t2.v1.Kind``."""
     return PREFIX + kind.__name__
 
 
 def kind_of(encoding: str) -> str:
-    """Return the type that an encoding names, ``Odometry``, or nothing."""
+    """Return the type name in an encoding, such as ``Odometry``, or an empty string."""
     return encoding.removeprefix(PREFIX) if encoding.startswith(PREFIX) else ""
 
 
 def finite(*values: float) -> bool:
-    """Tell whether all are numbers: NaN and infinity pass a typed decode."""
+    """Return whether all values are finite; NaN and infinity pass a typed decode."""
     return all(math.isfinite(value) for value in values)
 
 

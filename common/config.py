@@ -1,10 +1,10 @@
-"""TOML, environment and command line to frozen structs; the later wins.
+"""Configuration loading: TOML files, environment and command line to frozen structs.
 
-A setting is named by its path, ``board.port``. It is looked for in the files, then in the
-environment (``T2__BOARD__PORT``, in any case), then in ``--set board.port=4002``. A table adds to
-what was given before, whatever it came in. Sections of other services are left alone; unknown
-sections and unknown fields are refused, because a setting that is misspelt is a setting that is
-lost. The name of a certificate's file is relative to the file that it stands in.
+A setting is named by its path, ``board.port``. Sources in order of precedence, the last one wins:
+files, environment (``T2__BOARD__PORT``, in any case), ``--set board.port=4002``. Tables are merged
+across sources. Sections of other services are ignored; unknown sections and fields are refused,
+because a misspelt setting would be lost silently. A certificate's file name is relative to the
+settings file that contains it.
 """
 
 import difflib
@@ -25,15 +25,15 @@ C = TypeVar("C", bound=Struct)
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
 
-# Files that a file names lie beside it: the folder of a certificate works wherever it is put.
-BESIDE = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
+# File names that are relative to the settings file: a folder with certificates can be moved.
+FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 
-# Settings that have been replaced, and by what.
+# Replaced settings and their replacements.
 REPLACED = {
     "wire.angular_unit": "wire.command_angular_unit and wire.feedback_angular_unit",
 }
 
-# Whose sections may stand in a file; a service reads its own and the shared ones.
+# Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "bus", "board", "wire", "log", "vehicle",
     "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "sim",
@@ -41,7 +41,7 @@ SECTIONS = (
 
 
 class Sources(Struct, frozen=True):
-    """Where settings come from, weakest first."""
+    """Sources of settings, lowest precedence first."""
 
     files: Sequence[Path] = (DEFAULT_FILE,)
     environ: Mapping[str, str] = msgspec.field(default_factory=lambda: dict(os.environ))
@@ -49,14 +49,14 @@ class Sources(Struct, frozen=True):
 
 
 class Setting(Struct, frozen=True):
-    """One value and where it came from."""
+    """One value and its origin."""
 
     value: Any
     origin: str
 
 
 class Loaded(Struct, Generic[C], frozen=True):
-    """A valid configuration, and every setting in it by path."""
+    """A valid configuration and its settings by path."""
 
     config: C
     settings: dict[str, Setting]
@@ -93,25 +93,25 @@ def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
 
 
 def _from_file(file: Path) -> dict[str, Setting]:
-    origin = _nearby(file)
+    origin = _shown_path(file)
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"{origin}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
         raise ConfigError(f"{origin}: is no TOML: {error}") from None
-    return {at: _beside(file, at, leaf) for at, leaf in _leaves("", table, origin).items()}
+    return {at: _resolved(file, at, leaf) for at, leaf in _leaves("", table, origin).items()}
 
 
-def _beside(file: Path, at: str, leaf: Setting) -> Setting:
-    """Return the name of a file as it is from here; none stays none."""
-    if at not in BESIDE or not isinstance(leaf.value, str) or not leaf.value:
+def _resolved(file: Path, at: str, leaf: Setting) -> Setting:
+    """Resolve a file name relative to the settings file; empty stays empty."""
+    if at not in FILE_SETTINGS or not isinstance(leaf.value, str) or not leaf.value:
         return leaf
     return Setting(str(file.absolute().parent / leaf.value), leaf.origin)
 
 
-def _nearby(file: Path) -> str:
-    """Return a file's name as a person in the working directory would say it."""
+def _shown_path(file: Path) -> str:
+    """Return a file's name relative to the working directory if it is inside."""
     whole = file.absolute()
     return str(whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else file)
 
@@ -145,7 +145,7 @@ def _from_sets(root: type[Struct], sets: Sequence[str]) -> dict[str, Setting]:
 
 
 def _check_text(origin: str, text: str) -> None:
-    """Refuse what came from the system as bytes that are no UTF-8."""
+    """Refuse text from the system that is not UTF-8."""
     try:
         text.encode()
     except UnicodeEncodeError:
@@ -154,7 +154,7 @@ def _check_text(origin: str, text: str) -> None:
 
 
 def _parse(root: type[Struct], path: str, text: str) -> Any:
-    """Read a value as its field wants it: text as it stands, the rest as TOML, lists by commas."""
+    """Parse a value by its field's type: text as is, tuples by commas, the rest as TOML."""
     wanted = _type_at(root, path)
     if wanted is str:
         return text
@@ -189,7 +189,7 @@ def _nest(settings: Mapping[str, Setting]) -> dict[str, Any]:
             if not isinstance(inner, dict):
                 raise ConfigError(f"{setting.origin}: {path}: {name} is a value, not a table")
             branch = inner
-        # An empty table says nothing, so it takes nothing away.
+        # An empty table sets nothing, so it replaces nothing.
         if setting.value != {} or not isinstance(branch.get(leaf), dict):
             branch[leaf] = setting.value
     return tree
@@ -199,11 +199,11 @@ def _check_section(section: str, path: str, setting: Setting, names: set[str]) -
     known = names | set(SECTIONS)
     if section not in known:
         raise ConfigError(
-            f"{setting.origin}: {path}: no section {section!r}{_meant(section, known)}"
+            f"{setting.origin}: {path}: no section {section!r}{_suggestion(section, known)}"
         )
 
 
-def _meant(word: str, known: Iterable[str]) -> str:
+def _suggestion(word: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(word, sorted(known), n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(sorted(known))}"
 
@@ -211,7 +211,7 @@ def _meant(word: str, known: Iterable[str]) -> str:
 def _explain(
     error: str, root: type[Struct], tree: Any, given: Mapping[str, Setting]
 ) -> ConfigError:
-    """Turn msgspec's sentence into origin, field, value and what is allowed."""
+    """Convert msgspec's error to origin, field, value and allowed range."""
     head, mark, tail = error.rpartition(" - at `$")  # the last one: a field may be called so
     what, at = (head, tail) if mark else (tail, "")
     path, kind = _locate(at.rstrip("`"), root, tree)
@@ -222,22 +222,24 @@ def _explain(
         if path in REPLACED:
             text = f"was replaced by {REPLACED[path]}"
             return ConfigError(f"{_origin(path, given)}: {path}: {text}")
-        return ConfigError(f"{_origin(path, given)}: {path}: unknown{_meant(unknown[1], known)}")
+        return ConfigError(
+            f"{_origin(path, given)}: {path}: unknown{_suggestion(unknown[1], known)}"
+        )
     shown = f" = {given[path].value!r}" if path in given else ""
     return ConfigError(f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}")
 
 
 def _locate(at: str, root: type[Struct], tree: Any) -> tuple[str, Any]:
-    """Return the path of what msgspec complains about, and its type.
+    """Return the path of the invalid value, and its type.
 
-    msgspec writes ``[...]`` for some key of a table of tables; it is the first that is wrong.
+    msgspec writes ``[...]`` for a key of a table of tables; it is the first invalid one.
     """
     path: list[str] = []
     kind: Any = msgspec.inspect.type_info(root)
     for name in re.findall(r"\w+|\[\.\.\.\]", at):
         if isinstance(kind, msgspec.inspect.DictType):
             kind = kind.value_type
-            name = next(key for key, row in tree.items() if not _fits(row, kind.cls))
+            name = next(key for key, row in tree.items() if not _is_valid(row, kind.cls))
         elif isinstance(kind, msgspec.inspect.VarTupleType):
             kind = kind.item_type
             continue
@@ -248,7 +250,7 @@ def _locate(at: str, root: type[Struct], tree: Any) -> tuple[str, Any]:
     return ".".join(path), kind
 
 
-def _fits(row: Any, kind: type[Struct]) -> bool:
+def _is_valid(row: Any, kind: type[Struct]) -> bool:
     try:
         msgspec.convert(row, kind)
     except msgspec.ValidationError:
@@ -262,7 +264,7 @@ def _origin(path: str, given: Mapping[str, Setting]) -> str:
 
 
 def _allowed(kind: Any) -> str:
-    """Say the words or the range; msgspec's own sentence names one end of a range only."""
+    """Describe the allowed values; msgspec's own error names one end of a range only."""
     words = getattr(kind, "values", ())
     if words:
         return f"; allowed is {', '.join(map(repr, words))}"

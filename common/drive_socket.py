@@ -1,4 +1,4 @@
-"""The file of the drive link's Unix socket: where it is, and who may connect.
+"""Path and permissions of the drive link's Unix socket.
 
 The socket is in a directory of the user of bridge and safety that no other user can enter. The file
 permissions decide which programs may command motion.
@@ -16,10 +16,10 @@ NETWORK = Path("/proc/self/ns/net")
 
 
 def socket_path(where: BusSettings, robot: str) -> Path:
-    """Return the path that bridge and safety of one stack have in common.
+    """Return the socket path that bridge and safety of one stack share.
 
-    Without ``bus.drive`` it is derived from what the two share: user, robot, router and network. It
-    does not depend on the login, so that both find it from any shell.
+    Without ``bus.drive`` it is derived from user, robot, router and network namespace. It does not
+    depend on the login session, so that both find it from any shell.
     """
     if where.drive:
         return Path(drive_path(where.drive))
@@ -34,7 +34,7 @@ def socket_path(where: BusSettings, robot: str) -> Path:
 
 
 def prepare(path: Path) -> None:
-    """Make the socket's directory; raise ``ConfigError`` when others could connect."""
+    """Create the socket's directory; raise ``ConfigError`` if other users could connect."""
     folder = path.parent
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ def _check_file(path: Path) -> None:
 
 
 def _network() -> str:
-    """Return this process's network: ``127.0.0.1`` is another router in another one."""
+    """Return this process's network namespace: ``127.0.0.1`` differs between namespaces."""
     try:
         return str(NETWORK.stat().st_ino)
     except OSError:

@@ -1,23 +1,23 @@
-"""What can go wrong, as a tree.
+"""Exceptions of T2.
 
 RobotError
-├── WireError      a frame that the vehicle's protocol does not allow
-├── MessageError   a message that the bus contract does not allow
+├── WireError      a frame that violates the vehicle's protocol
+├── MessageError   a message that violates the bus contract
 ├── ConfigError    a setting that is missing, unknown or out of range
 └── LinkError      a socket, session or peer that cannot be reached
 """
 
 
 class RobotError(Exception):
-    """Anything that T2 itself reports as wrong."""
+    """Base class of all errors that T2 raises."""
 
 
 class WireError(RobotError):
-    """A frame that the vehicle's protocol does not allow."""
+    """A frame that violates the vehicle's protocol."""
 
 
 class MessageError(RobotError):
-    """A message that the bus contract does not allow."""
+    """A message that violates the bus contract."""
 
 
 class ConfigError(RobotError):

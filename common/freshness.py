@@ -21,5 +21,5 @@ class Latest(Struct, Generic[T], frozen=True):
 
 
 def fresh(latest: Latest[T] | None, now_ns: int, limit_s: float) -> bool:
-    """Tell whether there is a value at most ``limit_s`` old."""
+    """Return whether there is a value at most ``limit_s`` old."""
     return latest is not None and latest.age_s(now_ns) <= limit_s

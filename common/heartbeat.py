@@ -1,16 +1,16 @@
 """Age of a request without synchronized clocks, by the heartbeat number that it echoes.
 
 Safety puts a rising number into each ``SafetyState``. A program that requests motion or makes an
-operator's call echoes the newest number that it saw. Whoever sent or received that number knows on
-its own clock when that was, so it knows how old the request can be at most. Numbers start at
-random, so that echoes of an earlier start are unknown.
+operator's call echoes the newest number that it saw. A program that sent or
+received that number knows the time by its own clock, and so the maximum age of the request. Numbers
+start at random, so that echoes of an earlier start are unknown.
 """
 
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
 
-CAPACITY = 256  # at 20 states a second, and some at once: over 10 s, more than any limit needs
+CAPACITY = 256  # at 20 states a second plus immediate ones: over 10 s, more than any limit
 
 
 class Heartbeat(Struct, frozen=True):
@@ -20,11 +20,11 @@ class Heartbeat(Struct, frozen=True):
     sent: tuple[tuple[int, int], ...] = ()  # number, local time in ns; the newest last
 
     def beat(self, now_ns: int) -> "Heartbeat":
-        """Return it with a new number, sent now."""
+        """Return the heartbeat with a new number, sent now."""
         return self.noted(self.number + 1, now_ns)
 
     def noted(self, number: int, now_ns: int) -> "Heartbeat":
-        """Return it with a number that was received now."""
+        """Return the heartbeat with a number received now."""
         return Heartbeat(number, (*self.sent[-(CAPACITY - 1) :], (number, now_ns)))
 
     def is_late(self, echo: int, now_ns: int, max_age_ns: int) -> bool:
@@ -33,7 +33,7 @@ class Heartbeat(Struct, frozen=True):
         return age_ns is None or age_ns > max_age_ns
 
     def refusal(self, echo: int | None, now_ns: int, max_age_ns: int) -> str:
-        """Return why an operator's call with this echo is refused, for a person; empty if not."""
+        """Return why an operator's call with this echo is refused, as text; empty if accepted."""
         if echo is None:
             return (
                 "The call carries no echo of safety's heartbeat: send the newest "

@@ -1,13 +1,14 @@
-"""Every key on the bus, in one table: what it carries, how often, in which class of service.
+"""Table of all keys on the bus: message type, rate, class of service.
 
-Keys read ``t2/v1/{robot}/{class}/...``. ``@cmd`` is a verbatim chunk on purpose: a ``put t2/**``
-made by mistake does not reach it. ``estop`` is not, on purpose: ``put t2/v1/*/estop`` stops a
-fleet.
+Keys have the form ``t2/v1/{robot}/{class}/...``. ``@cmd`` is a verbatim chunk on purpose: a
+``put t2/**`` made by mistake does not match it. ``estop`` is none on purpose: ``put t2/v1/*/estop``
+stops a fleet.
 """
 
-from collections.abc import Collection, Mapping
-from typing import Generic, Literal, TypeVar
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, Generic, Literal, TypeVar
 
+import msgspec
 from msgspec import Struct
 
 from common import messages as m
@@ -26,37 +27,37 @@ Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIG
 
 
 class ClassOfService(Struct, frozen=True):
-    """How Zenoh carries a key; congestion always drops, because blocking stalls the healthy."""
+    """How Zenoh carries a key; congestion always drops, because blocking stalls other links."""
 
     name: str
     priority: Priority
     reason: str
-    express: bool = False  # sent at once, never batched
-    history: int = 0  # samples that late joiners and recovering readers still get
+    express: bool = False  # sent immediately, never batched
+    history: int = 0  # samples kept for late and recovering subscribers
 
 
-ESTOP_CLASS = ClassOfService("estop", "REAL_TIME", "nothing may be ahead of it", express=True)
+ESTOP_CLASS = ClassOfService("estop", "REAL_TIME", "has the highest priority", express=True)
 COMMAND = ClassOfService("command", "INTERACTIVE_HIGH", "moves or stops the wheels", express=True)
 STATE = ClassOfService(
-    "state", "INTERACTIVE_LOW", "who drives echoes it: late, it stops the vehicle", express=True
+    "state", "INTERACTIVE_LOW", "sources echo it: a late one stops the vehicle", express=True
 )
 FAST = ClassOfService("fast", "DATA_HIGH", "safety and odometry decide on it")
-SLOW = ClassOfService("slow", "DATA", "people and records read it")
-EVENT = ClassOfService("event", "DATA", "rare, and worth having late", history=100)
+SLOW = ClassOfService("slow", "DATA", "for people and recordings")
+EVENT = ClassOfService("event", "DATA", "rare, and useful even when late", history=100)
 
 
 class Topic(Struct, Generic[MessageT], frozen=True):
-    """A key that is published; ``{name}`` in its path is filled in by ``on``."""
+    """A published key; ``on`` fills in the ``{name}`` in its path."""
 
     path: str
     message: type[MessageT]
-    rate_hz: float  # as shipped; 0 for "when it happens"
+    rate_hz: float  # by default; 0 for events
     service: ClassOfService
     publisher: str
     what: str
 
     def on(self, robot: str, **names: str) -> str:
-        """Return the whole key for one robot, or a key expression for ``*``."""
+        """Return the full key for one robot, or a key expression for ``*``."""
         return f"{ROOT}/{robot}/{self.path.format(**names)}"
 
     def known(self, robot: str, names: Mapping[str, str], known: Collection[str]) -> frozenset[str]:
@@ -79,7 +80,7 @@ class Call(Struct, Generic[RequestT, ReplyT], frozen=True):
     what: str
 
     def on(self, robot: str) -> str:
-        """Return the whole key for one robot."""
+        """Return the full key for one robot."""
         return f"{ROOT}/{robot}/{self.path}"
 
 
@@ -102,17 +103,22 @@ DRIVER = Topic(
 SWITCHES = Topic(
     "tel/bridge/switches", m.Switches, 1, SLOW, "bridge", "the board's own emergency brakes"
 )
-LINK = Topic("tel/bridge/link", m.Link, 5, FAST, "bridge", "the way to the board")
+LINK = Topic("tel/bridge/link", m.Link, 5, FAST, "bridge", "the link to the board")
 ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 50, FAST, "odom", "pose and twist")
 SAFETY = Topic(
-    "tel/safety/state", m.SafetyState, 20, STATE, "safety", "verdict, causes, and who drives"
+    "tel/safety/state",
+    m.SafetyState,
+    20,
+    STATE,
+    "safety",
+    "verdict, causes, and the driving source",
 )
-HEALTH = Topic("tel/{service}/health", m.Health, 1, SLOW, "every service", "how a service fares")
+HEALTH = Topic("tel/{service}/health", m.Health, 1, SLOW, "every service", "health of a service")
 EVENTS = Topic("evt/{service}", m.Event, 0, EVENT, "every service", "transitions")
 DRIVE = Topic(
     "@cmd/drive/{source}", m.Drive, 20, COMMAND, "teleop, web, nav, ...", "a request to move"
 )
-MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "what safety lets through")
+MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
 # Any PUT or DELETE on it, with any payload or none, stops the robot and latches.
 ESTOP_PATH = "estop"
@@ -121,11 +127,13 @@ SET_SWITCHES = Call(
     "srv/bridge/switches", m.SwitchesRequest, m.Switches, "bridge", "set the emergency brakes"
 )
 SET_LED = Call("srv/bridge/led", m.LedRequest, m.Done, "bridge", "set one lamp channel")
-RESET = Call(
-    "srv/safety/reset", m.ResetRequest, m.ResetDone, "safety", "clear the causes that are named"
-)
+RESET = Call("srv/safety/reset", m.ResetRequest, m.ResetDone, "safety", "clear the named causes")
 RELEASE = Call(
-    "srv/safety/release", m.ReleaseRequest, m.Done, "safety", "creep off a pressed bumper, held"
+    "srv/safety/release",
+    m.ReleaseRequest,
+    m.Done,
+    "safety",
+    "creep off a pressed bumper while held",
 )
 SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry at a pose")
 
@@ -144,10 +152,18 @@ def estop_key(robot: str) -> str:
 
 
 def info_key(robot: str, service: str, part: str) -> str:
-    """Return where a service answers what a newcomer asks: ``schema``, ``config``, ``last``."""
+    """Return the key of a service's ``schema``, ``config`` or ``last`` messages."""
     return f"{ROOT}/{robot}/info/{service}/{part}"
 
 
 def live_key(robot: str, service: str, instance: str) -> str:
     """Return the liveliness token of one running service."""
     return f"{ROOT}/{robot}/live/{service}/{instance}"
+
+
+def schemas(topics: Iterable[Topic[m.Message]]) -> dict[str, Any]:
+    """Return the JSON schema of each topic's message, by the topic's path."""
+    return {
+        topic.path: msgspec.json.schema(topic.message)
+        for topic in sorted(topics, key=lambda topic: topic.path)
+    }

@@ -1,7 +1,7 @@
-"""A service's one thread: sockets, timers, and what other threads hand over.
+"""Event loop of a service: one thread for sockets, timers, and calls from other threads.
 
-Everything that a service decides happens in here, one thing at a time, so that its cores need no
-locks. Zenoh's threads only ``post``.
+All decisions of a service run here, one at a time, so that its cores need no locks. Zenoh's threads
+only ``post``.
 """
 
 import contextlib
@@ -19,15 +19,15 @@ Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
 
 
 class Timer(Struct):
-    """A call that is due every period; a late one is made once, never caught up in a burst."""
+    """A periodic call; a late one is made once, without catching up in a burst."""
 
     period_ns: int
     due_ns: int
     handler: Handler
-    late_ns: int = 0  # at worst
+    late_ns: int = 0  # maximum since the last report
 
     def call(self, now_ns: int) -> None:
-        """Make the call if it is due."""
+        """Call the handler if it is due."""
         late_ns = now_ns - self.due_ns
         if late_ns < 0:
             return
@@ -35,14 +35,14 @@ class Timer(Struct):
         self.due_ns += self.period_ns * (late_ns // self.period_ns + 1)
         self.handler(now_ns)
 
-    def put_off(self, now_ns: int) -> None:
-        """Make the next call a period from now, as what it is for has just been done."""
+    def defer(self, now_ns: int) -> None:
+        """Defer the next call to a period from now: its work was just done."""
         self.late_ns = max(self.late_ns, now_ns - self.due_ns)
         self.due_ns = now_ns + self.period_ns
 
 
 class Loop:
-    """Waits for what is due next and does it, until ``stop``."""
+    """Runs handlers as they become due, until ``stop``."""
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
@@ -55,48 +55,48 @@ class Loop:
         self._stopped = False
 
     def watch(self, sock: socket.socket, handler: Handler) -> None:
-        """Call the handler whenever the socket can be read."""
+        """Call the handler whenever the socket is readable."""
         self._selector.register(sock, selectors.EVENT_READ, handler)
 
     def every(self, period_s: float, handler: Handler) -> Timer:
         """Call the handler every ``period_s`` seconds, the first time at once.
 
-        Like ``watch`` it is for the loop's own thread; another thread posts it.
+        Like ``watch``, call it in the loop's own thread; other threads use ``post``.
         """
         timer = Timer(round(period_s * NS_PER_S), time.monotonic_ns(), handler)
         self._timers.append(timer)
         return timer
 
     def post(self, call: Callable[[], object]) -> None:
-        """Hand a call over from any thread; it is made in the loop's own."""
+        """Queue a call from any thread; the loop's thread makes it."""
         self._posted.append(call)
-        # A full pipe already holds a wake-up; a closed one has nobody left to wake.
+        # A full socket already holds a wake-up; a closed one needs none.
         with contextlib.suppress(OSError):
             self._wake_in.send(b"\0")
 
     def stop(self) -> None:
-        """Let ``run`` return after the current call; safe in a signal handler."""
+        """Make ``run`` return after the current call; safe in a signal handler."""
         self._stopped = True
         self.post(lambda: None)
 
     def run(self) -> None:
-        """Serve until ``stop``, which may have been said before; may be run again after that."""
+        """Run until ``stop``, which may precede this call; may be run again after that."""
         while not self._stopped:
             for key, _ in self._selector.select(self._until_due_s()):
                 key.data(time.monotonic_ns())
-            # Handed over before the timers look: they judge how old things are.
+            # Posted calls first: timers check the age of data.
             self._make_posted()
             self._call_due()
         self._stopped = False
 
     def close(self) -> None:
-        """Give the descriptors back."""
+        """Close the descriptors."""
         self._selector.close()
         self._wake_in.close()
         self._wake_out.close()
 
     def take_lateness_s(self) -> float:
-        """Return how late the latest timer was since the last call, in seconds."""
+        """Return the maximum timer lateness since the last call, in seconds."""
         late_ns = max((timer.late_ns for timer in self._timers), default=0)
         for timer in self._timers:
             timer.late_ns = 0
@@ -114,7 +114,7 @@ class Loop:
 
     def _drain(self, _: int) -> None:
         with contextlib.suppress(BlockingIOError):
-            self._wake_out.recv(65_536)  # what is left wakes once more
+            self._wake_out.recv(65_536)  # the rest wakes the loop again
         self._make_posted()
 
     def _make_posted(self) -> None:

@@ -1,7 +1,7 @@
-"""The members of a site: whose certificates a router lets in, and as what.
+"""Members of a site: the certificates that a router accepts, with their roles.
 
-`t2 keys` writes the list, routers read it. A certificate that is not on it, or that is revoked,
-passes TLS and then may do nothing: Zenoh knows no revocation lists.
+`t2 keys` writes the list, routers read it. A certificate that is not on it, or is revoked, passes
+TLS and then has no permissions: Zenoh does not support revocation lists.
 """
 
 from datetime import datetime
@@ -18,37 +18,37 @@ ROLES: tuple[Role, ...] = ("robot", "driver", "viewer", "fleet", "site")
 
 # The name of a source of motion requests, as in ``safety.sources``.
 SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
-# A robot's id, and whatever else becomes a part of a certificate's name: one chunk of a key.
+# A robot's id, and other parts of a certificate's name: one chunk of a key.
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
 
 
 class Member(Struct, frozen=True, kw_only=True):
-    """One certificate; ``common_name`` is ``ROLE.NAME.SERIAL`` and never used again."""
+    """One certificate; ``common_name`` is ``ROLE.NAME.SERIAL`` and never reused."""
 
     common_name: str
     role: Role
     name: Name
     robots: tuple[str, ...] = ()  # that a driver may move, or that a robot is
     sources: tuple[SourceName, ...] = ()  # that a driver may use; empty means any
-    addresses: tuple[str, ...] = ()  # where a router is dialled; lists of before have none
+    addresses: tuple[str, ...] = ()  # addresses of a router; empty in older lists
     expires: datetime  # UTC
     revoked: bool = False
 
 
 class Members(Struct, frozen=True, kw_only=True):
-    """Everybody who has ever been a member."""
+    """All members, revoked ones included."""
 
     site: Name
     members: tuple[Member, ...] = ()
 
     @property
     def welcome(self) -> tuple[Member, ...]:
-        """Those who are let in."""
+        """Members that are not revoked."""
         return tuple(member for member in self.members if not member.revoked)
 
 
 def read(file: Path) -> Members:
-    """Return the list; raise ``ConfigError`` naming the file and what is wrong with it."""
+    """Read the list; raise ``ConfigError`` naming the file and the error."""
     try:
         return msgspec.json.decode(file.read_bytes(), type=Members)
     except OSError as error:

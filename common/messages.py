@@ -1,8 +1,8 @@
-"""What travels on the bus: frozen structs, SI units and radians, ``None`` for unknown.
+"""Messages on the bus: frozen structs, SI units and radians, ``None`` for unknown.
 
-Frames follow REP-103 and REP-105: x forward, y left, counter-clockwise positive; ``odom`` is where
-odometry started, ``base_link`` is the vehicle. Every message carries the header of ``Message``, put
-there by the publisher. A reader ignores fields that it does not know.
+Frames follow REP-103 and REP-105: x forward, y left, counter-clockwise positive; ``odom`` is the
+start pose of odometry, ``base_link`` is the vehicle. Every message has the header of ``Message``,
+set by the publisher. Readers ignore unknown fields.
 """
 
 from typing import Annotated, Literal
@@ -33,11 +33,11 @@ Covariance2 = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
 class Message(Struct, frozen=True, kw_only=True):
     """The header of every message."""
 
-    seq: int = 0  # rises by one per publisher; starts anew with ``boot``
+    seq: int = 0  # rises by one per publisher; restarts with ``boot``
     boot: int = 0  # random per start of the sender
     t_ns: int = 0  # the sender's wall clock, for records only
     mono_ns: int = 0  # the sender's monotonic clock
-    host: int = 0  # whose clock that is: random per boot of the sender's host, 0 unknown
+    host: int = 0  # identifies that clock: random per boot of the sender's host, 0 if unknown
 
 
 # --- tel/bridge -----------------------------------------------------------------------------
@@ -55,11 +55,11 @@ class Mileage(Message, frozen=True, kw_only=True):
 
     distance: float  # m, forward positive
     heading: float  # rad, wrapped to -pi..pi
-    epoch: int  # how often the bridge has seen the board start anew
+    epoch: int  # number of board restarts that the bridge has detected
 
 
 class Ultrasonic(Message, frozen=True, kw_only=True):
-    """Eight ranges, counted clockwise from the left (manual 2.3, its second of that number)."""
+    """Eight ranges, counted clockwise from the left (manual 2.3, the second section 2.3)."""
 
     ranges: Ranges  # m; None where the status is not "ok"
     status: Statuses
@@ -87,13 +87,13 @@ class Switches(Message, frozen=True, kw_only=True):
 
 
 class Link(Message, frozen=True, kw_only=True):
-    """The way to the board, as the bridge sees it."""
+    """State of the link to the board."""
 
     state: LinkState
     board: str  # address:port
     epoch: int
     armed: bool  # whether the bridge would obey a RUN now
-    waiting: str  # why it would not, in words; empty when armed
+    waiting: str  # why it would not, as text; empty when armed
     rates: dict[str, float]  # frames per second by name, over the last second
     rejected: dict[str, int]  # frames and datagrams refused since start, by reason
     round_trip: float | None  # s, the median of the last queries
@@ -117,7 +117,7 @@ class Odometry(Message, frozen=True, kw_only=True):
     angular: float  # rad/s
     pose_covariance: Covariance3  # 3x3 row by row over x, y, heading
     twist_covariance: Covariance2  # 2x2 row by row over linear, angular
-    epoch: int  # how often the pose started anew
+    epoch: int  # number of times the pose was set
     residual: float | None  # m, counters less integrated velocity over the last second
     slip: bool
     frame_id: str = "odom"
@@ -130,12 +130,12 @@ class Cause(Struct, frozen=True, kw_only=True):
     name: str
     action: Action
     age: float  # s since it became active
-    text: str  # in words, for the operator
-    id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one each time it comes back
+    text: str  # text for the operator
+    id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
 
 
 class Limits(Struct, frozen=True, kw_only=True):
-    """What safety allows at this moment."""
+    """Velocity limits that safety allows now."""
 
     forward: float  # m/s
     backward: float  # m/s, as a positive number
@@ -143,7 +143,7 @@ class Limits(Struct, frozen=True, kw_only=True):
 
 
 class Release(Struct, frozen=True, kw_only=True):
-    """What is known about moving off a pressed bumper; the operator chooses the direction."""
+    """State of moving off a pressed bumper; the operator chooses the direction."""
 
     believed_free: Direction | None  # opposite of the last motion; None when none is known
     travelled: float  # m, net travel by the counters over the last metre before the contact
@@ -153,15 +153,15 @@ class Release(Struct, frozen=True, kw_only=True):
 
 
 class SafetyState(Message, frozen=True, kw_only=True):
-    """What safety decided and why."""
+    """Safety's decision and its causes."""
 
     verdict: Verdict
-    latched: tuple[str, ...]  # names of the causes that want a reset
+    latched: tuple[str, ...]  # names of the causes that need a reset
     causes: tuple[Cause, ...]  # all active ones, the worst first
-    source: str | None  # who drives
+    source: str | None  # the driving source
     limits: Limits
-    heartbeat: int  # echoed by whoever drives, see ``Drive.echo``
-    text: str  # one sentence: why the vehicle does or does not move
+    heartbeat: int  # echoed by sources, see ``Drive.echo``
+    text: str  # one sentence: why the vehicle may or may not move
     release: Release | None = None  # None while there is no contact
 
 
@@ -169,7 +169,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
 
 
 class Drive(Message, frozen=True, kw_only=True):
-    """A request to move; holds for its source's lease."""
+    """A drive request; valid for its source's lease."""
 
     linear: float  # m/s
     angular: float  # rad/s
@@ -177,17 +177,17 @@ class Drive(Message, frozen=True, kw_only=True):
 
 
 class Motion(Message, frozen=True, kw_only=True):
-    """What safety lets through; the bridge obeys nothing else, and for 200 ms."""
+    """The motion that safety allows; the bridge obeys only this, for 200 ms."""
 
     command: Command
     linear: float = 0.0  # m/s
     angular: float = 0.0  # rad/s
     source: str | None = None
-    judged: int = 0  # ``seq`` of the newest bumper sample that the verdict knows
+    judged: int = 0  # ``seq`` of the newest bumper sample in the verdict
     judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
-    latched: bool = False  # whether an operator's reset is due
-    predecessor: int | None = None  # what the newest ``Link.latched_by`` was that the verdict knows
-    # For measuring only, on the clock of ``mono_ns``.
+    latched: bool = False  # whether an operator's reset is needed
+    predecessor: int | None = None  # the newest ``Link.latched_by`` in the verdict
+    # For latency measurement only, on the clock of ``mono_ns``.
     asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
     heard_ns: int = 0  # when safety received that request; 0 when this answers none
     judged_ns: int = 0  # when safety received the sample that ``judged`` names
@@ -206,32 +206,32 @@ class Event(Message, frozen=True, kw_only=True):
 
 
 class Durations(Struct, frozen=True, kw_only=True):
-    """A histogram of how long something took, since the service's start."""
+    """Histogram of durations since the service's start."""
 
-    counts: tuple[int, ...]  # one for each of ``Timing.bounds``, and one for what took longer
-    worst: float  # s, 0 as long as there is none
+    counts: tuple[int, ...]  # one for each of ``Timing.bounds``, and one above the last
+    worst: float  # s, 0 without any
 
 
 class Timing(Struct, frozen=True, kw_only=True):
-    """How fast a service reacts; a name with a dot is a hop of what stands before the dot."""
+    """Reaction times of a service; a name with a dot is a hop of the name before the dot."""
 
-    bounds: tuple[float, ...]  # s, rising; a count is of what took up to its bound
+    bounds: tuple[float, ...]  # s, rising; upper bounds of the counts
     durations: dict[str, Durations]  # by name
-    not_counted: dict[str, int]  # what could not be measured, by reason
+    not_counted: dict[str, int]  # number of unmeasured durations, by reason
 
 
 class Health(Message, frozen=True, kw_only=True):
-    """How a service fares, once a second."""
+    """Health of a service, once a second."""
 
     service: str
     version: str
     uptime: float  # s
     rates: dict[str, float]  # messages per second by key, in and out, over the last second
     counters: dict[str, int]  # since start
-    lateness: float  # s, how late the loop's latest timer was in the last second
+    lateness: float  # s, maximum lateness of the loop's timers in the last second
     rss: int  # bytes
-    priority: int = 0  # of SCHED_FIFO; 0 for an ordinary process, which waits its turn
-    timing: Timing | None = None  # None where nothing is measured
+    priority: int = 0  # of SCHED_FIFO; 0 for normal priority
+    timing: Timing | None = None  # None if not measured
 
 
 # --- srv ------------------------------------------------------------------------------------
@@ -275,7 +275,7 @@ class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Start odometry anew at this pose in ``odom``."""
+    """Set the odometry pose in ``odom``."""
 
     x: float = 0.0  # m
     y: float = 0.0  # m
@@ -287,7 +287,7 @@ class Done(Struct, frozen=True, kw_only=True):
     """A call was carried out."""
 
     text: str
-    boot: int = 0  # of the service that answers; 0 when it does not say
+    boot: int = 0  # of the answering service; 0 if unknown
 
 
 class ResetDone(Done, frozen=True, kw_only=True):

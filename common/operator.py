@@ -1,4 +1,4 @@
-"""Operator calls: built from the safety state that the operator saw, and checked for effect."""
+"""Operator calls: built from the displayed safety state, and checked for their effect."""
 
 from msgspec import Struct
 
@@ -23,10 +23,10 @@ class Echoes(Struct, frozen=True):
         return Echoes(state.boot, heartbeat.noted(state.heartbeat, now_ns))
 
     def refusal(self, echo: int | None, now_ns: int) -> str:
-        """Return why a call with this echo is refused, for a person; empty if not.
+        """Return why a call with this echo is refused, as text; empty if accepted.
 
-        A state may reach the operator's program before it comes here: an echo slightly ahead
-        counts as the newest number, and is as old as that.
+        A state may reach the operator's program before it arrives here: an echo slightly
+        ahead counts as the newest number.
         """
         newest = self.heartbeat.number
         if echo is not None and newest < echo <= newest + AHEAD:

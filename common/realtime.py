@@ -1,27 +1,26 @@
-"""Ahead of the crowd: what stands between the board and its wheels asks Linux for SCHED_FIFO.
+"""SCHED_FIFO priorities for the control chain.
 
-On a computer that is busy an ordinary process waits its turn, by milliseconds; these do not. Who is
-nearer to the wheels is ahead, so that a hang of one never keeps those from stopping the vehicle
-that watch it:
+On a busy computer an ordinary process waits milliseconds for its turn; these processes do not.
+Priority rises toward the actuators, so that a hang of one process never delays the processes that
+supervise it and stop the vehicle:
 
 ======= ======== ===================================================
-process priority its hang is found by
+process priority a hang is detected by
 ======= ======== ===================================================
 guard   54       systemd's watchdog
 bridge  53       the guard, which brakes
 safety  52       the bridge, whose lease runs out
-probe   52       systemd's watchdog: the router gives no sign of life without it
+probe   52       systemd's watchdog: the probe reports for the router
 router  51       the probe, which kills it
 ======= ======== ===================================================
 
-The simulated board, 55, is ahead of them all: the real one is another machine, which nothing on
-this one keeps waiting.
+The simulated board has 55, the highest priority: the real board is a separate machine.
 
-A thread that computes on for ``LONGEST_US`` without waiting for anything runs away, and Linux ends
-its process. The router is spared: a thread of it that passes on all that it can does not wait. So
-is the simulated board, which may be told to flood its bridge.
+A thread that computes for ``CPU_LIMIT_US`` without waiting is a runaway, and Linux kills its
+process. The router is exempt: a busy forwarding thread does not wait. So is the simulated board,
+which can flood its bridge for tests.
 
-Where the right to go ahead is missing, and on other systems, things go on as ordinary.
+Without the permission, and on other systems, processes run with normal priority.
 """
 
 import os
@@ -29,16 +28,15 @@ import sys
 from contextlib import suppress
 
 BOARD, GUARD, BRIDGE, SAFETY, PROBE, ROUTER = 55, 54, 53, 52, 52, 51
-# `t2 up` itself: on a busy machine a killed process ends only when it is scheduled, and only then
-# its children get their signal.
+# `t2 up`: a killed process ends only when it is scheduled; only then its children are signalled.
 SUPERVISOR = 51
-LONGEST_US = 1_000_000
+CPU_LIMIT_US = 1_000_000
 
 
 def ask(priority: int, *, alone: bool = False) -> None:
-    """Put this thread, and those that it starts, ahead of all ordinary ones, if that is granted.
+    """Request SCHED_FIFO for this thread and the threads it starts; ignored without permission.
 
-    ``alone``: what it starts begins as ordinary.
+    ``alone``: threads and processes that it starts have normal priority.
     """
     if sys.platform == "linux":
         policy = os.SCHED_FIFO | (os.SCHED_RESET_ON_FORK if alone else 0)
@@ -47,15 +45,15 @@ def ask(priority: int, *, alone: bool = False) -> None:
 
 
 def limit() -> None:
-    """Have Linux end this process when a thread of it that is ahead runs away."""
+    """Make Linux kill this process when one of its SCHED_FIFO threads is a runaway."""
     if sys.platform == "linux":
         import resource  # not everywhere
 
         _, most = resource.getrlimit(resource.RLIMIT_RTTIME)
-        longest = LONGEST_US if most == resource.RLIM_INFINITY else min(most, LONGEST_US)
+        longest = CPU_LIMIT_US if most == resource.RLIM_INFINITY else min(most, CPU_LIMIT_US)
         resource.setrlimit(resource.RLIMIT_RTTIME, (longest, most))
 
 
 def priority(pid: int = 0) -> int:
-    """Return the priority among those ahead, of this thread or a process; 0 for ordinary ones."""
+    """Return the SCHED_FIFO priority of this thread or a process; 0 for normal ones."""
     return os.sched_getparam(pid).sched_priority if sys.platform == "linux" else 0

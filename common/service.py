@@ -1,9 +1,9 @@
-"""A service's life: arguments, settings, logs, signals, presence, health, the loop, the end.
+"""Life cycle of a service: arguments, settings, logs, signals, presence, health, loop, exit.
 
-``run`` reads the settings (exit code 78 names what is wrong, before anything opens), builds the
-service around a ``Node``, and serves until SIGINT or SIGTERM. The first signal lets the service
-come to rest; a second one ends the process at once. The exit actions run once on every way out: a
-signal that arrives while they run changes nothing.
+``run`` reads the settings (exit code 78 names the invalid one, before anything opens), builds the
+service around a ``Node``, and runs it until SIGINT or SIGTERM. The first signal lets the service
+stop in order; a second one ends the process at once. The exit actions run once on every exit path:
+a signal that arrives while they run changes nothing.
 """
 
 import os
@@ -21,26 +21,24 @@ import msgspec
 from common import keys, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
-from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Event, Health, Level, Timing
-from common.schema import schemas
 from common.settings import Shared
-from common.systemd import OFTEN_S, Systemd
-from common.version import VERSION
+from common.systemd import CHECK_PERIOD_S, Systemd
 
-REST_S = 2.0  # how long a service may take to come to rest
-BEHIND = 10  # how nice a service is that does not drive
+STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
+NICENESS = 10  # of services that do not drive
 
 
 C = TypeVar("C", bound=Shared)
 
 
 class Node(Generic[C]):
-    """What a service is built on: its settings, its loop, its bus, its events and counters."""
+    """Base of a service: settings, loop, bus, events and counters."""
 
     drive: DriveLink  # of bridge and safety, see ``open_drive``
 
@@ -51,9 +49,9 @@ class Node(Generic[C]):
         self.log = log.Logger()
         self.bus = self.open_bus()
         self.counters: Counter[str] = Counter()
-        self.is_stopped: Callable[[], bool] = lambda: True  # asked while stopping
-        self.on_exit: Callable[[], None] = lambda: None  # on every way out, a crash too
-        self.timing: Callable[[], Timing | None] = lambda: None  # what goes into the health
+        self.is_stopped: Callable[[], bool] = lambda: True  # polled while stopping
+        self.on_exit: Callable[[], None] = lambda: None  # on every exit path, crashes included
+        self.timing: Callable[[], Timing | None] = lambda: None  # part of the health message
         self._loaded = loaded
         self._events = self.bus.publisher(keys.EVENTS, service=name)
         self._health = self.bus.publisher(keys.HEALTH, service=name)
@@ -61,22 +59,22 @@ class Node(Generic[C]):
         self._counted: Counter[str] = Counter()
 
     def open_bus(self) -> Bus:
-        """Return a bus of its own session, not yet open; the first one is ``bus``."""
+        """Return a bus with its own session, not yet open; the first one is ``bus``."""
         return Bus(self.config.bus, self.config.robot.id, self.loop.post)
 
     def open_drive(self, *, listens: bool) -> DriveLink:
-        """Make this service's end of the drive link, which opens and closes with ``bus``."""
+        """Create this service's end of the drive link; it opens and closes with ``bus``."""
         self.drive = DriveLink(self.bus, listens=listens)
-        self.loop.every(1.0, LinkWatch(self.drive, self.event).look)
+        self.loop.every(1.0, LinkWatch(self.drive, self.event).check)
         return self.drive
 
     def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
-        """Publish and log a transition."""
+        """Publish and log an event."""
         self._events.put(Event(name=name, level=level, text=text, about=about))
         getattr(self.log, level)(text, event_name=name, **about)
 
-    def present(self) -> None:
-        """Say on the bus that the service is there, and answer what a newcomer asks."""
+    def announce(self) -> None:
+        """Declare the liveliness token, the info queryables and the health timer."""
         robot, bus = self.config.robot.id, self.bus
         bus.live(keys.live_key(robot, self.name, f"{bus.boot:x}"))
         for part, make in (
@@ -108,7 +106,7 @@ class Node(Generic[C]):
 
     def _schema(self) -> bytes:
         mine = {publisher.topic for publisher in self.bus.publishers}
-        return msgspec.json.encode(schemas(mine))
+        return msgspec.json.encode(keys.schemas(mine))
 
     def _settings(self) -> bytes:
         settings = {
@@ -129,11 +127,11 @@ def run(
     *,
     priority: int = 0,
 ) -> int:
-    """Live a service's life and return its exit code; a ``priority`` is one of ``realtime``'s."""
+    """Run a service and return its exit code; ``priority`` is one of ``realtime``'s."""
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
         if priority and loaded.config.robot.realtime:
-            realtime.ask(priority)  # before there are threads: they follow it
+            realtime.ask(priority)  # before threads start: they inherit it
             realtime.limit()
         log.configure(loaded.config.log, name)
         node = Node(name, loaded)
@@ -145,7 +143,7 @@ def run(
     except (LinkError, ConfigError) as error:
         node.log.error(str(error))
         return EXIT_LINK if isinstance(error, LinkError) else EXIT_CONFIG
-    node.present()
+    node.announce()
     return serve(node)
 
 
@@ -157,9 +155,9 @@ def run_optional_service(
     *,
     extra: str,
 ) -> int:
-    """Live the life of a service that needs an extra and stands behind all that drives.
+    """Run a service that needs an extra, at lower priority than the control chain.
 
-    ``found`` imports what builds the service.
+    ``found`` imports and returns the builder of the service.
     """
     try:
         build = found()
@@ -169,35 +167,35 @@ def run_optional_service(
             file=sys.stderr,
         )
         return EXIT_CONFIG
-    os.nice(BEHIND)
+    os.nice(NICENESS)
     return run(name, root, build, argv)
 
 
 def serve(node: Node[C]) -> int:
-    """Run the loop until a signal, let the service come to rest, and leave."""
+    """Run the loop until a signal, stop the service in order, and exit."""
     exit_actions = ExitActions(node)
     _on_signal(node, exit_actions)
     systemd = Systemd()
-    if systemd.listens:
-        node.loop.every(OFTEN_S, systemd.ready)
+    if systemd.enabled:
+        node.loop.every(CHECK_PERIOD_S, systemd.ready)
     try:
         node.bus.open()
         node.log.info("started", robot=node.config.robot.id)
         node.loop.run()
         node.log.info("stopping")
         systemd.stopping()
-        _come_to_rest(node)
+        _await_stop(node)
     finally:
         exit_actions.run()
-        # After a bug of ours too: an open session keeps a process that has failed from ending.
+        # Also after a crash: an open session keeps a failed process from ending.
         node.bus.close()
         node.loop.close()
     node.log.info("stopped")
     return 0
 
 
-def _come_to_rest(node: Node[C]) -> None:
-    deadline_ns = time.monotonic_ns() + round(REST_S * NS_PER_S)
+def _await_stop(node: Node[C]) -> None:
+    deadline_ns = time.monotonic_ns() + round(STOP_TIMEOUT_S * NS_PER_S)
 
     def check(now_ns: int) -> None:
         if node.is_stopped() or now_ns > deadline_ns:
@@ -208,7 +206,7 @@ def _come_to_rest(node: Node[C]) -> None:
 
 
 def resident_bytes() -> int:
-    """Return the resident memory of this process, 0 where the system does not tell."""
+    """Return the resident memory of this process, 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except OSError:
@@ -217,19 +215,19 @@ def resident_bytes() -> int:
 
 
 class ExitActions:
-    """The exit actions of a service, run once."""
+    """Exit actions of a service; they run once."""
 
     def __init__(self, node: Node[C]) -> None:
         self._node = node
         self._begun = self._over = False
 
     @property
-    def under_way(self) -> bool:
-        """Whether they have begun and are not over."""
+    def running(self) -> bool:
+        """Whether they have begun and are not finished."""
         return self._begun and not self._over
 
     def run(self) -> None:
-        """Run them, unless they ran or are running."""
+        """Run them once."""
         if self._begun:
             return
         self._begun = True
@@ -246,7 +244,7 @@ def _on_signal(node: Node[C], exit_actions: ExitActions) -> None:
         node.loop.stop()
 
     def leave(number: int, _: FrameType | None) -> None:
-        if exit_actions.under_way:
+        if exit_actions.running:
             return  # the interrupted call ends the process
         try:
             exit_actions.run()

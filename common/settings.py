@@ -1,6 +1,6 @@
-"""Settings that two services share; each section is a frozen struct with its own limits.
+"""Settings sections that several services share; each section is a frozen struct with limits.
 
-A service's whole configuration is a struct of sections, see ``services/*/config.py``.
+The whole configuration of a service is a struct of sections, see ``services/*/config.py``.
 """
 
 import re
@@ -22,7 +22,7 @@ PROTECTIVE_OF_BUS: Limits = {"lease": (0.0, 2.0)}
 PROTECTIVE_OF_BOARD: Limits = {"any_source_port": (False, False)}
 Port = Annotated[int, Meta(ge=1, le=65535)]
 
-# What the wheel of eclipse-zenoh can carry; a client would look for anything else forever.
+# Protocols of the eclipse-zenoh wheel; a client would retry any other one forever.
 ENDPOINT = re.compile(r"((tcp|udp|tls|quic|ws)/.+:\d+|unixsock-stream/.+)([?#].*)?")
 ENCRYPTED = ("tls/", "quic/")
 SOCKET_BYTES = 107  # of the path of a Unix socket, on Linux
@@ -35,9 +35,9 @@ class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 def check_protections(
     given: Mapping[str, float], limits: Limits, unsafe_overrides: tuple[str, ...]
 ) -> None:
-    """Raise ``ValueError`` for a setting that takes a protection away and is not owned up to.
+    """Raise ``ValueError`` for an unsafe setting that ``unsafe_overrides`` does not name.
 
-    Outside of its limits a protection is as good as gone. Zero never means "off".
+    Outside of its limits a protection is ineffective. Zero never means "off".
     """
     unknown = sorted(set(unsafe_overrides) - set(limits))
     if unknown:
@@ -51,29 +51,29 @@ def check_protections(
 
 
 class Robot(Section, frozen=True, kw_only=True):
-    """Which robot this is, and how its computer treats it."""
+    """Identity of the robot, and scheduling of its processes."""
 
     id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+\Z")] = "001"
-    realtime: bool = True  # whether what stands before the wheels asks for SCHED_FIFO
+    realtime: bool = True  # whether the control chain requests SCHED_FIFO
 
 
 class BusSettings(Section, frozen=True, kw_only=True):
-    """Where the Zenoh router is."""
+    """Zenoh router, endpoints and certificates."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
-    connect: tuple[str, ...] = ()  # where services find it; empty means where it listens
-    uplink: tuple[str, ...] = ()  # the site's router, dialled by the robot's own
+    connect: tuple[str, ...] = ()  # where services connect; empty means ``listen``
+    uplink: tuple[str, ...] = ()  # the site's router, to which the robot's router connects
     # The drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
     drive: str = ""
-    lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is noticed
+    lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is detected
     # s for the router's answer to its probe: a router that misses it twice is restarted.
     probe_deadline: Annotated[float, Meta(ge=0.5, le=60.0)] = 1.0
     ca: str = ""  # PEM files of `t2 keys`, for tls/ endpoints
     certificate: str = ""
     private_key: str = ""
-    members: str = ""  # the list of `t2 keys`: whom the router lets in, and as what
-    insecure: bool = False  # let a router listen to the network, or dial it, without TLS
+    members: str = ""  # member list of `t2 keys`: accepted certificates and roles
+    insecure: bool = False  # allow network endpoints without TLS
     laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
 
     def __post_init__(self) -> None:
@@ -90,7 +90,7 @@ class BusSettings(Section, frozen=True, kw_only=True):
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where a client dials: ``connect``, or else the embedded router, if it can without TLS."""
+        """Endpoints for clients: ``connect``, or else the embedded router's, without TLS first."""
         plain = tuple(endpoint for endpoint in self.listen if not is_encrypted(endpoint))
         return self.connect or tuple(
             endpoint.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
@@ -99,49 +99,50 @@ class BusSettings(Section, frozen=True, kw_only=True):
 
     @property
     def onboard(self) -> tuple[str, ...]:
-        """The protocols whose links a router trusts, members or not: it listens there in plain."""
+        """Protocols that the router listens on without TLS, and trusts."""
         plain = (each for each in self.listen if not is_encrypted(each))
         return tuple(sorted({protocol(each) for each in plain}))
 
     def _check_open(self) -> None:
-        """Refuse to open the robot to everybody on the network, unless that is spelled out."""
+        """Refuse network endpoints without TLS, unless ``insecure`` is set."""
         if self.insecure:
             return
         for way, endpoints in (("listen", self.listen), ("uplink", self.uplink)):
             for endpoint in endpoints:
                 if not (is_encrypted(endpoint) or is_local(endpoint)):
                     raise ValueError(
-                        f"{way} {endpoint} lets everybody on the network drive; "
-                        "`t2 keys` and tls/... let in whom you name, --insecure lets in all"
+                        f"{way} {endpoint} lets everybody on the network drive; use tls/... with "
+                        "`t2 keys` to accept named members only, or --insecure to accept all"
                     )
         for endpoint in self.uplink if self.members else ():
-            if protocol(endpoint) in self.onboard:  # rules know a link by its protocol alone
+            # Access rules identify a link by its protocol alone.
+            if protocol(endpoint) in self.onboard:
                 raise ValueError(
                     f"uplink {endpoint} would pass for a service on board, as listen has "
-                    f"{protocol(endpoint)}/, too; dial tls/..., or listen on unixsock-stream/..."
+                    f"{protocol(endpoint)}/, too; use tls/... or listen on unixsock-stream/..."
                 )
 
     def _check_encrypted(self) -> None:
-        """Refuse TLS without the files that it takes."""
-        dialled = [e for e in (*self.listen, *self.connect, *self.uplink) if is_encrypted(e)]
+        """Refuse TLS endpoints without certificate files."""
+        encrypted = [e for e in (*self.listen, *self.connect, *self.uplink) if is_encrypted(e)]
         for name in ("ca", "certificate", "private_key"):
-            if dialled and not getattr(self, name):
-                raise ValueError(f"{dialled[0]} wants {name}: a PEM file of `t2 keys issue`")
+            if encrypted and not getattr(self, name):
+                raise ValueError(f"{encrypted[0]} wants {name}: a PEM file of `t2 keys issue`")
         for endpoint in (*self.listen, *self.uplink):
             if is_encrypted(endpoint) and not self.members:
                 raise ValueError(
-                    f"{endpoint} wants members: the list of `t2 keys`, or whoever comes that way "
-                    "may do everything"
+                    f"{endpoint} wants members: the list of `t2 keys`, without it every client "
+                    "has all permissions"
                 )
 
 
 def protocol(endpoint: str) -> str:
-    """Return what an endpoint is spoken to in, such as tcp."""
+    """Return the protocol of an endpoint, such as tcp."""
     return endpoint.partition("/")[0]
 
 
 def drive_path(endpoint: str) -> str:
-    """Return the path in the drive link's endpoint; raise ``ValueError`` if it cannot be one."""
+    """Return the path in the drive link's endpoint; raise ``ValueError`` if it is invalid."""
     kind, _, path = endpoint.partition("/")
     if kind != "unixsock-stream" or not path.startswith("/") or set(path) & set("?#"):
         raise ValueError(
@@ -157,12 +158,12 @@ def drive_path(endpoint: str) -> str:
 
 
 def is_encrypted(endpoint: str) -> bool:
-    """Tell whether an endpoint asks for certificates."""
+    """Return whether an endpoint uses TLS."""
     return endpoint.startswith(ENCRYPTED)
 
 
 def is_local(endpoint: str) -> bool:
-    """Tell whether only this host can reach an endpoint."""
+    """Return whether only this host can reach an endpoint."""
     if protocol(endpoint) == "unixsock-stream":
         return True
     address = endpoint.partition("/")[2]
@@ -174,14 +175,14 @@ def is_local(endpoint: str) -> bool:
 
 
 class Board(Section, frozen=True, kw_only=True):
-    """The vehicle's main board and our side of its cable (manual 1)."""
+    """Addresses of the vehicle's main board and of this computer (manual 1)."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
     listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
-    any_source_port: bool = False  # take frames from every port of the board's address
+    any_source_port: bool = False  # accept frames from every port of the board's address
 
     def __post_init__(self) -> None:
         given = {"any_source_port": self.any_source_port}
@@ -206,7 +207,7 @@ def _check_ipv4(name: str, value: str) -> None:
 
 
 class Wire(Section, frozen=True, kw_only=True):
-    """What the manual leaves open about the frames; the defaults are today's answers."""
+    """Frame details that the manual does not define; the defaults are the current answers."""
 
     crc: str = "crc-16"  # a 16-bit name of crcmod.predefined
     crc_covers: Covers = "payload"
@@ -221,14 +222,14 @@ class Wire(Section, frozen=True, kw_only=True):
 
 
 class Log(Section, frozen=True, kw_only=True):
-    """What is written to standard error."""
+    """Log output on standard error."""
 
     level: LogLevel = "info"
     format: Literal["auto", "text", "json"] = "auto"  # auto: text on a terminal, JSON otherwise
 
 
 class Vehicle(Section, frozen=True, kw_only=True):
-    """The vehicle's body; the manual gives no dimensions, so measure yours.
+    """Dimensions of the vehicle; the manual gives none, so measure yours.
 
     The origin of ``base_link`` is the middle of the wheels, on the ground.
     """
@@ -242,7 +243,7 @@ class Vehicle(Section, frozen=True, kw_only=True):
 
 
 class Shared(Struct, frozen=True, kw_only=True):
-    """The sections that every service has; a service's own configuration adds to them."""
+    """Sections of every service; a service's own configuration extends them."""
 
     robot: Robot = Robot()
     bus: BusSettings = BusSettings()

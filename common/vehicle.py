@@ -1,4 +1,4 @@
-"""Where things sit on the vehicle, in ``base_link``: x forward, y left, metres and radians."""
+"""Sonar mounting poses in ``base_link``: x forward, y left, metres and radians."""
 
 import math
 
@@ -8,7 +8,7 @@ from common.settings import Vehicle
 
 
 class Mount(Struct, frozen=True):
-    """A sonar's place and the way it looks."""
+    """Position and direction of a sonar."""
 
     name: str
     x: float

@@ -1,4 +1,4 @@
-"""The simulated vehicle alone: the board's side of the cable, in a world, until ctrl-c."""
+"""Run the simulated vehicle: main board and world, until ctrl-c."""
 
 import argparse
 import signal
@@ -11,17 +11,16 @@ from common import log, realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError
-from sim.config import Config
-from sim.files import load_plan, load_script
+from sim.config import Config, load_plan, load_script
 from sim.process import Process, Trace
 from sim.requests import Script
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the simulator's options."""
-    parser.add_argument("--world", help="a name in sim/worlds, or a TOML file")
-    parser.add_argument("--trace", type=Path, metavar="FILE", help="write down what happens")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="a script of faults")
+    parser.add_argument("--world", help="name of a file in sim/worlds, or path of a TOML file")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="write a trace file")
+    parser.add_argument("--faults", type=Path, metavar="FILE", help="fault script")
     add_sources(parser)
 
 

@@ -1,19 +1,19 @@
-"""The main board: what it knows, what it answers, and what it makes of the command that it holds.
+"""The simulated main board: state, answers, and the effect of the current command.
 
-It holds the last motion command for ever: no watchdog is documented. Two emergency brakes of its
-own, off at power-on, overrule that command; how the real ones work is unknown, these do this:
+It holds the last motion command for ever: no watchdog is documented. It has two emergency brakes,
+off at power-on, which override that command. The real behaviour is unknown; here it is:
 
 =================== ===============================================================================
-brake               while it acts, the board does BREAK instead of the command
+brake               while active, the board does BREAK instead of the command
 =================== ===============================================================================
 ultrasonic (0x7603) a sonar in the direction of motion, measured or commanded, is nearer than the
-                    brake range, too near to measure included
-bumper (0x7604)     the bumper is pressed; but ``toward`` lets a RUN pass that backs off, against
+                    brake range, or too near to measure
+bumper (0x7604)     the bumper is pressed; but ``toward`` allows a RUN that backs off, against
                     the direction in which the vehicle last moved when it was pressed
 =================== ===============================================================================
 
-A faulty sonar brakes nothing. A motion command has no answer of its own: the velocity comes anyway,
-all the time (manual 2.2).
+A faulty sonar brakes nothing. A motion command has no answer: the velocity is sent continuously
+(manual 2.2).
 """
 
 import math
@@ -27,7 +27,7 @@ from sim.config import Sim
 from sim.geometry import wrapped
 from sim.sonar import Ranges
 
-# rad/s for one unit of the wire; which unit it is each way, is a setting.
+# rad/s of one unit on the wire; the unit of each direction is a setting.
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}
 DRIVER_SIDES = {"left": Side.LEFT, "right": Side.RIGHT}
 FORWARD_SONARS, BACKWARD_SONARS = (1, 2, 3), (5, 6, 7)
@@ -39,7 +39,7 @@ BREAK = c.MotionCommand(c.MotionKind.BREAK)
 
 
 class Board:
-    """State since power-on; ``sense`` tells it what its sensors see."""
+    """State since power-on; ``sense`` sets the sensor values."""
 
     def __init__(self, wire: Wire, settings: Sim, ranges: Ranges) -> None:
         self._command_unit = RADIANS[wire.command_angular_unit]
@@ -53,7 +53,7 @@ class Board:
         self.power_on()
 
     def power_on(self) -> None:
-        """Start anew: counters, switches, command, lamps and driver faults."""
+        """Reset counters, switches, command, lamps and driver faults."""
         self.command = STOP
         self.ultrasonic_brake = self.bumper_brake = False
         self.driver_bits = {Side.LEFT: 0, Side.RIGHT: 0}
@@ -61,7 +61,7 @@ class Board:
         self._distance = self._turn = 0.0
 
     def sense(self, twist: Twist, ranges: Ranges, pressed: bool) -> None:
-        """Take what the sensors say."""
+        """Set the sensor values."""
         self._twist, self._ranges = twist, ranges
         if pressed and not self.pressed:
             self._pressed_way = self._last_way
@@ -69,24 +69,24 @@ class Board:
         self._last_way = _sign(twist.linear) or self._last_way
 
     def count(self, distance: float, turn: float) -> None:
-        """Add a way, in m and rad, to the counters."""
+        """Add distance (m) and turn (rad) to the counters."""
         self._distance += distance
         self._turn += turn
 
     def target(self, command: c.MotionCommand) -> Twist:
-        """Return what a command asks for, in SI."""
+        """Return the velocity of a command, in SI."""
         return Twist(command.linear_mmps / 1000, command.angular_raw * self._command_unit)
 
     def drive(self) -> c.MotionCommand:
-        """Return what the motors are told: the command that is held, or BREAK."""
+        """Return the command to the motors: the last one received, or BREAK."""
         return BREAK if self.braking() else self.command
 
     def braking(self) -> bool:
-        """Tell whether one of the emergency brakes acts."""
+        """Return whether one of the emergency brakes is active."""
         return (self.ultrasonic_brake and self._near()) or (self.bumper_brake and self._hit())
 
     def answer(self, frame: Frame) -> Frame | None:
-        """Obey a frame and return its answer; a motion command has none."""
+        """Process a frame and return its answer; a motion command has none."""
         if isinstance(frame, c.MotionCommand):
             self.command = frame
             return None
@@ -95,13 +95,13 @@ class Board:
         return self._report(frame)
 
     def velocity(self) -> r.VelocityReport:
-        """Return what comes unasked, all the time."""
+        """Return the continuous velocity report."""
         return r.VelocityReport(
             round(self._twist.linear * 1000), round(self._twist.angular / self._feedback_unit)
         )
 
     def driver(self, side: Side) -> r.DriverReport:
-        """Return what comes on a query, and unasked on a fault."""
+        """Return a driver report, sent on a query and on a fault."""
         return r.DriverReport(side, self.driver_bits[side])
 
     def _set(self, frame: c.UltrasonicBrakeSet | c.BumperBrakeSet | c.LedSet) -> Frame:
@@ -133,7 +133,7 @@ class Board:
         )
 
     def _ways(self) -> set[int]:
-        """Return where the vehicle moves or is told to: 1 forward, -1 backward."""
+        """Return the directions of motion, measured and commanded: 1 forward, -1 backward."""
         commanded = self.command.linear_mmps if self.command.kind is c.MotionKind.RUN else 0
         return {_sign(self._twist.linear), _sign(commanded / 1000)} - {0}
 

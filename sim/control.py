@@ -11,7 +11,7 @@ import msgspec
 
 from common.errors import LinkError, MessageError
 from sim.injection import Injection, Reply
-from sim.requests import Asked, AskTruth
+from sim.requests import Asked, GetTruth
 from sim.trace import Truth
 from sim.udp import LARGEST, bound, drain
 
@@ -22,21 +22,21 @@ _replies = msgspec.json.Decoder(Reply)
 
 
 class ControlSocket:
-    """The simulator's end."""
+    """The simulator's end of the control socket."""
 
     def __init__(self, port: int, injection: Injection) -> None:
         self.sock = bound(HOST, port, "sim.control_port")
         self._injection = injection
 
     def serve(self, now_ns: int) -> None:
-        """Answer what has come."""
+        """Answer the waiting requests."""
         for payload, sender in drain(self.sock):
             reply = self._answer(payload, now_ns)
-            with contextlib.suppress(OSError):  # who has left does not miss it
+            with contextlib.suppress(OSError):  # the client may be gone
                 self.sock.sendto(msgspec.json.encode(reply), sender)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the socket."""
         self.sock.close()
 
     def _answer(self, payload: bytes, now_ns: int) -> Reply:
@@ -58,15 +58,15 @@ class Control:
         """Send a request; ``MessageError`` when it is refused, ``LinkError`` when none answers."""
         try:
             reply = _replies.decode(self._exchange(msgspec.json.encode(request)))
-        except OSError as error:  # a time-out is one as well
+        except OSError as error:  # includes timeouts
             raise LinkError(f"the simulator's control socket: {error}") from None
         if not reply.ok:
             raise MessageError(reply.error)
         return reply
 
     def truth(self) -> Truth:
-        """Return how things are; errors as in ``do``."""
-        truth = self.do(AskTruth()).truth
+        """Return the true state; errors as in ``do``."""
+        truth = self.do(GetTruth()).truth
         assert truth is not None
         return truth
 

@@ -1,8 +1,8 @@
-"""The cable between board and PC, one way of it, with all that can happen to a datagram.
+"""Simulated cable: one direction between board and PC, with datagram faults.
 
-Each datagram meets the faults in this order: dropped, corrupted, sent from a foreign address, held
-to be joined with the next one, duplicated, queued for a cable that carries so much and no more,
-delayed. What is not delayed comes out at once and in order.
+Faults apply to each datagram in this order: dropped, corrupted, sent from a foreign address, held
+and joined with the next one, duplicated, queued by the rate limit, delayed. Datagrams without delay
+are delivered at once and in order.
 """
 
 import heapq
@@ -25,7 +25,7 @@ class Datagram:
 
 
 class Cable:
-    """One direction; what is put in is taken out when it is due."""
+    """One direction; a datagram is taken out when it is due."""
 
     def __init__(self, seed: int) -> None:
         self.faults = Wire()
@@ -33,10 +33,10 @@ class Cable:
         self._under_way: list[tuple[int, int, Datagram]] = []  # due, order, datagram
         self._held: dict[int, bytes] = {}
         self._order = 0
-        self._free_ns = 0  # when all that was put in has left
+        self._free_ns = 0  # when all queued data has left
 
     def put(self, datagram: Datagram, now_ns: int) -> None:
-        """Send one."""
+        """Send a datagram."""
         if self._happens(self.faults.drop):
             return
         if self._happens(self.faults.corrupt):

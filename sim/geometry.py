@@ -1,4 +1,4 @@
-"""Plane geometry of the simulated world: poses, segments, rays and the gap beside a rectangle.
+"""Plane geometry of the simulated world: poses, segments, rays and distances of a rectangle.
 
 Metres and radians, x east, y north, headings counter-clockwise from x. The body is a rectangle
 around its pose, length along the heading.
@@ -11,21 +11,21 @@ from typing import Self
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A place in the world and a heading; the heading is not wrapped."""
+    """A position in the world and a heading, not wrapped."""
 
     x: float
     y: float
     heading: float
 
     def outward(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a point of this pose's own frame lies in the world."""
+        """Transform a point of this pose's frame to the world."""
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         return self.x + cos * x - sin * y, self.y + sin * x + cos * y
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A straight piece of a surface, from a to b."""
+    """A straight surface segment, from a to b."""
 
     ax: float
     ay: float
@@ -33,7 +33,7 @@ class Segment:
     by: float
 
     def seen_from(self, pose: Pose) -> Self:
-        """Return it in the frame of a pose."""
+        """Transform the segment to the frame of a pose."""
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         ax, ay, bx, by = self.ax - pose.x, self.ay - pose.y, self.bx - pose.x, self.by - pose.y
         return type(self)(
@@ -59,7 +59,7 @@ class Rectangle:
         return tuple(Segment(*a, *b) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True))
 
     def touches(self, pose: Pose, segment: Segment) -> bool:
-        """Tell whether any point of the segment lies in it or on its edge."""
+        """Return whether any point of the segment lies in it or on its edge."""
         own = segment.seen_from(pose)
         enter, leave = 0.0, 1.0  # the part of the segment that is inside every strip so far
         for start, end, half in (
@@ -76,7 +76,7 @@ class Rectangle:
         return enter <= leave
 
     def holds(self, pose: Pose, x: float, y: float) -> bool:
-        """Tell whether a point of the world lies in it or on its edge."""
+        """Return whether a point of the world lies in it or on its edge."""
         return self.touches(pose, Segment(x, y, x, y))
 
     def gap(self, pose: Pose, segment: Segment) -> float:
@@ -104,11 +104,11 @@ def point_gap(x: float, y: float, segment: Segment) -> float:
 
 
 def ray(x: float, y: float, angle: float, segment: Segment) -> float:
-    """Return how far from a point, at an angle, the segment is met; infinity when it is not."""
+    """Return the distance from a point along a ray to the segment, or infinity."""
     cos, sin = math.cos(angle), math.sin(angle)
     dx, dy = segment.bx - segment.ax, segment.by - segment.ay
     cross = cos * dy - sin * dx
-    if cross == 0:  # seen edge on
+    if cross == 0:  # parallel
         return math.inf
     rx, ry = segment.ax - x, segment.ay - y
     along, where = (rx * dy - ry * dx) / cross, (rx * sin - ry * cos) / cross

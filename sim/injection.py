@@ -1,4 +1,4 @@
-"""Requests from outside, by hand or by script, done to a simulation."""
+"""Fault injection: requests from the control socket or a script, applied to the simulation."""
 
 from msgspec import Struct
 
@@ -31,7 +31,7 @@ class Reply(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Injection:
-    """Does requests, those of a script when their time has come."""
+    """Applies requests; those of a script at their time."""
 
     def __init__(self, simulation: Simulation, script: q.Script, now_ns: int) -> None:
         self._simulation = simulation
@@ -39,7 +39,7 @@ class Injection:
         self._steps = sorted(script.steps, key=lambda step: step.at, reverse=True)
 
     def advance(self, now_ns: int) -> None:
-        """Do the steps of the script that are due, each at its own time; step the simulation."""
+        """Apply the due steps of the script, each at its own time; advance the simulation."""
         while self._steps and self._due_ns(self._steps[-1]) <= now_ns:
             step = self._steps.pop()
             due_ns = self._due_ns(step)
@@ -48,18 +48,18 @@ class Injection:
         self._simulation.advance(now_ns)
 
     def handle(self, request: q.Asked, now_ns: int) -> Reply:
-        """Do one request; what is refused changes nothing."""
-        if isinstance(request, q.AskTruth):
+        """Apply one request; a refused one changes nothing."""
+        if isinstance(request, q.GetTruth):
             return Reply(ok=True, truth=self._simulation.truth(now_ns))
-        error = self._disturb(request, now_ns)
+        error = self._inject(request, now_ns)
         self._simulation.record(Disturbed(mono_ns=now_ns, request=request, error=error))
         return Reply(ok=not error, error=error)
 
     def _due_ns(self, step: q.Step) -> int:
         return self._start_ns + round(step.at * NS_PER_S)
 
-    def _disturb(self, request: q.Asked, now_ns: int) -> str:
-        """Return why it was refused, nothing when it was done."""
+    def _inject(self, request: q.Asked, now_ns: int) -> str:
+        """Return the reason of a refusal, empty when done."""
         match request:
             case q.Place():
                 return self._place(request.pose)
@@ -70,17 +70,17 @@ class Injection:
             case q.Wire():
                 self._wire(request)
             case _:
-                self._disturb_board(request, now_ns)
+                self._inject_board(request, now_ns)
         return ""
 
-    def _disturb_board(self, request: q.Asked, now_ns: int) -> None:
+    def _inject_board(self, request: q.Asked, now_ns: int) -> None:
         simulation = self._simulation
         match request:
             case q.Bumper():
-                simulation.hand_on_bumper = request.pressed
-                simulation.feel()
+                simulation.pressed_by_hand = request.pressed
+                simulation.update_bumper()
             case q.Sonar():
-                simulation.sonars.disturb(request)
+                simulation.sonars.inject(request)
             case q.Driver():
                 simulation.set_driver(DRIVER_SIDES[request.side], request.bits, now_ns)
             case q.Freeze():
@@ -90,9 +90,9 @@ class Injection:
             case q.Flood():
                 simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
             case _:
-                self._disturb_firmware(request)
+                self._inject_firmware(request)
 
-    def _disturb_firmware(self, request: q.Asked) -> None:
+    def _inject_firmware(self, request: q.Asked) -> None:
         simulation = self._simulation
         match request:
             case q.Mute():
@@ -113,7 +113,7 @@ class Injection:
         if simulation.world.blocks(simulation.body, pose):
             return f"something is in the way at x {pose.x:g}, y {pose.y:g}"
         simulation.pose, simulation.twist = pose, STILL
-        simulation.feel()
+        simulation.update_bumper()
         return ""
 
     def _rebuild(self, world: World) -> str:
@@ -121,7 +121,7 @@ class Injection:
         if world.blocks(simulation.body, simulation.pose):
             return "the vehicle is in the way"
         simulation.world = world
-        simulation.feel()
+        simulation.update_bumper()
         return ""
 
     def _remove(self, name: str) -> str:

@@ -22,7 +22,7 @@ from sim.world import Plan
 
 
 class Trace:
-    """A file of JSON lines, each written at once; or none."""
+    """A file of JSON lines, unbuffered; or none."""
 
     def __init__(self, file: Path | None) -> None:
         try:
@@ -36,13 +36,13 @@ class Trace:
             self._out.write(msgspec.json.encode(line) + b"\n")
 
     def close(self) -> None:
-        """End the file."""
+        """Close the file."""
         if self._out is not None:
             self._out.close()
 
 
 class Process:
-    """Everything that ``python -m sim`` runs; making one opens its sockets."""
+    """The whole of ``python -m sim``; the constructor opens the sockets."""
 
     def __init__(self, config: Config, plan: Plan, script: Script, trace: Trace) -> None:
         now_ns = time.monotonic_ns()
@@ -50,25 +50,25 @@ class Process:
         self._injection = Injection(self.simulation, script, now_ns)
         self._trace = trace
         self._log = Logger()
-        with ExitStack() as stack:  # what is open already is closed when the next port is taken
+        with ExitStack() as stack:  # closes opened sockets when a later port is taken
             self.loop = stack.enter_context(closing(Loop()))
             self._board = stack.enter_context(closing(BoardSocket(config.board)))
-            self.loop.watch(self._board.sock, self._hear)
+            self.loop.watch(self._board.sock, self._receive)
             if config.sim.control_port:
                 control = ControlSocket(config.sim.control_port, self._injection)
                 stack.enter_context(closing(control))
-                self.loop.watch(control.sock, lambda now_ns: self._obey(control, now_ns))
+                self.loop.watch(control.sock, lambda now_ns: self._serve_control(control, now_ns))
             self._opened = stack.pop_all()
         self.loop.every(STEP_NS / NS_PER_S, self._step)
 
     def run(self) -> None:
-        """Serve until the loop is stopped."""
+        """Run until the loop is stopped."""
         self.loop.run()
         counters = dict(self.simulation.counters)
         self._log.info("stopped", unsent=self._board.unsent, **counters)
 
     def close(self) -> None:
-        """Give ports and descriptors back."""
+        """Close ports and descriptors."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -81,14 +81,14 @@ class Process:
         self._injection.advance(now_ns)
         self._deliver()
 
-    def _hear(self, now_ns: int) -> None:
-        # An answer must tell of now, also when this process was held up before it.
+    def _receive(self, now_ns: int) -> None:
+        # Advance first, so that answers are current even after a stall of this process.
         self._injection.advance(now_ns)
         for payload, port in self._board.receive():
             self.simulation.receive(payload, port, now_ns)
         self._deliver()
 
-    def _obey(self, control: ControlSocket, now_ns: int) -> None:
+    def _serve_control(self, control: ControlSocket, now_ns: int) -> None:
         control.serve(now_ns)
         self._deliver()
 
@@ -98,9 +98,9 @@ class Process:
             self._board.send(datagram)
         for line in self.simulation.take_records():
             self._trace.write(line)
-            self._tell(line)
+            self._log_line(line)
 
-    def _tell(self, line: t.Line) -> None:
+    def _log_line(self, line: t.Line) -> None:
         match line:
             case t.BumperSent():
                 self._log.info("bumper reported", pressed=line.pressed)
@@ -109,5 +109,5 @@ class Process:
             case t.Disturbed():
                 request = msgspec.to_builtins(line.request)
                 self._log.warning("disturbed", request=request, error=line.error)
-            case _:  # commands and truth are samples, no transitions
+            case _:  # commands and truth are samples, not transitions
                 pass

@@ -1,7 +1,7 @@
-"""What can be done to the simulated vehicle from outside, by hand or by script.
+"""Requests to the simulated vehicle, from the control socket or a script.
 
 A request is a JSON object whose ``do`` names it: ``{"do": "bumper", "pressed": true}``. A script
-is a TOML file of the same requests, each ``at`` so many seconds after the start::
+is a TOML file of the same requests, each ``at`` a number of seconds after the start::
 
     [[steps]]
     at = 2.0
@@ -26,17 +26,17 @@ Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class Request(Struct, frozen=True, kw_only=True, tag_field="do", forbid_unknown_fields=True):
-    """One thing to do."""
+    """Base class of all requests."""
 
 
 class Bumper(Request, frozen=True, kw_only=True, tag="bumper"):
-    """Press the bumper strip by hand, or let go of it; an obstacle presses it as well."""
+    """Press or release the bumper strip by hand; an obstacle presses it as well."""
 
     pressed: bool
 
 
 class Sonar(Request, frozen=True, kw_only=True, tag="sonar"):
-    """Let one sonar be faulty, stuck at its last range, or see this range; well without any."""
+    """Make one sonar faulty, stuck at its last range, or report this range; no field: normal."""
 
     name: SonarName
     fault: bool = False
@@ -45,26 +45,26 @@ class Sonar(Request, frozen=True, kw_only=True, tag="sonar"):
 
 
 class Driver(Request, frozen=True, kw_only=True, tag="driver"):
-    """Set the fault bits of one motor driver (manual 2.7); it drives on, which is the worst."""
+    """Set the fault bits of one motor driver (manual 2.7); it keeps driving, the worst case."""
 
     side: Literal["left", "right"]
     bits: Annotated[int, Meta(ge=0, le=0xFFFFFFFF)]
 
 
 class Freeze(Request, frozen=True, kw_only=True, tag="freeze"):
-    """Let the board neither hear nor say anything for a time; the wheels go on."""
+    """Make the board neither receive nor send for a time; the wheels keep moving."""
 
     seconds: Seconds
 
 
 class PowerCycle(Request, frozen=True, kw_only=True, tag="power_cycle"):
-    """Take the board's power away, and give it back: counters, switches, command, faults at 0."""
+    """Power-cycle the board: counters, switches, command and faults are reset."""
 
-    seconds: Seconds = 1.0  # until it speaks again
+    seconds: Seconds = 1.0  # until it sends again
 
 
 class Mute(Request, frozen=True, kw_only=True, tag="mute"):
-    """Let the board not say these reports any more, asked or not; it says all without any."""
+    """Suppress these reports, solicited or not; no reports: suppress none."""
 
     reports: tuple[ReportName, ...] = ()
 
@@ -86,31 +86,31 @@ class Lose(Request, frozen=True, kw_only=True, tag="lose"):
 
 
 class Flood(Request, frozen=True, kw_only=True, tag="flood"):
-    """Let the board send that many datagrams a second besides, for a time."""
+    """Make the board send this many extra datagrams a second, for a time."""
 
     rate: Annotated[int, Meta(ge=100, le=100_000)] = 20_000
     seconds: Seconds = 1.0
-    garbage: bool = False  # otherwise its velocity, true each time
+    garbage: bool = False  # otherwise valid velocity reports
 
 
 class Wire(Request, frozen=True, kw_only=True, tag="wire"):
-    """What happens to datagrams from now on, each with its chance; all well when left out."""
+    """Cable faults from now on, each with its probability; defaults mean none."""
 
     direction: Literal["to_pc", "to_board", "both"] = "both"
     drop: Chance = 0.0
     duplicate: Chance = 0.0
-    reorder: Chance = 0.0  # held back until some later ones have overtaken it
+    reorder: Chance = 0.0  # delayed until later datagrams have overtaken it
     corrupt: Chance = 0.0  # one to three bits flipped
-    join: Chance = 0.0  # put into one datagram with the next one
+    join: Chance = 0.0  # joined with the next one in one datagram
     foreign: Chance = 0.0  # sent from an address that is not the sender's own
     delay: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0  # s
-    jitter: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0  # s, at most that much more
-    rate: Annotated[float, Meta(ge=1e3)] | None = None  # bit/s; as fast as it comes without any
-    queue: Annotated[float, Meta(ge=2048)] = 65536  # bytes that may wait for it; more are dropped
+    jitter: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0  # s, maximum additional delay
+    rate: Annotated[float, Meta(ge=1e3)] | None = None  # bit/s; unlimited without any
+    queue: Annotated[float, Meta(ge=2048)] = 65536  # bytes of the queue; more are dropped
 
 
 class Place(Request, frozen=True, kw_only=True, tag="place"):
-    """Put the vehicle somewhere, standing; refused where something is in the way."""
+    """Place the vehicle, at standstill; refused where an obstacle is."""
 
     x: Coordinate  # m
     y: Coordinate  # m
@@ -118,40 +118,40 @@ class Place(Request, frozen=True, kw_only=True, tag="place"):
 
     @property
     def pose(self) -> Pose:
-        """Return where."""
+        """The pose."""
         return Pose(self.x, self.y, self.heading)
 
 
 class AddBox(Request, frozen=True, kw_only=True, tag="add_box"):
-    """Put a box into the world; refused where the vehicle is."""
+    """Add a box to the world; refused where the vehicle is."""
 
     box: Box
 
 
 class RemoveBox(Request, frozen=True, kw_only=True, tag="remove_box"):
-    """Take the box of that name away."""
+    """Remove the box of that name."""
 
     name: str
 
 
-class AskTruth(Request, frozen=True, kw_only=True, tag="truth"):
-    """Ask how things really are; changes nothing."""
+class GetTruth(Request, frozen=True, kw_only=True, tag="truth"):
+    """Query the true state; changes nothing."""
 
 
 Asked = (
     Bumper | Sonar | Driver | Freeze | PowerCycle | Mute | Firmware | Lose | Flood | Wire
-    | Place | AddBox | RemoveBox | AskTruth
+    | Place | AddBox | RemoveBox | GetTruth
 )  # fmt: skip
 
 
 class Step(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A request of a script."""
+    """One step of a script."""
 
     at: Seconds  # after the start
     request: Asked
 
 
 class Script(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What will happen by itself; steps may stand in any order."""
+    """A fault script; steps may be in any order."""
 
     steps: tuple[Step, ...] = ()

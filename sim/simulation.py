@@ -1,10 +1,10 @@
-"""The whole simulated vehicle: body, world, sensors, board and cable, in steps of simulated time.
+"""The simulated vehicle: body, world, sensors, board and cable, in steps of simulated time.
 
-Time comes in: ``advance`` steps up to it, ``receive`` and ``handle`` happen at it. What goes out is
-collected, to be taken: datagrams for the PC, and lines for the trace. The same seed and the same
-calls give the same of both. One step::
+Time is an input: ``advance`` steps up to it, ``receive`` and ``handle`` happen at it. Outputs are
+collected: datagrams for the PC, and lines for the trace. The same seed and the same calls give the
+same outputs. One step::
 
-    script -> command -> velocity -> way through the world -> sensors -> stream -> trace
+    script -> command -> velocity -> motion in the world -> sensors -> stream -> trace
 """
 
 import math
@@ -29,15 +29,15 @@ from sim.faults import Cable, Datagram
 from sim.geometry import Rectangle
 from sim.requests import Firmware, Where
 from sim.sonar import Sonars
-from sim.vehicle import go, next_twist, wheels
+from sim.vehicle import move, next_twist, wheels
 from sim.world import Plan, World
 
 STEP_NS = NS_PER_S // 100
 STREAM_STEPS = 2  # velocity at 50 Hz
-SONAR_STEPS = 5  # a round of echoes takes about that long: 20 Hz
+SONAR_STEPS = 5  # one round of echoes: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
-CATCH_UP_NS = NS_PER_S // 2  # a longer hole is skipped: the world stood still meanwhile
-GARBAGE = b"GS" + bytes(20)  # begins as a frame does
+CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
+GARBAGE = b"GS" + bytes(20)  # starts with a frame's magic
 
 ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
 COMMANDS = {
@@ -51,12 +51,12 @@ class Simulation:
     """A vehicle that was powered on at ``now_ns``; its start must be free of obstacles."""
 
     def __init__(self, config: Config, plan: Plan, now_ns: int) -> None:
-        self.now_ns = now_ns  # simulated up to here
+        self.now_ns = now_ns  # end of the last step
         self.world = World.of(plan)
         self.body = Rectangle(config.vehicle.length / 2, config.vehicle.width / 2)
         self.pose = plan.start.pose
         self.twist = STILL
-        self.hand_on_bumper = False
+        self.pressed_by_hand = False
         sim = config.sim
         self.sonars = Sonars(config.vehicle, sim.sonar_cone, sim.sonar_noise, sim.seed)
         self._ranges = self.sonars.measure(self.world, self.pose)
@@ -73,54 +73,54 @@ class Simulation:
         self._powered = True
         self.muted: frozenset[type[Frame]] = frozenset()
         self.firmware = Firmware()
-        self._losing: tuple[frozenset[type[Frame]], int] = frozenset(), 1
-        self._losable: Counter[type[Frame]] = Counter()
+        self._loss: tuple[frozenset[type[Frame]], int] = frozenset(), 1
+        self._loss_counts: Counter[type[Frame]] = Counter()
         self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
         self._flood_until_ns = now_ns
-        self._said_pressed = False
+        self._reported_pressed = False
         self._command = t.Command(mono_ns=now_ns, kind=Command.STOP, linear=0.0, angular=0.0)
 
     def advance(self, now_ns: int) -> None:
-        """Step up to now, or leave out what is too long ago."""
-        hole = now_ns - self.now_ns - CATCH_UP_NS
-        if hole > 0:
-            self.now_ns += hole
+        """Step up to now; skip a gap that is too long."""
+        gap_ns = now_ns - self.now_ns - CATCH_UP_NS
+        if gap_ns > 0:
+            self.now_ns += gap_ns
             self.counters["holes"] += 1
         while self.now_ns + STEP_NS <= now_ns:
             self.now_ns += STEP_NS
             self._step()
-            self._hear(self.now_ns)
+            self._receive(self.now_ns)
 
     def receive(self, payload: bytes, port: int | None, now_ns: int) -> None:
-        """Take a datagram from that port of the PC; None for any other sender, who is ignored."""
+        """Process a datagram from this port of the PC; None: another sender, ignored."""
         if port is None:
             self.counters["foreign"] += 1
             return
         self.to_board.put(Datagram(payload, port), now_ns)
-        self._hear(now_ns)
+        self._receive(now_ns)
 
     def take_sent(self, now_ns: int) -> list[Datagram]:
         """Return the datagrams that leave for the PC by now."""
         sent = self.to_pc.take(now_ns)
         for datagram in sent:
-            self._note_bumper(datagram, now_ns)
+            self._record_bumper(datagram, now_ns)
         return sent
 
     def take_records(self) -> Sequence[t.Line]:
-        """Return what there is to trace since the last call."""
+        """Return the trace lines since the last call."""
         records, self._records = self._records, []
         return records
 
     def record(self, line: t.Line) -> None:
-        """Put something into the trace."""
+        """Add a line to the trace."""
         self._records.append(line)
 
     def freeze(self, seconds: float, now_ns: int) -> None:
-        """Let the board hear and say nothing for that long."""
+        """Make the board neither receive nor send for this long."""
         self._silent_until_ns = now_ns + round(seconds * NS_PER_S)
 
     def power_cycle(self, seconds: float, now_ns: int) -> None:
-        """Cut the board's power; it speaks again that much later, with all counters at zero."""
+        """Power-cycle the board; it sends again after this time, with all counters at zero."""
         self._powered = False
         self.twist = STILL  # unpowered wheels hold: their motors are geared and shorted
         self.board.power_on()
@@ -129,24 +129,24 @@ class Simulation:
         self.record(t.Power(mono_ns=now_ns, on=False))
 
     def flood(self, rate: int, seconds: float, garbage: bool, now_ns: int) -> None:
-        """Send so many datagrams a second besides, for that long."""
+        """Send this many extra datagrams a second, for this long."""
         self._flood = rate * STEP_NS // NS_PER_S, GARBAGE if garbage else None
         self._flood_until_ns = now_ns + round(seconds * NS_PER_S)
 
     def lose(self, reports: frozenset[type[Frame]], every: int) -> None:
-        """Lose every n-th of these reports from now on."""
-        self._losing = reports, every
-        self._losable.clear()
+        """Drop every n-th of these reports from now on."""
+        self._loss = reports, every
+        self._loss_counts.clear()
 
     def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
-        """Set a driver's fault bits; the board reports a fault unasked."""
+        """Set a driver's fault bits; the board reports a fault unsolicited."""
         changed = bits != self.board.driver_bits[side]
         self.board.driver_bits[side] = bits
         if changed and bits:
             self._send_to_all(self.board.driver(side), now_ns)
 
     def truth(self, now_ns: int) -> t.Truth:
-        """Return how things are."""
+        """Return the true state."""
         clearance = self.world.clearance(self.body, self.pose)
         return t.Truth(
             mono_ns=now_ns,
@@ -167,14 +167,14 @@ class Simulation:
             silent=self._silent(now_ns),
         )
 
-    def feel(self) -> None:
-        """Let the bumper know of a world, a pose or a hand that has changed."""
+    def update_bumper(self) -> None:
+        """Update the bumper after a change of world, pose or hand."""
         self._contact = self.world.contact(self.body, self.pose)
         self.board.sense(self.twist, self._ranges, self._pressed())
 
     def _step(self) -> None:
         self._steps += 1
-        self._wake()
+        self._update_power()
         self._move(STEP_NS / NS_PER_S)
         if self._steps % SONAR_STEPS == 0:
             self._ranges = self.sonars.measure(self.world, self.pose)
@@ -182,11 +182,11 @@ class Simulation:
         if self._steps % STREAM_STEPS == 0:
             self._send_to_all(self.board.velocity(), self.now_ns)
         if self.now_ns < self._flood_until_ns:
-            self._pour(*self._flood)
+            self._send_flood(*self._flood)
         if self._steps % TRUTH_STEPS == 0:
             self.record(self.truth(self.now_ns))
 
-    def _wake(self) -> None:
+    def _update_power(self) -> None:
         if not self._powered and not self._silent(self.now_ns):
             self._powered = True
             self.record(t.Power(mono_ns=self.now_ns, on=True))
@@ -198,13 +198,13 @@ class Simulation:
         if twist == STILL:
             self.twist = twist
             return
-        way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
+        way = move(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
         self.pose, self.twist = way.pose, STILL if way.held else twist
         self._driven += abs(way.distance)
         self.board.count(way.distance, way.turn)
         self._contact = self.world.contact(self.body, self.pose)
 
-    def _hear(self, now_ns: int) -> None:
+    def _receive(self, now_ns: int) -> None:
         for datagram in self.to_board.take(now_ns):
             if datagram.foreign:
                 self.counters["foreign"] += 1
@@ -229,7 +229,7 @@ class Simulation:
                 self._answer(answer, datagram.port, now_ns)
 
     def _answer(self, frame: Frame, asked: int, now_ns: int) -> None:
-        """Send an answer to the port of this firmware, unless it is withheld."""
+        """Send an answer to the ports that this firmware uses, unless it is suppressed."""
         if isinstance(frame, ECHOES) and not self.firmware.echoes:
             return
         where = self.firmware.answers
@@ -243,11 +243,11 @@ class Simulation:
         return {"asked": (asked,), "first": ports[:1], "second": ports[-1:], "both": ports}[where]
 
     def _is_lost(self, kind: type[Frame]) -> bool:
-        kinds, every = self._losing
+        kinds, every = self._loss
         if kind not in kinds:
             return False
-        self._losable[kind] += 1
-        return self._losable[kind] % every == 0
+        self._loss_counts[kind] += 1
+        return self._loss_counts[kind] % every == 0
 
     def _hold(self, command: MotionCommand, now_ns: int) -> None:
         target = self.board.target(command)
@@ -262,7 +262,7 @@ class Simulation:
         for port in self._config.board.listen_ports:
             self._send(frame, port, now_ns)
 
-    def _pour(self, count: int, garbage: bytes | None) -> None:
+    def _send_flood(self, count: int, garbage: bytes | None) -> None:
         payload = garbage or self._framing.pack(self.board.velocity())
         ports = self._config.board.listen_ports
         for number in range(0 if self._silent(self.now_ns) else count):
@@ -273,18 +273,18 @@ class Simulation:
         if not self._silent(now_ns) and kind not in self.muted and not self._is_lost(kind):
             self.to_pc.put(Datagram(self._framing.pack(frame), port), now_ns)
 
-    def _note_bumper(self, datagram: Datagram, now_ns: int) -> None:
+    def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
         if datagram.foreign:
             return
         for part in self._framing.read(datagram.payload, FROM_BOARD):
             if not isinstance(part, Received) or not isinstance(part.frame, BumperReport):
                 continue
-            if part.frame.on != self._said_pressed:
-                self._said_pressed = part.frame.on
-                self.record(t.BumperSent(mono_ns=now_ns, pressed=self._said_pressed))
+            if part.frame.on != self._reported_pressed:
+                self._reported_pressed = part.frame.on
+                self.record(t.BumperSent(mono_ns=now_ns, pressed=self._reported_pressed))
 
     def _pressed(self) -> bool:
-        return self._contact or self.hand_on_bumper
+        return self._contact or self.pressed_by_hand
 
     def _silent(self, now_ns: int) -> bool:
         return now_ns < self._silent_until_ns

@@ -1,8 +1,8 @@
-"""Eight sonars that look around the vehicle.
+"""Simulated sonars, eight around the vehicle.
 
 Each sends a cone, here a fan of rays; the nearest surface in it is the echo, with noise. What the
-real sensors say at the ends of their range is unknown; these say 0 when something is too near to
-measure, and their greatest range when nothing answers.
+real sensors report at the ends of their range is unknown; these report 0 when something is too near
+to measure, and their maximum range without an echo.
 """
 
 import random
@@ -22,7 +22,7 @@ Ranges = tuple[int, int, int, int, int, int, int, int]
 
 
 class Sonars:
-    """The eight of them, in the manual's order, with what is wrong with each.
+    """The eight of them, in the manual's order, with what is injected with each.
 
     cone: the whole opening, rad. noise: standard deviation, m.
     """
@@ -33,27 +33,27 @@ class Sonars:
         self._fan = tuple(cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
         self._noise = noise
         self._random = random.Random(seed)
-        self._wrong: dict[str, Sonar] = {}
+        self._injected: dict[str, Sonar] = {}
         self._last = dict.fromkeys(SONAR_NAMES, self._in_mm(self._farthest))
 
-    def disturb(self, sonar: Sonar) -> None:
-        """Let one be faulty, stuck, or see a given range; or be well again."""
-        self._wrong[sonar.name] = sonar
+    def inject(self, sonar: Sonar) -> None:
+        """Set or clear the fault of one sonar."""
+        self._injected[sonar.name] = sonar
 
     def measure(self, world: World, pose: Pose) -> Ranges:
-        """Return what they report from this pose, in mm."""
+        """Return the reported ranges from this pose, in mm."""
         a, b, c, d, e, f, g, h = (self._report(mount, world, pose) for mount in self._mounts)
         return a, b, c, d, e, f, g, h
 
     def _report(self, mount: Mount, world: World, pose: Pose) -> int:
-        noise = self._random.gauss(0.0, self._noise)  # drawn always: a fault moves no other sonar
-        wrong = self._wrong.get(mount.name)
-        if wrong is not None and wrong.fault:
+        noise = self._random.gauss(0.0, self._noise)  # always drawn: independent of faults
+        injected = self._injected.get(mount.name)
+        if injected is not None and injected.fault:
             return SONAR_FAULT_MM
-        if wrong is not None and wrong.stuck:
+        if injected is not None and injected.stuck:
             return self._last[mount.name]
-        if wrong is not None and wrong.range is not None:
-            value = self._in_mm(wrong.range)
+        if injected is not None and injected.range is not None:
+            value = self._in_mm(injected.range)
         else:
             value = self._in_mm(self._echo(mount, world, pose) + noise)
         self._last[mount.name] = value

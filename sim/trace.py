@@ -1,7 +1,7 @@
-"""What the simulated vehicle writes down while it runs: one JSON object a line, named by ``event``.
+"""Trace of the simulated vehicle: one JSON object a line, named by ``event``.
 
-``mono_ns`` is the host's monotonic clock, the same that the services read, so that a frame here and
-a message there can be told apart in time. SI units and radians, in the world's frame.
+``mono_ns`` is the host's monotonic clock, the same that the services read, so that times of frames
+here and of messages there can be compared. SI units and radians, in the world's frame.
 """
 
 import msgspec
@@ -18,7 +18,7 @@ class Record(Struct, frozen=True, kw_only=True, tag_field="event"):
 
 
 class Command(Record, frozen=True, kw_only=True, tag="command"):
-    """The board took a motion command; queries are only counted."""
+    """The board received a motion command; queries are only counted."""
 
     kind: motion.Command
     linear: float  # m/s
@@ -26,25 +26,25 @@ class Command(Record, frozen=True, kw_only=True, tag="command"):
 
 
 class BumperSent(Record, frozen=True, kw_only=True, tag="bumper_sent"):
-    """The first frame has left that says this of the bumper."""
+    """The first frame with this bumper state was sent."""
 
     pressed: bool
 
 
 class Truth(Record, frozen=True, kw_only=True, tag="truth"):
-    """How things really are, whatever the board reports."""
+    """The true state, whatever the board reports."""
 
     x: float
     y: float
     heading: float  # not wrapped
     linear: float
     angular: float
-    distance: float  # m, driven since the start, either way; no power cycle clears it
+    distance: float  # m, driven since the start, in both directions; survives power cycles
     clearance: float | None  # m, to the nearest surface that sonar sees; None without any
     contact: bool  # something presses the bumper strip
-    pressed: bool  # what the board knows: contact, or by hand
+    pressed: bool  # the bumper as the board senses it: contact, or by hand
     wheels: tuple[float, ...]  # rad: front left, front right, rear left, rear right
-    command: Command  # the one that the board holds
+    command: Command  # the current command of the board
     braking: bool  # one of the board's own emergency brakes overrules that command
     ultrasonic_brake: bool
     bumper_brake: bool
@@ -52,13 +52,13 @@ class Truth(Record, frozen=True, kw_only=True, tag="truth"):
 
 
 class Power(Record, frozen=True, kw_only=True, tag="power"):
-    """The board lost its power, or is back."""
+    """The board lost its power, or has it back."""
 
     on: bool
 
 
 class Disturbed(Record, frozen=True, kw_only=True, tag="fault"):
-    """Someone asked for something that is no part of driving; ``error`` says why it was refused."""
+    """A request was applied or refused; ``error`` is the reason of a refusal."""
 
     request: Asked
     error: str = ""
@@ -70,5 +70,5 @@ _lines = msgspec.json.Decoder(Line)
 
 
 def read(trace: bytes) -> list[Line]:
-    """Read a trace; the end of one that is still being written may be half a line: left out."""
+    """Parse a trace; an incomplete last line is ignored."""
     return [_lines.decode(line) for line in trace.split(b"\n")[:-1]]

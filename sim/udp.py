@@ -9,13 +9,13 @@ from common.settings import Board
 from sim.faults import Datagram
 
 LARGEST = 65536
-BURST = 256  # datagrams read in a row, so that a flood does not stop the world
+BURST = 256  # datagrams per round, so that a flood does not stall the simulation
 
 Address = tuple[str, int]
 
 
 class BoardSocket:
-    """The board's end of the cable, and a second socket for what comes from elsewhere."""
+    """The board's socket, and a second one that plays a foreign sender."""
 
     def __init__(self, board: Board) -> None:
         self._ports = board.listen_ports
@@ -25,13 +25,13 @@ class BoardSocket:
         self.unsent = 0
 
     def receive(self) -> Iterator[tuple[bytes, int | None]]:
-        """Yield what has come, with the PC's port, or None when another sent it."""
+        """Yield received datagrams with the PC's port, or None for other senders."""
         for payload, (address, port, *_) in drain(self.sock):
             ours = address == self._pc and port in self._ports
             yield payload, port if ours else None
 
     def send(self, datagram: Datagram) -> None:
-        """Send to a port of the PC; what cannot be sent is counted."""
+        """Send to a port of the PC; count errors."""
         sock = self._foreign if datagram.foreign else self.sock
         try:
             sock.sendto(datagram.payload, (self._pc, datagram.port))
@@ -39,13 +39,13 @@ class BoardSocket:
             self.unsent += 1
 
     def close(self) -> None:
-        """Give the ports back."""
+        """Close the sockets."""
         self.sock.close()
         self._foreign.close()
 
 
 def bound(address: str, port: int, setting: str) -> socket.socket:
-    """Return a UDP socket that does not block; raise ``LinkError`` when it cannot be had."""
+    """Return a bound, non-blocking UDP socket; raise ``LinkError`` on failure."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sock.bind((address, port))
@@ -60,8 +60,8 @@ def bound(address: str, port: int, setting: str) -> socket.socket:
 
 
 def drain(sock: socket.socket) -> Iterator[tuple[bytes, Address]]:
-    """Yield what is waiting, a burst at most."""
-    # Refused is what a peer of an earlier datagram said; what waits behind is read next time.
+    """Yield waiting datagrams, a burst at most."""
+    # ConnectionRefusedError belongs to an earlier datagram; the rest is read next time.
     with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
         for _ in range(BURST):
             payload, address = sock.recvfrom(LARGEST)
@@ -69,7 +69,7 @@ def drain(sock: socket.socket) -> Iterator[tuple[bytes, Address]]:
 
 
 def _foreign_socket(address: str) -> socket.socket:
-    """Return a socket at another address of the loopback net, or at another port elsewhere."""
+    """Return a socket with another loopback address, or another port on other networks."""
     if address.startswith("127."):
         other = "127.0.0.2" if address != "127.0.0.2" else "127.0.0.3"
         with contextlib.suppress(LinkError):  # not every system has the whole of 127.0.0.0/8

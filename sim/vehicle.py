@@ -1,7 +1,7 @@
-"""The body on its four driven and steered wheels: how its velocity and its pose follow a command.
+"""Vehicle dynamics: velocity and pose of a body on four driven and steered wheels.
 
 Both axles steer, so that the body turns around any point of its own y axis, or on the spot; the
-wheels' angles follow from the twist alone. Wheels that are held by an obstacle stand.
+wheel angles follow from the twist alone. Wheels blocked by an obstacle stand still.
 """
 
 import math
@@ -14,7 +14,7 @@ from common.wire.commands import MotionKind
 from sim.config import Drive
 from sim.geometry import Pose
 
-BISECTIONS = 12  # of one step's way, 15 mm at 1.5 m/s: contact is found to some micrometres
+BISECTIONS = 12  # of one step, 15 mm at 1.5 m/s: contact is found to a few micrometres
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,8 @@ class Wheel:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """What became of one step: the pose after it, and how far and around it really went."""
+class Movement:
+    """Result of one step: the new pose, and the actual distance and turn."""
 
     pose: Pose
     distance: float  # m, forward positive
@@ -62,21 +62,21 @@ def moved(pose: Pose, twist: Twist, dt: float) -> Pose:
     return Pose(pose.x + chord * math.cos(course), pose.y + chord * math.sin(course), course + half)
 
 
-def go(pose: Pose, twist: Twist, dt: float, blocked: Callable[[Pose], bool]) -> Way:
-    """Move for ``dt`` seconds, or as far as nothing blocks; ``pose`` itself must be free."""
+def move(pose: Pose, twist: Twist, dt: float, blocked: Callable[[Pose], bool]) -> Movement:
+    """Move for ``dt`` seconds, or up to the first obstacle; ``pose`` itself must be free."""
     ahead = moved(pose, twist, dt)
     if not blocked(ahead):
-        return Way(ahead, twist.linear * dt, twist.angular * dt, held=False)
+        return Movement(ahead, twist.linear * dt, twist.angular * dt, held=False)
     free, hit = 0.0, dt
     for _ in range(BISECTIONS):
         middle = (free + hit) / 2
         free, hit = (free, middle) if blocked(moved(pose, twist, middle)) else (middle, hit)
     end = moved(pose, twist, free)
-    return Way(end, twist.linear * free, twist.angular * free, held=True)
+    return Movement(end, twist.linear * free, twist.angular * free, held=True)
 
 
 def wheels(twist: Twist, vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
-    """Return front left, front right, rear left and rear right."""
+    """Return the front left, front right, rear left and rear right wheels."""
     x, y = vehicle.wheelbase / 2, vehicle.track / 2
     return (
         _wheel(twist, x, y),
@@ -90,7 +90,7 @@ def _wheel(twist: Twist, x: float, y: float) -> Wheel:
     # Adding 0.0 turns -0.0 into 0.0, which atan2 would take for backward.
     forward, left = twist.linear - twist.angular * y + 0.0, twist.angular * x + 0.0
     speed = math.hypot(forward, left)
-    if forward < 0:  # a wheel rolls backward rather than turn around
+    if forward < 0:  # a wheel rolls backward instead of turning around
         return Wheel(math.atan2(-left, -forward), -speed)
     return Wheel(math.atan2(left, forward), speed)
 

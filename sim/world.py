@@ -1,7 +1,7 @@
-"""Rooms and obstacles: what sonar sees, what only the bumper meets, and where a body fits.
+"""World model: walls and boxes, visible to sonar or only to the bumper.
 
-A plan is what a world file says; the world is the plan as surfaces. A world does not change: adding
-a box makes another one.
+A plan is the content of a world file; the world is the plan as surfaces. A world is immutable:
+adding a box makes a new one.
 """
 
 import math
@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 from sim.geometry import Pose, Rectangle, Segment, point_gap
 
-BUMPER_TRAVEL = 0.005  # m; the strip gives that much before the body meets what pressed it
+BUMPER_TRAVEL = 0.005  # m; travel of the strip until the body itself touches
 
 Side = Annotated[float, Meta(ge=0.01, le=100.0)]
 Coordinate = Annotated[float, Meta(ge=-1000.0, le=1000.0)]  # m; a limit also refuses NaN
@@ -27,7 +27,7 @@ class Part(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Spot(Part, frozen=True, kw_only=True):
-    """A pose with a name for people: where the vehicle starts, or a hint for a driver."""
+    """A named pose: the start of the vehicle, or a waypoint for a driver."""
 
     x: Coordinate  # m
     y: Coordinate  # m
@@ -36,12 +36,12 @@ class Spot(Part, frozen=True, kw_only=True):
 
     @property
     def pose(self) -> Pose:
-        """Return it without its name."""
+        """The pose without its name."""
         return Pose(self.x, self.y, self.heading)
 
 
 class Box(Spot, frozen=True, kw_only=True):
-    """A rectangle on the floor around its pose; a low one is under every sonar's beam."""
+    """A rectangle on the floor around its pose; a low one is below all sonar beams."""
 
     name: str
     length: Side  # m, along the heading
@@ -50,7 +50,7 @@ class Box(Spot, frozen=True, kw_only=True):
 
     @property
     def shape(self) -> Rectangle:
-        """Return its rectangle."""
+        """Its rectangle."""
         return Rectangle(self.length / 2, self.width / 2)
 
 
@@ -61,7 +61,7 @@ class Wall(Part, frozen=True, kw_only=True):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Return its pieces."""
+        """Its segments."""
         return tuple(
             Segment(*a, *b) for a, b in zip(self.points[:-1], self.points[1:], strict=True)
         )
@@ -74,7 +74,7 @@ class Plan(Part, frozen=True, kw_only=True):
     start: Spot = Spot(x=0.0, y=0.0)
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
-    route: tuple[Spot, ...] = ()  # a hint for drivers; the simulation does not read it
+    route: tuple[Spot, ...] = ()  # waypoints for drivers; the simulation does not use them
 
     def __post_init__(self) -> None:
         names = [box.name for box in self.boxes]
@@ -91,36 +91,36 @@ class World:
 
     @classmethod
     def of(cls, plan: Plan) -> Self:
-        """Build what a plan says."""
+        """Build the world of a plan."""
         return cls(tuple(s for wall in plan.walls for s in wall.segments), plan.boxes)
 
     @cached_property
     def visible(self) -> tuple[Segment, ...]:
-        """Return the surfaces that sonar sees."""
+        """The surfaces visible to sonar."""
         return self.walls + _outlines(box for box in self.boxes if not box.low)
 
     @cached_property
     def solid(self) -> tuple[Segment, ...]:
-        """Return all surfaces."""
+        """All surfaces."""
         return self.visible + _outlines(box for box in self.boxes if box.low)
 
     def blocks(self, body: Rectangle, pose: Pose) -> bool:
-        """Tell whether a body cannot be there."""
+        """Return whether a body at this pose collides."""
         if any(box.shape.holds(box.pose, pose.x, pose.y) for box in self.boxes):
             return True
         return any(body.touches(pose, segment) for segment in _near(self.solid, body, pose, 0.0))
 
     def contact(self, body: Rectangle, pose: Pose) -> bool:
-        """Tell whether something presses the bumper strip, which goes all around the body."""
+        """Return whether something presses the bumper strip around the body."""
         near = _near(self.solid, body, pose, BUMPER_TRAVEL)
         return any(body.gap(pose, segment) <= BUMPER_TRAVEL for segment in near)
 
     def clearance(self, body: Rectangle, pose: Pose) -> float:
-        """Return the gap to the nearest surface that sonar sees, in metres; or infinity."""
+        """Return the distance to the nearest surface visible to sonar, in metres, or infinity."""
         return min((body.gap(pose, segment) for segment in self.visible), default=math.inf)
 
     def with_box(self, box: Box) -> Self:
-        """Return a world with one more box, in place of one of the same name."""
+        """Return a world with this box; it replaces one of the same name."""
         return type(self)(self.walls, (*self.without(box.name).boxes, box))
 
     def without(self, name: str) -> Self:
@@ -135,6 +135,6 @@ def _outlines(boxes: Iterable[Box]) -> tuple[Segment, ...]:
 def _near(
     segments: tuple[Segment, ...], body: Rectangle, pose: Pose, margin: float
 ) -> Iterable[Segment]:
-    """Yield what can be within the margin of the body: most is not, and that is cheap to see."""
+    """Yield the segments that may be within the margin of the body: a cheap filter."""
     reach = math.hypot(body.half_length, body.half_width) + margin
     return (s for s in segments if point_gap(pose.x, pose.y, s) <= reach)

@@ -19,7 +19,7 @@ def stack(tmp_path: Path) -> Iterator[Chain]:
         yield it
 
 
-class Stick:
+class ConstantSource:
     """A source that asks without a pause: unlike a held key, it is never let go by mistake."""
 
     def __init__(self, loop: Loop) -> None:
@@ -36,20 +36,20 @@ class Stick:
 
 
 @pytest.fixture
-def stick(stack: Chain) -> Iterator[Stick]:
+def source(stack: Chain) -> Iterator[ConstantSource]:
     with running(Loop()) as loop:
-        stick = Stick(loop)
-        with bus_on(stack.endpoint, loop, stick.declare):
-            yield stick
+        source = ConstantSource(loop)
+        with bus_on(stack.endpoint, loop, source.declare):
+            yield source
 
 
-def push(stack: Chain, stick: Stick) -> None:
-    """Push the stick until the vehicle moves; center it first when safety wants a neutral."""
+def drive_until_moving(stack: Chain, source: ConstantSource) -> None:
+    """Push the source until the vehicle moves; center it first when safety wants a neutral."""
     for _ in range(10):
-        stick.linear = 0.0
+        source.linear = 0.0
         centered = partial(kinds_since, stack, len(stack.trace().commands))
         wait_until(lambda: "run" in centered(), "a neutral is taken")  # noqa: B023
-        stick.linear = 0.5
+        source.linear = 0.5
         try:
             wait_until(lambda: stack.speed() > 0.1, "the vehicle moves", patience_s=6)
         except AssertionError:

@@ -23,8 +23,7 @@ from services.safety.inputs import DriveRequest, Event, Hold, Inputs, Reset
 from services.safety.policy import Policy
 from services.safety.report import motion_message, state_message
 from sim import trace as t
-from sim.config import Config
-from sim.files import load_plan
+from sim.config import Config, load_plan
 from sim.simulation import Simulation
 
 MS = NS_PER_S // 1000
@@ -33,7 +32,7 @@ BOOT = 77  # of the bridge
 START_NS = 100 * NS_PER_S
 
 
-class Clockwork:
+class SimulatedStack:
     """Sim, bridge, safety, odometry and the lap's driver, turned by hand."""
 
     def __init__(self, lap: Lap, world: str = "office") -> None:

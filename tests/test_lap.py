@@ -8,20 +8,20 @@ import pytest
 from cli.demo.score import Trace, good, results, stops
 from cli.demo.script import PATIENT, QUICK, Lap, Pace, lap
 from sim import trace as t
-from tests.simulated_stack import Clockwork
+from tests.simulated_stack import SimulatedStack
 
 LAP_S = 60.0
 
 
-def driven(pace: Pace, seconds: float) -> Clockwork:
-    it = Clockwork(Lap(lap(fast=False, pace=pace)))
+def driven(pace: Pace, seconds: float) -> SimulatedStack:
+    it = SimulatedStack(Lap(lap(fast=False, pace=pace)))
     for _ in it.run(seconds):
         if it.lap.step is None:
             break
     return it
 
 
-def trace_of(it: Clockwork) -> Trace:
+def trace_of(it: SimulatedStack) -> Trace:
     return Trace(
         [r for r in it.records if isinstance(r, t.Truth)],
         [r for r in it.records if isinstance(r, t.Command)],
@@ -30,17 +30,17 @@ def trace_of(it: Clockwork) -> Trace:
 
 
 @cache
-def quick() -> Clockwork:
+def quick() -> SimulatedStack:
     return driven(QUICK, LAP_S)
 
 
 @cache
-def patient() -> Clockwork:
+def patient() -> SimulatedStack:
     return driven(PATIENT, 2 * LAP_S)
 
 
 @pytest.mark.parametrize("made", [quick, patient])
-def test_the_lap_is_driven_as_it_should_be(made: Callable[[], Clockwork]) -> None:
+def test_the_lap_is_driven_as_it_should_be(made: Callable[[], SimulatedStack]) -> None:
     it = made()
     assert it.lap.step is None, f"stuck at: {it.lap.step.name}"
     trace = trace_of(it)

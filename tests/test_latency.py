@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 
-from common.bus.host import host_id
+from common.bus.publisher import host_id
 from common.freshness import NS_PER_S
 from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
-from tests.drive_source import Stick, push, stack, stick
+from tests.drive_source import ConstantSource, drive_until_moving, source, stack
 from verification.harness.stack import Chain
 from verification.harness.support import wait_until
 from verification.harness.teleop_terminal import terminal
 
-__all__ = ["stack", "stick"]  # fixtures
+__all__ = ["source", "stack"]  # fixtures
 
 pytestmark = pytest.mark.alone
 
@@ -39,11 +39,11 @@ def told_once(stack: Chain) -> dict[str, Any]:
 
 @pytest.mark.skipif(not host_id(), reason="this system does not name its boot: clocks are not one")
 def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
-    stack: Chain, stick: Stick, tmp_path: Path
+    stack: Chain, source: ConstantSource, tmp_path: Path
 ) -> None:
     before = told_once(stack)["durations"]
     assert before["contact_to_break"] == {"count": 0, "p50": None, "p99": None, "worst": None}
-    push(stack, stick)
+    drive_until_moving(stack, source)
     pressed_ns = time.monotonic_ns()
     stack.control.do(Bumper(pressed=True))
     lines = tmp_path / "lines"

@@ -48,7 +48,7 @@ async def terminal_screen(stack: Chain) -> str:
     sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
     desk = Desk(node, Logbook())
-    node.present()
+    node.announce()
     desk.plug(find(node.config.teleop))
     app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):

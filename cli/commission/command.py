@@ -21,10 +21,9 @@ from cli.commission.walk import Stop, sign, walk
 from cli.commission.watchdog import Master, watchdog
 from cli.settings import Everything
 from common import log
-from common.cli_args import add_sources, sources
+from common.cli_args import VERSION, add_sources, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
-from common.version import VERSION
 
 NAMES = [step.name for step in STEPS]
 SECTIONS = ("wire", "board", "vehicle", "bridge")

@@ -25,7 +25,7 @@ from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from sim.files import load_plan
+from sim.config import load_plan
 
 WORLD = "office"
 PATIENCE_S = 120.0  # a lap takes a third of that; a busy machine stops it now and then

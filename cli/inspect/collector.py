@@ -7,8 +7,8 @@ from cli.inspect.diagnosis import Seen
 from cli.inspect.shell import quietly
 from common import codec
 from common import messages as m
-from common.bus.host import host_id
 from common.bus.probe import Probe
+from common.bus.publisher import host_id
 from common.errors import MessageError
 from common.freshness import NS_PER_S
 from common.sample import Sample

@@ -18,9 +18,9 @@ from cli.inspect.shell import add_options, positive, settings, wants_json
 from cli.inspect.vehicle import at_the_vehicle
 from common import keys
 from common.bus.probe import Probe, probe
+from common.cli_args import VERSION
 from common.errors import LinkError
 from common.settings import Shared
-from common.version import VERSION
 
 LISTEN_S = 3.0  # what comes once a second comes twice
 

@@ -11,7 +11,7 @@ from cli.inspect.addressing import add_key, expression, short
 from cli.inspect.payload import read
 from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json, whole
 from cli.inspect.stream_stats import Figures, Meter, Taken
-from common.bus.host import host_id
+from common.bus.publisher import host_id
 from common.freshness import NS_PER_S
 from common.sample import Sample
 

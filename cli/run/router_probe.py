@@ -22,9 +22,8 @@ import msgspec
 from cli.run.router_attempts import MISSES, Attempts
 from common import child_process, realtime
 from common import log as logs
-from common.backoff import Backoff
-from common.bus.answering import answers, router_at
-from common.bus.session import READERS_ENV
+from common.bus.session import READERS_ENV, answers, router_at
+from common.child_process import Backoff
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Log
 

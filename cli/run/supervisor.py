@@ -16,8 +16,8 @@ from functools import partial
 from typing import BinaryIO
 
 from common import child_process
-from common.backoff import Backoff
-from common.cli_args import HOPELESS
+from common.child_process import Backoff
+from common.cli_args import NO_RESTART
 from common.log import Logger
 
 PATIENCE_S = 5.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s until the vehicle stands still
@@ -80,7 +80,7 @@ class Supervisor:
                 child.process = _start(child.command, self._output)
                 child.started_s = now_s
             code = child.process.poll() if child.process is not None else None
-            if code in HOPELESS:
+            if code in NO_RESTART:
                 self._log.error("cannot run", process=child.name, exit_code=code)
                 return int(code or 0)
             if code is not None:

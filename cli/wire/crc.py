@@ -11,8 +11,8 @@ from typing import get_args
 
 import crcmod.predefined
 
+from common.wire.frame import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET
 from common.wire.framing import Covers, crc_function
-from common.wire.header import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
-"""Zenoh, typed: the only package that imports it.
+"""Typed Zenoh bus: the only package that imports zenoh.
 
-Zenoh calls back on its own threads. Those calls only queue what came and ``post`` it; decoding and
-handling happen in the owner's thread. What was measured of Zenoh and shapes this package stands in
-``docs/adr/0003-zenoh.md``.
+Zenoh calls back on its own threads. These callbacks only queue the sample and ``post`` it; decoding
+and handling happen in the owner's thread. ``docs/adr/0003-zenoh.md`` lists the measurements behind
+this design.
 """

@@ -1,4 +1,4 @@
-"""One Zenoh session of one process, with the declarations that live on it."""
+"""One Zenoh session of one process, with its declarations."""
 
 import contextlib
 import os
@@ -13,11 +13,9 @@ from msgspec import Struct
 
 from common import codec, settings
 from common.bus.calls import Answers, Caller
-from common.bus.host import host_id
-from common.bus.overwriting_queue import Ring
-from common.bus.publisher import QUERY_CONGESTION, Publisher, qos
-from common.bus.sample import copied
-from common.bus.session import Opener
+from common.bus.overwriting_queue import OverwritingQueue
+from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
+from common.bus.session import Opener, copied
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.messages import Message
@@ -31,7 +29,7 @@ Post = Callable[[Callable[[], None]], None]
 
 
 class Arrival(Struct, Generic[M], frozen=True):
-    """A message as it came in, with the local receive time and the raw frame when there is one."""
+    """A received message with its local receive time, and the raw frame if attached."""
 
     message: M
     key: str
@@ -42,19 +40,18 @@ class Arrival(Struct, Generic[M], frozen=True):
 class Bus:
     """One Zenoh session of one process.
 
-    Declare first, then ``open``: a thread looks for a router until there is one, and the
-    declarations are made as soon as the session stands. Zenoh renews them by itself after a
-    router's restart.
+    Declare first, then ``open``: a thread retries until a router answers, and the declarations are
+    made as soon as the session is open. Zenoh renews them after a router's restart.
     """
 
     def __init__(self, where: settings.BusSettings, robot: str, post: Post) -> None:
         self.robot = robot
-        # Not by `secrets`: it brings OpenSSL along, 5 ms and 5 MB in each process.
+        # Not by `secrets`: it loads OpenSSL, 5 ms and 5 MB in each process.
         self.boot = int.from_bytes(os.urandom(8), "big") >> 1
         self.host = host_id()
-        self.counts: Counter[str] = Counter()  # messages by key, both ways
-        # What went wrong, by name; named here, because a new name must not appear on a thread of
-        # Zenoh's while the loop reads them.
+        self.counts: Counter[str] = Counter()  # messages by key, sent and received
+        # Errors by name. All names exist from the start: Zenoh's threads must not add one while the
+        # loop reads them.
         self.counters: Counter[str] = Counter(overrun=0, undecodable=0)
         self.publishers: list[Publisher[Any]] = []
         self.post = post
@@ -86,14 +83,14 @@ class Bus:
         known: Collection[str] = (),
         **names: str,
     ) -> None:
-        """Call the handler for each message, at most ``depth`` of which may wait.
+        """Call the handler for each message, with a queue of ``depth``.
 
-        A newer one pushes the oldest out. ``refused`` gets the key and the error of what is no such
-        message; it is counted in any case. Where a name is ``*``, those ``known`` are counted one
-        by one and all others together, because any client can invent names.
+        When the queue is full, the oldest message is dropped. ``refused`` gets key and error of an
+        undecodable message; it is counted in any case. Where a name is ``*``, the ``known`` ones
+        are counted one by one and all others together, because any client can invent names.
         """
         expression = topic.on(self.robot, **names)
-        only = "" if "*" in expression else expression  # to ask a sample for its key takes time
+        only = "" if "*" in expression else expression  # reading the key of a sample takes time
         single = topic.known(self.robot, names, known) | {expression}
 
         def take(sample: zenoh.Sample, received_ns: int) -> None:
@@ -112,9 +109,9 @@ class Bus:
         self._subscribe(expression, take, depth, topic.service.history)
 
     def tap(self, expression: str, handler: Callable[[Sample], None], *, depth: int) -> None:
-        """Call the handler with each sample on these keys, just as it came; see ``subscribe``.
+        """Call the handler with each raw sample on these keys; see ``subscribe``.
 
-        ``**`` in an expression passes by what begins with ``@``.
+        ``**`` in an expression does not match chunks that begin with ``@``.
         """
 
         def take(sample: zenoh.Sample, received_ns: int) -> None:
@@ -128,7 +125,7 @@ class Bus:
         self._subscribe(key, lambda _, received_ns: handler(received_ns), depth=1, history=0)
 
     def announce(self, key: str) -> None:
-        """Declare a subscriber of a key whose samples another subscription hands over."""
+        """Declare a subscriber of a key whose samples another subscription handles."""
         self._declare(lambda session: session.declare_subscriber(key, lambda _: None))
 
     def serve(self, call: Call[Q, R], handler: Callable[[Q, Caller[R]], None]) -> None:
@@ -150,7 +147,7 @@ class Bus:
         self._queryable(key, take)
 
     def answer(self, key: str, make: Callable[[], bytes], encoding: str) -> None:
-        """Answer any query on a key with bytes made on the spot."""
+        """Answer any query on a key with the bytes that ``make`` returns."""
 
         def take(query: zenoh.Query) -> None:
             with contextlib.suppress(zenoh.ZError):
@@ -160,11 +157,11 @@ class Bus:
         self._queryable(key, take)
 
     def live(self, key: str) -> None:
-        """Hold a liveliness token while the session lives."""
+        """Declare a liveliness token."""
         self._declare(lambda session: session.liveliness().declare_token(key))
 
     def watch_live(self, expression: str, handler: Callable[[str, bool], None]) -> None:
-        """Call the handler with each liveliness key that appears or goes."""
+        """Call the handler with each liveliness key that appears or disappears."""
 
         def queue(sample: zenoh.Sample) -> None:
             key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
@@ -182,7 +179,7 @@ class Bus:
         on_refusal: Callable[[str], None],
         timeout_s: float = 2.0,
     ) -> None:
-        """Make a call; exactly one of the two handlers follows."""
+        """Make a call; exactly one of both handlers is called."""
 
         def read(payload: bytes) -> R:
             return codec.decode(payload, call.reply)
@@ -198,7 +195,7 @@ class Bus:
         on_refusal: Callable[[str], None],
         timeout_s: float = 2.0,
     ) -> None:
-        """Ask for a service's ``schema``, ``config`` or ``last``, as JSON; one handler follows."""
+        """Query a service's ``schema``, ``config`` or ``last`` as JSON; calls one handler."""
         answers = Answers(service, bytes, on_answer, on_refusal, self._hand_over)
         self._query(info_key(self.robot, service, part), None, answers, timeout_s)
 
@@ -208,29 +205,29 @@ class Bus:
             self._session.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
 
     def shares_clock(self, message: Message) -> bool:
-        """Tell whether the sender's ``mono_ns`` is of this host's clock."""
+        """Return whether the sender's ``mono_ns`` is of this host's clock."""
         return self.host != 0 and message.host == self.host
 
-    # --- life -----------------------------------------------------------------------------
+    # --- session -----------------------------------------------------------------------------
 
     def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:
-        """Return what finds the session."""
+        """Return the opener of the session."""
         return Opener(self.where, adopt)
 
     def open(self) -> None:
-        """Begin to look for a router; returns at once."""
+        """Start connecting; returns at once."""
         for bus in (self, *self.links):
             bus._opener.start()
 
     @property
     def connected(self) -> bool:
-        """Whether there is a router at the other end right now."""
-        # A robot's router that dials a site's is a peer.
+        """Whether a router is connected now."""
+        # A robot's router with an uplink to a site's router is a peer.
         info = self._session.info if self._session is not None else None
         return info is not None and bool(info.routers_zid() or info.peers_zid())
 
     def close(self) -> None:
-        """End the session; no handler is called any more."""
+        """Close the session; no handler is called after that."""
         self._closed = True
         for publisher in self.publishers:
             publisher.withdraw()
@@ -251,21 +248,21 @@ class Bus:
             self._declared.append(declare(self._session))
 
     def _hand_over(self, call: Callable[[], None]) -> None:
-        """Let the owner's thread make the call, unless the bus has closed by then."""
+        """Post the call to the owner's thread, unless the bus is closed by then."""
         self.post(lambda: None if self._closed else call())
 
     def _subscribe(
         self, key: str, take: Callable[[zenoh.Sample, int], None], depth: int, history: int
     ) -> None:
-        ring: Ring[tuple[zenoh.Sample, int]] = Ring(depth)
+        items: OverwritingQueue[tuple[zenoh.Sample, int]] = OverwritingQueue(depth)
 
         def drain() -> None:
-            came = ring.take()
+            came = items.take()
             if came:
                 take(*came)
 
         def queue(sample: zenoh.Sample) -> None:
-            if ring.add((sample, time.monotonic_ns())):
+            if items.add((sample, time.monotonic_ns())):
                 self.counters["overrun"] += 1
             else:
                 self._hand_over(drain)
@@ -287,7 +284,7 @@ class Bus:
         self, key: str, payload: bytes | None, answers: Answers[Any], timeout_s: float
     ) -> None:
         if self._session is None:
-            answers.fail("there is no router")
+            answers.fail("not connected to a router")
             return
         callback = zenoh.handlers.Callback(answers.queue, answers.end)
         self._session.get(

@@ -1,4 +1,4 @@
-"""Calls: the far end of one that a service answers, and the answers to one that we made."""
+"""Calls: the caller of a served call, and the answers to a call that was made."""
 
 import contextlib
 from collections.abc import Callable
@@ -11,34 +11,34 @@ from common import codec
 from common.errors import MessageError
 
 R = TypeVar("R", bound=Struct)
-A = TypeVar("A")  # an answer, read: a call's reply, or bare bytes
+A = TypeVar("A")  # a decoded answer: a call's reply, or raw bytes
 
 
 class Caller(Generic[R]):
-    """The other end of a call that is being served; answer it once, now or later."""
+    """The caller of a served call; answer it once, now or later."""
 
     def __init__(self, query: zenoh.Query, key: str) -> None:
         self._query = query
         self._key = key
 
     def reply(self, message: R) -> None:
-        """Answer with the reply that the call promises."""
+        """Answer with the reply."""
         encoding = codec.encoding(type(message))
-        with contextlib.suppress(zenoh.ZError):  # the caller may be gone
+        with contextlib.suppress(zenoh.ZError):  # the caller may have disconnected
             self._query.reply(self._key, codec.encode(message), encoding=encoding)
         self._query.drop()
 
     def refuse(self, reason: str) -> None:
-        """Answer with the reason why not."""
+        """Answer with the reason of the refusal."""
         with contextlib.suppress(zenoh.ZError):
             self._query.reply_err(reason.encode(), encoding="text/plain")
         self._query.drop()
 
 
 class Answers(Generic[A]):
-    """Takes what comes back for a query; exactly one of the two handlers follows.
+    """Collects the answers to a query; exactly one of both handlers is called.
 
-    ``read`` makes an answer of the payload, or raises ``MessageError``.
+    ``read`` decodes the payload, or raises ``MessageError``.
     """
 
     def __init__(
@@ -57,20 +57,20 @@ class Answers(Generic[A]):
         self._answered = False
 
     def queue(self, reply: zenoh.Reply) -> None:
-        """Take one answer, on a thread of Zenoh's."""
+        """Process one answer, on a thread of Zenoh."""
         if is_timeout(reply):
-            return  # the end follows
+            return  # ``end`` follows
         if not self._answered:
             self._answered = True
             self._hand_over(lambda: self._read(reply))
 
     def end(self) -> None:
-        """Take the end of the answers, on a thread of Zenoh's."""
+        """Process the end of the answers, on a thread of Zenoh."""
         if not self._answered:
-            self.fail(f"{self._server} does not answer; `t2 doctor` tells why")
+            self.fail(f"{self._server} does not answer; run `t2 doctor`")
 
     def fail(self, reason: str) -> None:
-        """Let the refusal follow, from any thread."""
+        """Report a refusal, from any thread."""
         self._hand_over(lambda: self._on_refusal(reason))
 
     def _read(self, reply: zenoh.Reply) -> None:
@@ -87,7 +87,7 @@ class Answers(Generic[A]):
 
 
 def is_timeout(reply: zenoh.Reply) -> bool:
-    """Tell Zenoh's own "Timeout", said by our session or by the router, from a server's refusal."""
+    """Return whether a reply is Zenoh's own "Timeout", not a server's refusal."""
     if reply.err is None or reply.err.encoding == zenoh.Encoding.TEXT_PLAIN:
         return False
     return reply.err.payload.to_bytes() == b"Timeout"

@@ -1,9 +1,8 @@
-"""What a robot's router sends to laptops: their link may be thin, and what drives comes first.
+"""Downsampling of streams from a robot's router to laptops, whose link may be slow.
 
-Streams that are faster than a laptop needs are thinned on their way out, by Zenoh's own
-``downsampling``: it counts on each link for itself, and lets the newest through when it is due. The
-state, events, answers and all that comes *from* laptops are untouched, and so is whatever moves
-on board: only links of ``PROTOCOLS`` are thinned, and services on board never dial these.
+Zenoh's ``downsampling`` limits the rate on each link and passes the newest sample when one is due.
+The state, events, answers and everything *from* laptops are not affected, nor is traffic on board:
+only links of ``PROTOCOLS`` are downsampled, and services on board never use these.
 """
 
 from collections.abc import Sequence
@@ -15,10 +14,12 @@ from common.keys import FAST, MOTION, TOPICS, Topic
 PROTOCOLS = ("tls", "quic")
 
 
-def thinned(robot: str, rate_hz: float, protocols: Sequence[str] = PROTOCOLS) -> dict[str, Any]:
-    """Return the part of a router's configuration that lets at most so many a second through.
+def downsampling_rules(
+    robot: str, rate_hz: float, protocols: Sequence[str] = PROTOCOLS
+) -> dict[str, Any]:
+    """Return the router configuration that limits each stream to ``rate_hz``.
 
-    Time is counted for each rule, not for each key: a rule is of one robot.
+    Zenoh applies a limit per rule, not per key: a rule is for one robot.
     """
     rules = [
         {"key_expr": topic.on(robot), "freq": _freq_hz(topic.rate_hz, rate_hz)}
@@ -38,15 +39,15 @@ def thinned(robot: str, rate_hz: float, protocols: Sequence[str] = PROTOCOLS) ->
 
 
 def _streams(topic: Topic[Any]) -> bool:
-    """Tell whether laptops only look at it: a motion commands the bridge and nobody else."""
+    """Return whether laptops only display a topic; a motion commands only the bridge."""
     return topic.service is FAST or topic is MOTION
 
 
 def _freq_hz(given_hz: float, wanted_hz: float) -> float:
-    """Return what to ask of Zenoh, so that every so manieth passes even when it comes early.
+    """Return the ``freq`` for Zenoh that passes every n-th sample, even with jitter.
 
-    Zenoh lets one through when 1 / freq is over: at just the wanted rate, one that is early by a
-    hair is held back, and the next one is a whole period late.
+    Zenoh passes a sample when 1 / freq has elapsed: at exactly the wanted rate, a sample that is
+    slightly early is dropped, and the next one is a whole period late.
     """
     every = ceil(given_hz / wanted_hz)
     return given_hz / (every - 0.5)

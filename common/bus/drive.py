@@ -1,7 +1,7 @@
 """The drive link: the private session on which bridge and safety move the vehicle.
 
-The bridge listens on a Unix socket and safety dials it. Neither end has any other way in, so no
-message of the router can pass for one of theirs (``docs/adr/0022-drive-link.md``).
+The bridge listens on a Unix socket and safety connects to it. Neither end has other endpoints, so
+no message of the router can be mistaken for one of theirs (``docs/adr/0022-drive-link.md``).
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import zenoh
 
 from common.bus.bus import Bus
 from common.bus.publisher import Publisher
-from common.bus.session import COMPLAIN_S, Opener, drive_config
+from common.bus.session import WARN_PERIOD_S, Opener, drive_config
 from common.drive_socket import prepare, socket_path
 from common.freshness import NS_PER_S
 from common.keys import Topic
@@ -24,10 +24,10 @@ M = TypeVar("M", bound=Message)
 
 
 class DriveLink(Bus):
-    """One end of the drive link; it opens and closes with the bus that it belongs to.
+    """One end of the drive link; it opens and closes with its bus.
 
-    What is subscribed here comes from the other end alone. What is published here goes to the other
-    end first, and then to the bus for observers.
+    Subscriptions receive only from the other end. Publications go to the other end first, and then
+    to the bus for observers.
     """
 
     def __init__(self, bus: Bus, *, listens: bool) -> None:
@@ -54,7 +54,7 @@ class DriveLink(Bus):
         return self._session is not None and bool(self._session.info.peers_zid())
 
     def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:
-        """Return what listens or dials."""
+        """Return the opener that listens or connects."""
         return DriveOpener(self.where, self.socket, adopt, listens=self._listens)
 
 
@@ -74,13 +74,13 @@ class DriveOpener(Opener):
         self._listens = listens
 
     def opened(self, turn: int) -> zenoh.Session:
-        """Listen or dial; an end that dials retries until the other one is connected."""
+        """Listen or connect; a connecting end retries until the other one listens."""
         session = zenoh.open(drive_config(self._where, self._socket, listens=self._listens))
         if self._listens:
             self._socket.chmod(0o600)
         return session
 
-    def complain(self) -> None:
+    def warn(self) -> None:
         """Log that the socket cannot be opened."""
         Logger().warning(
             "the drive link cannot listen; is another bridge of this robot running?",
@@ -94,10 +94,10 @@ class LinkWatch:
     def __init__(self, link: DriveLink, event: Callable[[str, Level, str], None]) -> None:
         self._link = link
         self._event = event
-        self._was_up: bool | None = None  # None until it was up once
-        self._since_ns: int | None = None  # of the last report that it is missing
+        self._was_up: bool | None = None  # None until the first connection
+        self._since_ns: int | None = None  # last report of a missing end
 
-    def look(self, now_ns: int) -> None:
+    def check(self, now_ns: int) -> None:
         """Report what has changed since the last call."""
         up = self._link.connected
         if up and self._was_up is False:
@@ -107,7 +107,7 @@ class LinkWatch:
         self._was_up = up or (None if self._was_up is None else False)
         if up or self._since_ns is None:
             self._since_ns = now_ns
-        elif now_ns - self._since_ns >= COMPLAIN_S * NS_PER_S:
+        elif now_ns - self._since_ns >= WARN_PERIOD_S * NS_PER_S:
             self._since_ns = now_ns
             Logger().warning(
                 f"no {self._link.other} on the drive link; both must run as one user and with one "

@@ -1,4 +1,4 @@
-"""What waits between a thread of Zenoh's and the owner's: the newest few, the oldest goes first."""
+"""Bounded queue between Zenoh's threads and the owner's thread; it overwrites the oldest item."""
 
 import threading
 from collections import deque
@@ -7,11 +7,11 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Ring(Generic[T]):
-    """Holds up to ``depth`` items.
+class OverwritingQueue(Generic[T]):
+    """Queue of up to ``depth`` items.
 
-    Looking and adding are one step, under a lock: the adder wakes the taker only for an item that
-    pushed no other out, so an item that is lost between the two would silence the ring for good.
+    Check and append are one step, under a lock: the producer wakes the consumer only for an item
+    that overwrote none, so an item lost between both steps would stall the queue.
     """
 
     def __init__(self, depth: int) -> None:
@@ -19,13 +19,13 @@ class Ring(Generic[T]):
         self._lock = threading.Lock()
 
     def add(self, item: T) -> bool:
-        """Add the newest; tell whether the oldest had to go for it."""
+        """Append an item; return whether the oldest one was dropped."""
         with self._lock:
             full = len(self._items) == self._items.maxlen
             self._items.append(item)
         return full
 
     def take(self) -> T | None:
-        """Take the oldest, or None."""
+        """Remove and return the oldest item, or None."""
         with self._lock:
             return self._items.popleft() if self._items else None

@@ -1,7 +1,7 @@
-"""What the inspecting tools hold to the bus: a session that takes any key, right or wrong.
+"""Bus access of the inspecting tools: a session that takes any key and any payload.
 
-A service lets its loop be called; a tool asks and waits in its own thread, and ctrl-c reaches it
-there. Zenoh's threads only note when a sample came and queue it.
+A tool asks and waits in its own thread, where ctrl-c reaches it. Zenoh's threads only timestamp and
+queue samples.
 """
 
 import queue
@@ -16,21 +16,20 @@ import zenoh.ext
 
 from common.bus.calls import is_timeout
 from common.bus.publisher import QUERY_CONGESTION, qos
-from common.bus.sample import copied
-from common.bus.session import check_files, client_config
+from common.bus.session import check_files, client_config, copied
 from common.errors import LinkError
 from common.keys import ClassOfService
 from common.sample import Sample
 from common.settings import BusSettings
 
-MATCH_S = 1.0  # until the router has told who is there for what was declared
-MOST = 20_000  # samples that may wait for a slow reader; the newest of more are left out
-PAUSE_S = 0.02
+MATCH_TIMEOUT_S = 1.0  # until the router has reported matching declarations
+QUEUE_MAX = 20_000  # samples queued for a slow reader; newer ones are dropped
+POLL_PERIOD_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came back for a query; ``refusal`` says why it was refused."""
+    """Answer to a query; ``refusal`` is the reason of a refusal."""
 
     key: str
     payload: bytes
@@ -39,7 +38,7 @@ class Answer:
 
 
 class Probe:
-    """One session of one tool."""
+    """Session of one tool."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self.zid = str(session.zid())
@@ -49,7 +48,7 @@ class Probe:
         self._declared: list[Any] = []  # references keep them alive
 
     def listen(self, expression: str, *, history: bool = False) -> None:
-        """Hear what is put on these keys; with ``history`` also what publishers have kept."""
+        """Subscribe to these keys; with ``history`` also to samples that publishers kept."""
         if history:
             kept = zenoh.ext.HistoryConfig(detect_late_publishers=True)
             made: Any = zenoh.ext.declare_advanced_subscriber(
@@ -60,19 +59,19 @@ class Probe:
         self._declared.append(made)
 
     def take(self, wait_s: float) -> Sample | None:
-        """Return the oldest sample that waits; None when none comes for so long."""
+        """Return the oldest queued sample; None after ``wait_s``."""
         try:
             return self._samples.get(timeout=max(0.0, wait_s))
         except queue.Empty:
             return None
 
     def samples(self, seconds: float | None = None) -> Iterator[Sample]:
-        """Yield what comes, for so long or for good."""
+        """Yield samples, for ``seconds`` or without end."""
         end_s = time.monotonic() + (float("inf") if seconds is None else seconds)
         while (left_s := end_s - time.monotonic()) > 0:
-            heard = self.take(min(left_s, 1.0))
-            if heard:
-                yield heard
+            sample = self.take(min(left_s, 1.0))
+            if sample:
+                yield sample
 
     def put(
         self,
@@ -82,46 +81,46 @@ class Probe:
         service: ClassOfService,
         raw: bytes | None = None,
     ) -> None:
-        """Publish once, ``raw`` beside the payload."""
+        """Publish once, with ``raw`` as attachment."""
         self._session.put(key, payload, encoding=encoding, attachment=raw, **qos(service))
 
     def ask(
         self, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
     ) -> list[Answer]:
-        """Return every answer to a query; none when nobody answers in time."""
+        """Return all answers to a query within the timeout."""
         replies = self._session.get(
             selector, payload=payload, timeout=timeout_s, congestion_control=QUERY_CONGESTION
         )
         return [_answer(reply) for reply in replies if not is_timeout(reply)]
 
     def alive(self, expression: str, timeout_s: float = 2.0) -> list[str]:
-        """Return the liveliness tokens that stand."""
+        """Return the current liveliness tokens."""
         replies = self._session.liveliness().get(expression, timeout=timeout_s)
         return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok)
 
     def has_reader(self, key: str) -> bool:
-        """Tell whether the router would pass what is put there to anybody else; puts nothing."""
-        elsewhere = zenoh.Locality.REMOTE  # what this very session listens to does not count
+        """Return whether another session subscribes to the key; publishes nothing."""
+        elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
         return self._matched(self._session.declare_publisher(key, allowed_destination=elsewhere))
 
     def has_server(self, key: str) -> bool:
-        """Tell whether the router would pass a query to anybody; asks nothing."""
+        """Return whether a queryable matches the key; sends no query."""
         return self._matched(self._session.declare_querier(key))
 
     def _matched(self, declared: Any) -> bool:
-        end_s = time.monotonic() + MATCH_S
+        end_s = time.monotonic() + MATCH_TIMEOUT_S
         try:
             while not declared.matching_status.matching:
                 if time.monotonic() > end_s:
                     return False
-                time.sleep(PAUSE_S)
+                time.sleep(POLL_PERIOD_S)
             return True
         finally:
             declared.undeclare()
 
     def _queue(self, sample: zenoh.Sample) -> None:
         received_ns, wall_ns = time.monotonic_ns(), time.time_ns()
-        if self._samples.qsize() >= MOST:
+        if self._samples.qsize() >= QUEUE_MAX:
             self.left_out += 1
             return
         self._samples.put(copied(sample, received_ns, wall_ns))
@@ -129,7 +128,7 @@ class Probe:
 
 @contextmanager
 def probe(where: BusSettings) -> Iterator[Probe]:
-    """Join the bus while the context lasts; raise ``LinkError`` when no router answers."""
+    """Connect to the bus for the context; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
     with _opened(where) as session:
         yield Probe(session)
@@ -140,13 +139,13 @@ def _opened(where: BusSettings) -> zenoh.Session:
         with suppress(zenoh.ZError):
             return zenoh.open(client_config(where, turn))
     raise LinkError(
-        f"no router answers at {', '.join(where.endpoints)}: is `t2 up` on there? "
-        "`t2 doctor` looks further; --set bus.connect=tcp/HOST:7447 looks elsewhere"
+        f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
+        "Run `t2 doctor`, or choose another router: --set bus.connect=tcp/HOST:7447"
     )
 
 
 def valid(expression: str) -> bool:
-    """Tell whether it is a key or key expression as Zenoh wants it."""
+    """Return whether it is a valid key expression."""
     try:
         zenoh.KeyExpr(expression)
     except zenoh.ZError:
@@ -155,12 +154,12 @@ def valid(expression: str) -> bool:
 
 
 def intersects(one: str, other: str) -> bool:
-    """Tell whether some key is in both expressions."""
+    """Return whether some key matches both expressions."""
     return bool(zenoh.KeyExpr(one).intersects(zenoh.KeyExpr(other)))
 
 
 def includes(wide: str, narrow: str) -> bool:
-    """Tell whether every key of the second expression is in the first."""
+    """Return whether the first expression includes the second."""
     return bool(zenoh.KeyExpr(wide).includes(zenoh.KeyExpr(narrow)))
 
 

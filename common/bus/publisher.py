@@ -1,7 +1,9 @@
-"""Typed publishing, in the class of service that the key table names."""
+"""Typed publishers, with the class of service of the key table."""
 
 import time
+import uuid
 from collections import Counter, deque
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -14,14 +16,18 @@ from common.messages import Message
 
 M = TypeVar("M", bound=Message)
 
-# Of a query, and so of its answers: by Zenoh's default the router waits up to 5 s for a full link.
+# For queries and their answers; by default Zenoh's router blocks up to 5 s on a full link.
 QUERY_CONGESTION = zenoh.CongestionControl.DROP
+
+# All processes of a host share one monotonic clock, which starts at the host's boot. Two hosts that
+# were restored from one image may have the same id: check that a difference is plausible, too.
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class Publisher(Generic[M]):
-    """Puts the header on a topic's messages and sends them.
+    """Adds the header to a topic's messages and sends them.
 
-    While there is no bus it drops them, but for those of a class with a history: these wait.
+    Without a session messages are dropped, except in a class with a history: these are queued.
     """
 
     def __init__(
@@ -44,13 +50,13 @@ class Publisher(Generic[M]):
 
     @property
     def passed_on(self) -> bool | None:
-        """Whether the router has anybody to pass messages to; None while there is no bus."""
+        """Whether a subscriber matches; None without a session."""
         if not self._declared:
             return None
         return any(bool(each.matching_status.matching) for each in self._declared)
 
     def put(self, message: M, raw: bytes | None = None) -> M:
-        """Send the message with a header of its own, ``raw`` beside it; return what was sent."""
+        """Send the message with a header, and ``raw`` as attachment; return what was sent."""
         self._seq += 1
         stamped = msgspec.structs.replace(
             message,
@@ -68,11 +74,11 @@ class Publisher(Generic[M]):
         return stamped
 
     def withdraw(self) -> None:
-        """Send no more; the bus calls this before it ends its session."""
+        """Stop sending; the bus calls this before it closes its session."""
         self._declared.clear()
 
     def declare(self, session: zenoh.Session, *, first: bool = False) -> None:
-        """Declare it; the bus calls this once it has a session.
+        """Declare the publisher; the bus calls this once it has a session.
 
         With ``first`` each message goes to this session before it goes to any other.
         """
@@ -97,9 +103,17 @@ class Publisher(Generic[M]):
 
 
 def qos(service: ClassOfService) -> dict[str, Any]:
-    """Return a class of service in Zenoh's own words."""
+    """Return Zenoh's options for a class of service."""
     return {
         "priority": getattr(zenoh.Priority, service.priority),
         "congestion_control": zenoh.CongestionControl.DROP,
         "express": service.express,
     }
+
+
+def host_id(boot_id: Path = BOOT_ID) -> int:
+    """Return an id of this boot of this host; 0 where it is unknown (not Linux)."""
+    try:
+        return uuid.UUID(boot_id.read_text(encoding="ascii").strip()).int >> 65  # fits an int64
+    except (OSError, ValueError):
+        return 0

@@ -1,4 +1,4 @@
-"""Sessions: how a client finds its router, and the embedded router itself."""
+"""Zenoh sessions: of clients, of the drive link, and of the embedded router."""
 
 import contextlib
 import itertools
@@ -9,38 +9,40 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import zenoh
+from msgspec.structs import replace
 
-from common.bus.downsampling import thinned
+from common.bus.downsampling import downsampling_rules
 from common.errors import ConfigError, LinkError
 from common.log import Logger
+from common.sample import Sample
 from common.settings import BusSettings, is_encrypted
 
-RETRY_S = 0.5  # between two tries to find a router
-COMPLAIN_S = 5.0  # between two lines that say so
-# What may not be dropped (declarations, their history) makes a router wait for a link that is full,
-# with all others waiting behind. Zenoh's default is 5 s, then the link is closed: a laptop that was
-# cut off would stop the robot's own streams for as long.
-FULL_US = 100_000
-# Zenoh ends a dead TCP link in a thread that reads from the others, and waits up to 10 s there for
-# what was not sent (SO_LINGER; no setting). It has two, as many as a laptop has sessions. Each link
-# that dies within 10 s takes one; idle ones cost 20 kB. For the process of a router: `READERS_ENV`.
+RETRY_PERIOD_S = 0.5  # between two attempts to connect
+WARN_PERIOD_S = 5.0  # between two warnings
+# Data that must not be dropped (declarations, history) blocks a router on a full link, and with it
+# all other links. Zenoh closes the link after 5 s by default: a disconnected laptop would stall the
+# robot's own streams for that time.
+BLOCKED_TIMEOUT_US = 100_000
+# Zenoh closes a dead TCP link in a reader thread shared with other links, and waits up to 10 s for
+# unsent data (SO_LINGER; no setting). The default is two threads, as many as a laptop has sessions.
+# Each link that dies within 10 s occupies one; idle ones cost 20 kB. A router reads `READERS_ENV`.
 READERS = "(rx:(worker_threads:32))"
 READERS_ENV = "ZENOH_RUNTIME"
-# For one try to dial. Who has just got another address may have dialled from the old one, and waits
-# this long for nothing; five ways there and back of a bad link fit in it.
+# Timeout of one connection attempt: five round trips of a bad link. After a change of address, a
+# host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
-# Verdicts come in bursts, and each takes a batch because it is express. With Zenoh's two batches a
-# burst of eight lost its newest up to once in five on a busy machine.
+# Motions come in bursts, and each takes a batch because it is express. With Zenoh's two batches, up
+# to one in five bursts of eight lost its newest message on a busy machine.
 BURST = {"queue": {"size": {"interactive_high": 16}}, "batch_size": 8192}
-# Dialling a missing socket is cheap, and a restarted bridge is found within 100 ms.
+# Connecting to a missing socket is cheap, and a restarted bridge is found within 100 ms.
 REDIAL = {"period_init_ms": 100, "period_max_ms": 100, "period_increase_factor": 1.0}
 
 
 class Opener:
-    """Looks for a router in a thread of its own, and hands the session over once.
+    """Connects to a router in its own thread, and passes the session on once.
 
-    ``zenoh.open`` must not wait by itself (it ignores SIGINT then), so the waiting is done here.
+    ``zenoh.open`` must not wait (it ignores SIGINT then), so the retries are made here.
     """
 
     def __init__(self, where: BusSettings, adopt: Callable[[zenoh.Session], None]) -> None:
@@ -52,11 +54,11 @@ class Opener:
         self._session: zenoh.Session | None = None
 
     def start(self) -> None:
-        """Begin to look; returns at once."""
+        """Start connecting; returns at once."""
         self._thread.start()
 
     def close(self) -> None:
-        """Give up looking, and end the session that was found, handed over or not."""
+        """Stop connecting, and close the session if there is one."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -64,37 +66,37 @@ class Opener:
             self._session.close()
 
     def _run(self) -> None:
-        complained_s = -COMPLAIN_S
+        warned_s = -WARN_PERIOD_S
         for turn in itertools.count():
             if self._closing.is_set():
                 return
             try:
                 self._session = self.opened(turn)
             except zenoh.ZError:
-                if time.monotonic() - complained_s >= COMPLAIN_S:
-                    complained_s = time.monotonic()
-                    self.complain()
-                self._closing.wait(RETRY_S)
+                if time.monotonic() - warned_s >= WARN_PERIOD_S:
+                    warned_s = time.monotonic()
+                    self.warn()
+                self._closing.wait(RETRY_PERIOD_S)
                 continue
             self._adopt(self._session)
             return
 
     def opened(self, turn: int) -> zenoh.Session:
-        """Open a session, once; raise ``ZError`` when that fails."""
+        """Open a session, once; raise ``ZError`` on failure."""
         return zenoh.open(client_config(self._where, turn))
 
-    def complain(self) -> None:
+    def warn(self) -> None:
         """Log that there is no session yet."""
         Logger().warning(
-            "waiting for a router; `t2 doctor` looks further", endpoints=list(self._where.endpoints)
+            "waiting for a router; run `t2 doctor`", endpoints=list(self._where.endpoints)
         )
 
 
 def client_config(where: BusSettings, turn: int = 0) -> zenoh.Config:
-    """Return how a service joins: a client of one of these routers, never by scouting.
+    """Return the configuration of a client of one of these routers, without scouting.
 
-    Zenoh waits for the first endpoint, if it is silent, until there is no time left for the others:
-    each try begins with another one.
+    Zenoh spends the whole timeout on a first endpoint that is silent, so each attempt begins with
+    another one.
     """
     first = turn % len(where.endpoints)
     endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
@@ -119,9 +121,9 @@ def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Co
 def router_config(
     where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
 ) -> dict[str, object]:
-    """Return a router's whole configuration, as JSON.
+    """Return a router's configuration, as JSON.
 
-    ``access`` is its ``access_control``; ``robot`` is whose streams it thins towards laptops.
+    ``access`` is its ``access_control``; streams of ``robot`` are downsampled towards laptops.
     """
     parts: dict[str, object] = {
         "mode": "router",
@@ -130,14 +132,14 @@ def router_config(
     }
     if where.uplink:
         parts["connect"] = {"endpoints": list(where.uplink), "retry": RETRY}
-        # Routers among themselves learn every declaration of all; a peer tells one, and hears its
-        # own. A site's router that dials on knows robots by the name.
+        # Routers exchange all declarations of all; a peer exchanges only its own. The region name
+        # identifies robots to a site's router that has an uplink of its own.
         parts |= {"mode": "peer", "region_name": "robot"}
     if access is not None:
         parts["access_control"] = access
     if robot:
-        parts |= thinned(robot, where.laptop_rate)
-    full = {"congestion_control": {"block": {"wait_before_close": FULL_US}}}
+        parts |= downsampling_rules(robot, where.laptop_rate)
+    full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
     return _common(where, queue=full) | parts
 
 
@@ -145,10 +147,10 @@ def router_config(
 def router(
     where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
 ) -> Iterator[None]:
-    """Run the embedded router while the context lasts; raise ``LinkError`` if it cannot listen."""
+    """Run the embedded router for the context; raise ``LinkError`` if it cannot listen."""
     check_files(where, (*where.listen, *where.uplink))
     for socket in (each for each in where.listen if each.startswith("unixsock-stream/")):
-        with contextlib.suppress(OSError):  # what is wrong with it, Zenoh says
+        with contextlib.suppress(OSError):  # Zenoh reports the error
             Path(socket.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
     try:
         config = json.dumps(router_config(where, access, robot))
@@ -162,7 +164,7 @@ def router(
 
 
 def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
-    """Raise ``ConfigError`` for a file that these endpoints want and that cannot be read."""
+    """Raise ``ConfigError`` for an unreadable certificate file of these endpoints."""
     if not any(map(is_encrypted, endpoints)):
         return
     for name in ("ca", "certificate", "private_key"):
@@ -185,7 +187,7 @@ def _common(where: BusSettings, **sending: object) -> dict[str, object]:
         link["tls"] = _tls(where)
     return {
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        # The advanced publishers behind evt/** want timestamps.
+        # The advanced publishers of evt/** need timestamps.
         "timestamping": {"enabled": True},
         "transport": {
             "link": link,
@@ -196,7 +198,7 @@ def _common(where: BusSettings, **sending: object) -> dict[str, object]:
 
 
 def _tls(where: BusSettings) -> dict[str, object]:
-    """Both ends show a certificate of the site's own CA, whoever dials."""
+    """Return the mutual TLS settings: both ends present a certificate of the site's CA."""
     return {
         "root_ca_certificate": where.ca,
         "listen_certificate": where.certificate,
@@ -206,3 +208,37 @@ def _tls(where: BusSettings) -> dict[str, object]:
         "enable_mtls": True,
         "close_link_on_expiration": True,
     }
+
+
+def copied(sample: zenoh.Sample, received_ns: int, wall_ns: int) -> Sample:
+    """Return a copy of a sample, without Zenoh's buffers."""
+    return Sample(
+        key=str(sample.key_expr),
+        payload=sample.payload.to_bytes(),
+        encoding=str(sample.encoding),
+        deleted=sample.kind == zenoh.SampleKind.DELETE,
+        raw=sample.attachment.to_bytes() if sample.attachment else None,
+        received_ns=received_ns,
+        wall_ns=wall_ns,
+    )
+
+
+def router_at(where: BusSettings) -> BusSettings:
+    """Return the settings of a client of the router that listens there."""
+    return replace(where, connect=replace(where, connect=()).endpoints[:1])
+
+
+def answers(where: BusSettings) -> bool:
+    """Return whether a router works: it accepts a session and answers an admin query.
+
+    A hanging router may block the caller for long: use a separate thread.
+    """
+    with contextlib.suppress(zenoh.ZError), zenoh.open(client_config(where)) as session:
+        # A robot's router that dials a site's is a peer.
+        routers = (*session.info.routers_zid(), *session.info.peers_zid())
+        return any(
+            reply.ok
+            for zid in routers
+            for reply in session.get(f"@/{zid}/*", timeout=where.probe_deadline)
+        )
+    return False

@@ -1,1 +1,1 @@
-"""The vehicle's UDP protocol: frames in wire units, and datagrams made of them."""
+"""The vehicle's UDP protocol: frames in wire units, and their datagrams."""

@@ -1,4 +1,4 @@
-"""What the PC sends to the main board, one frozen struct per frame.
+"""Frames from the PC to the main board, one frozen struct each.
 
 Packed and little-endian (manual 2.2 to 2.7; the LED command is not in the manual):
 
@@ -37,14 +37,14 @@ from common.wire.frame import (
 
 
 class MotionKind(IntEnum):
-    """What a motion command asks of the board (manual 2.2)."""
+    """Kind of a motion command (manual 2.2)."""
 
     STOP = 0  # coasts to a stop, with a ramp
     RUN = 1  # follows the velocities
     BREAK = 2  # stops at once; the manual's own spelling
 
 
-# By the byte on the wire; a look-up here takes a fifth of ``MotionKind(value)``.
+# By the byte on the wire; this lookup takes a fifth of ``MotionKind(value)``.
 MOTION_KINDS = {kind.value: kind for kind in MotionKind}
 
 
@@ -70,7 +70,7 @@ class MotionCommand(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of kind and velocities; raise ``WireError`` for another kind."""
+        """Decode kind and velocities; raise ``WireError`` for an unknown kind."""
         value, linear, angular = values
         kind = MOTION_KINDS.get(value)
         if kind is None:
@@ -79,19 +79,19 @@ class MotionCommand(Frame, frozen=True):
 
 
 class DistanceQuery(Frame, frozen=True):
-    """PC to board: how far and which way since power-on (manual 2.3)."""
+    """PC to board: distance and heading since power-on (manual 2.3)."""
 
     ID = 0x7600
 
 
 class UltrasonicQuery(Frame, frozen=True):
-    """PC to board: the eight ranges (manual 2.3, its second of that number)."""
+    """PC to board: the eight ranges (manual 2.3, the second section 2.3)."""
 
     ID = 0x7601
 
 
 class BumperQuery(Frame, frozen=True):
-    """PC to board: is the bumper pressed (manual 2.4)."""
+    """PC to board: the bumper state (manual 2.4)."""
 
     ID = 0x7602
 
@@ -122,13 +122,13 @@ class DriverQuery(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of the side; raise ``WireError`` for a third one."""
+        """Decode the side; raise ``WireError`` for an unknown one."""
         (side,) = values
         return cls(to_side(side))
 
 
 class LedSet(Frame, frozen=True):
-    """PC to board: how one lamp channel shines; times and speed in the board's own units."""
+    """PC to board: setting of one lamp channel; times and speed in the board's own units."""
 
     ID = 0x7503
     LAYOUT = Struct("<9B")
@@ -155,7 +155,7 @@ class LedSet(Frame, frozen=True):
         return self.LAYOUT.pack(*astuple(self))
 
 
-# What the board may be sent, by what its frame begins with.
+# All frames to the board, by their opening.
 TO_BOARD = by_opening(
     MotionCommand, DistanceQuery, UltrasonicQuery, BumperQuery,
     UltrasonicBrakeSet, BumperBrakeSet, DriverQuery, LedSet,

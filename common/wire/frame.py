@@ -1,8 +1,22 @@
-"""What every frame is made of: a payload with a layout, and the number formats of this wire.
+"""Frame base class: header, payload layout, and number formats of this wire.
 
 Velocities are sign and magnitude: bit 15 is the sign, bits 14..0 the magnitude (manual 2.2).
-A frame object always holds values that the wire can carry: making one from others raises
-``WireError``, and sending it checks nothing again.
+A frame object holds only values that the wire can carry: its constructor raises ``WireError`` for
+others, and sending needs no check.
+
+Every frame begins with a header, little-endian (manual 2.1):
+
+====== ======= ========================================================================
+offset bytes   field
+====== ======= ========================================================================
+0      2       magic, ``47 53`` ("GS")
+2      2       size of the whole frame, header included
+4      2       command id, see ``commands`` and ``reports``
+6      2       CRC, over the payload alone: the header is not protected
+8      size-8  payload
+====== ======= ========================================================================
+
+The bytes before the CRC are the same in all frames of a kind: the *opening* identifies the kind.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,7 +27,11 @@ from typing import ClassVar, NamedTuple, Self
 import msgspec
 
 from common.errors import WireError
-from common.wire.header import HEADER, MAGIC, OPENING
+
+MAGIC = b"GS"
+OPENING = Struct("<2sHH")  # magic, size, id
+HEADER = Struct("<6sH")  # opening, CRC
+CRC_OFFSET, PAYLOAD_OFFSET = 6, 8
 
 SIGN_BIT = 0x8000
 MAGNITUDE_MAX = 0x7FFF
@@ -35,28 +53,28 @@ def refusal(field: str, value: object, allowed: str) -> WireError:
 
 
 def too_fast(*velocities: int) -> WireError:
-    """Return the error that names the one that is furthest beyond 15 bits."""
+    """Return the error for the velocity that is furthest beyond 15 bits."""
     return refusal("velocity", max(velocities, key=abs), "-32767..32767")
 
 
 class Side(IntEnum):
-    """Which of the two motor drivers (manual 2.7)."""
+    """Side of a motor driver (manual 2.7)."""
 
     LEFT = 0
     RIGHT = 1
 
 
 def to_side(value: int) -> Side:
-    """Read the side byte of a motor driver frame."""
+    """Decode the side byte of a motor driver frame."""
     if value > Side.RIGHT:
         raise refusal("motor driver", value, "0 left, 1 right")
     return Side(value)
 
 
 class Frame(msgspec.Struct, frozen=True, gc=False):
-    """A payload without fields; those with fields say how they are packed."""
+    """A frame without payload; subclasses with fields define their layout."""
 
-    ID: ClassVar[int] = 0  # no frame that is sent has this one
+    ID: ClassVar[int] = 0  # placeholder; no frame has this id
     LAYOUT: ClassVar[Struct] = Struct("<")
     OPENING: ClassVar[bytes]  # of its header
 
@@ -69,7 +87,7 @@ class Frame(msgspec.Struct, frozen=True, gc=False):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of what ``LAYOUT`` found in a payload; raise ``WireError`` if it cannot be."""
+        """Decode the values of ``LAYOUT``; raise ``WireError`` for invalid ones."""
         return cls(*values)
 
 
@@ -86,7 +104,7 @@ class Switch(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of its byte; raise ``WireError`` for neither 0 nor 1."""
+        """Decode its byte; raise ``WireError`` for values other than 0 and 1."""
         (value,) = values
         if value > 1:
             raise refusal(cls.__name__, value, "0 or 1")
@@ -94,7 +112,7 @@ class Switch(Frame, frozen=True):
 
 
 class Kind(NamedTuple):
-    """A frame class, with all that reading takes looked up already."""
+    """A frame class with precomputed decoding functions."""
 
     frame: type[Frame]
     size: int  # of the whole frame, header included
@@ -106,7 +124,7 @@ Kinds = Mapping[bytes, Kind]
 
 
 def by_opening(*frames: type[Frame]) -> Kinds:
-    """Index frame classes by what their frames begin with."""
+    """Index frame classes by their opening."""
     return {
         frame.OPENING: Kind(
             frame, HEADER.size + frame.LAYOUT.size, frame.LAYOUT.unpack, frame.from_wire

@@ -1,10 +1,10 @@
-"""Datagrams to frames and back.
+"""Encoding of frames to datagrams, and decoding.
 
-A datagram holds one frame or several, back to back; ``header`` draws what each begins with.
+A datagram holds one or several frames, back to back; ``frame`` documents the header.
 
-Reading never raises. What is no frame becomes a ``Rejected`` run of bytes with one named reason,
-and reading goes on at the next magic; the runs and the frames together are the whole datagram.
-A frame is read without asking what might be wrong with it; that is worked out for what is none.
+Reading never raises. Invalid bytes become a ``Rejected`` run with one reason, and reading continues
+at the next magic; the runs and the frames together are the whole datagram. Valid frames take the
+fast path; the reason is determined only after a failure.
 """
 
 import struct
@@ -16,17 +16,16 @@ import crcmod.predefined
 import msgspec
 
 from common.errors import WireError
-from common.wire.frame import Frame, Kinds
-from common.wire.header import HEADER, MAGIC, OPENING, PAYLOAD_OFFSET
+from common.wire.frame import HEADER, MAGIC, OPENING, PAYLOAD_OFFSET, Frame, Kinds
 
-# Bound here: to look these up in what is imported takes as long as the call itself.
+# Bound here: the attribute lookup takes as long as the call itself.
 pack_header, unpack_header = HEADER.pack, HEADER.unpack_from
 
 Covers = Literal["payload", "header_and_payload"]
 
 
 class Reason(StrEnum):
-    """Why bytes were not taken for a frame."""
+    """Why bytes are not a valid frame."""
 
     NO_MAGIC = "no_magic"
     TRUNCATED = "truncated"
@@ -37,14 +36,14 @@ class Reason(StrEnum):
 
 
 class Received(msgspec.Struct, frozen=True, gc=False):
-    """A frame as it stood in the datagram, header and payload in ``raw``."""
+    """A frame of a datagram, with header and payload in ``raw``."""
 
     frame: Frame
     raw: bytes
 
 
 class Rejected(msgspec.Struct, frozen=True, gc=False):
-    """A run of bytes that is no frame, and why."""
+    """A run of invalid bytes, with the reason."""
 
     reason: Reason
     raw: bytes
@@ -70,10 +69,10 @@ class Framing:
         return pack_header(opening, checksum(covered)) + payload
 
     def read(self, datagram: bytes, kinds: Kinds) -> list[Received | Rejected]:
-        """Return all that a datagram holds, in order; ``kinds`` is what its sender may say."""
+        """Return the parts of a datagram, in order; ``kinds`` are the frames of its sender."""
         parts: list[Received | Rejected] = []
         start, end = 0, len(datagram)
-        for _ in datagram:  # a part has a byte or more: this ends, whatever the datagram holds
+        for _ in datagram:  # bounded: each part has at least one byte
             part = self.part_at(start, datagram, kinds)
             parts.append(part)
             start += len(part.raw)
@@ -82,14 +81,14 @@ class Framing:
         return parts
 
     def part_at(self, start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
-        """Return the frame that begins at ``start``, or the run of bytes that is none."""
+        """Return the frame that begins at ``start``, or the run of invalid bytes."""
         try:
             opening, crc = unpack_header(datagram, start)
             _, size, unpack, from_wire = kinds[opening]
             raw = datagram[start : start + size]
             payload = raw[PAYLOAD_OFFSET:]
             values = unpack(payload)
-        except (struct.error, KeyError):  # it is cut short, or no such frame begins here
+        except (struct.error, KeyError):  # truncated, or no known frame begins here
             return _reject(datagram, start, *_fault(datagram, start, kinds))
         checksum = self._checksum
         computed = checksum(pack_header(opening, 0) + payload if self._covers_header else payload)
@@ -115,7 +114,7 @@ def crc_function(name: str) -> Callable[[bytes], int]:
 
 
 def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
-    """Say why no frame of these kinds begins at ``start``, or not all of one."""
+    """Return why no complete frame of these kinds begins at ``start``."""
     if not datagram.startswith(MAGIC, start):
         return Reason.NO_MAGIC, "does not start with 47 53"
     left = len(datagram) - start
@@ -132,7 +131,7 @@ def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
 
 
 def _reject(datagram: bytes, start: int, reason: Reason, detail: str) -> Rejected:
-    """Give up everything from ``start`` to the next magic behind it."""
+    """Reject all bytes from ``start`` to the next magic."""
     following = datagram.find(MAGIC, start + 1)
     end = len(datagram) if following == -1 else following
     return Rejected(reason, datagram[start:end], detail)

@@ -1,4 +1,4 @@
-"""What the main board sends to the PC, one frozen struct per frame.
+"""Frames from the main board to the PC, one frozen struct each.
 
 Packed and little-endian (manual 2.2 to 2.7; the LED answer is not in the manual):
 
@@ -15,8 +15,8 @@ id     name                        payload
 0x7503 LED                         u8 0x55 done, 0xAA failed
 ====== =========================== =====================================================
 
-``VelocityReport`` comes unasked and continuously, ``DriverReport`` on a query and unasked on a
-fault; the rest answers a query.
+``VelocityReport`` is sent unsolicited and continuously, ``DriverReport`` on a query and on a
+fault; the others answer a query.
 """
 
 import struct
@@ -43,7 +43,7 @@ LED_FAILED = 0xAA
 
 
 class VelocityReport(Frame, frozen=True):
-    """Board to PC, unasked and continuous: the measured velocity (manual 2.2)."""
+    """Board to PC, unsolicited and continuous: the measured velocity (manual 2.2)."""
 
     ID = 0x7426
     LAYOUT = Struct("<HH")
@@ -63,7 +63,7 @@ class VelocityReport(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of both velocities."""
+        """Decode both velocities."""
         linear, angular = values
         return cls(from_sign_magnitude(linear), from_sign_magnitude(angular))
 
@@ -99,7 +99,7 @@ class UltrasonicReport(Frame, frozen=True):
 
     def __post_init__(self) -> None:
         try:
-            self.LAYOUT.pack(*self.ranges_mm)  # half of what it takes to compare each of them
+            self.LAYOUT.pack(*self.ranges_mm)  # takes half the time of comparing each value
         except struct.error:
             raise refusal("ranges_mm", self.ranges_mm, "8 of 0..65535") from None
 
@@ -109,7 +109,7 @@ class UltrasonicReport(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of the eight ranges."""
+        """Decode the eight ranges."""
         return cls(values)
 
 
@@ -129,19 +129,19 @@ class BumperReport(Switch, frozen=True):
 
 
 class UltrasonicBrakeReport(Switch, frozen=True):
-    """Board to PC: the echo of that switch (manual 2.5)."""
+    """Board to PC: the echo of ``UltrasonicBrakeSet`` (manual 2.5)."""
 
     ID = 0x7603
 
 
 class BumperBrakeReport(Switch, frozen=True):
-    """Board to PC: the echo of that switch (manual 2.6)."""
+    """Board to PC: the echo of ``BumperBrakeSet`` (manual 2.6)."""
 
     ID = 0x7604
 
 
 class DriverReport(Frame, frozen=True):
-    """Board to PC, on a query and unasked on a fault (manual 2.7).
+    """Board to PC, on a query and unsolicited on a fault (manual 2.7).
 
     Bits: 0 over-current, 1 over-voltage, 2 encoder, 3 under-voltage, 4 overload, 5..31 reserved.
     """
@@ -162,7 +162,7 @@ class DriverReport(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of side and bits; raise ``WireError`` for a third side."""
+        """Decode side and bits; raise ``WireError`` for an unknown side."""
         side, bits = values
         return cls(to_side(side), bits)
 
@@ -181,14 +181,14 @@ class LedReport(Frame, frozen=True):
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Make it of the answer; raise ``WireError`` for another."""
+        """Decode the answer; raise ``WireError`` for an unknown one."""
         (value,) = values
         if value not in (LED_DONE, LED_FAILED):
             raise refusal("LED answer", hex(value), "0x55 or 0xaa")
         return cls(value == LED_DONE)
 
 
-# What the board may send, by what its frame begins with.
+# All frames from the board, by their opening.
 FROM_BOARD = by_opening(
     VelocityReport, DistanceReport, UltrasonicReport, BumperReport,
     UltrasonicBrakeReport, BumperBrakeReport, DriverReport, LedReport,

@@ -1,4 +1,4 @@
-"""``python -m services.bridge``: the guard, and the bridge under it."""
+"""``python -m services.bridge``: the guard, with the bridge as its child."""
 
 import sys
 import time
@@ -14,12 +14,12 @@ from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
 
-# A bridge whose guard was killed keeps the ports until its vehicle stands.
-RIVAL_S = 4.0
+# A bridge whose guard was killed keeps the ports until standstill.
+BIND_TIMEOUT_S = 4.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Guard the bridge until it is told to stop; return the exit code."""
+    """Run the guard until a signal; return the exit code."""
     given = sys.argv[1:] if argv is None else argv
     try:
         config = load(BridgeConfig, sources(arguments("bridge").parse_args(given))).config
@@ -29,12 +29,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_CONFIG
     if config.robot.realtime:
         realtime.ask(realtime.GUARD)
-    log.configure(config.log, "guard")  # its thread holds Python's lock now and then: it follows
+    log.configure(
+        config.log, "guard"
+    )  # after the priority: the log's thread holds Python's lock at times
     if config.robot.realtime:
         realtime.ask(realtime.GUARD, alone=True)
         realtime.limit()
         if not realtime.priority():
-            log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
+            log.Logger().info("SCHED_FIFO is not granted: the bridge runs with normal priority")
     try:
         sockets = bound(config.board)
     except LinkError as error:
@@ -44,8 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def bound(board: Board) -> Sockets:
-    """Bind the ports; raise ``LinkError`` when they cannot be had for long enough."""
-    end_s = time.monotonic() + RIVAL_S
+    """Bind the ports; raise ``LinkError`` when they stay taken for 4 s."""
+    end_s = time.monotonic() + BIND_TIMEOUT_S
     while True:
         try:
             return Sockets(board)

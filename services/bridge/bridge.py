@@ -1,7 +1,7 @@
-"""The bridge's shell: sockets, bus and clock around the core. What the core returns is done here.
+"""The bridge's shell: sockets, bus and clock around the core.
 
-The reflex goes ahead of everything: BRAKE leaves before the datagram with the hit is read any
-further. Receive stamps and reaction times are observed beside the core.
+The shell carries out what the core returns. The reflex has priority: BRAKE is sent before the rest
+of the datagram with the hit is read. Receive timestamps and reaction times are measured here.
 """
 
 import time
@@ -16,7 +16,7 @@ from common.motion import Command
 from common.service import Node
 from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
-from services.bridge.guard_ipc import Handover, Heartbeat
+from services.bridge.guard_ipc import Heartbeat, Inherited
 from services.bridge.output import Output, Send
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import Timings
@@ -24,21 +24,21 @@ from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 TICK_S = 0.01
 LINK_S = 0.2
-MOTIONS = 8  # that may wait
-ECHOES = 64  # queued states of safety; a call that echoes a dropped one would be refused
+MOTIONS = 8  # queue length
+ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
 class Bridge:
-    """Hands the core what comes, and carries out what it returns."""
+    """Passes inputs to the core and carries out its outputs."""
 
-    def __init__(self, node: Node[BridgeConfig], handover: Handover | None = None) -> None:
+    def __init__(self, node: Node[BridgeConfig], inherited: Inherited | None = None) -> None:
         self._node = node
-        drive = node.open_drive(listens=True)  # safety takes samples from this link alone
-        self._sockets = Sockets(node.config.board, handover.sockets if handover else ())
-        self._heartbeat = Heartbeat(handover.heartbeat, self._on_no_guard) if handover else None
+        drive = node.open_drive(listens=True)  # safety accepts samples only from this link
+        self._sockets = Sockets(node.config.board, inherited.sockets if inherited else ())
+        self._heartbeat = Heartbeat(inherited.heartbeat, self._on_no_guard) if inherited else None
         self._timings = Timings()
         self._core = Core(node.config, node.bus.boot, node.counters, time.monotonic_ns())
-        self._unsent: Send | None = None  # a BRAKE that the system refused to send
+        self._unsent: Send | None = None  # the BRAKE that the system did not send
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
             "mileage": drive.publisher(keys.MILEAGE),
@@ -70,9 +70,9 @@ class Bridge:
     # --- in -----------------------------------------------------------------------------------
 
     def _read(self, now_ns: int) -> None:
-        """Take in what waits in the sockets."""
-        # The main port first: after a pause both have something, and the other one must not take
-        # over only because it is looked at first.
+        """Process the datagrams waiting in the sockets."""
+        # The main port first: after a stall both ports have datagrams, and the other one must not
+        # take over only because it is read first.
         main = self._core.port
         for port in (main, *(p for p in range(len(self._sockets.sockets)) if p != main)):
             for datagram, ancillary, read_ns in self._sockets.read(port):
@@ -90,8 +90,8 @@ class Bridge:
         if out.obeyed:
             sent_ns, shared = time.monotonic_ns(), self._node.bus.shares_clock(motion)
             self._timings.on_motion(motion, shared, arrival.received_ns, sent_ns)
-            if out.judged:
-                self._timings.on_judged(motion, shared, arrival.received_ns, sent_ns)
+            if out.acked:
+                self._timings.on_acked(motion, shared, arrival.received_ns, sent_ns)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._core.operator.on_safety(arrival.message, arrival.received_ns)
@@ -103,8 +103,8 @@ class Bridge:
         self._do(self._core.led(request, caller, time.monotonic_ns()))
 
     def _on_tick(self, now_ns: int) -> None:
-        # What waits in the sockets came before now: a loop that was held up must not take its own
-        # silence for the board's.
+        # Read the sockets first: after a stall of this loop, queued datagrams are not yet counted,
+        # and the board would seem silent.
         self._read(now_ns)
         unsent = self._unsent
         out = self._core.tick(now_ns, self._sockets.send_errors)
@@ -145,15 +145,15 @@ class Bridge:
             self._unsent = None
 
     def _brake(self, brake: Send) -> int:
-        """Send BRAKE, several times where the system refuses; return when.
+        """Send BRAKE, retrying when the system refuses; return the time.
 
-        One that could not be sent is sent again at each tick.
+        A BRAKE that could not be sent is sent again at each tick.
         """
         sent = self._sockets.send(brake.datagram, brake.port, BRAKE_ATTEMPTS)
         self._unsent = None if sent else brake
         return time.monotonic_ns()
 
-    # --- beside the core ----------------------------------------------------------------------
+    # --- measurements and counters ----------------------------------------------------------
 
     def _observe(self, out: Output, receipt: Receipt, braked_ns: int | None) -> None:
         if out.hit is not None:
@@ -162,13 +162,14 @@ class Bridge:
         self._timings.on_read(receipt)
 
     def _report_sockets(self) -> None:
-        sockets, counters, rejected = self._sockets, self._node.counters, self._core.report.rejected
-        stranger = sockets.last_stranger
-        if sockets.refused > rejected["wrong_address"] and stranger is not None:
+        sockets, counters = self._sockets, self._node.counters
+        rejected = self._core.report.rejected
+        foreign = sockets.last_foreign_source
+        if sockets.refused > rejected["wrong_address"] and foreign is not None:
             board = self._node.config.board
             self._node.log.warning(
                 "datagrams from another address are dropped; see board.any_source_port",
-                stranger=f"{stranger[0]}:{stranger[1]}",
+                source=f"{foreign[0]}:{foreign[1]}",
                 board=f"{board.address}:{board.port}",
             )
         rejected["wrong_address"] = sockets.refused
@@ -181,12 +182,14 @@ class Bridge:
     # --- the end ------------------------------------------------------------------------------
 
     def _on_no_guard(self) -> None:
-        # The two are restarted together: a bridge that nobody guards must not drive.
-        self._node.event("guard_gone", "error", "the guard has died: stops the vehicle and ends")
+        # Both are restarted together: a bridge without a guard must not drive.
+        self._node.event(
+            "guard_gone", "error", "the guard has died: the bridge stops the vehicle and exits"
+        )
         self._node.loop.stop()
 
     def _is_stopped(self) -> bool:
-        """Stop the vehicle for good; true once it stands, or a second has passed."""
+        """Stop the vehicle; return True at standstill, or after one second."""
         now_ns = time.monotonic_ns()
         self._do(self._core.stop(now_ns))
         return self._core.motions.is_stopped(now_ns)

@@ -1,4 +1,4 @@
-"""``python -m services.bridge.child``: the bridge itself; ``services.bridge.guard`` starts it."""
+"""``python -m services.bridge.child``: the bridge process, started by ``services.bridge.guard``."""
 
 import os
 import signal
@@ -12,17 +12,17 @@ from services.bridge.guard_ipc import NAME, received
 
 
 def main() -> int:
-    """Run the bridge until it is told to stop, or its guard has died."""
+    """Run the bridge until a signal, or until its guard has died."""
     if NAME not in os.environ:
         print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
         return 2
-    # systemd sends these to guard and bridge alike; a bridge is told by its guard, or by its end.
+    # systemd sends these to guard and bridge alike; the guard passes them on.
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    handover = received(os.environ)
-    # Never ahead of its guard, which has to brake for it.
+    inherited = received(os.environ)
+    # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run("bridge", BridgeConfig, lambda node: Bridge(node, handover), priority=ahead)
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, inherited), priority=ahead)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,23 @@
-"""The bridge's settings."""
+"""Settings of the bridge, and the queries and ports that follow from them."""
 
 from typing import Annotated
 
 from msgspec import Meta
 
 from common import settings
+from common.freshness import NS_PER_S
+from common.wire import commands, reports
+from common.wire.frame import Frame, Side
+from services.bridge.ports import Ports
+
+ECHO_HZ = 5.0
+STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
+ASKED: dict[str, type[Frame]] = {
+    "bumper": reports.BumperReport,
+    "mileage": reports.DistanceReport,
+    "ultrasonic": reports.UltrasonicReport,
+}
+ANSWERS = {kind.frame.ID: kind.frame for kind in reports.FROM_BOARD.values()}
 
 Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
@@ -21,7 +34,7 @@ PROTECTIVE: settings.Limits = {
     "max_linear": (0.0, 1.5),
     "max_angular": (0.0, 2.0),
     "require_switches": (True, True),
-    # Asked less often, a short hit, a near wall and a board that has started anew are seen late.
+    # Lower rates delay the detection of a short hit, a near wall and a restarted board.
     "bumper_rate": (20.0, 200.0),
     "ultrasonic_rate": (10.0, 200.0),
     "mileage_rate": (10.0, 200.0),
@@ -29,15 +42,17 @@ PROTECTIVE: settings.Limits = {
 
 
 class Bridge(settings.Section, frozen=True, kw_only=True):
-    """How the bridge treats the board."""
+    """Parameters of the bridge."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
-    lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message holds
-    silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s after which the board is lost
-    failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port is taken
-    # s without a sign of the bridge's loop after which its guard brakes
+    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
+    lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message is valid
+    silence: Annotated[float, Meta(ge=0.05, le=10.0)] = (
+        0.2  # s without a frame until the link is lost
+    )
+    failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port takes over
+    # s without a heartbeat of the bridge until the guard brakes
     heartbeat: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2
-    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP at most before it is BREAK
+    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP at most until BREAK
     deceleration: Positive = 0.6  # m/s^2 that a STOP must reach, or it becomes BREAK sooner
     angular_deceleration: Positive = 1.0  # rad/s^2, likewise
     max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
@@ -64,3 +79,29 @@ class BridgeConfig(settings.Shared, frozen=True, kw_only=True):
     wire: settings.Wire = settings.Wire()
     vehicle: settings.Vehicle = settings.Vehicle()
     bridge: Bridge = Bridge()
+
+
+def queries(bridge: Bridge) -> list[tuple[str, Frame, float]]:
+    """Return the queries to the board: name, frame, rate in Hz."""
+    return [
+        ("bumper", commands.BumperQuery(), bridge.bumper_rate),
+        ("mileage", commands.DistanceQuery(), bridge.mileage_rate),
+        ("ultrasonic", commands.UltrasonicQuery(), bridge.ultrasonic_rate),
+        ("driver_left", commands.DriverQuery(Side.LEFT), bridge.driver_rate),
+        ("driver_right", commands.DriverQuery(Side.RIGHT), bridge.driver_rate),
+    ]
+
+
+def ports_of(config: BridgeConfig, now_ns: int) -> Ports:
+    """Return the port selection, with the poll rate of each kind of frame."""
+    bridge = config.bridge
+    rates_hz: dict[type[Frame], float] = {
+        reports.BumperReport: bridge.bumper_rate,
+        reports.DistanceReport: bridge.mileage_rate,
+        reports.UltrasonicReport: bridge.ultrasonic_rate,
+        reports.DriverReport: bridge.driver_rate,
+        reports.UltrasonicBrakeReport: ECHO_HZ,
+        reports.BumperBrakeReport: ECHO_HZ,
+    }
+    count = len(config.board.listen_ports)
+    return Ports(count, round(bridge.failover * NS_PER_S), rates_hz, now_ns)

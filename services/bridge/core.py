@@ -1,14 +1,14 @@
 """The bridge's core: datagrams, motions, calls and ticks in; frames, messages and events out. Pure.
 
 ========== ================================== ==================================================
-entry      called by the shell for            leads to
+entry      called by the shell for            returns
 ========== ================================== ==================================================
 reflex     each datagram, first               BRAKE, when it holds a new bumper hit
 datagram   the same datagram                  messages; answers of calls; events
 motion     each message on ``@cmd/motion``    the frame that the lease allows
 switches,  an operator's calls                frames; the board's echo answers them later
 led
-tick       every 10 ms                        queries; STOP or BRAKE that is due; events
+tick       every 10 ms                        queries; STOP or BRAKE if due; events
 second     once a second                      the switches' message; rates for the link message
 link       5 times a second, and on a change  the link message
 stop, exit the end of the process             STOP or BRAKE
@@ -26,10 +26,9 @@ from common.errors import WireError
 from common.freshness import Latest
 from common.motion import Command
 from common.wire import reports
-from common.wire.frame import Frame, Side
+from common.wire.frame import OPENING, Frame, Side
 from common.wire.framing import Framing, Received
-from common.wire.header import OPENING
-from services.bridge.config import BridgeConfig
+from services.bridge.config import ANSWERS, ASKED, STEADY, BridgeConfig, ports_of, queries
 from services.bridge.link_report import LinkReport
 from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
@@ -38,23 +37,22 @@ from services.bridge.poll import Poll
 from services.bridge.readiness import Readiness
 from services.bridge.reflex import Reflex
 from services.bridge.restart_detection import restarted
-from services.bridge.schedule import ANSWERS, ASKED, STEADY, ports_of, queries
 from services.bridge.translate import BumperFilter, Translator, driver
 
-# Frames that count from either port when they report something new.
-DANGERS = (reports.BumperReport, reports.DriverReport)
+# A new hit or fault in these frames counts from either port.
+URGENT_KINDS = (reports.BumperReport, reports.DriverReport)
 Handler = Callable[[Any, bytes, int, Output], None]  # frame, raw bytes, receive time
-# Frames that come all the time: a change of their port is an event.
+# Continuous frames: a change of their port is an event.
 POLLED = frozenset((reports.VelocityReport, *ASKED.values(), reports.DriverReport))
 
 
 class Core:
-    """Reads the board's frames, keeps asking it, and tells it what the lease allows."""
+    """Processes the board's frames, polls it, and sends the commands that the lease allows."""
 
     def __init__(
         self, config: BridgeConfig, boot: int, counters: Counter[str], now_ns: int
     ) -> None:
-        """Take the boot of our messages, and where to count what was dropped."""
+        """Set up with the boot of our messages and the counters of dropped input."""
         self._config, settings = config, config.bridge
         self._counters = counters
         self._framing = Framing(config.wire.crc, config.wire.crc_covers)
@@ -91,19 +89,19 @@ class Core:
 
     @property
     def port(self) -> int:
-        """The index of the UDP port that commands leave from; read it before the others."""
+        """The index of the UDP port that commands leave from; read it first."""
         return self._ports.main
 
-    # --- what comes from the board ----------------------------------------------------------
+    # --- input from the board ----------------------------------------------------------
 
     def reflex(self, datagram: bytes) -> Send | None:
-        """Return BRAKE when a datagram, on whichever port, holds a hit that is not known yet."""
+        """Return BRAKE when a datagram, on either port, holds a new hit."""
         if self._bumper.pressed:
             return None
         return self._reflex.answer(datagram, self.motions.port)
 
     def datagram(self, datagram: bytes, port: int, now_ns: int, *, braked: bool) -> Output:
-        """Take in a datagram that came to this port; ``braked``: ``reflex`` returned BRAKE."""
+        """Process a datagram received on this port; ``braked``: ``reflex`` returned BRAKE."""
         out = Output(braked=braked)
         if port != self._ports.main and self._is_copy(datagram, port, now_ns):
             self._counters["other_port"] += 1
@@ -116,18 +114,18 @@ class Core:
         return out
 
     def _is_copy(self, datagram: bytes, port: int, now_ns: int) -> bool:
-        """Return whether a datagram is one frame that needs no reading: a copy, and no danger."""
+        """Return whether a datagram is one non-urgent frame that the active port delivers too."""
         kind = reports.FROM_BOARD.get(datagram[: OPENING.size])
         return (
             kind is not None
             and len(datagram) == kind.size
-            and kind.frame not in DANGERS
+            and kind.frame not in URGENT_KINDS
             and not self._ports.takes(kind.frame, port, now_ns)
         )
 
     def _on_frame(self, part: Received, port: int, now_ns: int, out: Output) -> None:
         frame, kind = part.frame, type(part.frame)
-        news = self._is_news(frame)
+        news = self._is_urgent(frame)
         if not (self._ports.takes(kind, port, now_ns) or news):
             self._counters["other_port"] += 1
             return
@@ -145,14 +143,14 @@ class Core:
             text = f"{kind.__name__} is now taken from UDP port {number}"
             out.event("port_changed", "warning", text, port=number, frame=kind.__name__)
 
-    def _is_news(self, frame: Frame) -> bool:
+    def _is_urgent(self, frame: Frame) -> bool:
         """Return whether a frame on either port reports a new hit or driver fault."""
         if isinstance(frame, reports.DriverReport):
             return bool(frame.fault_bits & ~self._faults.get(frame.side, 0))
         if not isinstance(frame, reports.BumperReport) or not frame.on:
             return False
         if self._bumper.pressed:
-            self._bumper.take(True)  # while either port shows a hit, no row of clear ones counts
+            self._bumper.take(True)  # a hit on either port restarts the count of clear samples
             return False
         return True
 
@@ -179,7 +177,7 @@ class Core:
             out.event("contact", "error", "the bumper is hit: BREAK")
         self._poll.answered("bumper", now_ns)
         if message is not None:
-            # A short hit stays in the samples until safety has judged one: it may have lost some.
+            # A short hit stays in the samples until safety has acknowledged one: some may be lost.
             pressed = message.pressed or self.motions.lease.hit is not None
             lost = self._poll.lost("bumper", now_ns)
             self._bumper_seq += 1
@@ -188,14 +186,14 @@ class Core:
     def _on_distance(
         self, frame: reports.DistanceReport, raw: bytes, now_ns: int, out: Output
     ) -> None:
-        # Measured after it was asked for, however long it then waited to be read.
+        # Measured no earlier than the query, even if the answer was read late.
         asked_ns = self._poll.answered("mileage", now_ns)
         after = self._translator.mileage(frame, self.readiness.epoch)
         before = self._mileage
         if before is not None and self._is_new_board(before, after, now_ns):
             self.readiness.on_restart(now_ns, out)
             self._bumper = BumperFilter()
-            self.motions.on_ready(False)  # not only at the next tick: no RUN in between
+            self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)
         self.motions.on_mileage(after, now_ns)
@@ -215,35 +213,35 @@ class Core:
         self._poll.answered(f"driver_{side}", now_ns)
         message = driver(frame)
         if frame.fault_bits != self._faults.get(frame.side, 0):
-            text = f"{side} motor driver: {', '.join(message.faults) or 'no fault any more'}"
+            text = f"{side} motor driver: {', '.join(message.faults) or 'no fault'}"
             level: m.Level = "error" if message.faults else "info"
             out.event("driver_fault", level, text, side=side, bits=frame.fault_bits)
         self._faults[frame.side] = frame.fault_bits
         out.publish(f"driver_{side}", message, raw)
 
-    # --- what comes from the bus ------------------------------------------------------------
+    # --- input from the bus ------------------------------------------------------------
 
     def motion(self, motion: m.Motion, received_ns: int, now_ns: int) -> Output:
-        """Take in a motion message of safety."""
+        """Process a motion message of safety."""
         out = Output()
         self.motions.on_motion(motion, received_ns, now_ns, out)
         return out
 
     def switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Output:
-        """Take in a call that sets the board's emergency brakes; ``caller`` is handed back."""
+        """Process a call that sets the board's emergency brakes; the answer names ``caller``."""
         out = Output()
         self.operator.on_switches(request, caller, now_ns, out)
         return out
 
     def led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Output:
-        """Take in a call that sets a lamp channel; ``caller`` is handed back."""
+        """Process a call that sets a lamp channel; the answer names ``caller``."""
         out = Output()
         frame = self.operator.on_led(request, caller, now_ns, out)
         if frame is not None:
             self._ask(frame, now_ns, out)
         return out
 
-    # --- what is due by time ----------------------------------------------------------------
+    # --- timers ----------------------------------------------------------------
 
     def start(self) -> Output:
         """Return the first frame: STOP."""
@@ -252,11 +250,11 @@ class Core:
         return out
 
     def tick(self, now_ns: int, send_errors: int) -> Output:
-        """Send what is due; ``send_errors``: datagrams that the system has refused to send."""
+        """Send what is due; ``send_errors``: datagrams that the system did not send."""
         out = Output()
         frames = self.readiness.on_tick(now_ns, out)
         if self.readiness.link.state != "up":
-            self._bumper = BumperFilter()  # what was received before the gap is no part of a row
+            self._bumper = BumperFilter()  # samples from before the gap do not count as consecutive
         self.motions.on_ready(self.readiness.ready)
         self.motions.on_tick(now_ns, out)
         for frame in (*frames, *self._poll.due(now_ns)):
@@ -267,7 +265,7 @@ class Core:
         return out
 
     def second(self) -> Output:
-        """Take the rates of the last second; publish the switches."""
+        """Update the rates of the last second; publish the switches."""
         out = Output()
         self.report.second()
         for name, count in self._poll.missed().items():
@@ -276,25 +274,25 @@ class Core:
         return out
 
     def link(self, now_ns: int, send_errors: int) -> Output:
-        """Publish what is known of the link to the board."""
+        """Publish the state of the link to the board."""
         out = Output()
         self.report.publish(now_ns, send_errors, out)
         return out
 
     def _ask(self, frame: Frame, now_ns: int, out: Output) -> None:
-        """Send a query or a setting from the port that its answers come to."""
+        """Send a query or a setting from the port that receives its answers."""
         self.motions.send(frame, self._ports.to_ask(ANSWERS[frame.ID], now_ns), out)
 
     # --- the end ----------------------------------------------------------------------------
 
     def stop(self, now_ns: int) -> Output:
-        """Stop the vehicle for good; ``motions.is_stopped`` says when it stands."""
+        """Stop the vehicle before exit; ``motions.is_stopped`` reports standstill."""
         out = Output()
         self.motions.stop(now_ns, out)
         return out
 
     def exit(self, now_ns: int) -> Output:
-        """Return the last frame: STOP for a vehicle that stands, otherwise BRAKE."""
+        """Return the last frame: STOP at standstill, otherwise BRAKE."""
         out = Output()
         self.motions.on_exit(now_ns, out)
         return out

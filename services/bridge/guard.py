@@ -1,7 +1,7 @@
-"""The bridge's parent, and the last line on the host: no RUN outlives a bridge that has failed.
+"""The bridge's parent process: sends BREAK whenever the bridge does not work.
 
-It opens the sockets to the board, so that source port and queue survive a restart, starts the
-bridge as its child and reads its heartbeat. While there is none, BREAK goes out at 20 Hz through
+It opens the sockets to the board, so that source port and receive queue survive a restart, starts
+the bridge as its child and reads its heartbeat. Without a heartbeat it sends BREAK at 20 Hz through
 the socket that the bridge used:
 
 ============== =============================== ==============================================
@@ -10,13 +10,13 @@ phase          BREAK                           ends with
 starting       until the first heartbeat, that a heartbeat: alive; none in 10 s: killed
                follows the bridge's first STOP
 alive          from 200 ms without one         five BREAKs without one: killed; the pipe's end
-ending, killed until the child is gone         it is gone: started again, first at once
-not started    until it could be started       started; tried again after 0 to 5 s (no memory)
+ending, killed until the child has exited      exit: restarted, the first time at once
+not started    until it could be started       started; retried after 0 to 5 s (no memory)
 ============== =============================== ==============================================
 
-SIGTERM, SIGINT and SIGHUP are passed on; a bridge that comes to rest sends its last frame itself.
-A signal after the parent has died means that the supervisor was killed: the system sends it then
-(see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
+SIGTERM, SIGINT and SIGHUP are passed on; a bridge that stops the vehicle sends its last frame
+itself. A signal after the parent has died means that the supervisor was killed: the system sends it
+then (see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
 """
 
 import os
@@ -28,26 +28,26 @@ from collections.abc import Sequence
 from types import FrameType
 
 from common import child_process
-from common.backoff import Backoff
-from common.cli_args import HOPELESS
+from common.child_process import Backoff
+from common.cli_args import NO_RESTART
 from common.log import Logger
 from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.config import BridgeConfig
-from services.bridge.guard_ipc import Handover
+from services.bridge.guard_ipc import Inherited
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
-HANGS = 5  # BREAKs to a bridge that gives no heartbeat, until it is killed
-HANGS_AT_START = 200
-GOES = 20  # BREAKs to one that has said its last word
-NOT_STARTED = 1  # an exit code for a bridge that could not be started
-GOES_AT_REST_S = 4.0  # for one that was told to come to rest
+HANG_BRAKES_MAX = 5  # BREAKs without a heartbeat, until the bridge is killed
+START_BRAKES_MAX = 200
+EXIT_BRAKES_MAX = 20  # BREAKs after the bridge closed its pipe, until it is killed
+NOT_STARTED = 1  # exit code when the bridge could not be started
+STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
 
 
 class Guard:
-    """Watches one bridge after another."""
+    """Starts and watches the bridge process."""
 
     def __init__(self, config: BridgeConfig, sockets: Sockets, command: Sequence[str]) -> None:
         self._sockets = sockets
@@ -55,37 +55,37 @@ class Guard:
         self._missed_ms = round(config.bridge.heartbeat * 1000)
         framing = Framing(config.wire.crc, config.wire.crc_covers)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
-        self._port = 0  # index of the one that the bridge uses
+        self._port = 0  # index of the port that the bridge uses
         self._stopping = False
         self._parent = os.getppid()  # the supervisor
-        self._child: subprocess.Popen[bytes] | None = None  # the one that signals go to
+        self._child: subprocess.Popen[bytes] | None = None  # receives the signals
         self._backoff = Backoff()
         self._log = Logger()
         self._systemd = Systemd()
 
     def run(self) -> int:
-        """Keep a bridge running until a signal or a hopeless end; return the exit code."""
+        """Keep a bridge running until a signal or a permanent error; return the exit code."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._stop)
         code = 0
-        while not self._stopping and code not in HOPELESS:
+        while not self._stopping and code not in NO_RESTART:
             self.brake()
             started_s = time.monotonic()
-            code = self._live()
+            code = self._run_bridge()
             self._await_restart(code, time.monotonic() - started_s)
         return code
 
     def brake(self) -> None:
-        """Send BREAK as the bridge would; a guard that does so works."""
+        """Send BREAK as the bridge does, and report to the watchdog."""
         self._systemd.beat(time.monotonic_ns())
         self._sockets.send(self._brake, self._port, BRAKE_ATTEMPTS)
 
-    def _live(self) -> int:
-        """Start a bridge, watch it to its end, and return its exit code as a shell would."""
+    def _run_bridge(self) -> int:
+        """Start a bridge, watch it until it exits, and return its exit code as a shell does."""
         try:
             child, heartbeat = self._start()
         except (OSError, MemoryError, subprocess.SubprocessError) as error:
-            self._log.error("the bridge cannot be started: brakes on", error=str(error))
+            self._log.error("the bridge cannot be started; sending BREAK", error=str(error))
             return NOT_STARTED
         self._watch(child, heartbeat)
         os.close(heartbeat)
@@ -95,13 +95,13 @@ class Guard:
         self._child = None
         heartbeat, to_guard = os.pipe()
         try:
-            handover = Handover(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
-            # A session of its own: ctrl-c reaches the guard, which passes it on once; a kill of the
-            # guard's whole session leaves the bridge, which stops the vehicle.
+            inherited = Inherited(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
+            # Own session: ctrl-c reaches only the guard, which passes it on once; a kill of the
+            # guard's session spares the bridge, which stops the vehicle.
             self._child = subprocess.Popen(
                 self._command,
-                env=child_process.environ() | handover.environ(),
-                pass_fds=handover.descriptors,
+                env=child_process.environ() | inherited.environ(),
+                pass_fds=inherited.descriptors,
                 start_new_session=True,
             )
         except BaseException:
@@ -109,15 +109,15 @@ class Guard:
             raise
         finally:
             os.close(to_guard)
-        if self._stopping:  # told while it started
+        if self._stopping:  # signal during the start
             self._child.terminate()
         return self._child, heartbeat
 
     def _watch(self, child: "subprocess.Popen[bytes]", heartbeat: int) -> None:
-        """Read heartbeats and brake while they are missed; return when there will be no more."""
+        """Read heartbeats and brake while they are missing; return when the pipe is closed."""
         poll = select.poll()
         poll.register(heartbeat, select.POLLIN)
-        timeout_ms, missed, hangs = BRAKE_MS, 0, HANGS_AT_START
+        timeout_ms, missed, hangs = BRAKE_MS, 0, START_BRAKES_MAX
         while missed < hangs:
             if poll.poll(timeout_ms):
                 beats = os.read(heartbeat, 4096)
@@ -125,7 +125,7 @@ class Guard:
                     return
                 self._port = beats[-1]
                 self._systemd.ready(time.monotonic_ns())
-                timeout_ms, missed, hangs = self._missed_ms, 0, HANGS
+                timeout_ms, missed, hangs = self._missed_ms, 0, HANG_BRAKES_MAX
             else:
                 self.brake()
                 timeout_ms = BRAKE_MS
@@ -134,17 +134,17 @@ class Guard:
         self._log.error("the bridge hangs: killed")
 
     def _end(self, child: "subprocess.Popen[bytes]") -> int:
-        """Brake until the child is gone, and return its exit code as a shell would."""
+        """Brake until the child has exited; return its exit code as a shell does."""
         try:
-            code = child.wait(GOES_AT_REST_S if self._stopping else 0.0)
+            code = child.wait(STOP_TIMEOUT_S if self._stopping else 0.0)
         except subprocess.TimeoutExpired:
-            code = self._outlast(child)
+            code = self._brake_until_exit(child)
         if code != 0:
             self.brake()
         return code if code >= 0 else 128 - code
 
-    def _outlast(self, child: "subprocess.Popen[bytes]") -> int:
-        for _ in range(GOES):
+    def _brake_until_exit(self, child: "subprocess.Popen[bytes]") -> int:
+        for _ in range(EXIT_BRAKES_MAX):
             self.brake()
             try:
                 return child.wait(BRAKE_MS / 1000)
@@ -157,7 +157,7 @@ class Guard:
         wait_s = self._backoff.after(lived_s)
         self._log.error("the bridge ended", exit_code=code, wait_s=wait_s)
         end_s = time.monotonic() + wait_s
-        while not self._stopping and code not in HOPELESS and time.monotonic() < end_s:
+        while not self._stopping and code not in NO_RESTART and time.monotonic() < end_s:
             self.brake()
             time.sleep(BRAKE_MS / 1000)
 
@@ -167,5 +167,5 @@ class Guard:
         if self._child is None:
             return
         if os.getppid() != self._parent:
-            self._child.send_signal(signal.SIGINT)  # the second signal makes it brake
+            self._child.send_signal(signal.SIGINT)  # a second signal makes it brake
         self._child.send_signal(signal.SIGTERM)

@@ -1,7 +1,7 @@
-"""What the guard hands down to the bridge: its sockets, and the pipe that the bridge feeds.
+"""Guard-to-bridge IPC: inherited sockets, and the heartbeat pipe.
 
-A byte on the pipe is a heartbeat of the bridge's working loop; its value is the index of the port
-that commands leave from. The pipe's end is the bridge's last word, or its death.
+A byte on the pipe is a heartbeat of the bridge's event loop; its value is the index of the port
+that commands leave from. End of file on the pipe means that the bridge exits or has died.
 """
 
 import os
@@ -13,30 +13,30 @@ from msgspec import Struct
 NAME = "T2_BRIDGE_HANDOVER"
 
 
-class Handover(Struct, frozen=True):
-    """Descriptors that a parent leaves open for its child."""
+class Inherited(Struct, frozen=True):
+    """File descriptors that the bridge inherits from its guard."""
 
     sockets: tuple[int, ...]  # in the order of ``board.listen_ports``
-    heartbeat: int  # to write to
+    heartbeat: int  # write end of the pipe
 
     @property
     def descriptors(self) -> tuple[int, ...]:
-        """Return all of them."""
+        """All descriptors."""
         return *self.sockets, self.heartbeat
 
     def environ(self) -> dict[str, str]:
-        """Return what tells the child."""
+        """Return the environment variable that lists them."""
         return {NAME: ",".join(map(str, self.descriptors))}
 
 
-def received(environ: Mapping[str, str]) -> Handover:
-    """Return what the parent handed down; KeyError when there was no guard."""
+def received(environ: Mapping[str, str]) -> Inherited:
+    """Read the inherited descriptors from the environment; KeyError without a guard."""
     *sockets, heartbeat = map(int, environ[NAME].split(","))
-    return Handover(tuple(sockets), heartbeat)
+    return Inherited(tuple(sockets), heartbeat)
 
 
 class Heartbeat:
-    """The bridge's end of the pipe."""
+    """Write end of the heartbeat pipe."""
 
     def __init__(self, descriptor: int, on_gone: Callable[[], None]) -> None:
         self._descriptor: int | None = descriptor
@@ -44,18 +44,18 @@ class Heartbeat:
         os.set_blocking(descriptor, False)
 
     def beat(self, port: int) -> None:
-        """Say that the loop works; ``on_gone`` is called, once, when the guard has died."""
+        """Send a heartbeat; ``on_gone`` is called once when the guard has died."""
         if self._descriptor is None:
             return
         try:
-            with suppress(BlockingIOError):  # the guard has enough to read
+            with suppress(BlockingIOError):  # the pipe is full: the guard has heartbeats to read
                 os.write(self._descriptor, bytes((port,)))
         except OSError:
             self.end()
             self._on_gone()
 
     def end(self) -> None:
-        """Say that no frame will follow."""
+        """Close the pipe: no frame follows."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None

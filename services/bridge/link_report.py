@@ -1,15 +1,15 @@
-"""The message on the link to the board: what comes, what is refused, why no RUN is obeyed. Pure."""
+"""The link message: frame rates, rejected frames, and why a RUN would be refused. Pure."""
 
 from collections import Counter
 
 from common import messages as m
 from common.settings import Board
+from services.bridge.config import ASKED
 from services.bridge.motion_output import MotionOutput
 from services.bridge.output import Output
 from services.bridge.poll import Poll
 from services.bridge.ports import Ports
 from services.bridge.readiness import Readiness
-from services.bridge.schedule import ASKED
 
 
 class LinkReport:
@@ -18,7 +18,7 @@ class LinkReport:
     def __init__(
         self, board: Board, readiness: Readiness, motions: MotionOutput, ports: Ports, poll: Poll
     ) -> None:
-        """Take the parts whose state the message reports; it only reads them."""
+        """Set up with the components whose state the message reports, read-only."""
         self.frames: Counter[str] = Counter()  # since the last second
         self.rejected: Counter[str] = Counter()
         self._board = board
@@ -30,7 +30,7 @@ class LinkReport:
         self._published: tuple[object, ...] = ()
 
     def second(self) -> None:
-        """Take the rates of the last second, in Hz."""
+        """Update the frame rates of the last second, in Hz."""
         self._rates = {name: float(count) for name, count in sorted(self.frames.items())}
         self.frames.clear()
 
@@ -39,7 +39,7 @@ class LinkReport:
         return self._published != self._state(now_ns)
 
     def publish(self, now_ns: int, send_errors: int, out: Output) -> None:
-        """Publish it; ``send_errors``: datagrams that the system has refused to send."""
+        """Publish the message; ``send_errors``: datagrams that the system did not send."""
         self._published = self._state(now_ns)
         waiting = self._waiting(now_ns)
         numbers = self._board.listen_ports
@@ -62,9 +62,9 @@ class LinkReport:
         return self._readiness.link.state, self._readiness.epoch, self._waiting(now_ns)
 
     def _waiting(self, now_ns: int) -> str:
-        """Describe why a RUN would not be obeyed, and what the board does not answer."""
+        """Describe why a RUN would be refused, and which queries get no answer."""
         waiting = self._readiness.waiting() or self._motions.lease.waiting
         if not waiting or self._readiness.link.state != "up":
             return waiting
-        silent = [name for name, kind in ASKED.items() if not self._ports.is_heard(kind, now_ns)]
-        return f"{waiting}; no answers of: {', '.join(silent)}" if silent else waiting
+        silent = [name for name, kind in ASKED.items() if not self._ports.is_received(kind, now_ns)]
+        return f"{waiting}; no answers to: {', '.join(silent)}" if silent else waiting

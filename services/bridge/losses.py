@@ -1,27 +1,27 @@
-"""How many polls of a steady query the board did not answer lately.
+"""Lost polls of a steady query.
 
-Answers carry no number, so none can be matched to its poll, and a lost answer looks like one that
-is late. Matching them in order hides losses: after one loss each answer is taken for that of the
-poll before. Therefore the time between two polls, a *slot*, is judged, and not a poll:
+Answers carry no number, so an answer cannot be matched to its poll, and a lost answer looks like a
+late one. Matching them in order hides losses: after one loss each answer counts for the previous
+poll. Therefore the time between two polls, a *slot*, is evaluated instead of a poll:
 
 ============================== ====================================================================
 in a slot                      meaning
 ============================== ====================================================================
 no answer                      the poll is lost, from the end of its slot on
-one answer                     answered; with a constant delay it is that of an earlier poll
+one answer                     answered; with a constant delay it belongs to an earlier poll
 another answer                 it was late: the oldest poll that was counted as lost within the
                                answer timeout no longer counts as lost
-another answer, right behind   a copy of the first one: it takes no loss back
+another answer, right behind   a copy of the first one: no loss is taken back
 ============================== ====================================================================
 
-At 50 Hz a loss is known 20 ms after its poll. A delay that grows by n periods counts as n losses
-for as long as the window: the bumper was unknown meanwhile. A slot ends with the next
-poll, so a process that is held up and does not poll counts nothing.
+At 50 Hz a loss is detected 20 ms after its poll. A delay that grows by n periods counts as n losses
+for the length of the window: the bumper state was unknown meanwhile. A slot ends with the next
+poll, so a stalled process that does not poll counts no losses.
 """
 
 from collections import deque
 
-COPY_PART = 8  # of a period; an answer that comes sooner behind another one is its copy
+COPY_PART = 8  # of a period; an answer this soon after another one is a copy
 
 
 class Losses:
@@ -33,19 +33,19 @@ class Losses:
         self._timeout_ns = timeout_ns
         self._window_ns = window_ns
         self._lost_ns: deque[int] = deque()  # when each slot without an answer ended
-        self._answered = True  # no poll, none lost
+        self._answered = True  # no poll yet, so none is lost
         self._answer_ns: int | None = None  # the newest
 
     def on_poll(self, now_ns: int) -> None:
-        """Take in that a poll is sent: the slot before it is over."""
+        """Record a poll, which ends the previous slot."""
         if not self._answered:
             self._lost_ns.append(now_ns)
             self.total += 1
-            self._forget(now_ns)
+            self._drop_expired(now_ns)
         self._answered = False
 
     def on_answer(self, now_ns: int) -> None:
-        """Take in an answer."""
+        """Record an answer."""
         before_ns, self._answer_ns = self._answer_ns, now_ns
         if not self._answered:
             self._answered = True
@@ -60,9 +60,9 @@ class Losses:
 
     def lost(self, now_ns: int) -> int:
         """Return how many polls were lost within the window."""
-        self._forget(now_ns)
+        self._drop_expired(now_ns)
         return len(self._lost_ns)
 
-    def _forget(self, now_ns: int) -> None:
+    def _drop_expired(self, now_ns: int) -> None:
         while self._lost_ns and now_ns - self._lost_ns[0] > self._window_ns:
             self._lost_ns.popleft()

@@ -1,4 +1,4 @@
-"""What the wheels are told: the lease's orders as frames, from the port of the commands. Pure."""
+"""Motion output: the lease's orders as frames, from the command port. Pure."""
 
 from collections import Counter
 
@@ -15,12 +15,12 @@ from services.bridge.output import Output, Send
 from services.bridge.standstill import Standstill
 from services.bridge.translate import Translator, check_finite
 
-REPORTED_MAX = 20  # a sender that changes its boot all the time must not fill memory and events
-REST_NS = NS_PER_S  # how long a stopping bridge waits for the vehicle to stand
+REPORTED_MAX = 20  # limit: a sender that keeps changing its boot must not fill memory and events
+STOP_TIMEOUT_NS = NS_PER_S  # until a stopping bridge no longer waits for standstill
 
 
 class MotionOutput:
-    """Obeys ``@cmd/motion`` as far as the lease allows; otherwise STOP or BRAKE."""
+    """Sends the commands of ``@cmd/motion`` that the lease allows, otherwise STOP or BRAKE."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class MotionOutput:
         counters: Counter[str],
         now_ns: int,
     ) -> None:
-        """Take the bridge's own ``boot``, and where refused motions are counted."""
+        """Set up with the bridge's own ``boot`` and the counters of refused motions."""
         self.lease = Lease(over_since_ns=now_ns)
         self.port = 0
         self._boot = boot
@@ -42,7 +42,9 @@ class MotionOutput:
         self._brake = framing.pack(translator.command(BRAKE))
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
-        self._reported: set[tuple[Refusal, int]] = set()  # refused senders that had an event
+        self._reported: set[tuple[Refusal, int]] = (
+            set()
+        )  # refused senders already reported by an event
         self._lease_ns = round(settings.lease * NS_PER_S)
         self._silence_ns = round(settings.silence * NS_PER_S)
         self._standstill = Standstill(
@@ -53,7 +55,7 @@ class MotionOutput:
         )
 
     def on_motion(self, motion: Motion, received_ns: int, now_ns: int, out: Output) -> None:
-        """Turn one motion message into one frame."""
+        """Process a motion message and send one frame."""
         try:
             check_finite(motion)
         except MessageError as error:
@@ -67,16 +69,16 @@ class MotionOutput:
         if order is not None:
             self.order(order, out, motion)
             out.obeyed = True
-            out.judged = hit is not None and self.lease.hit is None and order is BRAKE
+            out.acked = hit is not None and self.lease.hit is None and order is BRAKE
         self._report(refusal, motion, out)
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
-        """Take in the measured velocity."""
+        """Process a measured velocity."""
         self._velocity = velocity, now_ns
         self._standstill.on_velocity(velocity, now_ns)
 
     def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
-        """Take in the board's counters."""
+        """Process the board's counters."""
         self._standstill.on_mileage(mileage, now_ns)
 
     def brake(self) -> Send:
@@ -84,19 +86,19 @@ class MotionOutput:
         return Send(self._brake, self.port, BRAKE)
 
     def on_hit(self, seq: int, now_ns: int) -> None:
-        """Take in a hit, in the sample that will be published as ``seq``."""
+        """Process a hit, in the sample that will be published as ``seq``."""
         self.lease, _ = lease.on_hit(self.lease, seq, now_ns)
 
     def on_ready(self, ready: bool) -> None:
-        """Take in whether the board may be driven."""
+        """Set whether the board may be driven."""
         self.lease = lease.on_ready(self.lease, ready and self._stopping_ns is None)
 
     def on_tick(self, now_ns: int, out: Output) -> None:
-        """Send what is due although nobody asked."""
+        """Send the order that is due."""
         limit_ns, standing = self._standstill.limit_ns, self._standing(now_ns)
         self.lease, order = lease.on_tick(self.lease, now_ns, self._lease_ns, limit_ns, standing)
         self._standstill.on_lease(self.lease.over_since_ns)
-        if self._standstill.left:
+        if self._standstill.moved_away:
             self._on_uncommanded(now_ns, out)
         if order is not None:
             self.order(order, out)
@@ -105,27 +107,27 @@ class MotionOutput:
         self.lease, order = lease.on_uncommanded(self.lease, now_ns, self._boot)
         if order is not None:
             self.order(order, out)
-            text = "moved away from a standstill without a command: BREAK"
+            text = "moved from standstill without a command: BREAK"
             out.event("uncommanded_motion", "error", text)
 
     def stop(self, now_ns: int, out: Output) -> None:
-        """Stop the vehicle for good; only the first call sends a frame."""
+        """Stop the vehicle before exit; only the first call sends a frame."""
         if self._stopping_ns is None:
             self._stopping_ns = now_ns
             self.on_ready(False)
             self.order(BRAKE if self.lease.braking else STOP, out)
 
     def is_stopped(self, now_ns: int) -> bool:
-        """Return whether the vehicle stands after ``stop``, or had a second to do so."""
+        """Return whether the vehicle is at standstill after ``stop``, or a second has passed."""
         since_ns = now_ns if self._stopping_ns is None else self._stopping_ns
-        return self._rests(now_ns) or now_ns - since_ns > REST_NS
+        return self._is_at_standstill(now_ns) or now_ns - since_ns > STOP_TIMEOUT_NS
 
     def on_exit(self, now_ns: int, out: Output) -> None:
-        """Leave no RUN behind, whatever ends the bridge; the board stops nothing by itself."""
-        self.order(STOP if self._rests(now_ns) else BRAKE, out)
+        """Send the last frame, on every exit: the board does not stop by itself."""
+        self.order(STOP if self._is_at_standstill(now_ns) else BRAKE, out)
 
-    def _rests(self, now_ns: int) -> bool:
-        """Return whether the vehicle was seen to stand since the bridge began to stop."""
+    def _is_at_standstill(self, now_ns: int) -> bool:
+        """Return whether standstill was measured after ``stop``."""
         measured_ns = self._velocity[1] if self._velocity else 0
         stopped = self._stopping_ns is not None and measured_ns > self._stopping_ns
         return stopped and self._standing(now_ns)
@@ -143,9 +145,9 @@ class MotionOutput:
         out.sends.append(Send(datagram, self.port, order))
 
     def _standing(self, now_ns: int) -> bool:
-        """Judge by the measured velocity; one that has dried up is no evidence any more.
+        """Return whether the measured velocity shows standstill; False if it is too old.
 
-        Without any so far it counts as standing: this bridge has moved nothing yet.
+        Without any velocity so far it is True: this bridge has commanded no motion yet.
         """
         if self._velocity is None:
             return True

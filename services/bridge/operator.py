@@ -1,7 +1,7 @@
-"""What an operator may ask of the board: its emergency brakes and its lamps. Pure.
+"""Operator calls to the board: emergency brakes and lamps. Pure.
 
-Both answer with the board's own echo, or with the reason why there is none. The switches need an
-echo of safety's heartbeat too, so that a call that was delayed is refused.
+Both are answered with the board's echo, or with the reason for its absence. The switches call must
+also echo safety's heartbeat, so that a delayed call is refused.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ from services.bridge.readiness import Readiness
 
 
 class Waiting(Struct, frozen=True):
-    """A call whose echo is due."""
+    """A pending call that waits for the board's echo."""
 
     caller: Any
     until_ns: int
@@ -27,7 +27,7 @@ class Operator:
     """Answers ``srv/bridge/switches`` and ``srv/bridge/led``; one call of each at a time."""
 
     def __init__(self, readiness: Readiness, timeout_s: float) -> None:
-        """Take how long the board may take to echo, in seconds."""
+        """Set up with the timeout of the board's echo, in seconds."""
         self._readiness = readiness
         self._timeout_s = timeout_s
         self._lamp: Waiting | None = None
@@ -35,13 +35,13 @@ class Operator:
         self._echoes = Echoes()
 
     def on_safety(self, state: m.SafetyState, received_ns: int) -> None:
-        """Take in a heartbeat of safety."""
+        """Process a safety state with its heartbeat."""
         self._echoes = self._echoes.received(state, received_ns)
 
     def on_switches(
         self, request: m.SwitchesRequest, caller: Any, now_ns: int, out: Output
     ) -> None:
-        """Ask the board to set its brakes; the echo answers the caller."""
+        """Request the board's brakes; its echo answers the caller."""
         late = self._echoes.refusal(request.echo, now_ns)
         reason = late or self._refusal(self._switching, "switches")
         if reason:
@@ -60,17 +60,17 @@ class Operator:
         return LedSet(**{name: getattr(request, name) for name in request.__struct_fields__})
 
     def on_led_echo(self, done: bool, out: Output) -> None:
-        """Take in the board's answer to a lamp command."""
+        """Process the board's answer to a lamp command."""
         if self._lamp is None:
             return
         if done:
             out.reply(self._lamp.caller, m.Done(text="the lamp is set"))
         else:
-            out.refuse(self._lamp.caller, "the board answers that it failed (0xAA)")
+            out.refuse(self._lamp.caller, "the board reports a failure (0xAA)")
         self._lamp = None
 
     def on_tick(self, now_ns: int, out: Output) -> None:
-        """Answer the calls whose echo has come, or is overdue."""
+        """Answer the calls whose echo was received or is overdue."""
         if self._lamp is not None and now_ns > self._lamp.until_ns:
             out.refuse(self._lamp.caller, self._overdue())
             self._lamp = None
@@ -89,7 +89,7 @@ class Operator:
     def _refusal(self, busy: Waiting | None, what: str) -> str:
         if self._readiness.link.state != "up":
             return f"the board is absent (link {self._readiness.link.state})"
-        return f"another call for the {what} is under way" if busy else ""
+        return f"another call for the {what} is pending" if busy else ""
 
     def _overdue(self) -> str:
         return f"the board did not echo within {self._timeout_s:g} s"

@@ -1,4 +1,4 @@
-"""What one input of the core leads to. Pure: the shell carries it out, frames first."""
+"""Output of one input of the core: frames, messages, events, answers. Pure."""
 
 from typing import Any
 
@@ -26,14 +26,14 @@ class Event(Struct, frozen=True):
 
 
 class Answer(Struct, frozen=True):
-    """The end of a call: a reply, or a refusal with its reason."""
+    """The answer to a call: a reply, or a refusal with its reason."""
 
     caller: Any  # with the methods of ``common.bus.calls.Caller``
     reply: Struct | None
     refusal: str = ""
 
     def give(self) -> None:
-        """Tell the caller."""
+        """Send it to the caller."""
         if self.reply is None:
             self.caller.refuse(self.refusal)
         else:
@@ -51,20 +51,20 @@ class Output(Struct):
     braked: bool = False  # whether the reflex has sent BRAKE for this datagram
     hit: int | None = None  # ``seq`` of the bumper message that reports a new hit
     obeyed: bool = False  # whether a motion message became a frame
-    judged: bool = False  # whether that motion judged the hit, and brakes
+    acked: bool = False  # whether that motion acknowledged the hit, and brakes
 
     def publish(self, stream: str, message: Message, raw: bytes | None = None) -> None:
         """Add a message for the bus; ``stream`` names its publisher."""
         self.messages.append((stream, message, raw))
 
     def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
-        """Add a transition."""
+        """Add an event."""
         self.events.append(Event(name, level, text, about))
 
     def reply(self, caller: Any, reply: Struct) -> None:
-        """Answer a call."""
+        """Add the reply to a call."""
         self.answers.append(Answer(caller, reply))
 
     def refuse(self, caller: Any, reason: str) -> None:
-        """Refuse a call."""
+        """Add the refusal of a call."""
         self.answers.append(Answer(caller, None, reason))

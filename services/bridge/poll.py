@@ -1,10 +1,9 @@
-"""Which query is due and which answer is overdue.
+"""Poll scheduling: queries that are due, and overdue answers.
 
-A *steady* query (bumper, mileage) is sent at its rate whether answers come or not; its losses are
-counted in ``losses``. Of any other kind one query is open at a time: an answer that does not come
-within the timeout counts as missed and halves that query's rate, down to a quarter; the first
-answer restores it. So a busy board is not flooded, and one that recovers is not kept
-waiting.
+A *steady* query (bumper, mileage) is sent at its rate with or without answers; ``losses`` counts
+its losses. Of any other kind one query is open at a time: an answer that does not arrive within the
+timeout counts as missed and halves that query's rate, down to a quarter; the first answer restores
+it. This limits the load of a busy board, and recovers fast.
 """
 
 from collections.abc import Collection, Iterable
@@ -15,12 +14,12 @@ from common.freshness import NS_PER_S
 from common.wire.frame import Frame
 from services.bridge.losses import Losses
 
-SLOWEST = 4  # times the period
+SLOWEST = 4  # maximum slowdown, in periods
 WINDOW_NS = NS_PER_S // 5  # of ``lost``
 
 
 class Query(Struct):
-    """One query and what became of it."""
+    """One query and its state."""
 
     name: str
     frame: Frame
@@ -30,7 +29,7 @@ class Query(Struct):
     slowdown: int = 1
     missed: int = 0
     round_trip_ns: int | None = None
-    losses: Losses | None = None  # of a steady one
+    losses: Losses | None = None  # of a steady query
 
 
 class Poll:
@@ -42,7 +41,7 @@ class Poll:
         timeout_s: float,
         steady: Collection[str] = (),
     ) -> None:
-        """Take name, frame and rate in Hz of each query, and the names of the steady ones."""
+        """Set up with name, frame and rate (Hz) of each query, and the names of the steady ones."""
         self.queries = {
             name: Query(name, frame, round(NS_PER_S / rate_hz)) for name, frame, rate_hz in queries
         }
@@ -56,9 +55,9 @@ class Poll:
         return [query.frame for query in self.queries.values() if self._is_due(query, now_ns)]
 
     def answered(self, name: str, now_ns: int) -> int:
-        """Take in an answer, and return when it was asked for: it is no older than that.
+        """Record an answer; return the time of its query, which bounds its age.
 
-        One that nobody asked for changes nothing.
+        An unsolicited answer changes nothing.
         """
         query = self.queries[name]
         query.slowdown = 1
@@ -83,7 +82,7 @@ class Poll:
         return trips[len(trips) // 2] / NS_PER_S if trips else None
 
     def missed(self) -> dict[str, int]:
-        """Return how many answers never came in time, by query."""
+        """Return the number of missed answers, by query."""
         counts = {
             query.name: query.missed if query.losses is None else query.losses.total
             for query in self.queries.values()
@@ -99,7 +98,7 @@ class Poll:
             query.slowdown = min(2 * query.slowdown, SLOWEST)
         if now_ns < query.due_ns:
             return False
-        # Keep the beat while on time; after a pause begin a new one instead of catching up.
+        # Keep the period while on time; after a stall start a new one instead of catching up.
         period_ns = query.period_ns * query.slowdown
         late = now_ns - query.due_ns >= period_ns
         query.due_ns = now_ns + period_ns if late else query.due_ns + period_ns
@@ -107,6 +106,6 @@ class Poll:
             query.sent_ns = now_ns
         if query.losses is not None:
             query.losses.on_poll(now_ns)
-            # A late poll must not be followed at once by the next: its answer needs its time.
+            # After a late poll, wait half a period at least: the answer needs that time.
             query.due_ns = max(query.due_ns, now_ns + period_ns // 2)
         return True

@@ -1,23 +1,47 @@
-"""Whether the board may be driven: it is there, and both its emergency brakes are on. Pure.
+"""Readiness of the board: it is connected, and both its emergency brakes are on. Pure.
 
-Each return of the board asks for the brakes anew; configuration is replayed, motion never is.
+The link: ``never`` --frame--> ``up`` --silence--> ``lost`` --frame--> ``up``. On each return of the
+board the brakes are requested again; configuration is replayed, motion never is.
 """
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Board
 from common.wire.frame import Frame
-from services.bridge import link as links
 from services.bridge import switches as brakes
 from services.bridge.config import Bridge as Settings
 from services.bridge.output import Output
 
 
+class Link(Struct, frozen=True):
+    """Link state, by frames on either of our ports."""
+
+    state: m.LinkState = "never"
+    received_ns: int = 0
+    up_ns: int = 0  # start of the current ``up`` phase
+
+
+def link_on_frame(link: Link, now_ns: int) -> Link:
+    """Process a valid frame."""
+    up_ns = link.up_ns if link.state == "up" else now_ns
+    return replace(link, state="up", received_ns=now_ns, up_ns=up_ns)
+
+
+def link_on_tick(link: Link, now_ns: int, silence_ns: int) -> Link:
+    """Detect a board that is silent for too long."""
+    if link.state == "up" and now_ns - link.received_ns > silence_ns:
+        return replace(link, state="lost")
+    return link
+
+
 class Readiness:
-    """Keeps link and switches, and reports their transitions."""
+    """Tracks link and switches, and reports their transitions."""
 
     def __init__(self, settings: Settings, board: Board) -> None:
-        self.link = links.Link()
+        self.link = Link()
         self.switches = brakes.Switches()
         self.epoch = 0
         self.gap_ns = 0  # end of the last short silence (no lost link) of the board
@@ -37,9 +61,9 @@ class Readiness:
         return self.switches.verified or (not self._required and self.switches.unechoed)
 
     def waiting(self) -> str:
-        """Describe what is missing; empty when ready."""
+        """Describe the missing condition; empty when ready."""
         if self.link.state == "never":
-            return f"nothing was ever received from the board on UDP port {self._ports}"
+            return f"nothing received from the board yet on UDP port {self._ports}"
         if self.link.state != "up":
             return "link lost"
         if not self._brakes_on:
@@ -50,36 +74,36 @@ class Readiness:
         return ""
 
     def on_frame(self, now_ns: int, out: Output) -> None:
-        """Take in a valid frame from the board."""
+        """Process a valid frame from the board."""
         before = self.link
-        self.link = links.on_frame(before, now_ns)
+        self.link = link_on_frame(before, now_ns)
         if before.state != "up":
             self.switches = brakes.on_return(now_ns)
-            out.event("link_up", "info", "the board is there", before=before.state)
-        elif now_ns - before.heard_ns > brakes.GAP_NS:
+            out.event("link_up", "info", "the board is connected", before=before.state)
+        elif now_ns - before.received_ns > brakes.GAP_NS:
             self.gap_ns = now_ns
             self.switches = brakes.on_gap(self.switches)
 
     def on_restart(self, now_ns: int, out: Output) -> None:
-        """The board's counters have started anew."""
+        """Process a restart of the board."""
         self.epoch += 1
         self.switches = brakes.on_return(now_ns)
-        out.event("board_restarted", "warning", "the board has started anew", epoch=self.epoch)
+        out.event("board_restarted", "warning", "the board has restarted", epoch=self.epoch)
 
     def on_echo(self, ultrasonic: bool | None, bumper: bool | None, out: Output) -> None:
-        """Take in the echo of one switch."""
+        """Process the echo of one switch."""
         before = self.message()
         self.switches = brakes.on_echo(self.switches, ultrasonic, bumper)
         self._publish_change(before, out)
 
     def want(self, ultrasonic: bool | None, bumper: bool | None, now_ns: int) -> None:
-        """Want other positions, on an operator's request."""
+        """Request other positions, for an operator."""
         self.switches = brakes.on_request(self.switches, ultrasonic, bumper, now_ns)
 
     def on_tick(self, now_ns: int, out: Output) -> list[Frame]:
-        """Notice what is overdue; return the frames that ask for the switches."""
+        """Detect timeouts; return the frames that set the switches."""
         before = self.link
-        self.link = links.on_tick(before, now_ns, self._silence_ns)
+        self.link = link_on_tick(before, now_ns, self._silence_ns)
         if self.link.state != before.state:
             out.event("link_lost", "error", "the board is silent")
         if self.link.state != "up":

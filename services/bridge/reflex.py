@@ -1,4 +1,4 @@
-"""The reflex: BRAKE for a bumper hit, before anything else is read of its datagram. Pure."""
+"""The reflex: BRAKE for a bumper hit, before the rest of its datagram is read. Pure."""
 
 from common.motion import Command
 from common.wire.commands import MotionCommand, MotionKind
@@ -8,7 +8,7 @@ from services.bridge.output import Send
 
 
 class Reflex:
-    """Finds a hit anywhere in a datagram; fast when there is none."""
+    """Detects a bumper hit anywhere in a datagram; fast path without one."""
 
     def __init__(self, framing: Framing) -> None:
         self._framing = framing

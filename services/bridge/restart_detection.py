@@ -1,25 +1,25 @@
-"""When the board's counters have started anew."""
+"""Restart detection: the board's counters have started again at zero."""
 
 import math
 
 from common.messages import Mileage
 
-# No driving explains more than this between two samples. A board that has just been powered on
-# counts from zero: a step to zero is believed to be a restart much sooner, after any time, because
-# hardly anybody drives to within 5 mm of where the board was powered on while nothing is heard.
+# Maximum motion between two samples. A board that was just powered on counts from zero, so the
+# limit for a step to zero is much lower, after any time: it is very unlikely to drive to within
+# 5 mm of the power-on position while nothing is received.
 FAST_MPS, FAST_RADPS, STEP = 5.0, 5.0, 1.0
 DRIVEN_MPS, TURNED_RADPS, STEP_TO_ZERO = 1.5, 2.0, 0.02
 ZERO_M = 0.005
 ZERO_RAD = math.radians(0.5)
-GAP_MAX_S = 0.2  # counted of a gap in which the link was lost: it may be the board that was off
+GAP_MAX_S = 0.2  # used of a gap with a lost link: the board may have been off
 
 
 def restarted(
     before: Mileage, after: Mileage, gap_s: float, *, unbroken: bool, silent: bool = False
 ) -> bool:
-    """Tell whether the counters jumped, ``gap_s`` after the last sample.
+    """Return whether the counters jumped, ``gap_s`` after the last sample.
 
-    ``unbroken`` says that the board was heard all the while, if not its counters: then it drove.
+    ``unbroken``: other frames of the board were received throughout, so it may have driven.
     ``silent``: the whole board was silent meanwhile, for some periods of its velocity.
     """
     short_s = min(gap_s, GAP_MAX_S)
@@ -34,11 +34,11 @@ def restarted(
     return distance > STEP + FAST_MPS * driven_s or turn > STEP + FAST_RADPS * driven_s
 
 
-# After a short silence of the whole board a smaller step is enough: it may have been off.
+# After a short silence of the whole board, which may have been off, a smaller step is enough.
 def _from_zero(before: Mileage, after: Mileage, short_s: float) -> bool:
-    """Return whether both counters may have restarted at zero, and one is too near to it.
+    """Return whether both counters may have restarted at zero, and driving explains one not.
 
-    Too near for driving: a vehicle that passes its power-on place is no board that restarted.
+    A vehicle that drives past its power-on position must not count as a restart.
     The emergency brakes are sent after such a silence in any case.
     """
     near = (

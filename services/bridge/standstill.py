@@ -5,18 +5,17 @@ STOP coasts, and the board may not obey it. From the moment the motion lease is 
 =========== ==================================== ===================================================
 phase       ends with                            BRAKE
 =========== ==================================== ===================================================
-stopping    a velocity that counts as standstill not standing after v / a + 0.5 s, or after the
+stopping    a velocity that counts as standstill no standstill after v / a + 0.5 s, or after the
                                                  coast limit if that is sooner
-standing    a living lease                       0.05 m or 0.05 rad away from where it stood, by the
-                                                 board's counters or by its velocities
+standstill  a valid lease                        0.05 m or 0.05 rad away from the stop position, by
+                                                 the board's counters or by its velocities
 =========== ==================================== ===================================================
 
-The first BRAKE lasts until the vehicle stands, the second one until safety has latched it (see
-``lease``). The way is measured by the rules of
-safety's supervision, so that it does not trip by noise or drift:
+The first BRAKE lasts until standstill, the second one until safety has latched it (see ``lease``).
+Distances are measured by the rules of safety's supervision, so that noise or drift do not trip it:
 
-- of two velocities in a row the smaller counts, and none below the standstill threshold: a sensor's
-  offset is no motion, and the counters find a slow creep
+- of two consecutive velocities the smaller counts, and none below the standstill threshold: the
+  offset of a sensor is no motion, and the counters detect slow creep
 - the integral of the velocities leaks
 - the heading counter may drift, as gyroscopes do
 """
@@ -36,22 +35,22 @@ DRIFT_RADPS = 0.001  # of the heading counter
 
 
 class Travel(Struct):
-    """How far the vehicle moved since it stood, in m and rad."""
+    """Travel since standstill, in m and rad."""
 
     moved: float = 0.0  # by the velocities
     turned: float = 0.0
     counted_m: float = 0.0  # by the counters
     counted_rad: float = 0.0
-    mileage: tuple[Mileage, int] | None = None  # the newest one, and when it came
+    mileage: tuple[Mileage, int] | None = None  # the newest sample and its receive time
 
 
 class Standstill:
-    """Follows the vehicle from the end of a lease on."""
+    """Supervises the vehicle from the end of a lease on."""
 
     def __init__(
         self, deceleration: float, angular_deceleration: float, coast_ns: int, silence_ns: int
     ) -> None:
-        """Take m/s^2 and rad/s^2 that a STOP reaches, and how long a velocity sample holds."""
+        """Set up with the deceleration of a STOP (m/s^2, rad/s^2), and time limits."""
         self._deceleration = deceleration
         self._angular_deceleration = angular_deceleration
         self._coast_ns = coast_ns
@@ -61,12 +60,12 @@ class Standstill:
 
     def _begin(self, over_since_ns: int | None) -> None:
         self._since_ns = over_since_ns
-        self.limit_ns = self._coast_ns  # from the end of the lease until it must stand
-        self.left = False  # whether it moved away from where it stood
-        self._travel: Travel | None = None  # None while it has not stood
+        self.limit_ns = self._coast_ns  # from the end of the lease until standstill is required
+        self.moved_away = False  # away from the stop position
+        self._travel: Travel | None = None  # None until standstill
 
     def on_lease(self, over_since_ns: int | None) -> None:
-        """Take in since when the lease is over; None while it lives."""
+        """Set the end time of the lease; None while it is valid."""
         if over_since_ns == self._since_ns:
             return
         self._begin(over_since_ns)
@@ -76,7 +75,7 @@ class Standstill:
                 self.limit_ns = min(self._coast_ns, self._stopping_ns(velocity))
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
-        """Take in what the board measured."""
+        """Process a measured velocity."""
         before, self._velocity = self._velocity, (velocity, now_ns)
         if self._since_ns is None:
             return
@@ -90,10 +89,10 @@ class Standstill:
         angular = _steady(before[0].angular, velocity.angular, STANDING_RADPS)
         travel.moved = travel.moved * kept + linear * elapsed_s
         travel.turned = travel.turned * kept + angular * elapsed_s
-        self._judge(travel.moved, travel.turned)
+        self._check(travel.moved, travel.turned)
 
     def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
-        """Take in what the board counted."""
+        """Process the board's counters."""
         travel = self._travel
         if travel is None:
             return
@@ -104,10 +103,10 @@ class Standstill:
         turned = travel.counted_rad + math.remainder(mileage.heading - before[0].heading, math.tau)
         drift = DRIFT_RADPS * (now_ns - before[1]) / NS_PER_S
         travel.counted_rad = math.copysign(max(0.0, abs(turned) - drift), turned)
-        self._judge(travel.counted_m, travel.counted_rad)
+        self._check(travel.counted_m, travel.counted_rad)
 
-    def _judge(self, moved: float, turned: float) -> None:
-        self.left = self.left or abs(moved) >= AWAY_M or abs(turned) >= AWAY_RAD
+    def _check(self, moved: float, turned: float) -> None:
+        self.moved_away = self.moved_away or abs(moved) >= AWAY_M or abs(turned) >= AWAY_RAD
 
     def _stopping_ns(self, velocity: Velocity) -> int:
         linear_s = abs(velocity.linear) / self._deceleration
@@ -116,7 +115,7 @@ class Standstill:
 
 
 def _steady(before: float, after: float, threshold: float) -> float:
-    """Return what two velocities agree on, 0 if that is under the threshold."""
+    """Return the smaller of two velocities of one sign; 0 below the threshold."""
     if before * after <= 0:
         return 0.0
     steady = min(before, after, key=abs)

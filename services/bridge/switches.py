@@ -1,12 +1,12 @@
 """The board's own emergency brakes: on and echoed, or the bridge is not ready.
 
-After each return of the board both are asked for again, whatever an operator had set before: a
-board that restarted has forgotten. They are verified once both have echoed "on"; until then they
-are asked for every tenth of a second, and after the echo timeout the bridge counts as inhibited.
-From then on they are sent five times a second, because the wire has no query for them, and at once
-when the board comes back from a gap of some velocity periods: a board that restarted with its
-counters near zero shows nothing else, and its emergency brakes are off. One that does not echo five
-of these in a row is no longer known to be on.
+After each return of the board both are requested again, whatever an operator had set before: a
+board that restarted has lost them. They are verified once both have echoed "on"; until then they
+are requested every 0.1 s, and after the echo timeout the bridge counts as inhibited. From then on
+they are sent five times a second, because the wire has no query for them, and at once when the
+board returns from a gap of some velocity periods: a board that restarted with its counters near
+zero shows nothing else, and its emergency brakes are off. A brake without an echo to five
+consecutive sends is no longer known to be on.
 
 A firmware without echoes cannot verify them. Where the settings accept that, the board may be
 driven as long as both are commanded on and none has echoed "off".
@@ -21,25 +21,25 @@ from common.wire.frame import Frame
 
 ASK_NS = NS_PER_S // 10
 AGAIN_NS = NS_PER_S // 5
-UNECHOED = 5  # sends in a row, one second: the echo before them no longer counts
+UNECHOED = 5  # consecutive sends (1 s) after which an earlier echo no longer counts
 GAP_NS = 60 * NS_PER_S // 1000  # of silence; the velocity comes every 20 ms
 
 
 class Switches(Struct, frozen=True):
-    """What is wanted of the two brakes, and what the board echoed last."""
+    """Requested positions of both brakes, and the board's last echoes."""
 
     want_ultrasonic: bool = True
     want_bumper: bool = True
     ultrasonic: bool | None = None
     bumper: bool | None = None
-    since_ns: int = 0  # when they were wanted first
+    since_ns: int = 0  # time of the request
     asked_ns: int | None = None
     ultrasonic_sent: int = 0  # since its last echo
     bumper_sent: int = 0
 
     @property
     def verified(self) -> bool:
-        """Whether both are on, by the board's own word."""
+        """Whether the board has echoed both as on."""
         return self.ultrasonic is True and self.bumper is True
 
     @property
@@ -50,12 +50,12 @@ class Switches(Struct, frozen=True):
 
     @property
     def settled(self) -> bool:
-        """Whether the board has echoed what is wanted."""
+        """Whether the board has echoed the requested positions."""
         return (self.ultrasonic, self.bumper) == (self.want_ultrasonic, self.want_bumper)
 
 
 def on_return(now_ns: int) -> Switches:
-    """Begin anew: the board is back, or has restarted."""
+    """Return the initial state: the board is back, or has restarted."""
     return Switches(since_ns=now_ns)
 
 
@@ -67,7 +67,7 @@ def on_gap(switches: Switches) -> Switches:
 def on_request(
     switches: Switches, ultrasonic: bool | None, bumper: bool | None, now_ns: int
 ) -> Switches:
-    """Want other positions; the echo decides when they count."""
+    """Request other positions; they take effect with the echo."""
     return replace(
         switches,
         want_ultrasonic=switches.want_ultrasonic if ultrasonic is None else ultrasonic,
@@ -80,11 +80,11 @@ def on_request(
 
 
 def on_tick(switches: Switches, now_ns: int) -> tuple[Switches, list[Frame]]:
-    """Return the frames that are due: often until the board has echoed, then now and again."""
+    """Return the frames that are due: every 0.1 s until echoed, then every 0.2 s."""
     asked, wait_ns = switches.asked_ns, AGAIN_NS if switches.settled else ASK_NS
     if asked is not None and now_ns - asked < wait_ns:
         return switches, []
-    switches = _forget(switches)
+    switches = _drop_unechoed(switches)
     frames: list[Frame] = []
     ultrasonic_sent, bumper_sent = switches.ultrasonic_sent, switches.bumper_sent
     if switches.settled or switches.ultrasonic != switches.want_ultrasonic:
@@ -97,8 +97,8 @@ def on_tick(switches: Switches, now_ns: int) -> tuple[Switches, list[Frame]]:
     return replace(switches, asked_ns=now_ns, **sent), frames
 
 
-def _forget(switches: Switches) -> Switches:
-    """Drop an "on" whose echo has not come again; an "off" lasts until an echo of "on"."""
+def _drop_unechoed(switches: Switches) -> Switches:
+    """Drop an "on" that is no longer echoed; an "off" lasts until an echo of "on"."""
     ultrasonic, bumper = switches.ultrasonic, switches.bumper
     if ultrasonic is True and switches.ultrasonic_sent >= UNECHOED:
         ultrasonic = None
@@ -108,7 +108,7 @@ def _forget(switches: Switches) -> Switches:
 
 
 def on_echo(switches: Switches, ultrasonic: bool | None, bumper: bool | None) -> Switches:
-    """Take in the board's echo of one switch; None for the other."""
+    """Process the board's echo of one switch; None for the other."""
     return replace(
         switches,
         ultrasonic=switches.ultrasonic if ultrasonic is None else ultrasonic,

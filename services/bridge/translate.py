@@ -1,8 +1,8 @@
-"""Frames to messages and back: the one place where mm/s and 0.1 deg/s become SI.
+"""Conversion between frames and messages: the only place where mm/s and 0.1 deg/s become SI.
 
 The bus has metres, radians and seconds; the wire has millimetres and tenths of a degree
-(manual 2.2 to 2.7). What the vehicle cannot mean is refused with ``WireError`` here, because the
-frame's CRC does not cover everything.
+(manual 2.2 to 2.7). Implausible values are refused with ``WireError`` here, because the frame's CRC
+does not cover everything.
 """
 
 import math
@@ -24,7 +24,7 @@ from common.wire.reports import (
 
 MM = 1000.0
 PER_RADIAN = {"decidegree": 1800.0 / math.pi, "milliradian": 1000.0}
-# No such vehicle drives or turns faster; the frame was damaged in its unprotected header.
+# The vehicle cannot exceed these: a larger value means a damaged, unprotected header.
 PLAUSIBLE_MPS = 5.0
 PLAUSIBLE_RADPS = 10.0
 
@@ -37,7 +37,7 @@ KINDS = {
 
 
 class Translator:
-    """Translates by the settings of one vehicle."""
+    """Converts with the settings of one vehicle."""
 
     def __init__(self, wire: Wire, vehicle: Vehicle, max_linear: float, max_angular: float) -> None:
         self._commanded_per_radian = PER_RADIAN[wire.command_angular_unit]
@@ -69,7 +69,7 @@ class Translator:
         return Mileage(distance=frame.distance_mm / MM, heading=heading, epoch=epoch)
 
     def ultrasonic(self, frame: UltrasonicReport) -> Ultrasonic:
-        """Return the ranges in m; None where there is none, and why."""
+        """Return the ranges in m, None if invalid, with their status."""
         ranges = tuple(
             raw_mm / MM if self._status(raw_mm) == "ok" else None for raw_mm in frame.ranges_mm
         )
@@ -102,9 +102,9 @@ def driver(frame: DriverReport) -> Driver:
 
 
 class BumperFilter:
-    """A hit needs one sample, a clear bumper three in a row: the header of a frame has no CRC.
+    """Debounces the bumper: one sample is a hit, three consecutive samples are clear.
 
-    A board that was gone or has started anew wants a new filter.
+    The header of a frame has no CRC. Make a new filter after a link loss or a restart of the board.
     """
 
     CLEAR_SAMPLES = 3
@@ -114,7 +114,7 @@ class BumperFilter:
         self._clear = 0
 
     def take(self, pressed: bool) -> tuple[Bumper | None, bool]:
-        """Return the message for a sample, if one can be made, and whether a hit begins with it."""
+        """Return the message for a sample, if any, and whether a hit begins with it."""
         self._clear = 0 if pressed else self._clear + 1
         hit = pressed and not self.pressed
         if pressed or self._clear >= self.CLEAR_SAMPLES:

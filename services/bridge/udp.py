@@ -1,4 +1,4 @@
-"""The sockets to the board: both of our ports, and nobody but the board."""
+"""UDP sockets to the board, one for each of our ports; other senders are dropped."""
 
 import errno
 import socket
@@ -9,29 +9,35 @@ from contextlib import suppress
 
 from common.errors import LinkError
 from common.settings import Board
-from services.bridge.rx_timestamp import ANCILLARY_MAX, SO_TIMESTAMPNS, Receipt, WallClock, stamp_in
+from services.bridge.rx_timestamp import (
+    ANCILLARY_MAX,
+    SO_TIMESTAMPNS,
+    Receipt,
+    WallClock,
+    kernel_timestamp,
+)
 
 DATAGRAM_MAX = 2048
-# A flood must not keep the loop from its timers: the rest waits for the next round.
+# Limit of datagrams per round, so that a flood does not delay the loop's timers.
 BURST = 64
-BREATH_S = 20e-6
-BRAKE_ATTEMPTS = 4  # at once, when the system refuses to send a BREAK
+BURST_PAUSE_S = 20e-6
+BRAKE_ATTEMPTS = 4  # attempts when the system refuses to send a BREAK
 
 Ancillary = list[tuple[int, int, bytes]]
 
 
 class Sockets:
-    """One socket for each of our ports; commands leave from the one that is active."""
+    """One socket for each of our ports."""
 
     def __init__(self, board: Board, inherited: Sequence[int] = ()) -> None:
-        """Bind the ports, or take over the descriptors of a parent that has bound them.
+        """Bind the ports, or use inherited descriptors.
 
-        Raise ``LinkError`` naming the one that cannot be had.
+        Raise ``LinkError`` naming the port that cannot be bound.
         """
-        self.refused = 0  # datagrams from anybody else
+        self.refused = 0  # datagrams from other senders
         self.send_errors = 0  # datagrams that the system refused to send
-        self.last_error = ""  # of those, in words
-        self.last_stranger: tuple[str, int] | None = None
+        self.last_error = ""  # text of the last send error
+        self.last_foreign_source: tuple[str, int] | None = None
         self._board = (board.address, board.port)
         self._any_port = board.any_source_port
         self.sockets = [socket.socket(fileno=descriptor) for descriptor in inherited] or [
@@ -39,13 +45,13 @@ class Sockets:
         ]
         self.wall = WallClock()
         for sock in self.sockets:
-            want_stamps(sock)
+            enable_timestamps(sock)
 
     def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
-        """Yield what the board sent to the port of this index: bytes, ancillary data, read time.
+        """Yield datagrams of the board on the port of this index: bytes, ancillary data, read time.
 
-        A burst ends with a short sleep: in a flood Linux would take us for one that runs away, and
-        end us (``realtime.limit``).
+        A full burst ends with a short sleep: without it, Linux kills a SCHED_FIFO process in a
+        flood (``realtime.limit``).
         """
         sock = self.sockets[port]
         for _ in range(BURST):
@@ -54,27 +60,27 @@ class Sockets:
             except BlockingIOError:
                 return
             except OSError:
-                continue  # an earlier command found no board, or no network
+                continue  # ICMP error of an earlier send: no board, or no network
             if source == self._board or (self._any_port and source[0] == self._board[0]):
                 yield datagram, ancillary, time.monotonic_ns()
             else:
                 self.refused += 1
-                self.last_stranger = source
-        time.sleep(BREATH_S)
+                self.last_foreign_source = source
+        time.sleep(BURST_PAUSE_S)
 
     def receipt(self, ancillary: Ancillary, read_ns: int) -> Receipt:
-        """Return when a datagram came that was read with these ancillary data."""
+        """Return the receive times of a datagram read with this ancillary data."""
         before_ns, wall_ns, now_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
-        self.wall.look(before_ns, wall_ns, now_ns)
-        stamp_ns = stamp_in(ancillary)
+        self.wall.update(before_ns, wall_ns, now_ns)
+        stamp_ns = kernel_timestamp(ancillary)
         kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)
         return Receipt(kernel_ns, read_ns)
 
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
-        """Send to the board from the port of this index; return whether the system took it.
+        """Send to the board from the port of this index; return whether that succeeded.
 
-        A refusal (no network, no buffer, no permission) is counted, and the call is repeated at
-        once, ``attempts`` times in total.
+        An error (no network, no buffer, no permission) is counted; the call is repeated at once,
+        ``attempts`` times in total.
         """
         for _ in range(attempts):
             try:
@@ -87,13 +93,13 @@ class Sockets:
         return False
 
     def close(self) -> None:
-        """Give the ports back."""
+        """Close the sockets."""
         for sock in self.sockets:
             sock.close()
 
 
-def want_stamps(sock: socket.socket) -> None:
-    """Have the kernel stamp what it receives; a system that does not is done without."""
+def enable_timestamps(sock: socket.socket) -> None:
+    """Enable kernel receive timestamps where the system supports them."""
     if sys.platform == "linux":  # elsewhere the number means something else
         with suppress(OSError):
             sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)

@@ -13,7 +13,7 @@ from pathlib import Path
 from common import log
 from common.config import Loaded
 from common.errors import ConfigError
-from common.service import REST_S, Node
+from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.credentials import TOKEN_MIN, Gate, new_token
@@ -36,7 +36,7 @@ class Host:
         node.counters = self._socket.counters
         viewers = Viewers(node.loop.post, settings.messages_per_second, node.counters)
         self._fleet = viewers.fleet = Fleet(node, viewers.show)
-        node.present()
+        node.announce()
         self._systemd = Systemd()
         self._server = serving(
             settings,
@@ -62,7 +62,7 @@ class Host:
         finally:
             self._systemd.stopping()
             self._node.loop.post(self._fleet.end)
-            self._thread.join(REST_S)
+            self._thread.join(STOP_TIMEOUT_S)
         if self._error:
             raise self._error
         return 0

@@ -8,7 +8,7 @@ from services.odom.odometer import Odometer
 
 
 def main() -> int:
-    """Run odometry until it is told to stop."""
+    """Run odometry until a signal."""
     return run("odom", OdomConfig, Odometer)
 
 

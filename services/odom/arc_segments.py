@@ -1,7 +1,7 @@
-"""The way since the last counter sample, leg by leg, as the velocities saw it.
+"""Arc segments between two counter samples.
 
-The counters say how long the way was and how far it turned; the velocities say what shape it had.
-``fitted`` puts the two together.
+The counters give the length and the turn of the trajectory, the velocities give its shape.
+``fitted`` combines both.
 """
 
 from collections.abc import Sequence
@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 
-class Leg(Struct, frozen=True):
-    """One arc; ``seen`` while there was a velocity, else nothing is known of it but its time."""
+class ArcSegment(Struct, frozen=True):
+    """One arc; ``seen`` if a velocity was valid, otherwise only its duration is known."""
 
     distance: float  # m, forward positive
     turn: float  # rad, counter-clockwise positive
@@ -18,37 +18,39 @@ class Leg(Struct, frozen=True):
     seen: bool
 
 
-def total(legs: Sequence[Leg]) -> Leg:
-    """Add legs up; the sum is seen if all of them are."""
-    return Leg(
-        sum(leg.distance for leg in legs),
-        sum(leg.turn for leg in legs),
-        sum(leg.time_s for leg in legs),
-        all(leg.seen for leg in legs),
+def total(segments: Sequence[ArcSegment]) -> ArcSegment:
+    """Return the sum of segments; it is seen if all of them are."""
+    return ArcSegment(
+        sum(segment.distance for segment in segments),
+        sum(segment.turn for segment in segments),
+        sum(segment.time_s for segment in segments),
+        all(segment.seen for segment in segments),
     )
 
 
-def fitted(legs: Sequence[Leg], distance: float, turn: float) -> list[Leg]:
-    """Return the legs with the counters' distance and turn.
+def fitted(segments: Sequence[ArcSegment], distance: float, turn: float) -> list[ArcSegment]:
+    """Return the segments, corrected to the counters' distance and turn.
 
-    What the velocities do not explain happened while nobody saw it, or else evenly over the time.
+    The difference is distributed over the unseen segments by time, or over all if all are seen.
     """
-    way = total(legs)
-    if way.time_s <= 0:
-        return [Leg(distance, turn, 0.0, seen=True)]
-    blamed_s = way.time_s if way.seen else sum(leg.time_s for leg in legs if not leg.seen)
-    linear, angular = (distance - way.distance) / blamed_s, (turn - way.turn) / blamed_s
+    whole = total(segments)
+    if whole.time_s <= 0:
+        return [ArcSegment(distance, turn, 0.0, seen=True)]
+    unseen_s = sum(segment.time_s for segment in segments if not segment.seen)
+    corrected_s = whole.time_s if whole.seen else unseen_s
+    linear, angular = (distance - whole.distance) / corrected_s, (turn - whole.turn) / corrected_s
     return [
-        leg if leg.seen and not way.seen else _faster(leg, linear, angular)
-        for leg in legs
+        segment if segment.seen and not whole.seen else _adjusted(segment, linear, angular)
+        for segment in segments
     ]  # fmt: skip
 
 
-def halved(legs: Sequence[Leg]) -> list[Leg]:
-    """Return half as many legs for the same way, of a coarser shape."""
-    return [total(legs[i : i + 2]) for i in range(0, len(legs), 2)]
+def halved(segments: Sequence[ArcSegment]) -> list[ArcSegment]:
+    """Return the same trajectory in half as many, coarser segments."""
+    return [total(segments[i : i + 2]) for i in range(0, len(segments), 2)]
 
 
-def _faster(leg: Leg, linear: float, angular: float) -> Leg:
-    distance, turn = leg.distance + linear * leg.time_s, leg.turn + angular * leg.time_s
-    return Leg(distance, turn, leg.time_s, leg.seen)
+def _adjusted(segment: ArcSegment, linear: float, angular: float) -> ArcSegment:
+    distance = segment.distance + linear * segment.time_s
+    turn = segment.turn + angular * segment.time_s
+    return ArcSegment(distance, turn, segment.time_s, segment.seen)

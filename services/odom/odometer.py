@@ -14,23 +14,22 @@ from common.operator import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
-from services.odom.pose import Pose
-from services.odom.trajectory import Path
+from services.odom.pose import Pose, Trajectory
 
-SILENT_NS = NS_PER_S // 2  # a pause this long is told; shorter ones are seen by the missing samples
-ECHOES = 64  # queued states of safety; a call that echoes a dropped one would be refused
+SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
+ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
 class Odometer:
-    """The shell around the estimator and the trajectory."""
+    """Connects estimator and trajectory to the bus."""
 
     def __init__(self, node: Node[OdomConfig]) -> None:
         settings = node.config.odom
         self._node = node
         self._estimator = Estimator(settings)
-        self._path = Path(settings.path_spacing, settings.path_points)
+        self._trajectory = Trajectory(settings.path_spacing, settings.path_points)
         self._published_ns: int | None = None
-        self._silent = True  # nothing was heard yet
+        self._silent = True  # no input yet
         self._slip = False
         self._echoes = Echoes()
         bus = node.bus
@@ -40,7 +39,7 @@ class Odometer:
         bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         bus.serve(keys.SET_POSE, self._on_set_pose)
         path_key = keys.info_key(bus.robot, node.name, "path")
-        bus.answer(path_key, self._trajectory, "application/json")
+        bus.answer(path_key, self._trajectory_json, "application/json")
         node.loop.every(1 / keys.ODOMETRY.rate_hz, self._on_tick)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
@@ -53,7 +52,7 @@ class Odometer:
         if outcome in REFUSALS:
             self._node.counters[f"refused_{outcome}"] += 1
         elif outcome in RESTARTS:
-            text = f"{outcome}: the pose stays, counting goes on from here"
+            text = f"{outcome}: the pose is kept, counting restarts here"
             self._node.event("reanchored", "warning", text)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
@@ -65,38 +64,40 @@ class Odometer:
             caller.refuse(late)
             return
         if not finite(request.x, request.y, request.heading):
-            caller.refuse("x, y and heading must be numbers, not NaN or infinity")
+            caller.refuse("x, y and heading must be finite numbers")
             return
         pose = Pose(request.x, request.y, request.heading)
         self._estimator.place(pose, time.monotonic_ns())
-        self._path.clear()
-        text = f"the pose is x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
+        self._trajectory.clear()
+        text = f"pose set to x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
         self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
         caller.reply(m.Done(text=text, boot=self._node.bus.boot))
 
     def _on_tick(self, now_ns: int) -> None:
         odometry = self._estimator.estimate(now_ns)
         if odometry is None:
-            self._tell_silence(now_ns)
+            self._report_silence(now_ns)
             return
         self._published_ns = now_ns
         self._to_odometry.put(odometry)
-        self._path.add(Pose(odometry.x, odometry.y, odometry.heading))
-        self._tell_voice()
-        self._tell_slip(odometry)
+        self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
+        self._report_input()
+        self._report_slip(odometry)
 
-    def _tell_silence(self, now_ns: int) -> None:
+    def _report_silence(self, now_ns: int) -> None:
         if self._silent or self._published_ns is None or now_ns - self._published_ns < SILENT_NS:
             return
         self._silent = True
-        self._node.event("silent", "warning", "no counters, no velocities: odometry says nothing")
+        self._node.event(
+            "silent", "warning", "no counters, no velocities: no odometry is published"
+        )
 
-    def _tell_voice(self) -> None:
+    def _report_input(self) -> None:
         if self._silent:
             self._silent = False
-            self._node.event("heard", "info", "counters and velocities come in")
+            self._node.event("heard", "info", "counters and velocities are received")
 
-    def _tell_slip(self, odometry: m.Odometry) -> None:
+    def _report_slip(self, odometry: m.Odometry) -> None:
         if odometry.slip == self._slip:
             return
         self._slip = odometry.slip
@@ -106,12 +107,12 @@ class Odometer:
         else:
             self._node.event("slip_over", "info", "counters and velocities agree again")
 
-    def _trajectory(self) -> bytes:
+    def _trajectory_json(self) -> bytes:
         return msgspec.json.encode(
             {
                 "frame_id": "odom",
                 "epoch": self._estimator.epoch,
-                "spacing": self._path.spacing,
-                "points": self._path.points(),
+                "spacing": self._trajectory.spacing,
+                "points": self._trajectory.points(),
             }
         )

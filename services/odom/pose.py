@@ -1,8 +1,7 @@
-"""Where the vehicle is and how well that is known; how an arc moves both.
+"""Pose, its covariance, their motion along an arc, and the recorded trajectory.
 
-Between two looks the vehicle is taken to run on an arc of length ``distance`` that turns it by
-``turn``. The arc's chord has the length ``distance * k(turn)`` and points half the turn away from
-the heading before:
+Between two samples the motion is an arc of length ``distance`` and heading change ``turn``. Its
+chord has the length ``distance * k(turn)`` and is rotated by half the turn from the old heading:
 
     k(turn) = sin(turn / 2) / (turn / 2)
     x' = x + distance * k(turn) * cos(heading + turn / 2)
@@ -10,10 +9,11 @@ the heading before:
     heading' = heading + turn
 
 This is exact for a constant curvature, straight on and turning on the spot included. The covariance
-is carried on by the derivatives of these lines.
+is propagated by the derivatives of these equations.
 """
 
 import math
+from collections import deque
 from typing import Self
 
 from msgspec import Struct
@@ -22,14 +22,14 @@ SMALL_TURN = 1e-4  # rad; below it, the difference in the derivative loses its d
 
 
 class Pose(Struct, frozen=True):
-    """A place in ``odom``: metres, radians, heading wrapped to -pi..pi."""
+    """A pose in ``odom``: metres, radians, heading wrapped to -pi..pi."""
 
     x: float
     y: float
     heading: float
 
     def moved(self, distance: float, turn: float) -> "Pose":
-        """Return where an arc leads: m, forward positive, and rad, counter-clockwise positive."""
+        """Return the pose after an arc: m forward and rad counter-clockwise."""
         chord = distance * chord_ratio(turn)[0]
         direction = self.heading + turn / 2
         return Pose(
@@ -40,7 +40,7 @@ class Pose(Struct, frozen=True):
 
 
 def chord_ratio(turn: float) -> tuple[float, float]:
-    """Return an arc's chord as a part of its length, and the derivative of that by the turn."""
+    """Return the ratio of chord to arc length, and its derivative by the turn."""
     if abs(turn) < SMALL_TURN:
         return 1.0 - turn * turn / 24, -turn / 12
     ratio = math.sin(turn / 2) / (turn / 2)
@@ -48,7 +48,7 @@ def chord_ratio(turn: float) -> tuple[float, float]:
 
 
 class Covariance(Struct, frozen=True):
-    """Of x, y and heading (m², m rad, rad²); six numbers, so that it cannot but be symmetric."""
+    """Covariance of x, y, heading (m², m rad, rad²); six numbers keep it symmetric."""
 
     xx: float
     xy: float
@@ -58,7 +58,7 @@ class Covariance(Struct, frozen=True):
     hh: float
 
     def carried(self, dx: float, dy: float) -> Self:
-        """Return it after a move by (dx, dy) in ``odom``; the heading's error led aside."""
+        """Return the covariance after a translation (dx, dy) in ``odom``."""
         return type(self)(
             self.xx - 2 * dy * self.xh + dy * dy * self.hh,
             self.xy - dy * self.yh + dx * self.xh - dx * dy * self.hh,
@@ -69,7 +69,7 @@ class Covariance(Struct, frozen=True):
         )
 
     def plus(self, variance: float, x: float, y: float, heading: float) -> Self:
-        """Return it with an independent error of this variance along (x, y, heading)."""
+        """Return the covariance plus an independent error along (x, y, heading)."""
         return type(self)(
             self.xx + variance * x * x,
             self.xy + variance * x * y,
@@ -80,12 +80,12 @@ class Covariance(Struct, frozen=True):
         )
 
     def rows(self) -> tuple[float, ...]:
-        """Return it as a 3x3 matrix, row by row."""
+        """Return the 3x3 matrix, row by row."""
         return (self.xx, self.xy, self.xh, self.xy, self.yy, self.yh, self.xh, self.yh, self.hh)
 
 
 class ProcessNoise(Struct, frozen=True):
-    """The variances of one arc: of its length, of its turn, and of its end in every direction."""
+    """Variances of one arc: of its length, its turn, and its end position in each axis."""
 
     distance: float
     turn: float
@@ -93,13 +93,13 @@ class ProcessNoise(Struct, frozen=True):
 
 
 class PoseEstimate(Struct, frozen=True):
-    """A pose and how far it may be off."""
+    """A pose and its covariance."""
 
     pose: Pose
     covariance: Covariance
 
-    def moved(self, distance: float, turn: float, spread: ProcessNoise) -> "PoseEstimate":
-        """Return the belief after an arc that is itself known with this spread only."""
+    def moved(self, distance: float, turn: float, noise: ProcessNoise) -> "PoseEstimate":
+        """Return the estimate after an arc with this process noise."""
         after = self.pose.moved(distance, turn)
         ratio, slope = chord_ratio(turn)
         cos, sin = (f(self.pose.heading + turn / 2) for f in (math.cos, math.sin))
@@ -107,9 +107,31 @@ class PoseEstimate(Struct, frozen=True):
         along = distance * slope
         covariance = (
             self.covariance.carried(after.x - self.pose.x, after.y - self.pose.y)
-            .plus(spread.distance, ratio * cos, ratio * sin, 0.0)
-            .plus(spread.turn, along * cos - aside * sin, along * sin + aside * cos, 1.0)
-            .plus(spread.place, 1.0, 0.0, 0.0)
-            .plus(spread.place, 0.0, 1.0, 0.0)
+            .plus(noise.distance, ratio * cos, ratio * sin, 0.0)
+            .plus(noise.turn, along * cos - aside * sin, along * sin + aside * cos, 1.0)
+            .plus(noise.place, 1.0, 0.0, 0.0)
+            .plus(noise.place, 0.0, 1.0, 0.0)
         )
         return PoseEstimate(after, covariance)
+
+
+class Trajectory:
+    """Poses ``spacing`` metres apart, at most ``points`` of them; the oldest are dropped."""
+
+    def __init__(self, spacing: float, points: int) -> None:
+        self.spacing = spacing
+        self._points: deque[Pose] = deque(maxlen=points)
+
+    def add(self, pose: Pose) -> None:
+        """Add the pose if it is at least ``spacing`` from the last one kept."""
+        last = self._points[-1] if self._points else None
+        if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= self.spacing:
+            self._points.append(pose)
+
+    def clear(self) -> None:
+        """Remove all points."""
+        self._points.clear()
+
+    def points(self) -> list[tuple[float, float, float]]:
+        """Return x, y (m) and heading (rad) of each point in ``odom``, the oldest first."""
+        return [(point.x, point.y, point.heading) for point in self._points]

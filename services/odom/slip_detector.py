@@ -1,4 +1,7 @@
-"""The last second of the counters: against the velocities, and as a velocity themselves."""
+"""Slip detection: compares counters with velocities over the last second.
+
+The same history gives the twist by the counters alone.
+"""
 
 import math
 from collections import deque
@@ -6,13 +9,11 @@ from collections import deque
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from services.odom.arc_segments import Leg
+from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
 
-COMPARED_NS = NS_PER_S  # how far back counters and velocities are compared
-TWIST_NS = (
-    NS_PER_S // 5
-)  # how far back the counters make a velocity: 1 mm and 0.1 deg are coarse steps
+COMPARED_NS = NS_PER_S  # comparison window
+TWIST_NS = NS_PER_S // 5  # window of the twist by counters, whose steps are 1 mm and 0.1 deg
 TWIST_MIN_S = 0.05
 COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)
@@ -28,40 +29,40 @@ class TwistEstimate(Struct, frozen=True):
 
 
 class Entry(Struct, frozen=True):
-    """The way between two counter samples, as counted and as the velocities had it."""
+    """The motion between two counter samples: counted, and integrated from velocities."""
 
     end_ns: int
-    counted: Leg
-    integrated: Leg
+    counted: ArcSegment
+    integrated: ArcSegment
     comparable: bool
 
 
-class Comparison:
-    """Remembers the last second between counter samples; starts anew when the counters do."""
+class SlipDetector:
+    """Slip flag and residual over the last second of counter samples."""
 
     def __init__(self, settings: Odom) -> None:
-        self.residual: float | None = None  # m that the counters went farther than the velocities
+        self.residual: float | None = None  # m, counters minus velocities
         self.slip = False
         self._settings = settings
         self._entries: deque[Entry] = deque()
         self._seen = True
 
     def clear(self) -> None:
-        """Forget all, because the counters started anew."""
+        """Drop the history: the counters restarted."""
         self._entries.clear()
 
-    def add(self, end_ns: int, counted: Leg, integrated: Leg) -> None:
-        """Take the way to a new counter sample."""
+    def add(self, end_ns: int, counted: ArcSegment, integrated: ArcSegment) -> None:
+        """Add the motion up to a new counter sample."""
         comparable = integrated.seen and self._seen
         self._entries.append(Entry(end_ns, counted, integrated, comparable))
         self._seen = integrated.seen
 
-    def look_back(self, now_ns: int) -> None:
-        """Compare what is at most a second old.
+    def update(self, now_ns: int) -> None:
+        """Compare the entries of the last second; set ``slip`` and ``residual``.
 
-        What no velocity saw cannot be compared and is left out, and so is the way after it: where a
-        process was held up, the first counters behind the gap may be from before it. The slip flag
-        rises over a limit and falls under half of it.
+        Entries without velocities are left out, and so is the entry after such a gap: after a
+        stall of this process its counters may have been measured before the gap. The slip flag
+        is set above a limit and cleared below half of it.
         """
         while self._entries and now_ns - self._entries[0].end_ns > COMPARED_NS:
             self._entries.popleft()
@@ -74,14 +75,14 @@ class Comparison:
         self.residual = distance if compared else None
 
     def twist(self, now_ns: int) -> TwistEstimate | None:
-        """Return the velocity that the counters make, if they came often enough."""
+        """Return the velocity by the counters; None with too few samples."""
         recent = [e.counted for e in self._entries if now_ns - e.end_ns <= TWIST_NS]
-        time_s = sum(leg.time_s for leg in recent)
+        time_s = sum(segment.time_s for segment in recent)
         if time_s < TWIST_MIN_S:
             return None
         return TwistEstimate(
-            sum(leg.distance for leg in recent) / time_s,
-            sum(leg.turn for leg in recent) / time_s,
+            sum(segment.distance for segment in recent) / time_s,
+            sum(segment.turn for segment in recent) / time_s,
             (COUNTER_STEP_M / time_s) ** 2,
             (COUNTER_STEP_RAD / time_s) ** 2,
         )

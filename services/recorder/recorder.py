@@ -5,11 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from common import codec, keys
+from common.cli_args import VERSION
 from common.errors import MessageError
 from common.messages import SafetyState
 from common.sample import Sample
 from common.service import Node
-from common.version import VERSION
 from services.recorder.blackbox import BlackBox, LatchDetector
 from services.recorder.config import MB, RecorderConfig
 from services.recorder.mcap_codec import Encoder

@@ -131,7 +131,7 @@ class SafetyService:
         self, event: Event | None = None, answer: Callable[[Reply], None] | None = None
     ) -> None:
         now_ns = time.monotonic_ns()
-        self._decision_timer.put_off(now_ns)
+        self._decision_timer.defer(now_ns)
         inputs = replace(self._inputs, estop_session_up=self._estop_bus.connected, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)

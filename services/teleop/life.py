@@ -21,7 +21,7 @@ from common import log
 from common.cli_args import EXIT_CONFIG, add_sources, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
-from common.service import REST_S, Node
+from common.service import STOP_TIMEOUT_S, Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Desk
 from services.teleop.event_log import Logbook
@@ -67,7 +67,7 @@ class Life:
         self._settings = loaded.config
         self._node = node = Node("teleop", loaded)
         self._desk = desk = Desk(node, logbook, multiplexer(os.environ, ancestors()))
-        node.present()
+        node.announce()
         node.loop.every(LOOK_S, self._look)
         node.loop.post(lambda: desk.plug(find(self._settings.teleop)))
         self._lost = False
@@ -87,7 +87,7 @@ class Life:
             ).run()
         finally:
             self._leave()
-            self._thread.join(REST_S)
+            self._thread.join(STOP_TIMEOUT_S)
             log.configure(self._settings.log, "teleop")
         if self._error:
             raise self._error

@@ -20,8 +20,7 @@ from bench.load.loss import Passage
 from bench.load.stack import Ports
 from common.wire import commands
 from common.wire.framing import Received
-from services.bridge.config import Bridge
-from services.bridge.schedule import queries
+from services.bridge.config import Bridge, queries
 from tests.bench.load_series import made_up
 from verification.harness.support import free_port, wait_until
 

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from common import keys
@@ -15,12 +16,15 @@ from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.motion import Command
 from common.wire.commands import MotionKind
+from tests.factories import safety_state
 from verification.harness.fake_board import Board
-from verification.harness.support import safety_state, wait_until
+from verification.harness.support import wait_until
+
+PROC = Path("/proc")
 
 
 @dataclass
-class Rig:
+class BridgeFixture:
     """A bridge between a test board and a test bus on which the test plays safety."""
 
     board: Board
@@ -55,7 +59,7 @@ class Rig:
 
     def _beat(self, _: int) -> None:
         self.heartbeat += 1
-        self.safety.put(safety_state(self.heartbeat))
+        self.safety.put(safety_state(heartbeat=self.heartbeat))
         if self.driving is not None:
             bumpers = self.seen.get("tel/bridge/bumper", [m.Bumper(pressed=False)])
             judged = {"judged": bumpers[-1].seq, "judged_boot": bumpers[-1].boot}
@@ -123,3 +127,14 @@ def bridge_process(made: Board, endpoint: str, *sets: str) -> Iterator["subproce
         finally:
             process.terminate()
             process.wait(20)
+
+
+def bridge_pid(guard: "subprocess.Popen[bytes]") -> int:
+    """Return the process that the guard watches, once there is one."""
+    children = PROC / f"{guard.pid}/task/{guard.pid}/children"
+    return int(wait_until(lambda: children.read_text().split(), "a bridge under the guard")[0])
+
+
+def breaks_since(made: Board, count: int) -> int:
+    """Return how many BREAKs the board got after that many commands."""
+    return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from common.loop import Loop
-from tests.bridge.bridge_fixture import Rig, bridge_process
+from tests.bridge.bridge_fixture import BridgeFixture, bridge_process
 from verification.harness.fake_board import board
 from verification.harness.support import bus_on, free_port, router_process, running
 
@@ -19,12 +19,12 @@ def endpoint() -> Iterator[str]:
 
 
 @pytest.fixture
-def rig(endpoint: str) -> Iterator[Rig]:
+def bridge(endpoint: str) -> Iterator[BridgeFixture]:
     with (
         board() as made,
         bridge_process(made, endpoint) as process,
         running(Loop()) as loop,
     ):
-        rig = Rig(made, endpoint, loop, process)
-        with bus_on(endpoint, loop, rig.declare):
-            yield rig
+        bridge = BridgeFixture(made, endpoint, loop, process)
+        with bus_on(endpoint, loop, bridge.declare):
+            yield bridge

@@ -8,16 +8,16 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.motion import Command
-from tests.bridge.bridge_fixture import Rig
+from tests.bridge.bridge_fixture import BridgeFixture
 from verification.harness.support import wait_until
 
 
-def switches(rig: Rig, **brakes: bool) -> m.SwitchesRequest:
+def switches(bridge: BridgeFixture, **brakes: bool) -> m.SwitchesRequest:
     """Return the request of an operator who sees the newest state of safety."""
-    return m.SwitchesRequest(**brakes, echo=rig.heartbeat)
+    return m.SwitchesRequest(**brakes, echo=bridge.heartbeat)
 
 
-def ask(rig: Rig, call: Any, request: Any) -> Any:
+def ask(bridge: BridgeFixture, call: Any, request: Any) -> Any:
     answers: list[Any] = []
     done = threading.Event()
 
@@ -25,54 +25,54 @@ def ask(rig: Rig, call: Any, request: Any) -> Any:
         answers.append(answer)
         done.set()
 
-    rig.bus.ask(call, request, take, take)
+    bridge.bus.ask(call, request, take, take)
     assert done.wait(10)
     return answers[0]
 
 
-def ready(rig: Rig) -> None:
+def ready(bridge: BridgeFixture) -> None:
     """Wait until the bridge has its board and receives safety's state."""
-    wait_until(lambda: (link := rig.link()) and link.state == "up", "link up")
+    wait_until(lambda: (link := bridge.link()) and link.state == "up", "link up")
     wait_until(
-        lambda: isinstance(ask(rig, keys.SET_SWITCHES, switches(rig)), m.Switches),
+        lambda: isinstance(ask(bridge, keys.SET_SWITCHES, switches(bridge)), m.Switches),
         "a call that is in time",
     )
 
 
-def test_switches_and_lamps_answer_with_the_boards_own_echo(rig: Rig) -> None:
-    ready(rig)
-    answer = ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=False))
+def test_switches_and_lamps_answer_with_the_boards_own_echo(bridge: BridgeFixture) -> None:
+    ready(bridge)
+    answer = ask(bridge, keys.SET_SWITCHES, switches(bridge, bumper_brake=False))
     assert answer.bumper_brake is False
-    rig.command(Command.STOP)
-    wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "not ready")
-    assert ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=True)).bumper_brake is True
+    bridge.command(Command.STOP)
+    wait_until(lambda: (link := bridge.link()) and "brakes" in link.waiting, "not ready")
+    assert ask(bridge, keys.SET_SWITCHES, switches(bridge, bumper_brake=True)).bumper_brake is True
     lamp = m.LedRequest(channel=3, mode=1)
-    assert isinstance(ask(rig, keys.SET_LED, lamp), m.Done)
-    assert rig.board.leds[0].channel == 3
+    assert isinstance(ask(bridge, keys.SET_LED, lamp), m.Done)
+    assert bridge.board.leds[0].channel == 3
 
 
-def test_refusals_name_the_reason(rig: Rig) -> None:
-    ready(rig)
+def test_refusals_name_the_reason(bridge: BridgeFixture) -> None:
+    ready(bridge)
     lamp = m.LedRequest(channel=3, mode=1)
-    rig.board.led_done = False
-    assert "0xAA" in ask(rig, keys.SET_LED, lamp)
-    rig.board.led_done = None
-    assert "did not echo" in ask(rig, keys.SET_LED, lamp)
-    rig.board.echo = False
-    request = switches(rig, ultrasonic_brake=False)
-    assert "did not echo" in ask(rig, keys.SET_SWITCHES, request)
-    rig.board.silent = True
-    wait_until(lambda: (link := rig.link()) and link.state == "lost", "link lost")
-    assert "absent" in ask(rig, keys.SET_LED, lamp)
+    bridge.board.led_done = False
+    assert "0xAA" in ask(bridge, keys.SET_LED, lamp)
+    bridge.board.led_done = None
+    assert "did not echo" in ask(bridge, keys.SET_LED, lamp)
+    bridge.board.echo = False
+    request = switches(bridge, ultrasonic_brake=False)
+    assert "did not echo" in ask(bridge, keys.SET_SWITCHES, request)
+    bridge.board.silent = True
+    wait_until(lambda: (link := bridge.link()) and link.state == "lost", "link lost")
+    assert "absent" in ask(bridge, keys.SET_LED, lamp)
 
 
-def test_switches_that_were_asked_late_are_refused(rig: Rig) -> None:
-    ready(rig)
-    late = switches(rig, bumper_brake=False)
+def test_switches_that_were_asked_late_are_refused(bridge: BridgeFixture) -> None:
+    ready(bridge)
+    late = switches(bridge, bumper_brake=False)
     due_ns = time.monotonic_ns() + round(1.1 * NS_PER_S)
     wait_until(lambda: time.monotonic_ns() > due_ns, "a late call")
-    assert "allowed is 1 s" in ask(rig, keys.SET_SWITCHES, late)
-    assert "no echo" in ask(rig, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))
+    assert "allowed is 1 s" in ask(bridge, keys.SET_SWITCHES, late)
+    assert "no echo" in ask(bridge, keys.SET_SWITCHES, m.SwitchesRequest(bumper_brake=False))
     unknown = m.SwitchesRequest(bumper_brake=False, echo=1)
-    assert "unknown heartbeat" in ask(rig, keys.SET_SWITCHES, unknown)
-    assert ask(rig, keys.SET_SWITCHES, switches(rig)).bumper_brake is True
+    assert "unknown heartbeat" in ask(bridge, keys.SET_SWITCHES, unknown)
+    assert ask(bridge, keys.SET_SWITCHES, switches(bridge)).bumper_brake is True

@@ -11,9 +11,8 @@ from common.freshness import NS_PER_S
 from common.motion import Command
 from common.wire import commands, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.frame import Frame, Side
+from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import Framing, Received, crc_function
-from common.wire.header import HEADER
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
@@ -192,7 +191,7 @@ def test_only_a_brake_is_the_judged_stop(bench: Bench, command: Command, is_judg
     hit = bench.receive(HIT).hit
     assert hit is not None
     outs = [bench.move(command, judged=seq, judged_boot=BOOT) for seq in (hit - 1, hit, hit)]
-    assert [out.judged for out in outs] == [False, is_judged, False]
+    assert [out.acked for out in outs] == [False, is_judged, False]
     assert all(out.obeyed for out in outs)
 
 

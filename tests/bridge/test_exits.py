@@ -12,39 +12,39 @@ from common.service import Node, serve
 from common.wire.commands import MotionKind
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from tests.bridge.bridge_fixture import Rig
+from tests.bridge.bridge_fixture import BridgeFixture
 from verification.harness.fake_board import board
 
 
-def end(rig: Rig, *signals: signal.Signals) -> int:
+def end(bridge: BridgeFixture, *signals: signal.Signals) -> int:
     """Send the signals and wait for the end of the bridge."""
     for number in signals:
-        rig.process.send_signal(number)
-    return rig.process.wait(20)
+        bridge.process.send_signal(number)
+    return bridge.process.wait(20)
 
 
-def test_a_bridge_whose_parent_and_log_are_gone_stops_the_vehicle(rig: Rig) -> None:
-    rig.drive()
-    assert rig.process.stderr is not None
-    rig.process.stderr.close()
-    assert end(rig, signal.SIGTERM) == 0
-    rig.board.wait_for(MotionKind.STOP)
+def test_a_bridge_whose_parent_and_log_are_gone_stops_the_vehicle(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    assert bridge.process.stderr is not None
+    bridge.process.stderr.close()
+    assert end(bridge, signal.SIGTERM) == 0
+    bridge.board.wait_for(MotionKind.STOP)
 
 
-def test_a_second_signal_brakes_before_the_bridge_ends(rig: Rig) -> None:
-    rig.drive()
-    rig.board.speed_mmps = 500  # it would wait for the vehicle to stand
-    rig.process.send_signal(signal.SIGINT)
-    rig.board.wait_for(MotionKind.STOP)
-    assert end(rig, signal.SIGTERM) == 128 + signal.SIGTERM
-    rig.board.wait_for(MotionKind.BREAK)
+def test_a_second_signal_brakes_before_the_bridge_ends(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    bridge.board.speed_mmps = 500  # it would wait for the vehicle to stand
+    bridge.process.send_signal(signal.SIGINT)
+    bridge.board.wait_for(MotionKind.STOP)
+    assert end(bridge, signal.SIGTERM) == 128 + signal.SIGTERM
+    bridge.board.wait_for(MotionKind.BREAK)
 
 
-def test_a_vehicle_that_does_not_stop_is_left_with_a_break(rig: Rig) -> None:
-    rig.drive()
-    rig.board.speed_mmps = 500
-    assert end(rig, signal.SIGTERM) == 0
-    rig.board.wait_for(MotionKind.BREAK)
+def test_a_vehicle_that_does_not_stop_is_left_with_a_break(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    bridge.board.speed_mmps = 500
+    assert end(bridge, signal.SIGTERM) == 0
+    bridge.board.wait_for(MotionKind.BREAK)
 
 
 @pytest.fixture

@@ -25,8 +25,13 @@ from services.bridge import child
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
-from tests.bridge.bridge_fixture import Rig, bridge_process
-from tests.bridge.guarding import PROC, breaks_since, bridge_pid
+from tests.bridge.bridge_fixture import (
+    PROC,
+    BridgeFixture,
+    breaks_since,
+    bridge_pid,
+    bridge_process,
+)
 from verification.harness.fake_board import Board, board
 from verification.harness.support import wait_until
 
@@ -41,18 +46,18 @@ def test_break_goes_first_then_the_bridges_stop() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
 def test_a_bridge_that_dies_is_braked_for_and_started_again(
-    rig: Rig, number: signal.Signals
+    bridge: BridgeFixture, number: signal.Signals
 ) -> None:
-    rig.drive()
-    source = rig.board.sources[-1]
-    first = bridge_pid(rig.process)
-    count = len(rig.board.motions)
+    bridge.drive()
+    source = bridge.board.sources[-1]
+    first = bridge_pid(bridge.process)
+    count = len(bridge.board.motions)
     os.kill(first, number)
-    wait_until(lambda: breaks_since(rig.board, count), "BREAK")
-    wait_until(lambda: bridge_pid(rig.process) != first, "the next bridge")
-    rig.board.wait_for(MotionKind.STOP)
-    rig.drive()
-    assert rig.board.sources[-1] == source, "from the same port, and the same socket"
+    wait_until(lambda: breaks_since(bridge.board, count), "BREAK")
+    wait_until(lambda: bridge_pid(bridge.process) != first, "the next bridge")
+    bridge.board.wait_for(MotionKind.STOP)
+    bridge.drive()
+    assert bridge.board.sources[-1] == source, "from the same port, and the same socket"
 
 
 def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
@@ -78,53 +83,53 @@ def test_a_bridge_that_was_only_held_up_lives_on() -> None:
         assert bridge_pid(process) == first
 
 
-def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(rig: Rig) -> None:
-    rig.drive()
-    first = bridge_pid(rig.process)
-    rig.process.kill()
-    rig.board.wait_for(MotionKind.STOP)
+def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    first = bridge_pid(bridge.process)
+    bridge.process.kill()
+    bridge.board.wait_for(MotionKind.STOP)
     wait_until(lambda: not (PROC / str(first)).exists(), "the end of the bridge")
-    assert "guard_gone" in rig.events()
-    count = len(rig.board.motions)
+    assert "guard_gone" in bridge.events()
+    count = len(bridge.board.motions)
     with pytest.raises(AssertionError):
-        wait_until(lambda: len(rig.board.motions) > count, "a frame of nobody's", patience_s=0.3)
+        wait_until(lambda: len(bridge.board.motions) > count, "a frame of nobody's", patience_s=0.3)
 
 
-def test_the_next_guard_waits_for_the_ports_of_an_orphan(rig: Rig) -> None:
-    rig.drive()
-    rig.board.speed_mmps = 500  # the orphan waits for the vehicle to stand
-    rig.process.kill()
-    with bridge_process(rig.board, rig.endpoint) as second:
-        rig.board.speed_mmps = 0
+def test_the_next_guard_waits_for_the_ports_of_an_orphan(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    bridge.board.speed_mmps = 500  # the orphan waits for the vehicle to stand
+    bridge.process.kill()
+    with bridge_process(bridge.board, bridge.endpoint) as second:
+        bridge.board.speed_mmps = 0
         bridge_pid(second)
-        rig.board.wait_for(MotionKind.STOP)
+        bridge.board.wait_for(MotionKind.STOP)
         assert second.poll() is None
 
 
-def test_a_second_bridge_is_refused_with_the_port(rig: Rig) -> None:
-    rig.board.wait_for(MotionKind.STOP)  # the first one has the ports
-    with bridge_process(rig.board, rig.endpoint) as second:
+def test_a_second_bridge_is_refused_with_the_port(bridge: BridgeFixture) -> None:
+    bridge.board.wait_for(MotionKind.STOP)  # the first one has the ports
+    with bridge_process(bridge.board, bridge.endpoint) as second:
         assert second.stderr is not None
         said = second.stderr.read().decode()
         assert second.wait(20) == EXIT_LINK
-    port = rig.board.ports[0]
+    port = bridge.board.ports[0]
     assert f"cannot listen on UDP 127.0.0.1:{port}: another program has it" in said
-    assert rig.process.poll() is None
+    assert bridge.process.poll() is None
 
 
-def test_ctrl_c_comes_to_rest_with_stop_and_leaves_no_break(rig: Rig) -> None:
-    rig.drive()
-    count = len(rig.board.motions)
-    os.kill(rig.process.pid, signal.SIGINT)
-    assert rig.process.wait(20) == 0
-    assert breaks_since(rig.board, count) == 0
-    rig.board.wait_for(MotionKind.STOP)
+def test_ctrl_c_comes_to_rest_with_stop_and_leaves_no_break(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    count = len(bridge.board.motions)
+    os.kill(bridge.process.pid, signal.SIGINT)
+    assert bridge.process.wait(20) == 0
+    assert breaks_since(bridge.board, count) == 0
+    bridge.board.wait_for(MotionKind.STOP)
 
 
-def test_the_guard_knows_nothing_of_the_bus(rig: Rig) -> None:
-    rig.board.wait_for(MotionKind.STOP)  # the bridge lives
-    assert "zenoh" in (PROC / f"{bridge_pid(rig.process)}/maps").read_text()
-    assert "zenoh" not in (PROC / f"{rig.process.pid}/maps").read_text()
+def test_the_guard_knows_nothing_of_the_bus(bridge: BridgeFixture) -> None:
+    bridge.board.wait_for(MotionKind.STOP)  # the bridge lives
+    assert "zenoh" in (PROC / f"{bridge_pid(bridge.process)}/maps").read_text()
+    assert "zenoh" not in (PROC / f"{bridge.process.pid}/maps").read_text()
 
 
 @contextmanager

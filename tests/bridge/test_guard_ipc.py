@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from services.bridge.guard_ipc import Handover, Heartbeat, received
+from services.bridge.guard_ipc import Heartbeat, Inherited, received
 
 
 @pytest.fixture
@@ -19,10 +19,10 @@ def pipe() -> Iterator[tuple[int, int]]:
             continue
 
 
-@pytest.mark.parametrize("handover", [Handover((3, 4), 5), Handover((7,), 6)])
-def test_the_child_gets_what_the_parent_leaves_open(handover: Handover) -> None:
-    assert received(handover.environ()) == handover
-    assert handover.descriptors == (*handover.sockets, handover.heartbeat)
+@pytest.mark.parametrize("inherited", [Inherited((3, 4), 5), Inherited((7,), 6)])
+def test_the_child_gets_what_the_parent_leaves_open(inherited: Inherited) -> None:
+    assert received(inherited.environ()) == inherited
+    assert inherited.descriptors == (*inherited.sockets, inherited.heartbeat)
 
 
 def test_a_beat_names_the_port_in_use(pipe: tuple[int, int]) -> None:

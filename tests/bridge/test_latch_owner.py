@@ -15,13 +15,13 @@ from tests.bridge.motions import ARMED, LEASE, NOW, OWED, brake, obey, run, stop
     [
         # its own authority may creep, another must take it on
         (replace(ARMED, latched_by=1), run(), Command.RUN, None),
-        (OWED, run(), Command.STOP, Refusal.NOT_HEIR),
-        (OWED, run(0.0), Command.STOP, Refusal.NOT_HEIR),
+        (OWED, run(), Command.STOP, Refusal.NOT_LATCH_OWNER),
+        (OWED, run(0.0), Command.STOP, Refusal.NOT_LATCH_OWNER),
         (OWED, stop(), Command.STOP, None),
         (OWED, brake(), Command.BRAKE, None),
         (OWED, taking_on(run(), 3), Command.RUN, None),
-        (OWED, taking_on(run(), None), Command.STOP, Refusal.NOT_HEIR),
-        (OWED, taking_on(run(), 4), Command.STOP, Refusal.NOT_HEIR),
+        (OWED, taking_on(run(), None), Command.STOP, Refusal.NOT_LATCH_OWNER),
+        (OWED, taking_on(run(), 4), Command.STOP, Refusal.NOT_LATCH_OWNER),
     ],
 )
 def test_order(state: Lease, motion: Motion, order: Command, refusal: Refusal | None) -> None:

@@ -79,13 +79,13 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (replace(ARMED, neutral=False), run(0.0, 0.0), Command.RUN, None),
         (replace(ARMED, neutral=False), brake(), Command.BRAKE, None),
         # an unjudged hit: BREAK, whatever is asked
-        (HIT, run(), Command.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(), Command.BRAKE, Refusal.NOT_ACKED),
         (HIT, stop(), Command.BRAKE, None),
         (HIT, brake(), Command.BRAKE, None),
-        (HIT, run(judged=4, judged_boot=OWN_BOOT), Command.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(judged=4, judged_boot=OWN_BOOT), Command.BRAKE, Refusal.NOT_ACKED),
         (HIT, run(judged=5, judged_boot=OWN_BOOT), Command.RUN, None),
         (HIT, run(judged=6, judged_boot=OWN_BOOT), Command.RUN, None),
-        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), Command.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), Command.BRAKE, Refusal.NOT_ACKED),
         # seq must rise
         (ARMED, run(seq=10), None, Refusal.OLD),
         (ARMED, run(seq=9), None, Refusal.OLD),
@@ -95,8 +95,8 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (ARMED, run(seq=11 + SEQ_STEP_MAX), None, Refusal.JUMP),
         (ARMED, brake(seq=2**62), None, Refusal.JUMP),
         # the vehicle moved without a command: BREAK until safety has latched that
-        (MOVED, run(), Command.BRAKE, Refusal.NOT_HEIR),
-        (MOVED, run(0.0, 0.0), Command.BRAKE, Refusal.NOT_HEIR),
+        (MOVED, run(), Command.BRAKE, Refusal.NOT_LATCH_OWNER),
+        (MOVED, run(0.0, 0.0), Command.BRAKE, Refusal.NOT_LATCH_OWNER),
         (MOVED, stop(), Command.BRAKE, None),
         (MOVED, brake(), Command.BRAKE, None),
         (MOVED, taking_on(brake(), None), Command.BRAKE, None),
@@ -106,7 +106,7 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (MOVED, taking_on(stop(), OWN_BOOT), Command.STOP, None),
         (MOVED, taking_on(brake(), OWN_BOOT), Command.BRAKE, None),
         (MOVED, taking_on(run(), OWN_BOOT), Command.RUN, None),
-        (replace(MOVED, hit=5), run(), Command.BRAKE, Refusal.NOT_JUDGED),
+        (replace(MOVED, hit=5), run(), Command.BRAKE, Refusal.NOT_ACKED),
         (replace(MOVED, hit=5), stop(), Command.BRAKE, None),
         # a second authority
         (ARMED, run(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),

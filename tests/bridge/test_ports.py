@@ -135,9 +135,9 @@ def test_what_was_never_answered_is_asked_for_from_the_main_port_first() -> None
 )
 def test_what_was_heard_lately(age: int, heard: bool) -> None:
     made = ports()
-    assert not made.is_heard(BumperReport, NS_PER_S)
+    assert not made.is_received(BumperReport, NS_PER_S)
     come(made, BumperReport, 0, NS_PER_S)
-    assert made.is_heard(BumperReport, NS_PER_S + age) is heard
+    assert made.is_received(BumperReport, NS_PER_S + age) is heard
 
 
 @given(st.lists(st.tuples(st.integers(1, 400), st.integers(-20, 20), st.booleans(), st.booleans())))

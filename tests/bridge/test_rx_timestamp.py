@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from services.bridge.rx_timestamp import SO_TIMESTAMPNS, Receipt, WallClock, stamp_in
+from services.bridge.rx_timestamp import SO_TIMESTAMPNS, Receipt, WallClock, kernel_timestamp
 
 AHEAD_NS = 1_700_000_000_000_000_000  # wall clock less monotonic clock
 NOW = 5_000_000_000
@@ -13,7 +13,7 @@ NOW = 5_000_000_000
 def look(clock: WallClock, now_ns: int, ahead_ns: int, width_ns: int = 100) -> None:
     """Read both clocks as the sockets do, the wall clock in the middle."""
     half_ns = width_ns // 2
-    clock.look(now_ns - half_ns, now_ns + ahead_ns, now_ns + half_ns)
+    clock.update(now_ns - half_ns, now_ns + ahead_ns, now_ns + half_ns)
 
 
 def test_a_stamp_becomes_monotonic_time() -> None:
@@ -37,10 +37,10 @@ def test_a_stamp_of_the_future_is_not_believed() -> None:
 def test_the_narrowest_look_counts() -> None:
     clock = WallClock()
     # Held up for 50 ms right after the wall clock was read, then right before.
-    clock.look(NOW, NOW + AHEAD_NS, NOW + 50_000_000)
+    clock.update(NOW, NOW + AHEAD_NS, NOW + 50_000_000)
     assert clock.monotonic_ns(NOW + AHEAD_NS, NOW + S) == NOW + 25_000_000
     look(clock, NOW + S, AHEAD_NS, 100)
-    clock.look(NOW + 2 * S, NOW + 2 * S + 50_000_000 + AHEAD_NS, NOW + 2 * S + 50_000_000)
+    clock.update(NOW + 2 * S, NOW + 2 * S + 50_000_000 + AHEAD_NS, NOW + 2 * S + 50_000_000)
     assert clock.monotonic_ns(NOW + AHEAD_NS, NOW + S) in range(NOW - 50, NOW + 51)
     assert clock.steps == 0
 
@@ -67,28 +67,28 @@ def test_after_the_clock_was_set_no_stamp_of_before_is_believed(step_ns: int) ->
 
 def test_a_stamp_at_the_very_moment_of_the_step_is_believed() -> None:
     clock = WallClock()
-    clock.look(0, AHEAD_NS, 0)
-    clock.look(NOW, NOW, NOW)
+    clock.update(0, AHEAD_NS, 0)
+    clock.update(NOW, NOW, NOW)
     assert clock.monotonic_ns(NOW, NOW) == NOW
     assert clock.monotonic_ns(NOW - 1, NOW) is None
 
 
 def test_clocks_that_disagree_by_nanoseconds_were_not_set() -> None:
     clock = WallClock()
-    clock.look(NOW, NOW + AHEAD_NS, NOW)
-    clock.look(NOW, NOW + AHEAD_NS + 1_000, NOW)
+    clock.update(NOW, NOW + AHEAD_NS, NOW)
+    clock.update(NOW, NOW + AHEAD_NS + 1_000, NOW)
     assert clock.steps == 0
     assert clock.monotonic_ns(NOW + AHEAD_NS, NOW) == NOW  # what was known stays
-    clock.look(NOW, NOW + AHEAD_NS + 1_001, NOW)
+    clock.update(NOW, NOW + AHEAD_NS + 1_001, NOW)
     assert clock.steps == 1
 
 
 def test_the_stamp_is_found_among_the_ancillary_data() -> None:
     stamp = struct.pack("=qq", 1_700_000_000, 5)
-    assert stamp_in([]) is None
-    assert stamp_in([(1, 99, stamp)]) is None
-    assert stamp_in([(1, SO_TIMESTAMPNS, stamp[:8])]) is None
-    assert stamp_in([(1, 99, b""), (1, SO_TIMESTAMPNS, stamp)]) == 1_700_000_000_000_000_005
+    assert kernel_timestamp([]) is None
+    assert kernel_timestamp([(1, 99, stamp)]) is None
+    assert kernel_timestamp([(1, SO_TIMESTAMPNS, stamp[:8])]) is None
+    assert kernel_timestamp([(1, 99, b""), (1, SO_TIMESTAMPNS, stamp)]) == 1_700_000_000_000_000_005
 
 
 def test_a_datagram_came_when_the_kernel_says_or_else_when_it_was_read() -> None:

@@ -27,7 +27,7 @@ def counts(
 
 def left(still: Standstill) -> bool:
     """Return whether it has moved away; a function, as mypy narrows attributes."""
-    return still.left
+    return still.moved_away
 
 
 def stood(at_ns: int = NOW) -> Standstill:
@@ -76,9 +76,9 @@ def test_an_old_velocity_says_nothing(age: int, limit_s: float) -> None:
 
 def test_without_a_velocity_the_coast_limit_holds() -> None:
     still = standstill()
-    assert (still.limit_ns, still.left) == (COAST, False)
+    assert (still.limit_ns, still.moved_away) == (COAST, False)
     still.on_lease(NOW)
-    assert (still.limit_ns, still.left) == (COAST, False)
+    assert (still.limit_ns, still.moved_away) == (COAST, False)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_away_by_the_counters(distance: float, heading: float, left: bool) -> No
     still = stood()
     counts(still, 0.0, 0.0)
     counts(still, distance, heading)
-    assert still.left is left
+    assert still.moved_away is left
 
 
 def test_the_heading_is_compared_across_half_a_turn() -> None:

@@ -12,8 +12,13 @@ from pathlib import Path
 import pytest
 
 from common.wire.commands import MotionKind
-from tests.bridge.bridge_fixture import Rig, bridge_command, bridge_process
-from tests.bridge.guarding import breaks_since, bridge_pid
+from tests.bridge.bridge_fixture import (
+    BridgeFixture,
+    breaks_since,
+    bridge_command,
+    bridge_pid,
+    bridge_process,
+)
 from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board
 from verification.harness.support import wait_until
@@ -89,21 +94,25 @@ def is_quiet(made: Board) -> bool:
     return len(made.motions) == count
 
 
-def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(rig: Rig) -> None:
-    rig.drive()
-    count = len(rig.board.motions)
-    os.kill(bridge_pid(rig.process), signal.SIGHUP)
-    rig.process.send_signal(signal.SIGHUP)
-    assert rig.process.wait(20) == 0
-    assert breaks_since(rig.board, count) == 0
-    rig.board.wait_for(MotionKind.STOP)
+def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
+    bridge: BridgeFixture,
+) -> None:
+    bridge.drive()
+    count = len(bridge.board.motions)
+    os.kill(bridge_pid(bridge.process), signal.SIGHUP)
+    bridge.process.send_signal(signal.SIGHUP)
+    assert bridge.process.wait(20) == 0
+    assert breaks_since(bridge.board, count) == 0
+    bridge.board.wait_for(MotionKind.STOP)
 
 
-def test_a_guard_that_is_killed_for_its_hang_leaves_a_bridge_that_stops(rig: Rig) -> None:
-    rig.drive()
-    bridge = bridge_pid(rig.process)
-    os.kill(bridge, signal.SIGQUIT)
-    rig.process.send_signal(signal.SIGQUIT)
-    assert rig.process.wait(20) == -signal.SIGQUIT
-    rig.board.wait_for(MotionKind.STOP)
-    wait_until(lambda: not Path(f"/proc/{bridge}").exists(), "the end of the bridge")
+def test_a_guard_that_is_killed_for_its_hang_leaves_a_bridge_that_stops(
+    bridge: BridgeFixture,
+) -> None:
+    bridge.drive()
+    pid = bridge_pid(bridge.process)
+    os.kill(pid, signal.SIGQUIT)
+    bridge.process.send_signal(signal.SIGQUIT)
+    assert bridge.process.wait(20) == -signal.SIGQUIT
+    bridge.board.wait_for(MotionKind.STOP)
+    wait_until(lambda: not Path(f"/proc/{pid}").exists(), "the end of the bridge")

@@ -164,7 +164,7 @@ def test_a_motion_that_answers_no_request_is_not_measured() -> None:
 def test_the_judged_stop() -> None:
     timings = Timings()
     timings.on_reflex(7, HIT, 102 * MS)
-    timings.on_judged(VERDICT, True, 114 * MS, 120 * MS)
+    timings.on_acked(VERDICT, True, 114 * MS, 120 * MS)
     judged = {name: ms for name, ms in measured(timings).items() if name.startswith("judged")}
     assert judged == {
         "judged_stop": 20,
@@ -186,7 +186,7 @@ def test_by_a_later_sample_or_a_foreign_safety_the_whole_is_still_known(
 ) -> None:
     timings = Timings()
     timings.on_reflex(seq, Receipt(None, 101 * MS), 102 * MS)
-    timings.on_judged(VERDICT, shared, 114 * MS, 120 * MS)
+    timings.on_acked(VERDICT, shared, 114 * MS, 120 * MS)
     judged = {name: ms for name, ms in measured(timings).items() if name.startswith("judged")}
     assert judged == {"judged_stop": 19, "judged_stop.bridge_to_break": 6}
     assert left_out(timings) == reasons
@@ -194,11 +194,11 @@ def test_by_a_later_sample_or_a_foreign_safety_the_whole_is_still_known(
 
 def test_a_hit_is_judged_once() -> None:
     timings = Timings()
-    timings.on_judged(VERDICT, True, 114 * MS, 120 * MS)
+    timings.on_acked(VERDICT, True, 114 * MS, 120 * MS)
     assert measured(timings) == {}
     timings.on_reflex(7, HIT, 102 * MS)
     for _ in range(2):
-        timings.on_judged(VERDICT, True, 114 * MS, 120 * MS)
+        timings.on_acked(VERDICT, True, 114 * MS, 120 * MS)
     assert measured(timings)["judged_stop"] == 20
 
 

@@ -11,7 +11,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.settings import Board
 from services.bridge.rx_timestamp import Receipt
-from services.bridge.udp import BREATH_S, BURST, Sockets, want_stamps
+from services.bridge.udp import BURST, BURST_PAUSE_S, Sockets, enable_timestamps
 from verification.harness.support import free_port, wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux stamps datagrams by itself")
@@ -78,9 +78,9 @@ def test_a_flood_is_read_in_bursts_with_a_breath_after_each(
         slept: list[float] = []
         monkeypatch.setattr(time, "sleep", slept.append)
         assert len(list(sockets.read(0))) == BURST
-        assert slept == [BREATH_S]
+        assert slept == [BURST_PAUSE_S]
         assert len(list(sockets.read(0))) == 1
-        assert slept == [BREATH_S]
+        assert slept == [BURST_PAUSE_S]
 
 
 @LINUX
@@ -125,18 +125,18 @@ def test_without_stamps_it_came_when_it_was_read(
 def test_a_kernel_that_knows_no_stamps_is_done_without() -> None:
     one, other = socket.socketpair()
     one.close()  # refuses every option
-    want_stamps(one)
+    enable_timestamps(one)
     other.close()
 
 
 def test_a_strangers_datagram_is_not_yielded(peer: socket.socket) -> None:
     with (
         sockets_of(peer) as sockets,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign,
     ):
         where = sockets.sockets[0].getsockname()
-        stranger.bind(("127.0.0.1", 0))
-        stranger.sendto(b"stranger", where)
+        foreign.bind(("127.0.0.1", 0))
+        foreign.sendto(b"foreign", where)
         peer.sendto(b"board", where)
         assert received(sockets)[0] == b"board"
-        assert (sockets.refused, sockets.last_stranger) == (1, stranger.getsockname())
+        assert (sockets.refused, sockets.last_foreign_source) == (1, foreign.getsockname())

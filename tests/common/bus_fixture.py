@@ -16,7 +16,7 @@ from verification.harness.support import at, running, wait_until
 _robots = count(1)
 
 
-class Rig:
+class BusFixture:
     """Opens what a test needs on the bus and closes it at the end."""
 
     def __init__(self, endpoint: str) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from common import log
-from tests.common.bus_fixture import Rig
-from tests.common.settings_fixture import Desk
+from tests.common.bus_fixture import BusFixture
+from tests.common.settings_fixture import SettingsFixture
 from verification.harness.support import Lines, free_port, router_process
 
 
@@ -20,9 +20,9 @@ def shared_router() -> Iterator[str]:
 
 
 @pytest.fixture
-def rig(shared_router: str) -> Iterator[Rig]:
+def buses(shared_router: str) -> Iterator[BusFixture]:
     """Give a robot, and buses of it."""
-    with Rig(shared_router) as made:
+    with BusFixture(shared_router) as made:
         yield made
 
 
@@ -35,7 +35,7 @@ def lines() -> Lines:
 
 
 @pytest.fixture
-def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
+def settings_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SettingsFixture:
     """Give a directory to write settings in, and work in it."""
     monkeypatch.chdir(tmp_path)
-    return Desk(tmp_path)
+    return SettingsFixture(tmp_path)

@@ -11,6 +11,8 @@ from typing import IO, Any
 
 from verification.harness.support import PATIENCE_S, wait_until
 
+SPECIMEN = "tests.common.example_service"
+
 
 class Program:
     """Runs ``python -m`` something and keeps its lines as they come."""
@@ -66,3 +68,8 @@ def program(*words: str, tty: bool = False) -> Iterator[Program]:
         yield made
     finally:
         made.end()
+
+
+def on(endpoint: str, robot: str) -> list[str]:
+    """Return the options that put a service on a router."""
+    return ["--set", f"bus.connect={endpoint}", "--set", f"robot.id={robot}"]

@@ -10,21 +10,21 @@ from common.realtime import BOARD
 
 PATIENCE_S = 60
 
-TELL = "from common import realtime as r; import os, threading, resource; "
+PRELUDE = "from common import realtime as r; import os, threading, resource; "
 
 LIMITS = "print(resource.getrlimit(resource.RLIMIT_RTTIME)[0])"
 
 
-def said(script: str) -> list[str]:
+def output_of(script: str) -> list[str]:
     """Run a script in an ordinary process; return its words."""
-    command = [sys.executable, "-c", TELL + script]
+    command = [sys.executable, "-c", PRELUDE + script]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     return done.stdout.split()
 
 
 @cache
 def granted() -> bool:
-    return said("r.ask(r.BOARD); print(r.priority())") == [str(BOARD)]
+    return output_of("r.ask(r.BOARD); print(r.priority())") == [str(BOARD)]
 
 
 needs_right = pytest.mark.skipif(

@@ -10,7 +10,7 @@ from common.config import DEFAULT_FILE, Loaded, Sources, load
 from common.errors import ConfigError
 
 
-class Desk:
+class SettingsFixture:
     """A directory to write settings in, which is the working directory too."""
 
     def __init__(self, folder: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from cli.settings import Everything
 from common.config import DEFAULT_FILE, Sources, flatten, load
 from common.settings import Shared
-from tests.common.settings_fixture import Desk
+from tests.common.settings_fixture import SettingsFixture
 
 # --- the file that we ship ----------------------------------------------------------------------
 
@@ -26,22 +26,22 @@ def test_the_shipped_file_gives_every_setting_its_default() -> None:
 # --- what wins ----------------------------------------------------------------------------------
 
 
-def test_the_later_source_wins(desk: Desk) -> None:
+def test_the_later_source_wins(settings_dir: SettingsFixture) -> None:
     file = "[board]\nport = 1\n[bridge]\nlease = 0.1\n[odom]\nhold = 0.2"
     env = {"T2__BOARD__PORT": "2", "T2__BRIDGE__LEASE": "0.15", "PATH": "/bin"}
-    loaded = desk.load(file, environ=env, sets=["board.port=3"])
+    loaded = settings_dir.load(file, environ=env, sets=["board.port=3"])
     assert loaded.config.board.port == 3
     assert loaded.config.bridge.lease == 0.15
     assert loaded.config.odom.hold == 0.2
 
 
-def test_of_two_files_and_of_two_sets_the_later_wins(desk: Desk) -> None:
-    assert desk.load("[board]\nport = 1", "[board]\nport = 2").config.board.port == 2
-    assert desk.load(sets=["board.port=1", "board.port=2"]).config.board.port == 2
+def test_of_two_files_and_of_two_sets_the_later_wins(settings_dir: SettingsFixture) -> None:
+    assert settings_dir.load("[board]\nport = 1", "[board]\nport = 2").config.board.port == 2
+    assert settings_dir.load(sets=["board.port=1", "board.port=2"]).config.board.port == 2
 
 
-def test_every_setting_knows_where_it_came_from(desk: Desk) -> None:
-    settings = desk.load(
+def test_every_setting_knows_where_it_came_from(settings_dir: SettingsFixture) -> None:
+    settings = settings_dir.load(
         "[board]\nport = 9",
         environ={"T2__ODOM__HOLD": "0.2"},
         sets=["log.level=debug"],
@@ -53,7 +53,7 @@ def test_every_setting_knows_where_it_came_from(desk: Desk) -> None:
     assert set(settings) == {path for path, _ in flatten(Everything())}
 
 
-def test_what_nobody_names_is_a_default(desk: Desk) -> None:
+def test_what_nobody_names_is_a_default(settings_dir: SettingsFixture) -> None:
     setting = load(Shared, Sources((), {})).settings["bus.lease"]
     assert (setting.value, setting.origin) == (1.0, "default")
 
@@ -66,30 +66,32 @@ def test_a_file_below_the_working_directory_is_called_by_its_short_name(
     assert loaded.settings["robot.id"].origin == "config/t2.toml"
 
 
-def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(desk: Desk) -> None:
-    (desk.folder / "keys").mkdir()
-    desk.file("[bus]\nca = 'ca.pem'\nmembers = '/etc/t2/members.json'", "keys/bus.toml")
+def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(
+    settings_dir: SettingsFixture,
+) -> None:
+    (settings_dir.folder / "keys").mkdir()
+    settings_dir.file("[bus]\nca = 'ca.pem'\nmembers = '/etc/t2/members.json'", "keys/bus.toml")
     file = Path("keys/bus.toml")
     loaded = load(Everything, Sources((file,), {}, ["bus.private_key=private.key"]))
-    assert loaded.config.bus.ca == str(desk.folder / "keys" / "ca.pem")
+    assert loaded.config.bus.ca == str(settings_dir.folder / "keys" / "ca.pem")
     assert loaded.config.bus.members == "/etc/t2/members.json"
     assert loaded.config.bus.private_key == "private.key"  # nobody put that beside anything
     assert loaded.config.bus.certificate == ""
     assert loaded.settings["bus.ca"].origin == "keys/bus.toml"
 
 
-def test_a_file_that_is_named_by_a_number_is_refused(desk: Desk) -> None:
+def test_a_file_that_is_named_by_a_number_is_refused(settings_dir: SettingsFixture) -> None:
     said = "over0.toml: bus.ca = 1: Expected `str`, got `int`"
-    assert desk.refused("[bus]\nca = 1").startswith(said)
+    assert settings_dir.refused("[bus]\nca = 1").startswith(said)
 
 
 @pytest.mark.parametrize("name", ["T2__BOARD__PORT", "t2__board__port", "T2__Board__Port"])
-def test_the_environment_is_read_in_any_case(desk: Desk, name: str) -> None:
-    assert desk.load(environ={name: "77"}).config.board.port == 77
+def test_the_environment_is_read_in_any_case(settings_dir: SettingsFixture, name: str) -> None:
+    assert settings_dir.load(environ={name: "77"}).config.board.port == 77
 
 
-def test_a_service_leaves_the_sections_of_others_alone(desk: Desk) -> None:
-    file = desk.file("[safety]\nnonsense = 1\n[robot]\nid = 'x'")
+def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFixture) -> None:
+    file = settings_dir.file("[safety]\nnonsense = 1\n[robot]\nid = 'x'")
     loaded = load(Shared, Sources((file,), {"T2__BRIDGE__NONSENSE": "1"}))
     assert loaded.config.robot.id == "x"
     assert not any(path.startswith(("safety", "bridge")) for path in loaded.settings)
@@ -115,17 +117,20 @@ def test_a_service_leaves_the_sections_of_others_alone(desk: Desk) -> None:
     ],
 )  # fmt: skip
 def test_a_set_is_read_as_its_field_wants_it(
-    desk: Desk, text: str, path: str, value: object
+    settings_dir: SettingsFixture, text: str, path: str, value: object
 ) -> None:
     found, _, given = text.partition("=")
     name = "T2__" + found.strip().upper().replace(".", "__")
-    for loaded in (desk.load(sets=[text]), desk.load(environ={name: given.strip()})):
+    for loaded in (
+        settings_dir.load(sets=[text]),
+        settings_dir.load(environ={name: given.strip()}),
+    ):
         assert dict(flatten(loaded.config))[path] == value
 
 
-def test_a_table_adds_to_what_was_given_before(desk: Desk) -> None:
+def test_a_table_adds_to_what_was_given_before(settings_dir: SettingsFixture) -> None:
     file = "[safety.sources.nav]\npriority = 40\nlease = 0.1"
-    loaded = desk.load(file, sets=["safety.sources={new={priority=5,lease=0.2}}"])
+    loaded = settings_dir.load(file, sets=["safety.sources={new={priority=5,lease=0.2}}"])
     sources = loaded.config.safety.sources
     assert sources["nav"].priority == 40
     assert sources["new"].priority == 5
@@ -134,8 +139,8 @@ def test_a_table_adds_to_what_was_given_before(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("empty", ["[board]", "board = {}", "[safety.sources]", ""])
-def test_an_empty_table_takes_nothing_away(desk: Desk, empty: str) -> None:
-    loaded = desk.load("[board]\nport = 5000", empty)
+def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty: str) -> None:
+    loaded = settings_dir.load("[board]\nport = 5000", empty)
     assert loaded.config.board.port == 5000
     assert "web" in loaded.config.safety.sources
 
@@ -183,9 +188,9 @@ def test_an_empty_table_takes_nothing_away(desk: Desk, empty: str) -> None:
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_refused_by_name_value_and_range(
-    desk: Desk, text: str, sentence: str
+    settings_dir: SettingsFixture, text: str, sentence: str
 ) -> None:
-    said = desk.refused(text)
+    said = settings_dir.refused(text)
     assert sentence in said
     assert "over0.toml" in said
 
@@ -202,8 +207,8 @@ def test_a_wrong_file_is_refused_by_name_value_and_range(
         ("safety.sources.web.lease=99", "safety.sources.web.lease = 99: Expected `float` <= 10.0"),
     ],
 )
-def test_a_wrong_set_is_refused(desk: Desk, sets: str, sentence: str) -> None:
-    assert sentence in desk.refused(sets=[sets])
+def test_a_wrong_set_is_refused(settings_dir: SettingsFixture, sets: str, sentence: str) -> None:
+    assert sentence in settings_dir.refused(sets=[sets])
 
 
 @pytest.mark.parametrize(
@@ -215,15 +220,17 @@ def test_a_wrong_set_is_refused(desk: Desk, sets: str, sentence: str) -> None:
         ("T2__", "1", "environment T2__: : no section ''"),
     ],
 )
-def test_a_wrong_environment_is_refused(desk: Desk, name: str, value: str, sentence: str) -> None:
-    assert sentence in desk.refused(environ={name: value})
+def test_a_wrong_environment_is_refused(
+    settings_dir: SettingsFixture, name: str, value: str, sentence: str
+) -> None:
+    assert sentence in settings_dir.refused(environ={name: value})
 
 
-def test_what_two_settings_break_together_names_both(desk: Desk) -> None:
-    said = desk.refused("[board]\nport = 4001")
+def test_what_two_settings_break_together_names_both(settings_dir: SettingsFixture) -> None:
+    said = settings_dir.refused("[board]\nport = 4001")
     assert f"{DEFAULT_FILE}, over0.toml: board: port 4001 of 127.0.0.1 is both the board's" in said
 
 
-def test_a_protection_may_be_taken_away_when_owned_up_to(desk: Desk) -> None:
-    loaded = desk.load("[safety]\nmargin = 0.0\nunsafe_overrides = ['margin']")
+def test_a_protection_may_be_taken_away_when_owned_up_to(settings_dir: SettingsFixture) -> None:
+    loaded = settings_dir.load("[safety]\nmargin = 0.0\nunsafe_overrides = ['margin']")
     assert loaded.config.safety.margin == 0.0

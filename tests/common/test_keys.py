@@ -1,5 +1,6 @@
 """The table of keys: complete, unambiguous, and out of reach of a stray ``put t2/**``."""
 
+import msgspec
 import pytest
 import zenoh
 
@@ -101,3 +102,17 @@ def test_known_names_of_an_expression_are_whole_keys() -> None:
     assert keys.DRIVE.known("001", {"source": "*"}, ["nav"]) == {"t2/v1/001/@cmd/drive/nav"}
     assert keys.DRIVE.known("001", {"source": "*"}, ()) == frozenset()
     assert keys.DRIVE.known("001", {"source": "nav"}, ()) == frozenset()
+
+
+def test_schemas_are_by_path_and_in_its_order() -> None:
+    by_path = {topic.path: topic for topic in TOPICS}
+    made = keys.schemas([by_path["tel/bridge/link"], by_path["tel/bridge/bumper"]])
+    assert list(made) == ["tel/bridge/bumper", "tel/bridge/link"]
+    bumper = made["tel/bridge/bumper"]["$defs"]["Bumper"]
+    assert bumper["properties"]["pressed"] == {"type": "boolean"}
+    assert "pressed" in bumper["required"]
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.path)
+def test_every_topic_has_a_schema_that_is_json(topic: Topic[Message]) -> None:
+    assert topic.message.__name__ in msgspec.json.encode(keys.schemas([topic])).decode()

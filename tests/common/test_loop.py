@@ -85,7 +85,7 @@ def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock)
     turn(loop)
     for _ in range(3):
         clock.pass_s(0.9)
-        timer.put_off(clock.now_ns)
+        timer.defer(clock.now_ns)
         turn(loop)
     assert calls == [100 * NS_PER_S]
     clock.pass_s(1.0)
@@ -97,7 +97,7 @@ def test_who_is_put_off_too_late_was_late(loop: Loop, clock: Clock) -> None:
     timer = loop.every(1.0, lambda _: None)
     turn(loop)
     clock.pass_s(1.5)
-    loop.post(lambda: timer.put_off(clock.now_ns))
+    loop.post(lambda: timer.defer(clock.now_ns))
     turn(loop)
     assert loop.take_lateness_s() == 0.5
 

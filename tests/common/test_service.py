@@ -11,14 +11,12 @@ import zenoh
 from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.messages import Event, Health
 from common.service import Node, resident_bytes, run
 from common.settings import Shared
-from common.version import VERSION
-from tests.common.bus_fixture import Rig
-from tests.common.example_options import SPECIMEN, on
-from tests.common.program import Program, program
+from tests.common.bus_fixture import BusFixture
+from tests.common.program import SPECIMEN, Program, on, program
 from verification.harness.support import free_port, listening, wait_until
 
 # --- settings -----------------------------------------------------------------------------------
@@ -76,23 +74,23 @@ class Witness:
 
 
 @pytest.fixture(scope="module")
-def lived(shared_router: str) -> Iterator[tuple[Rig, Program, Witness]]:
+def lived(shared_router: str) -> Iterator[tuple[BusFixture, Program, Witness]]:
     """Run one service for all the tests that only look at it."""
-    with Rig(shared_router) as rig:
-        witness = Witness(rig.robot)
-        rig.bus(witness.declare)
-        with program(SPECIMEN, "plain", *on(shared_router, rig.robot)) as it:
+    with BusFixture(shared_router) as buses:
+        witness = Witness(buses.robot)
+        buses.bus(witness.declare)
+        with program(SPECIMEN, "plain", *on(shared_router, buses.robot)) as it:
             wait_until(lambda: len(witness.health) >= 2, "health")
-            yield rig, it, witness
+            yield buses, it, witness
 
 
-Lived = tuple[Rig, Program, Witness]
+Lived = tuple[BusFixture, Program, Witness]
 
 
-def info(rig: Rig, part: str) -> dict[str, object]:
+def info(buses: BusFixture, part: str) -> dict[str, object]:
     """Ask the service what it tells newcomers."""
-    session: zenoh.Session = rig.session()
-    (reply,) = session.get(keys.info_key(rig.robot, "specimen", part))
+    session: zenoh.Session = buses.session()
+    (reply,) = session.get(keys.info_key(buses.robot, "specimen", part))
     assert reply.ok is not None
     assert str(reply.ok.encoding) == "application/json"
     found: dict[str, object] = json.loads(reply.ok.payload.to_bytes())
@@ -100,7 +98,7 @@ def info(rig: Rig, part: str) -> dict[str, object]:
 
 
 def test_its_health_comes_every_second(lived: Lived) -> None:
-    rig, _, witness = lived
+    buses, _, witness = lived
     first, last = witness.health[0], witness.health[-1]
     assert last.service == "specimen"
     assert last.version == VERSION
@@ -109,16 +107,16 @@ def test_its_health_comes_every_second(lived: Lived) -> None:
     assert last.counters["resets"] == 1
     assert 1_000_000 < last.rss < 10**10
     assert last.lateness >= 0
-    bumper = keys.BUMPER.on(rig.robot)
+    bumper = keys.BUMPER.on(buses.robot)
     wait_until(lambda: witness.health[-1].rates.get(bumper, 0) > 1, "the bumper's rate")
     # By the time that has passed, not by that which should have: never more than it is due.
     assert max(health.rates.get(bumper, 0) for health in witness.health) < 60
 
 
 def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
-    rig, it, _ = lived
-    witness = Witness(rig.robot)
-    rig.bus(witness.declare)
+    buses, it, _ = lived
+    witness = Witness(buses.robot)
+    buses.bus(witness.declare)
     wait_until(lambda: witness.events, "the event")
     assert witness.events[0].name == "built"
     assert witness.events[0].about == {"count": 3}
@@ -129,10 +127,10 @@ def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
 
 
 def test_its_token_carries_its_boot(lived: Lived) -> None:
-    rig, _, witness = lived
+    buses, _, witness = lived
     wait_until(lambda: witness.tokens, "the token")
     key, alive = witness.tokens[0]
-    assert key == keys.live_key(rig.robot, "specimen", f"{witness.health[0].boot:x}")
+    assert key == keys.live_key(buses.robot, "specimen", f"{witness.health[0].boot:x}")
     assert alive
 
 
@@ -143,17 +141,17 @@ def test_it_tells_its_schemas(lived: Lived) -> None:
 
 
 def test_it_tells_its_settings_and_where_they_came_from(lived: Lived) -> None:
-    rig, _, _ = lived
-    told = info(rig, "config")
-    assert told["robot.id"] == {"value": rig.robot, "origin": f"--set robot.id={rig.robot}"}
+    buses, _, _ = lived
+    told = info(buses, "config")
+    assert told["robot.id"] == {"value": buses.robot, "origin": f"--set robot.id={buses.robot}"}
     assert told["bus.lease"] == {"value": 1.0, "origin": "config/t2.toml"}
 
 
 def test_it_tells_its_last_values(lived: Lived) -> None:
-    rig, _, _ = lived
-    last = msgspec.convert(info(rig, "last"), dict[str, dict[str, object]])
-    assert last[keys.BUMPER.on(rig.robot)]["pressed"] is True
-    assert last[keys.HEALTH.on(rig.robot, service="specimen")]["service"] == "specimen"
+    buses, _, _ = lived
+    last = msgspec.convert(info(buses, "last"), dict[str, dict[str, object]])
+    assert last[keys.BUMPER.on(buses.robot)]["pressed"] is True
+    assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
 
 
 def test_its_logs_are_json_lines(lived: Lived) -> None:
@@ -184,19 +182,19 @@ def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) ->
 # --- without one, and with one that comes and goes ----------------------------------------------
 
 
-def test_it_waits_for_a_router_and_outlives_its_restart(rig: Rig) -> None:
-    rig.endpoint = f"tcp/127.0.0.1:{free_port()}"
-    witness = Witness(rig.robot)
-    with program(SPECIMEN, "plain", *on(rig.endpoint, rig.robot)) as it:
+def test_it_waits_for_a_router_and_outlives_its_restart(buses: BusFixture) -> None:
+    buses.endpoint = f"tcp/127.0.0.1:{free_port()}"
+    witness = Witness(buses.robot)
+    with program(SPECIMEN, "plain", *on(buses.endpoint, buses.robot)) as it:
         it.wait_for("waiting for a router")
-        with router(listening(rig.endpoint)):
-            rig.bus(witness.declare)
+        with router(listening(buses.endpoint)):
+            buses.bus(witness.declare)
             wait_until(lambda: witness.health, "health")
             assert {event.name for event in witness.events} <= {"built"}
         witness.health.clear()
-        with router(listening(rig.endpoint)):
+        with router(listening(buses.endpoint)):
             wait_until(lambda: witness.health, "health after the restart")
-            assert info(rig, "last")
+            assert info(buses, "last")
         it.process.send_signal(signal.SIGINT)
         assert it.code() == 0
         assert it.events()[-1] == "stopped"

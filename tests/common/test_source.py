@@ -10,7 +10,8 @@ from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.messages import Drive
 from common.source import BARRED_AFTER, DriveSource
-from tests.teleop.support import FakeBus, safety_state
+from tests.factories import safety_state
+from tests.teleop.support import FakeBus
 from verification.harness.support import at, bus_on, running, wait_until
 
 
@@ -34,9 +35,9 @@ def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_no_motion_is_refused(bus: FakeBus, wrong: float) -> None:
     source = DriveSource(bus, "demo")
-    with pytest.raises(ValueError, match="is no motion"):
+    with pytest.raises(ValueError, match="is not a finite motion"):
         source.ask(wrong, 0.0)
-    with pytest.raises(ValueError, match="is no motion"):
+    with pytest.raises(ValueError, match="is not a finite motion"):
         source.ask(0.0, wrong)
 
 

@@ -1,4 +1,4 @@
-"""What systemd is told, on a real socket of the kind that it listens on."""
+"""What systemd is told, on a real socket of the kind that it enabled on."""
 
 import contextlib
 import os
@@ -9,13 +9,12 @@ from pathlib import Path
 import pytest
 
 from common.freshness import NS_PER_S
-from common.systemd import BEATS, Systemd
-from tests.common.example_options import SPECIMEN, on
-from tests.common.program import program
+from common.systemd import BEATS_PER_TIMEOUT, Systemd
+from tests.common.program import SPECIMEN, on, program
 from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.support import free_port, wait_until
 
-PERIOD_NS = PATIENCE_US * 1000 // BEATS
+PERIOD_NS = PATIENCE_US * 1000 // BEATS_PER_TIMEOUT
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
 
 def test_ready_is_said_once_and_beats_when_they_are_due(manager: Manager) -> None:
     systemd = Systemd(manager.environ)
-    assert systemd.listens
+    assert systemd.enabled
     for now_ns in (0, 1, PERIOD_NS - 1, PERIOD_NS, PERIOD_NS + 1, 5 * PERIOD_NS):
         systemd.ready(now_ns)
     systemd.stopping()
@@ -65,7 +64,7 @@ def test_no_beat_where_nobody_waits_for_ours(manager: Manager, watchdog: dict[st
 
 def test_without_systemd_nothing_is_said() -> None:
     systemd = Systemd({})
-    assert not systemd.listens
+    assert not systemd.enabled
     systemd.ready(0)
     systemd.stopping()
 
@@ -85,7 +84,7 @@ def test_a_socket_that_is_full_holds_nobody_up(manager: Manager) -> None:
 @pytest.mark.timeout(20)
 def test_a_socket_that_is_gone_holds_nobody_up(manager: Manager) -> None:
     systemd = Systemd(dict(manager.environ))
-    manager.close()  # nobody listens
+    manager.close()  # nobody enabled
     systemd.ready(0)
     place = Path(manager.environ["NOTIFY_SOCKET"])
     place.unlink()

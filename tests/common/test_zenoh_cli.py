@@ -14,30 +14,30 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
 from common.messages import Bumper, Done, Drive, ReleaseRequest
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from verification.harness.support import PATIENCE_S, wait_until
 
 ZENOH = Path(sys.executable).parent / "zenoh"
 
 
-def command(rig: Rig, *words: str) -> list[str]:
+def command(buses: BusFixture, *words: str) -> list[str]:
     """Return the command line that docs and README give."""
-    options = ("--mode", "client", "--connect", rig.endpoint)
+    options = ("--mode", "client", "--connect", buses.endpoint)
     return [str(ZENOH), *options, "--cfg", "scouting/multicast/enabled:false", *words]
 
 
-def zenoh(rig: Rig, *words: str) -> "subprocess.CompletedProcess[str]":
+def zenoh(buses: BusFixture, *words: str) -> "subprocess.CompletedProcess[str]":
     """Run the command to its end."""
     return subprocess.run(
-        command(rig, *words), capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        command(buses, *words), capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
 
 
 @pytest.fixture
-def watching(rig: Rig) -> Iterator["subprocess.Popen[str]"]:
-    words = ("subscribe", "-k", f"t2/v1/{rig.robot}/**", "--decoder", "t2")
+def watching(buses: BusFixture) -> Iterator["subprocess.Popen[str]"]:
+    words = ("subscribe", "-k", f"t2/v1/{buses.robot}/**", "--decoder", "t2")
     with subprocess.Popen(
-        command(rig, *words, "--line", "{key}: {value}"), stdout=subprocess.PIPE, text=True,
+        command(buses, *words, "--line", "{key}: {value}"), stdout=subprocess.PIPE, text=True,
         env={"PYTHONUNBUFFERED": "1"},
     ) as process:  # fmt: skip
         try:
@@ -46,8 +46,8 @@ def watching(rig: Rig) -> Iterator["subprocess.Popen[str]"]:
             process.kill()
 
 
-def test_it_shows_our_messages(rig: Rig, watching: "subprocess.Popen[str]") -> None:
-    bus = rig.bus()
+def test_it_shows_our_messages(buses: BusFixture, watching: "subprocess.Popen[str]") -> None:
+    bus = buses.bus()
     publisher = bus.publisher(keys.BUMPER)
     # What is put before it has subscribed is lost; a match tells that it has.
     until_heard(
@@ -60,17 +60,17 @@ def test_it_shows_our_messages(rig: Rig, watching: "subprocess.Popen[str]") -> N
     line = watching.stdout.readline()
     found = re.fullmatch(r"(\S+): (\{.*\})\n", line)
     assert found, line
-    assert found[1] == keys.BUMPER.on(rig.robot)
+    assert found[1] == keys.BUMPER.on(buses.robot)
     shown = json.loads(found[2])
     assert shown["pressed"] is True
     assert shown["boot"] == bus.boot
 
 
 def test_it_shows_what_is_no_message_and_lives_on(
-    rig: Rig, watching: "subprocess.Popen[str]"
+    buses: BusFixture, watching: "subprocess.Popen[str]"
 ) -> None:
-    key = f"t2/v1/{rig.robot}/tel/mine"
-    publisher: Any = rig.session().declare_publisher(key)  # its type says that matching is a bool
+    key = f"t2/v1/{buses.robot}/tel/mine"
+    publisher: Any = buses.session().declare_publisher(key)  # its type says that matching is a bool
     wait_until(lambda: publisher.matching_status.matching, "the subscription")
     publisher.put(b"\xc1")
     publisher.delete()
@@ -80,12 +80,12 @@ def test_it_shows_what_is_no_message_and_lives_on(
     assert shown == [f"{key}: {each}\n" for each in ('{"not_msgpack": "c1"}', "null", '{"a": 1}')]
 
 
-def test_it_puts_a_message_that_we_understand(rig: Rig) -> None:
+def test_it_puts_a_message_that_we_understand(buses: BusFixture) -> None:
     heard: list[Arrival[Drive]] = []
-    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*"))
-    key = keys.DRIVE.on(rig.robot, source="web")
+    buses.bus(lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*"))
+    key = keys.DRIVE.on(buses.robot, source="web")
     text = '{"linear": 0.25, "angular": 0, "echo": 1}'
-    done = zenoh(rig, "put", "-k", key, "--encoder", "t2", "-v", text)
+    done = zenoh(buses, "put", "-k", key, "--encoder", "t2", "-v", text)
     assert done.returncode == 0, done.stderr
     wait_until(lambda: heard, "the message")
     message = heard[0].message
@@ -93,7 +93,7 @@ def test_it_puts_a_message_that_we_understand(rig: Rig) -> None:
     assert message.boot != 0
 
 
-def test_it_makes_a_call(rig: Rig) -> None:
+def test_it_makes_a_call(buses: BusFixture) -> None:
     asked: list[ReleaseRequest] = []
 
     def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
@@ -103,9 +103,9 @@ def test_it_makes_a_call(rig: Rig) -> None:
     def declare(bus: Bus) -> None:
         bus.serve(keys.RELEASE, release)
 
-    rig.bus(declare)
-    key = keys.RELEASE.on(rig.robot)
+    buses.bus(declare)
+    key = keys.RELEASE.on(buses.robot)
     words = ("--encoder", "t2", "--decoder", "t2", "-v", '{"held": false}')
-    done = zenoh(rig, "get", "-s", key, *words)
+    done = zenoh(buses, "get", "-s", key, *words)
     assert '"text": "creeping"' in done.stdout, done.stderr
     assert asked == [ReleaseRequest(held=False)]

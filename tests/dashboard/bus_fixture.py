@@ -7,7 +7,7 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, Release
-from tests.teleop.support import safety_state
+from tests.factories import safety_state
 from verification.harness.dashboard import Eye
 from verification.harness.support import PATIENCE_S, wait_until
 

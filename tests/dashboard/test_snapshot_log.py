@@ -4,7 +4,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from services.dashboard.snapshot_log import KEPT, Snapshots
-from tests.teleop.support import safety_state
+from tests.factories import safety_state
 
 STATE = safety_state(heartbeat=5)
 LIMIT_S = 1.0

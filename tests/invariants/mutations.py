@@ -15,7 +15,7 @@ from common.wire.frame import Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperReport
 from services.bridge import lease as leases
-from services.bridge import link as links
+from services.bridge import readiness
 from services.bridge.core import Core
 from services.bridge.lease import Lease
 from services.bridge.output import Send
@@ -265,7 +265,7 @@ MUTATIONS: dict[str, Mutation] = {
         leases, "expire", still_neutral, motions_get_lost, "no neutral motion came",
     ),
     "silence is not noticed": (
-        links, "on_tick", lambda link, *_: link, board_freezes_and_safety_hears_late,
+        readiness, "link_on_tick", lambda link, *_: link, board_freezes_and_safety_hears_late,
         "the board is silent",
     ),
     "brakes that are off": (

@@ -18,14 +18,14 @@ from services.metrics import exporter, life
 from services.metrics.exporter import call_in_loop
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from tests.metrics.robots import event, health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
 from verification.harness.support import free_port, router_process, wait_until
 
 
-def test_scrape_of_a_running_robot(rig: Rig, tmp_path: Path) -> None:
+def test_scrape_of_a_running_robot(rig: BusFixture, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
@@ -44,7 +44,7 @@ def test_scrape_of_a_running_robot(rig: Rig, tmp_path: Path) -> None:
     assert names(found) <= known
 
 
-def test_a_dead_robot_has_no_values(rig: Rig, tmp_path: Path) -> None:
+def test_a_dead_robot_has_no_values(rig: BusFixture, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         bus = pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
@@ -68,7 +68,7 @@ def test_a_dead_robot_has_no_values(rig: Rig, tmp_path: Path) -> None:
         )
 
 
-def test_all_robots_of_a_site_are_exported(rig: Rig, tmp_path: Path) -> None:
+def test_all_robots_of_a_site_are_exported(rig: BusFixture, tmp_path: Path) -> None:
     root = "t2/v1"
     site, stranger = f"{rig.robot}s", rig.session()
 
@@ -92,7 +92,7 @@ def test_all_robots_of_a_site_are_exported(rig: Rig, tmp_path: Path) -> None:
         assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # only a laptop has its id
 
 
-def test_events_are_counted_and_set_disk_full(rig: Rig, tmp_path: Path) -> None:
+def test_events_are_counted_and_set_disk_full(rig: BusFixture, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
     labels = {"event": "disk_full", "level": "error", "service": "recorder"}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
@@ -125,7 +125,7 @@ def test_router_loss_is_exported(tmp_path: Path) -> None:
             stack.close()
 
 
-def test_certificates_are_read_from_the_member_list(rig: Rig, tmp_path: Path) -> None:
+def test_certificates_are_read_from_the_member_list(rig: BusFixture, tmp_path: Path) -> None:
     members = tmp_path / "members.json"
     end = datetime(2030, 1, 1, tzinfo=UTC)
     one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
@@ -140,7 +140,7 @@ def test_certificates_are_read_from_the_member_list(rig: Rig, tmp_path: Path) ->
 
 
 def test_a_taken_port_is_an_error(
-    rig: Rig, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    rig: BusFixture, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with running(rig.endpoint, tmp_path) as port:
         words = [f"bus.connect={rig.endpoint}", f"metrics.port={port}"]

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from common.messages import Mileage, Velocity
-from services.odom.arc_segments import Leg
+from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
-from services.odom.estimator import Estimator, Outcome, judge, step
+from services.odom.estimator import Estimator, Outcome, check_continuity, step
 from services.odom.standstill import DISTANCE_WRAP_M
 
 UP = math.inf
@@ -19,8 +19,8 @@ def mileage(
     return Mileage(distance=distance, heading=heading, epoch=epoch, boot=boot, seq=seq)
 
 
-def seen(turn: float = 0.0) -> Leg:
-    return Leg(0.0, turn, 1.0, seen=True)
+def seen(turn: float = 0.0) -> ArcSegment:
+    return ArcSegment(0.0, turn, 1.0, seen=True)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_a_distance_goes_on_over_the_wrap(before: float, after: float, distance:
     ],
 )
 def test_what_goes_on_and_what_begins(before: Mileage, after: Mileage, outcome: Outcome) -> None:
-    assert judge(before, after, 0.0, 1.0) is outcome
+    assert check_continuity(before, after, 0.0, 1.0) is outcome
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_goes_on_and_what_begins(before: Mileage, after: Mileage, outcome: 
 def test_a_jump_is_farther_than_any_vehicle_drives(
     distance: float, time_s: float, outcome: Outcome
 ) -> None:
-    assert judge(mileage(), mileage(seq=2), distance, time_s) is outcome
+    assert check_continuity(mileage(), mileage(seq=2), distance, time_s) is outcome
 
 
 @pytest.mark.parametrize(

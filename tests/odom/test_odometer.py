@@ -17,7 +17,8 @@ from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from verification.harness.support import PATIENCE_S, at, bus_on, running, safety_state, wait_until
+from tests.factories import safety_state
+from verification.harness.support import PATIENCE_S, at, bus_on, running, wait_until
 
 SPEED, TURNING = 0.5, 0.25
 PERIOD_S = 0.02
@@ -52,7 +53,7 @@ class World:
 
     def tick(self, _: int) -> None:
         self.heartbeat += 1
-        self.to_safety.put(safety_state(self.heartbeat))
+        self.to_safety.put(safety_state(heartbeat=self.heartbeat))
         if not self.speaking:
             return
         self.ticks += 1

@@ -136,17 +136,17 @@ def derivative(start: Pose, distance: float, turn: float) -> Matrix:
 
 @given(headings, distances, turns, st.builds(ProcessNoise, variances, variances, variances))
 def test_covariance_follows_the_derivatives(
-    heading: float, distance: float, turn: float, spread: ProcessNoise
+    heading: float, distance: float, turn: float, noise: ProcessNoise
 ) -> None:
     start = Pose(2.0, 3.0, heading)
     before = CERTAIN.plus(0.3, 1.0, 0.2, 0.1).plus(0.2, -0.3, 1.0, 0.5).plus(0.1, 0.0, 0.0, 1.0)
-    after = PoseEstimate(start, before).moved(distance, turn, spread)
+    after = PoseEstimate(start, before).moved(distance, turn, noise)
     whole = [[*row, 0.0, 0.0] for row in matrix(before)]
-    whole += [[0.0, 0.0, 0.0, spread.distance, 0.0], [0.0, 0.0, 0.0, 0.0, spread.turn]]
+    whole += [[0.0, 0.0, 0.0, noise.distance, 0.0], [0.0, 0.0, 0.0, 0.0, noise.turn]]
     by = derivative(start, distance, turn)
     expected = product(product(by, whole), [list(col) for col in zip(*by, strict=True)])
-    expected[0][0] += spread.place
-    expected[1][1] += spread.place
+    expected[0][0] += noise.place
+    expected[1][1] += noise.place
     for row, wanted in zip(matrix(after.covariance), expected, strict=True):
         assert row == pytest.approx(wanted, abs=1e-6)
 

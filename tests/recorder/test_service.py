@@ -25,13 +25,13 @@ from services.recorder.reader import Reader, RecordedMessage
 from services.recorder.recorder import Recorder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from tests.recorder import samples
 from verification.harness.stack import Witness
 from verification.harness.support import PATIENCE_S, running, wait_until
 
 
-def sets(rig: Rig, folder: Path, *more: str) -> list[str]:
+def sets(rig: BusFixture, folder: Path, *more: str) -> list[str]:
     return [
         f"bus.connect={rig.endpoint}",
         f"robot.id={rig.robot}",
@@ -42,7 +42,7 @@ def sets(rig: Rig, folder: Path, *more: str) -> list[str]:
 
 
 @contextmanager
-def recorder(rig: Rig, folder: Path, *more: str) -> Iterator[None]:
+def recorder(rig: BusFixture, folder: Path, *more: str) -> Iterator[None]:
     """Record in this process while the context lasts."""
     node = Node("recorder", load(RecorderConfig, Sources(sets=sets(rig, folder, *more))))
     Recorder(node)
@@ -54,7 +54,7 @@ def recorder(rig: Rig, folder: Path, *more: str) -> Iterator[None]:
     node.bus.close()
 
 
-def recorder_events(rig: Rig) -> list[Event]:
+def recorder_events(rig: BusFixture) -> list[Event]:
     """Return the recorder's events, also earlier ones."""
     found: list[Event] = []
     rig.bus(
@@ -86,7 +86,7 @@ def paths(found: list[RecordedMessage]) -> set[str]:
     return {each.key.split("/", 3)[3] for each in found}
 
 
-def test_every_key_is_recorded_with_raw_frames(rig: Rig, tmp_path: Path) -> None:
+def test_every_key_is_recorded_with_raw_frames(rig: BusFixture, tmp_path: Path) -> None:
     stranger = rig.session()
     root = f"t2/v1/{rig.robot}"
     with recorder(rig, tmp_path, "recorder.everything=true"):
@@ -108,7 +108,7 @@ def test_every_key_is_recorded_with_raw_frames(rig: Rig, tmp_path: Path) -> None
     assert "t2/v1/another/tel/x" not in found
 
 
-def test_a_latch_writes_the_black_box(rig: Rig, tmp_path: Path) -> None:
+def test_a_latch_writes_the_black_box(rig: BusFixture, tmp_path: Path) -> None:
     events, numbers = recorder_events(rig), count()
     latched: list[str] = []
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
@@ -135,7 +135,7 @@ def test_a_latch_writes_the_black_box(rig: Rig, tmp_path: Path) -> None:
     assert reader.about["why"] == "latch-contact"
 
 
-def test_without_room_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
+def test_without_room_nothing_is_written(rig: BusFixture, tmp_path: Path) -> None:
     events = recorder_events(rig)
     latched: list[str] = []
     pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
@@ -154,7 +154,7 @@ def test_without_room_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
 
 
 def test_an_incident_replaces_old_recordings_on_a_full_disk(
-    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stem = f"{rig.robot}-2026"
     old = [f"{stem}0101-00000{n}{why}.mcap" for why in ("", "-latch-contact") for n in range(3)]
@@ -186,7 +186,7 @@ def test_an_incident_replaces_old_recordings_on_a_full_disk(
     assert not {"disk_full", "black_box_lost"} & {each.name for each in events}
 
 
-def test_sigkill_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
+def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None:
     numbers = count(1)
     put: list[m.Velocity] = []
 
@@ -216,7 +216,7 @@ def test_sigkill_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
     assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * held_up_s
 
 
-def test_an_invalid_safety_state_is_recorded_and_ignored(rig: Rig, tmp_path: Path) -> None:
+def test_an_invalid_safety_state_is_recorded_and_ignored(rig: BusFixture, tmp_path: Path) -> None:
     stranger, key = rig.session(), keys.SAFETY.on(rig.robot)
     with recorder(rig, tmp_path, "recorder.everything=true"):
         until_heard(
@@ -228,7 +228,7 @@ def test_an_invalid_safety_state_is_recorded_and_ignored(rig: Rig, tmp_path: Pat
 
 
 def test_a_disk_error_ends_the_file_and_nothing_else(
-    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     events, numbers = recorder_events(rig), count()
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
@@ -248,7 +248,7 @@ def test_a_disk_error_ends_the_file_and_nothing_else(
     assert "No space left on device" in full.text
 
 
-def test_t2_record_completes_its_files_on_ctrl_c(rig: Rig, tmp_path: Path) -> None:
+def test_t2_record_completes_its_files_on_ctrl_c(rig: BusFixture, tmp_path: Path) -> None:
     numbers = count()
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     where = ["--set", f"bus.connect={rig.endpoint}", "--set", "recorder.free=1"]

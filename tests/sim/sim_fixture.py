@@ -37,7 +37,7 @@ def room(*boxes: dict[str, Any], **plan: Any) -> Plan:
 WALL_AHEAD = room(walls=[{"points": [[3.0, -5.0], [3.0, 5.0]]}])
 
 
-class Rig:
+class SimFixture:
     """A simulation with its script, the PC's side of the wire, and all that came of it."""
 
     def __init__(

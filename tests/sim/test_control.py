@@ -10,19 +10,19 @@ from common.errors import LinkError, MessageError
 from sim.control import HOST, Control, ControlSocket
 from sim.injection import Reply
 from sim.requests import Bumper, RemoveBox
-from tests.sim.sim_fixture import Rig
+from tests.sim.sim_fixture import SimFixture
 from verification.harness.support import PATIENCE_S, free_port
 
 
 @contextmanager
-def served(rig: Rig) -> Iterator[int]:
-    """Serve a rig's control socket in a thread, and name its port."""
+def served(sim: SimFixture) -> Iterator[int]:
+    """Serve a sim's control socket in a thread, and name its port."""
     port = free_port(socket.SOCK_DGRAM)
-    control = ControlSocket(port, rig.injection)
+    control = ControlSocket(port, sim.injection)
     control.sock.settimeout(0.05)  # waits a little instead of turning at full speed
     ended = threading.Event()
     with closing(control):
-        thread = threading.Thread(target=_serve, args=(control, rig, ended.is_set))
+        thread = threading.Thread(target=_serve, args=(control, sim, ended.is_set))
         thread.start()
         try:
             yield port
@@ -31,16 +31,16 @@ def served(rig: Rig) -> Iterator[int]:
             thread.join(PATIENCE_S)
 
 
-def _serve(control: ControlSocket, rig: Rig, ended: Callable[[], bool]) -> None:
+def _serve(control: ControlSocket, sim: SimFixture, ended: Callable[[], bool]) -> None:
     while not ended():
         try:
-            control.serve(rig.now_ns)
+            control.serve(sim.now_ns)
         except TimeoutError:
             continue
 
 
 def test_a_client_does_and_asks() -> None:
-    with served(Rig()) as port:
+    with served(SimFixture()) as port:
         control = Control(port, PATIENCE_S)
         assert not control.truth().pressed
         assert control.do(Bumper(pressed=True)) == Reply(ok=True)
@@ -48,13 +48,16 @@ def test_a_client_does_and_asks() -> None:
 
 
 def test_a_client_is_told_why_it_is_refused() -> None:
-    with served(Rig()) as port, pytest.raises(MessageError, match="no box is called 'crate'"):
+    with (
+        served(SimFixture()) as port,
+        pytest.raises(MessageError, match="no box is called 'crate'"),
+    ):
         Control(port, PATIENCE_S).do(RemoveBox(name="crate"))
 
 
 @pytest.mark.parametrize("text", [b"", b"\xff", b"{", b'{"do": "dance"}', b"[" * 60_000])
 def test_what_is_no_request_is_answered_with_the_reason(text: bytes) -> None:
-    with served(Rig()) as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+    with served(SimFixture()) as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.settimeout(PATIENCE_S)
         sock.sendto(text, (HOST, port))
         reply = msgspec.json.decode(sock.recv(4096), type=Reply)

@@ -9,99 +9,99 @@ from hypothesis import strategies as st
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame
-from tests.sim.sim_fixture import WALL_AHEAD, Rig, room
+from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, room
 
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 
 
 def test_run_is_held_for_ever() -> None:
-    rig = Rig()
-    rig.run(0.5)
-    rig.after(60.0)
-    assert rig.truth.linear == 0.5
-    assert rig.truth.x == pytest.approx(0.5 * 60, abs=0.2)
+    sim = SimFixture()
+    sim.run(0.5)
+    sim.after(60.0)
+    assert sim.truth.linear == 0.5
+    assert sim.truth.x == pytest.approx(0.5 * 60, abs=0.2)
 
 
 def test_stop_ramps_and_break_does_not() -> None:
-    rig = Rig()
-    rig.run(0.8)
-    rig.after(2.0)
-    rig.stop()
-    rig.after(0.5)
-    assert rig.truth.linear == pytest.approx(0.4, abs=0.02)
-    rig.say(c.MotionCommand(c.MotionKind.BREAK))
-    rig.after(0.01)
-    assert rig.truth.linear == 0.0
+    sim = SimFixture()
+    sim.run(0.8)
+    sim.after(2.0)
+    sim.stop()
+    sim.after(0.5)
+    assert sim.truth.linear == pytest.approx(0.4, abs=0.02)
+    sim.say(c.MotionCommand(c.MotionKind.BREAK))
+    sim.after(0.01)
+    assert sim.truth.linear == 0.0
 
 
 def test_counters_are_what_was_really_driven() -> None:
-    rig = Rig()
-    rig.run(1.0, 0.5)
-    rig.after(10.0)
-    rig.stop()
-    rig.after(3.0)
-    truth = rig.truth
+    sim = SimFixture()
+    sim.run(1.0, 0.5)
+    sim.after(10.0)
+    sim.stop()
+    sim.after(3.0)
+    truth = sim.truth
     heading = math.degrees(math.remainder(truth.heading, math.tau))
-    assert rig.say(c.DistanceQuery()) == [
+    assert sim.say(c.DistanceQuery()) == [
         r.DistanceReport(round(truth.distance * 1000), round(heading * 10))
     ]
     assert abs(truth.heading) > math.pi
 
 
 def test_the_distance_driven_has_no_sign() -> None:
-    rig = Rig()
+    sim = SimFixture()
     for linear in (1.0, -1.0):
-        rig.run(linear)
-        rig.after(3.0)
-    rig.stop()
-    rig.after(2.0)
-    assert rig.truth.distance > 4.0
-    (counted,) = rig.say(c.DistanceQuery())
+        sim.run(linear)
+        sim.after(3.0)
+    sim.stop()
+    sim.after(2.0)
+    assert sim.truth.distance > 4.0
+    (counted,) = sim.say(c.DistanceQuery())
     assert isinstance(counted, r.DistanceReport)
-    assert counted.distance_mm < rig.truth.distance * 1000 - 1000
+    assert counted.distance_mm < sim.truth.distance * 1000 - 1000
 
 
 def test_a_wall_holds_it_and_presses_the_bumper() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.run(1.0)
-    rig.after(4.0)
-    assert rig.truth.x == pytest.approx(3.0 - 0.55, abs=1e-3)
-    assert rig.truth.clearance == pytest.approx(0.0, abs=1e-3)
-    assert (rig.truth.linear, rig.truth.contact) == (0.0, True)
-    assert rig.say(c.BumperQuery()) == [r.BumperReport(True)]
+    sim = SimFixture(WALL_AHEAD)
+    sim.run(1.0)
+    sim.after(4.0)
+    assert sim.truth.x == pytest.approx(3.0 - 0.55, abs=1e-3)
+    assert sim.truth.clearance == pytest.approx(0.0, abs=1e-3)
+    assert (sim.truth.linear, sim.truth.contact) == (0.0, True)
+    assert sim.say(c.BumperQuery()) == [r.BumperReport(True)]
 
 
 def test_a_low_box_gives_no_echo_but_presses_the_bumper() -> None:
-    rig = Rig(STEP_AHEAD)
-    rig.run(0.5)
-    rig.after(4.0)
-    (ranges,) = rig.say(c.UltrasonicQuery())
+    sim = SimFixture(STEP_AHEAD)
+    sim.run(0.5)
+    sim.after(4.0)
+    (ranges,) = sim.say(c.UltrasonicQuery())
     assert isinstance(ranges, r.UltrasonicReport)
     assert set(ranges.ranges_mm) == {5000}
-    assert (rig.truth.contact, rig.truth.clearance) == (True, None)
-    assert rig.truth.x == pytest.approx(1.8 - 0.55, abs=1e-3)
+    assert (sim.truth.contact, sim.truth.clearance) == (True, None)
+    assert sim.truth.x == pytest.approx(1.8 - 0.55, abs=1e-3)
 
 
 def test_it_backs_off_a_step_with_its_bumper_brake_on() -> None:
-    rig = Rig(STEP_AHEAD)
-    rig.say(c.BumperBrakeSet(True))
-    rig.run(0.5)
-    rig.after(4.0)
-    assert rig.truth.braking
-    touching = rig.truth.x
-    rig.run(-0.1)
-    rig.after(1.0)
-    assert rig.truth.x < touching - 0.05
-    assert (rig.truth.contact, rig.truth.braking) == (False, False)
+    sim = SimFixture(STEP_AHEAD)
+    sim.say(c.BumperBrakeSet(True))
+    sim.run(0.5)
+    sim.after(4.0)
+    assert sim.truth.braking
+    touching = sim.truth.x
+    sim.run(-0.1)
+    sim.after(1.0)
+    assert sim.truth.x < touching - 0.05
+    assert (sim.truth.contact, sim.truth.braking) == (False, False)
 
 
 def test_the_sonar_brake_keeps_it_from_the_wall() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.say(c.UltrasonicBrakeSet(True))
-    rig.run(0.3)
-    rig.after(15.0)
-    assert rig.truth.clearance == pytest.approx(0.14, abs=0.02)
-    assert (rig.truth.linear, rig.truth.command.kind) == (0.0, "run")
+    sim = SimFixture(WALL_AHEAD)
+    sim.say(c.UltrasonicBrakeSet(True))
+    sim.run(0.3)
+    sim.after(15.0)
+    assert sim.truth.clearance == pytest.approx(0.14, abs=0.02)
+    assert (sim.truth.linear, sim.truth.command.kind) == (0.0, "run")
 
 
 hostile = st.lists(
@@ -127,16 +127,16 @@ def test_it_never_penetrates_and_is_always_finite(
     start = {"x": 0.0, "y": 0.0, "heading": heading}
     walls = [{"points": [[-1, -1], [1.5, -1], [1, 1], [-1, 2], [-1, -1]]}]
     post = {"name": "post", "x": 0.9, "y": 0.0, "length": 0.02, "width": 0.02, "low": True}
-    rig = Rig(room(post, start=start, walls=walls))
-    world, body = rig.simulation.world, rig.simulation.body
+    sim = SimFixture(room(post, start=start, walls=walls))
+    world, body = sim.simulation.world, sim.simulation.body
     for part in said:
         if isinstance(part, bytes):
-            rig.simulation.receive(part, 4002, rig.now_ns)
+            sim.simulation.receive(part, 4002, sim.now_ns)
         else:
-            rig.say(*part)
+            sim.say(*part)
         for _ in range(10):
-            rig.after(0.02)
-            assert not world.blocks(body, rig.simulation.pose)
-            truth = rig.truth
+            sim.after(0.02)
+            assert not world.blocks(body, sim.simulation.pose)
+            truth = sim.truth
             numbers = truth.x, truth.y, truth.heading, truth.linear, truth.angular, truth.distance
             assert all(math.isfinite(number) for number in numbers)

@@ -7,21 +7,21 @@ from common.wire.frame import Frame, Side
 from sim import trace as t
 from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar
 from sim.simulation import CATCH_UP_NS
-from tests.sim.sim_fixture import EMPTY, PORTS, START_NS, WALL_AHEAD, Rig, config
+from tests.sim.sim_fixture import EMPTY, PORTS, START_NS, WALL_AHEAD, SimFixture, config
 
 LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
 
 
 def test_velocity_streams_to_both_ports_from_power_on() -> None:
-    rig = Rig()
-    assert len(rig.after(1.0)) == 100
-    assert [datagram.port for datagram in rig.datagrams] == [*PORTS] * 50
+    sim = SimFixture()
+    assert len(sim.after(1.0)) == 100
+    assert [datagram.port for datagram in sim.datagrams] == [*PORTS] * 50
 
 
 def test_an_answer_goes_to_the_port_that_asked() -> None:
-    rig = Rig()
-    assert rig.say(c.BumperQuery(), port=4001) == [r.BumperReport(False)]
-    assert rig.datagrams[-1].port == 4001
+    sim = SimFixture()
+    assert sim.say(c.BumperQuery(), port=4001) == [r.BumperReport(False)]
+    assert sim.datagrams[-1].port == 4001
 
 
 def test_every_frame_of_a_datagram_is_answered() -> None:
@@ -29,128 +29,128 @@ def test_every_frame_of_a_datagram_is_answered() -> None:
         c.DistanceQuery(), c.UltrasonicQuery(), c.BumperQuery(), c.UltrasonicBrakeSet(True),
         c.BumperBrakeSet(False), c.DriverQuery(Side.LEFT), c.DriverQuery(Side.RIGHT), LED,
     ]  # fmt: skip
-    answers = Rig().say(*asked)
+    answers = SimFixture().say(*asked)
     assert [answer.ID for answer in answers] == [query.ID for query in asked]
 
 
 def test_bad_bytes_are_counted_and_what_follows_is_heard() -> None:
-    rig = Rig()
-    good = rig.framing.pack(c.BumperQuery())
-    rig.simulation.receive(b"noise" + good[:3] + good, 4002, rig.now_ns)
-    assert len(rig.simulation.take_sent(rig.now_ns)) == 1
-    assert rig.simulation.counters["rejected_no_magic"] == 1
-    assert rig.simulation.counters["BumperQuery"] == 1
+    sim = SimFixture()
+    good = sim.framing.pack(c.BumperQuery())
+    sim.simulation.receive(b"noise" + good[:3] + good, 4002, sim.now_ns)
+    assert len(sim.simulation.take_sent(sim.now_ns)) == 1
+    assert sim.simulation.counters["rejected_no_magic"] == 1
+    assert sim.simulation.counters["BumperQuery"] == 1
 
 
 def test_nobody_else_is_obeyed() -> None:
-    rig = Rig()
-    assert rig.say(c.BumperQuery(), c.MotionCommand(c.MotionKind.RUN, 500), port=None) == []
-    assert rig.truth.command.kind == "stop"
-    assert rig.simulation.counters["foreign"] == 1
+    sim = SimFixture()
+    assert sim.say(c.BumperQuery(), c.MotionCommand(c.MotionKind.RUN, 500), port=None) == []
+    assert sim.truth.command.kind == "stop"
+    assert sim.simulation.counters["foreign"] == 1
 
 
 def test_ranges_are_renewed_at_their_own_rate() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.run(1.0)
-    rig.after(1.5)
+    sim = SimFixture(WALL_AHEAD)
+    sim.run(1.0)
+    sim.after(1.5)
     seen = []
     for _ in range(20):
-        rig.after(0.01)
-        seen += rig.say(c.UltrasonicQuery())
+        sim.after(0.01)
+        seen += sim.say(c.UltrasonicQuery())
     assert len(set(seen)) in (4, 5)
 
 
 def test_a_driver_fault_is_reported_unasked_once_and_to_both_ports() -> None:
-    rig = Rig()
-    rig.do(Driver(side="right", bits=0x80000001))
-    rig.do(Driver(side="right", bits=0x80000001))
+    sim = SimFixture()
+    sim.do(Driver(side="right", bits=0x80000001))
+    sim.do(Driver(side="right", bits=0x80000001))
     report = r.DriverReport(Side.RIGHT, 0x80000001)
-    assert rig.after(0.1).count(report) == 2
-    assert rig.say(c.DriverQuery(Side.RIGHT), c.DriverQuery(Side.LEFT)) == [
+    assert sim.after(0.1).count(report) == 2
+    assert sim.say(c.DriverQuery(Side.RIGHT), c.DriverQuery(Side.LEFT)) == [
         report,
         r.DriverReport(Side.LEFT, 0),
     ]
-    rig.do(Driver(side="right", bits=0))
-    assert not any(isinstance(frame, r.DriverReport) for frame in rig.after(0.1))
+    sim.do(Driver(side="right", bits=0))
+    assert not any(isinstance(frame, r.DriverReport) for frame in sim.after(0.1))
 
 
 def test_a_frozen_board_neither_speaks_nor_hears_and_drives_on() -> None:
-    rig = Rig()
-    rig.run(0.5)
-    rig.after(1.0)
-    rig.do(Freeze(seconds=0.5))
-    rig.do(Driver(side="left", bits=1))
-    rig.stop()
-    assert rig.after(0.49) == []
-    assert rig.truth.silent
-    assert rig.simulation.counters["unheard"] == 1
-    assert (rig.truth.linear, rig.truth.command.kind) == (0.5, "run")
-    assert r.VelocityReport(500, 0) in rig.after(0.1)
+    sim = SimFixture()
+    sim.run(0.5)
+    sim.after(1.0)
+    sim.do(Freeze(seconds=0.5))
+    sim.do(Driver(side="left", bits=1))
+    sim.stop()
+    assert sim.after(0.49) == []
+    assert sim.truth.silent
+    assert sim.simulation.counters["unheard"] == 1
+    assert (sim.truth.linear, sim.truth.command.kind) == (0.5, "run")
+    assert r.VelocityReport(500, 0) in sim.after(0.1)
 
 
 def test_a_power_cycle_stops_it_and_clears_counters_and_switches() -> None:
-    rig = Rig()
-    rig.say(c.BumperBrakeSet(True))
-    rig.run(0.5)
-    rig.after(2.0)
-    rig.do(PowerCycle(seconds=1.0))
-    assert rig.after(0.99) == []
-    assert (rig.truth.linear, rig.truth.command.kind) == (0.0, "stop")
-    assert rig.after(0.1)
-    assert rig.say(c.DistanceQuery()) == [r.DistanceReport(0, 0)]
-    assert not rig.truth.bumper_brake
-    assert [(line.on, line.mono_ns - START_NS) for line in rig.of(t.Power)] == [
+    sim = SimFixture()
+    sim.say(c.BumperBrakeSet(True))
+    sim.run(0.5)
+    sim.after(2.0)
+    sim.do(PowerCycle(seconds=1.0))
+    assert sim.after(0.99) == []
+    assert (sim.truth.linear, sim.truth.command.kind) == (0.0, "stop")
+    assert sim.after(0.1)
+    assert sim.say(c.DistanceQuery()) == [r.DistanceReport(0, 0)]
+    assert not sim.truth.bumper_brake
+    assert [(line.on, line.mono_ns - START_NS) for line in sim.of(t.Power)] == [
         (False, 2 * NS_PER_S),
         (True, 3 * NS_PER_S),
     ]
 
 
 def test_a_late_tick_is_caught_up() -> None:
-    rig = Rig()
-    rig.run(1.0)
-    rig.injection.advance(START_NS + CATCH_UP_NS)
-    assert rig.simulation.now_ns == START_NS + CATCH_UP_NS
-    assert rig.simulation.counters["holes"] == 0
+    sim = SimFixture()
+    sim.run(1.0)
+    sim.injection.advance(START_NS + CATCH_UP_NS)
+    assert sim.simulation.now_ns == START_NS + CATCH_UP_NS
+    assert sim.simulation.counters["holes"] == 0
 
 
 def test_a_hole_is_left_out() -> None:
-    rig = Rig()
-    rig.run(1.0)
-    rig.injection.advance(START_NS + 60 * NS_PER_S)
-    assert rig.simulation.now_ns == START_NS + 60 * NS_PER_S
-    assert rig.simulation.counters["holes"] == 1
-    assert rig.truth.x < 1.0
+    sim = SimFixture()
+    sim.run(1.0)
+    sim.injection.advance(START_NS + 60 * NS_PER_S)
+    assert sim.simulation.now_ns == START_NS + 60 * NS_PER_S
+    assert sim.simulation.counters["holes"] == 1
+    assert sim.truth.x < 1.0
 
 
 def test_the_angular_unit_of_the_wire_is_obeyed() -> None:
-    rig = Rig(
+    sim = SimFixture(
         EMPTY,
         config(
             wire={"command_angular_unit": "milliradian", "feedback_angular_unit": "milliradian"}
         ),
     )
-    rig.say(c.MotionCommand(c.MotionKind.RUN, 0, 500))
-    said = rig.after(1.0)
-    assert rig.truth.angular == pytest.approx(0.5)
+    sim.say(c.MotionCommand(c.MotionKind.RUN, 0, 500))
+    said = sim.after(1.0)
+    assert sim.truth.angular == pytest.approx(0.5)
     assert said[-1] == r.VelocityReport(0, 500)
 
 
 def test_the_crc_of_the_wire_is_obeyed() -> None:
-    rig = Rig(EMPTY, config(wire={"crc": "xmodem", "crc_covers": "header_and_payload"}))
-    assert rig.say(c.BumperQuery()) == [r.BumperReport(False)]
-    plain = Rig().framing.pack(c.BumperQuery())
-    rig.simulation.receive(plain, 4002, rig.now_ns)
-    assert rig.simulation.counters["rejected_bad_crc"] == 1
+    sim = SimFixture(EMPTY, config(wire={"crc": "xmodem", "crc_covers": "header_and_payload"}))
+    assert sim.say(c.BumperQuery()) == [r.BumperReport(False)]
+    plain = SimFixture().framing.pack(c.BumperQuery())
+    sim.simulation.receive(plain, 4002, sim.now_ns)
+    assert sim.simulation.counters["rejected_bad_crc"] == 1
 
 
 def test_a_stuck_sonar_reports_its_last_range() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.after(0.1)
-    before = rig.say(c.UltrasonicQuery())
-    rig.do(Sonar(name="front", stuck=True))
-    rig.run(0.5)
-    rig.after(1.0)
-    after = rig.say(c.UltrasonicQuery())
+    sim = SimFixture(WALL_AHEAD)
+    sim.after(0.1)
+    before = sim.say(c.UltrasonicQuery())
+    sim.do(Sonar(name="front", stuck=True))
+    sim.run(0.5)
+    sim.after(1.0)
+    after = sim.say(c.UltrasonicQuery())
     assert isinstance(before[0], r.UltrasonicReport)
     assert isinstance(after[0], r.UltrasonicReport)
     assert after[0].ranges_mm[2] == before[0].ranges_mm[2]
@@ -158,28 +158,28 @@ def test_a_stuck_sonar_reports_its_last_range() -> None:
 
 
 def test_what_is_muted_is_not_said_and_the_rest_is() -> None:
-    rig = Rig()
-    rig.do(Mute(reports=("bumper", "velocity")))
-    assert rig.say(c.BumperQuery(), c.DistanceQuery()) == [r.DistanceReport(0, 0)]
-    assert rig.after(0.1) == []
-    rig.do(Mute())
-    assert rig.say(c.BumperQuery()) == [r.BumperReport(False)]
+    sim = SimFixture()
+    sim.do(Mute(reports=("bumper", "velocity")))
+    assert sim.say(c.BumperQuery(), c.DistanceQuery()) == [r.DistanceReport(0, 0)]
+    assert sim.after(0.1) == []
+    sim.do(Mute())
+    assert sim.say(c.BumperQuery()) == [r.BumperReport(False)]
 
 
 @pytest.mark.parametrize("garbage", [False, True])
 def test_a_flood_comes_to_both_ports_at_its_rate_and_ends(garbage: bool) -> None:
-    rig = Rig()
-    rig.do(Flood(rate=20_000, seconds=0.1, garbage=garbage))
-    said = rig.after(0.1)
+    sim = SimFixture()
+    sim.do(Flood(rate=20_000, seconds=0.1, garbage=garbage))
+    said = sim.after(0.1)
     own = 10  # its stream, to both ports
-    assert 1800 + own <= len(rig.datagrams) <= 2000 + own
-    assert {datagram.port for datagram in rig.datagrams} == set(PORTS)
-    assert len(said) == (own if garbage else len(rig.datagrams))
-    assert len(rig.after(0.1)) == own
+    assert 1800 + own <= len(sim.datagrams) <= 2000 + own
+    assert {datagram.port for datagram in sim.datagrams} == set(PORTS)
+    assert len(said) == (own if garbage else len(sim.datagrams))
+    assert len(sim.after(0.1)) == own
 
 
 def test_a_frozen_board_does_not_flood() -> None:
-    rig = Rig()
-    rig.do(Flood(seconds=1.0))
-    rig.do(Freeze(seconds=0.5))
-    assert rig.after(0.4) == []
+    sim = SimFixture()
+    sim.do(Flood(seconds=1.0))
+    sim.do(Freeze(seconds=0.5))
+    assert sim.after(0.4) == []

@@ -93,7 +93,7 @@ def test_the_same_seed_gives_the_same_noise() -> None:
 
 def test_a_faulty_one_says_so_and_the_others_do_not() -> None:
     some = sonars()
-    some.disturb(Sonar(name="front", fault=True))
+    some.inject(Sonar(name="front", fault=True))
     assert measured(some, "front") == 0xFFFF
     assert measured(some, "right") == 700
 
@@ -101,22 +101,22 @@ def test_a_faulty_one_says_so_and_the_others_do_not() -> None:
 def test_a_stuck_one_keeps_its_last_range_and_comes_back() -> None:
     some = sonars()
     assert measured(some, "front") == 2500
-    some.disturb(Sonar(name="front", stuck=True))
+    some.inject(Sonar(name="front", stuck=True))
     assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 2500
-    some.disturb(Sonar(name="front"))
+    some.inject(Sonar(name="front"))
     assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 1500
 
 
 @pytest.mark.parametrize(("value", "expected"), [(1.234, 1234), (0.01, 0), (50.0, 4000)])
 def test_a_range_can_be_made_up(value: float, expected: int) -> None:
     some = sonars()
-    some.disturb(Sonar(name="left", range=value))
+    some.inject(Sonar(name="left", range=value))
     assert measured(some, "left") == expected
 
 
 def test_a_fault_does_not_change_the_noise_of_others() -> None:
     well, ill = sonars(noise=0.01), sonars(noise=0.01)
-    ill.disturb(Sonar(name="front", fault=True))
+    ill.inject(Sonar(name="front", fault=True))
     assert measured(well, "right") == measured(ill, "right")
 
 

@@ -10,19 +10,19 @@ from common.freshness import NS_PER_S
 from common.wire import commands as c
 from sim import trace as t
 from sim.requests import PowerCycle, Script, Step, Wire
-from tests.sim.sim_fixture import START_NS, WALL_AHEAD, Rig, config, room
+from tests.sim.sim_fixture import START_NS, WALL_AHEAD, SimFixture, config, room
 
 
 def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
-    rig = Rig()
-    rig.after(0.25)
-    rig.say(
+    sim = SimFixture()
+    sim.after(0.25)
+    sim.say(
         c.BumperQuery(),
         c.MotionCommand(c.MotionKind.RUN, -250, 900),
         c.MotionCommand(c.MotionKind.STOP),
         c.MotionCommand(c.MotionKind.BREAK),
     )
-    lines = [msgspec.to_builtins(line) for line in rig.of(t.Command)]
+    lines = [msgspec.to_builtins(line) for line in sim.of(t.Command)]
     assert [line["kind"] for line in lines] == ["run", "stop", "brake"]
     assert lines[0] == {
         "event": "command",
@@ -31,58 +31,58 @@ def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
         "linear": -0.25,
         "angular": pytest.approx(math.pi / 2),
     }
-    assert rig.simulation.counters["BumperQuery"] == 1
+    assert sim.simulation.counters["BumperQuery"] == 1
 
 
 def test_the_trace_knows_when_the_first_frame_said_so() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.run(1.0)
-    rig.after(4.0)
-    assert rig.of(t.BumperSent) == []
+    sim = SimFixture(WALL_AHEAD)
+    sim.run(1.0)
+    sim.after(4.0)
+    assert sim.of(t.BumperSent) == []
     for linear in (0.0, -0.5):
-        rig.say(c.BumperQuery())
-        rig.say(c.BumperQuery())
-        rig.run(linear)
-        rig.after(1.0)
-    rig.say(c.BumperQuery())
-    assert [line.pressed for line in rig.of(t.BumperSent)] == [True, False]
+        sim.say(c.BumperQuery())
+        sim.say(c.BumperQuery())
+        sim.run(linear)
+        sim.after(1.0)
+    sim.say(c.BumperQuery())
+    assert [line.pressed for line in sim.of(t.BumperSent)] == [True, False]
 
 
 @pytest.mark.parametrize("lost", [Wire(foreign=1.0), Wire(drop=1.0)])
 def test_a_frame_that_does_not_arrive_said_nothing(lost: Wire) -> None:
-    rig = Rig()
-    rig.simulation.hand_on_bumper = True
-    rig.simulation.feel()
-    rig.simulation.to_pc.faults = lost
-    rig.say(c.BumperQuery())
-    assert rig.of(t.BumperSent) == []
-    rig.simulation.to_pc.faults = Wire()
-    rig.say(c.BumperQuery())
-    assert len(rig.of(t.BumperSent)) == 1
+    sim = SimFixture()
+    sim.simulation.pressed_by_hand = True
+    sim.simulation.update_bumper()
+    sim.simulation.to_pc.faults = lost
+    sim.say(c.BumperQuery())
+    assert sim.of(t.BumperSent) == []
+    sim.simulation.to_pc.faults = Wire()
+    sim.say(c.BumperQuery())
+    assert len(sim.of(t.BumperSent)) == 1
 
 
 def test_a_delayed_command_is_obeyed_when_it_arrives() -> None:
-    rig = Rig()
-    rig.simulation.to_board.faults = Wire(delay=0.2)
-    rig.run(0.5)
-    rig.after(0.19)
-    assert rig.of(t.Command) == []
-    rig.after(0.02)
-    assert [line.kind for line in rig.of(t.Command)] == ["run"]
+    sim = SimFixture()
+    sim.simulation.to_board.faults = Wire(delay=0.2)
+    sim.run(0.5)
+    sim.after(0.19)
+    assert sim.of(t.Command) == []
+    sim.after(0.02)
+    assert [line.kind for line in sim.of(t.Command)] == ["run"]
 
 
 def test_a_command_from_a_foreign_address_is_not_obeyed() -> None:
-    rig = Rig()
-    rig.simulation.to_board.faults = Wire(foreign=1.0)
-    rig.run(0.5)
-    assert rig.truth.command.kind == "stop"
-    assert rig.simulation.counters["foreign"] == 1
+    sim = SimFixture()
+    sim.simulation.to_board.faults = Wire(foreign=1.0)
+    sim.run(0.5)
+    assert sim.truth.command.kind == "stop"
+    assert sim.simulation.counters["foreign"] == 1
 
 
 def test_truth_comes_at_20_hz() -> None:
-    rig = Rig(WALL_AHEAD)
-    rig.after(1.0)
-    lines = rig.of(t.Truth)
+    sim = SimFixture(WALL_AHEAD)
+    sim.after(1.0)
+    lines = sim.of(t.Truth)
     assert len(lines) == 20
     assert {b.mono_ns - a.mono_ns for a, b in itertools.pairwise(lines)} == {NS_PER_S // 20}
     assert lines[-1].clearance == pytest.approx(3.0 - 0.55)
@@ -102,14 +102,14 @@ def lap(seed: int) -> tuple[bytes, bytes]:
     walls = [{"points": [[-2, -2], [4, -2], [4, 3], [-2, 3], [-2, -2]]}]
     script = Script(steps=(Step(at=9.0, request=PowerCycle()), Step(at=4.0, request=LOSSY)))
     noisy = config(sim={"seed": seed, "sonar_noise": 0.01})
-    rig = Rig(room(*boxes, walls=walls), noisy, script)
+    sim = SimFixture(room(*boxes, walls=walls), noisy, script)
     for linear, angular, seconds in LAP:
         for _ in range(round(seconds * 10)):
-            rig.run(linear, angular)
-            rig.say(c.UltrasonicQuery(), c.BumperQuery())
-            rig.after(0.1)
-    trace = b"\n".join(msgspec.json.encode(line) for line in rig.records)
-    return trace, b"".join(datagram.payload for datagram in rig.datagrams)
+            sim.run(linear, angular)
+            sim.say(c.UltrasonicQuery(), c.BumperQuery())
+            sim.after(0.1)
+    trace = b"\n".join(msgspec.json.encode(line) for line in sim.records)
+    return trace, b"".join(datagram.payload for datagram in sim.datagrams)
 
 
 def test_the_same_seed_gives_the_same_trace_and_the_same_bytes() -> None:

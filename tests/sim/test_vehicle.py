@@ -9,7 +9,7 @@ from common.settings import Vehicle
 from common.wire.commands import MotionKind
 from sim.config import Drive
 from sim.geometry import Pose
-from sim.vehicle import go, moved, next_twist, wheels
+from sim.vehicle import move, moved, next_twist, wheels
 
 DRIVE = Drive()
 DT = 0.01
@@ -74,13 +74,13 @@ def test_many_short_steps_are_one_long_one(twist: Twist, steps: int) -> None:
 
 
 def test_a_free_way_is_gone_whole() -> None:
-    way = go(Pose(0.0, 0.0, 0.0), Twist(1.0, 0.5), 0.1, lambda _: False)
+    way = move(Pose(0.0, 0.0, 0.0), Twist(1.0, 0.5), 0.1, lambda _: False)
     assert not way.held
     assert (way.distance, way.turn) == pytest.approx((0.1, 0.05))
 
 
 def test_a_way_ends_just_before_what_blocks_it() -> None:
-    way = go(Pose(0.0, 0.0, 0.0), Twist(1.0), 0.1, lambda pose: pose.x > 0.03)
+    way = move(Pose(0.0, 0.0, 0.0), Twist(1.0), 0.1, lambda pose: pose.x > 0.03)
     assert way.held
     assert 0.0299 < way.pose.x <= 0.03
     assert way.distance == pytest.approx(way.pose.x)
@@ -88,7 +88,7 @@ def test_a_way_ends_just_before_what_blocks_it() -> None:
 
 def test_a_way_that_is_blocked_at_once_stays() -> None:
     start = Pose(1.0, 2.0, 3.0)
-    way = go(start, Twist(1.0, 1.0), 0.1, lambda pose: pose != start)
+    way = move(start, Twist(1.0, 1.0), 0.1, lambda pose: pose != start)
     assert way.held
     assert (way.pose, way.distance, way.turn) == (start, 0.0, 0.0)
 

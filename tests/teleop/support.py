@@ -11,7 +11,7 @@ from common.bus.bus import Arrival, Bus
 from common.config import Loaded
 from common.freshness import NS_PER_S
 from common.keys import Call, Topic
-from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Release, SafetyState
+from common.messages import Drive, Message
 from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
@@ -82,78 +82,6 @@ class FakeNode(Node[TeleopConfig]):
         """How many requests to move went out, and the last one."""
         publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
         return publisher.next_seq - 1, publisher.last
-
-
-def safety_state(**fields: Any) -> SafetyState:
-    """Return a state of safety that lets everything through, but for the given fields."""
-    usual: dict[str, Any] = {
-        "verdict": "run",
-        "latched": (),
-        "causes": (),
-        "source": "teleop",
-        "limits": Limits(forward=1.0, backward=0.5, angular=1.0),
-        "heartbeat": 7,
-        "text": "Driving.",
-    }
-    return SafetyState(**usual | fields)
-
-
-def release(**fields: Any) -> Release:
-    """Return a contact after a motion forward, but for the given fields."""
-    usual: dict[str, Any] = {
-        "believed_free": "backward",
-        "travelled": 0.43,
-        "age": 12.0,
-        "forbidden": (),
-        "left": 0.12,
-    }
-    return Release(**usual | fields)
-
-
-def contact_state(**fields: Any) -> SafetyState:
-    """Return a state of safety with a pressed bumper, but for the given fields."""
-    pressed = Cause(name="contact", action="brake", age=12.0, text="The bumper was hit.", id=42)
-    usual: dict[str, Any] = {
-        "verdict": "brake",
-        "latched": ("contact",),
-        "causes": (pressed,),
-        "source": None,
-        "text": "The bumper is pressed.",
-        "release": release(),
-    }
-    return safety_state(**usual | fields)
-
-
-def link(**fields: Any) -> Link:
-    """Return a link that is up, but for the given fields."""
-    usual: dict[str, Any] = {
-        "state": "up",
-        "board": "10.7.5.224:4002",
-        "epoch": 0,
-        "armed": True,
-        "waiting": "",
-        "rates": {"Velocity": 50.0, "Driver": 2.0},
-        "rejected": {},
-        "round_trip": 0.0008,
-    }
-    return Link(**usual | fields)
-
-
-def odometry(**fields: Any) -> Odometry:
-    """Return a pose, but for the given fields."""
-    usual: dict[str, Any] = {
-        "x": 1.234,
-        "y": -0.4,
-        "heading": 1.5708,
-        "linear": 0.2,
-        "angular": 0.0,
-        "pose_covariance": (0.0,) * 9,
-        "twist_covariance": (0.0,) * 4,
-        "epoch": 0,
-        "residual": 0.004,
-        "slip": False,
-    }
-    return Odometry(**usual | fields)
 
 
 def view(**fields: Any) -> View:

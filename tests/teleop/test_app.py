@@ -17,7 +17,8 @@ from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
 from services.teleop.controller import Desk
-from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
+from tests.factories import contact_state, link, safety_state
+from tests.teleop.support import FakeNode, answer
 from verification.harness.support import PATIENCE_S
 from verification.harness.teleop_app import NearApp
 

@@ -26,7 +26,8 @@ from common.motion import Twist
 from services.teleop.controller import ESTOP_TICKS, Desk
 from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick
-from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
+from tests.factories import contact_state, link, safety_state
+from tests.teleop.support import FakeNode, answer
 
 PERIOD_NS = NS_PER_S // 20
 

@@ -7,7 +7,8 @@ from common.motion import Twist
 from services.teleop import panels
 from services.teleop.round_trip import UNKNOWN, multiplexer
 from services.teleop.view import Line
-from tests.teleop.support import contact_state, link, release, safety_state, view
+from tests.factories import contact_state, link, release, safety_state
+from tests.teleop.support import view
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")

@@ -5,7 +5,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.messages import ResetDone
 from services.teleop.reset_check import ResetCheck
-from tests.teleop.support import contact_state, safety_state
+from tests.factories import contact_state, safety_state
 
 SEEN = contact_state(boot=5)
 DONE = ResetDone(text="Reset.", boot=5, heartbeat=9, cleared=(42,))

@@ -6,7 +6,8 @@ from common.messages import Direction, Driver, Limits, Velocity
 from common.motion import Twist
 from services.teleop.table import motion
 from services.teleop.view import View
-from tests.teleop.support import contact_state, link, odometry, safety_state, view
+from tests.factories import contact_state, link, odometry, safety_state
+from tests.teleop.support import view
 
 
 def rows(of: View) -> dict[str, str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from common.loop import Loop
-from tests.drive_source import Stick
+from tests.drive_source import ConstantSource
 from tests.zenohd.router import command, found
 from verification.harness.stack import Chain, chain
 from verification.harness.support import bus_on, running
@@ -23,9 +23,9 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
 
 
 @pytest.fixture
-def stick(stack: Chain) -> Iterator[Stick]:
+def source(stack: Chain) -> Iterator[ConstantSource]:
     """Be a source that asks without a pause."""
     with running(Loop()) as loop:
-        it = Stick(loop)
+        it = ConstantSource(loop)
         with bus_on(stack.endpoint, loop, it.declare):
             yield it

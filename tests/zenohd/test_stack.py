@@ -10,7 +10,7 @@ from common.bus.probe import probe
 from common.loop import Loop
 from common.messages import Event, ResetRequest
 from tests.cli.processes import ran, sets
-from tests.drive_source import Stick, moves_since, push
+from tests.drive_source import ConstantSource, drive_until_moving, moves_since
 from verification.harness.stack import Chain
 from verification.harness.support import bus_on, running, wait_until
 
@@ -28,20 +28,22 @@ def reset(stack: Chain) -> None:
     wait_until(lambda: t2(stack, "call", "safety/reset")[0] == 0, "a reset")
 
 
-def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, stick: Stick) -> None:
-    push(stack, stick)
+def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, source: ConstantSource) -> None:
+    drive_until_moving(stack, source)
     code, said = t2(stack, "estop")
     assert code == 0, said
     wait_until(lambda: stack.last() == "brake", "BREAK at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert not moves_since(stack, len(stack.trace().commands))
-    stick.linear = 0.0
+    source.linear = 0.0
     reset(stack)
-    push(stack, stick)
+    drive_until_moving(stack, source)
 
 
-def test_the_routers_death_stops_it_and_the_next_one_takes_over(stack: Chain, stick: Stick) -> None:
-    push(stack, stick)
+def test_the_routers_death_stops_it_and_the_next_one_takes_over(
+    stack: Chain, source: ConstantSource
+) -> None:
+    drive_until_moving(stack, source)
     stack.kill("router")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert stack.last() in ("stop", "brake")
@@ -49,9 +51,9 @@ def test_the_routers_death_stops_it_and_the_next_one_takes_over(stack: Chain, st
     stack.start("router")
     wait_until(lambda: t2(stack, "services")[0] == 0, "the services on the next router")
     assert not moves_since(stack, count)
-    stick.linear = 0.0
+    source.linear = 0.0
     reset(stack)
-    push(stack, stick)
+    drive_until_moving(stack, source)
 
 
 def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: Chain) -> None:

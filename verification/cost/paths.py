@@ -24,7 +24,7 @@ from common.wire.framing import Framing
 from services.bridge import udp
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.guard_ipc import Handover
+from services.bridge.guard_ipc import Inherited
 from services.bridge.translate import BumperFilter
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
@@ -73,7 +73,7 @@ class BridgePaths:
         self._cables = [Cable(clock, (board.address, board.port), answers) for _ in range(2)]
         self._guard, heartbeat = os.pipe()
         with patch.object(udp, "_bind", Mock(side_effect=self._cables)):
-            self._bridge = Bridge(self._node, Handover((), heartbeat))
+            self._bridge = Bridge(self._node, Inherited((), heartbeat))
         Session(self._node.bus, self._node.loop)
         self._session = Session(self._node.drive, self._node.loop)
         self._seq = 0

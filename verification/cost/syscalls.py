@@ -25,7 +25,7 @@ from common.loop import Loop
 from common.settings import Board
 from common.wire.framing import Framing
 from common.wire.reports import VelocityReport
-from services.bridge.guard_ipc import Handover
+from services.bridge.guard_ipc import Inherited
 from services.bridge.udp import Sockets
 from verification.cost.uncountable import Uncountable
 from verification.harness.support import bus_on, free_port, router_process, running
@@ -94,7 +94,7 @@ def traced(made: tuple[str, int], ours: int, endpoint: str, log: Path) -> Iterat
     """Run the bridge itself, as its guard would start it, with its own thread under strace."""
     sockets = Sockets(Board(port=made[1], listen_ports=(ours,)))
     guard, heartbeat = os.pipe()
-    handover = Handover(tuple(s.fileno() for s in sockets.sockets), heartbeat)
+    handover = Inherited(tuple(s.fileno() for s in sockets.sockets), heartbeat)
     sets = (f"board.port={made[1]}", f"board.listen_ports={ours}", f"bus.connect={endpoint}")
     command = ["strace", "-o", str(log), sys.executable, "-m", "services.bridge.child",
                *(word for one in sets for word in ("--set", one))]  # fmt: skip

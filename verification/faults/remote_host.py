@@ -25,7 +25,7 @@ from pathlib import Path
 
 import msgspec
 
-from common.bus.host import BOOT_ID
+from common.bus.publisher import BOOT_ID
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.requests import Wire

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from common import keys
 from common.keys import Topic
 from common.messages import Durations, Health, Message, Timing
-from services.bridge.timing import BOUNDS_NS, WAYS
+from services.bridge.timing import BOUNDS_NS, REACTIONS
 
 SERVICES = ("bridge", "safety", "odom", "recorder")
 UPWARD = "tel/"  # what a site may look at; commands stay on the robot
@@ -71,7 +71,9 @@ def histograms() -> Timing:
     counts = tuple(n * 37 % 1000 for n in range(len(BOUNDS_NS) + 1))
     return Timing(
         bounds=tuple(bound / 1e9 for bound in BOUNDS_NS),
-        durations={name: Durations(counts=counts, worst=0.0123) for w in WAYS for name in w.names},
+        durations={
+            name: Durations(counts=counts, worst=0.0123) for r in REACTIONS for name in r.names
+        },
         not_counted={"foreign_clock": 12_345},
     )
 

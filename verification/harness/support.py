@@ -15,25 +15,11 @@ from typing import TypeVar
 from common import log, settings
 from common.bus.bus import Bus
 from common.loop import Loop
-from common.messages import Limits, SafetyState
 
 PATIENCE_S = 20.0
 Lines = list[tuple[settings.LogLevel, str, log.Fields]]  # of a log
 WORKERS = 8  # whose ports do not meet
 T = TypeVar("T")
-
-
-def safety_state(heartbeat: int) -> SafetyState:
-    """Return a state of safety in which nothing is wrong; the publisher adds its ``boot``."""
-    return SafetyState(
-        verdict="run",
-        latched=(),
-        causes=(),
-        source=None,
-        limits=Limits(forward=1.0, backward=1.0, angular=1.0),
-        heartbeat=heartbeat,
-        text="",
-    )
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:

@@ -82,7 +82,7 @@ def main() -> None:
     sets = [f"bus.connect={endpoint}", *rest]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
     operator = Operator(node, Path(file))
-    node.present()
+    node.announce()
 
     def listen() -> None:
         for line in sys.stdin:

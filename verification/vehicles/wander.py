@@ -37,7 +37,7 @@ from services.safety.policy import Policy
 from sim.config import Drive as Motors
 from sim.geometry import Rectangle, wrapped
 from sim.sonar import Sonars
-from sim.vehicle import go, next_twist
+from sim.vehicle import move, next_twist
 from sim.world import Plan, World
 
 OFFICE = Path(__file__).parents[2] / "sim/worlds/office.toml"
@@ -139,7 +139,7 @@ class Walk:
         verdict, dt = self.state.verdict, TICK_NS / NS_PER_S
         target = Twist(verdict.twist.linear, verdict.twist.angular)
         twist = next_twist(self.twist, KINDS[verdict.command], target, Motors(), dt)
-        way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
+        way = move(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
         self.before.append(self.pose)
         self.pose, self.twist = way.pose, STILL if way.held else twist
         self.distance += way.distance

@@ -14,7 +14,7 @@ from cli.inspect.permission import check
 from cli.inspect.shell import Seat
 from cli.recordings.replay.plan import refusal
 from common import codec, keys
-from common.bus.host import host_id
+from common.bus.publisher import host_id
 from common.errors import LinkError, MessageError, RobotError
 from common.messages import Drive, SafetyState
 from common.sample import Sample

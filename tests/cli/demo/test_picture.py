@@ -17,7 +17,7 @@ from common.freshness import NS_PER_S
 from common.messages import Ultrasonic, Velocity
 from common.motion import Twist
 from common.settings import Vehicle
-from sim.files import load_plan
+from sim.config import load_plan
 from sim.geometry import Pose, Rectangle
 from tests.cli.demo.lap_fixture import hit_lap, odometry, safety
 from verification.harness.support import at

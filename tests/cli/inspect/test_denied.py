@@ -14,7 +14,7 @@ from common.loop import Loop
 from common.messages import Drive, ResetDone, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
-from tests.teleop.support import safety_state
+from tests.factories import safety_state
 from verification.harness.certificates import Site, dialling
 from verification.harness.support import at, joined, running, wait_until
 
@@ -119,7 +119,7 @@ def test_a_driver_drives_and_a_viewer_is_told_that_it_may_not(
         assert not drives(hall, robot)
         assert not anna.source.barred
         assert anna.reset() == "reset"
-        assert hall.reset() == "safety does not answer; `t2 doctor` tells why"
+        assert hall.reset() == "safety does not answer; run `t2 doctor`"
         hall.bus.estop()
         anna.bus.estop()
         wait_until(lambda: robot.estops, "Anna's stop")

@@ -12,17 +12,17 @@ from common.bus.bus import Bus
 from common.bus.session import router
 from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 from verification.harness.support import free_port, listening, wait_until
 
-Join = Callable[[str], Rig]
+Join = Callable[[str], BusFixture]
 LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
 
 
 class Robot:
     """Safety of one robot, which latches when it is told to."""
 
-    def __init__(self, rig: Rig, obeys: bool = True) -> None:
+    def __init__(self, rig: BusFixture, obeys: bool = True) -> None:
         self.stops: list[int] = []
         self._obeys = obeys
         pretend(rig, "safety", {keys.SAFETY: self.state}, self.declare)
@@ -44,8 +44,8 @@ def join(shared_router: str) -> Iterator[Join]:
     """Give a robot of that name, on the router that all share."""
     with contextlib.ExitStack() as stack:
 
-        def made(name: str) -> Rig:
-            rig = Rig(shared_router)
+        def made(name: str) -> BusFixture:
+            rig = BusFixture(shared_router)
             rig.robot = name
             return stack.enter_context(rig)
 
@@ -198,7 +198,7 @@ def test_services_of_a_robot_that_dials_a_site(
     def found() -> dict[str, Any]:
         return {line["name"]: line["publishes"] for line in tool("services").lines}
 
-    with router(listening(site)), router(listening(own, site)), Rig(own) as rig:
+    with router(listening(site)), router(listening(own, site)), BusFixture(own) as rig:
         rig.robot = "berlin-001"
         pretend(rig, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
         wait_until(lambda: found() == {"bridge": {"tel/bridge/velocity": []}}, "the bridge alone")

@@ -11,10 +11,10 @@ from cli.inspect import health as command
 from common import keys
 from common.bus.bus import Bus
 from tests.cli.inspect.tool import Tool, health, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 
 
-def test_health(rig: Rig, tool: Tool) -> None:
+def test_health(rig: BusFixture, tool: Tool) -> None:
     for name in ("bridge", "safety"):
         pretend(rig, name, {keys.HEALTH: partial(health, name)}, service=name)
     pretend(rig, "odom", {})
@@ -27,7 +27,7 @@ def test_health(rig: Rig, tool: Tool) -> None:
     assert "it hangs" in result.err
 
 
-def test_nobody_tells_how_another_fares(rig: Rig, tool: Tool) -> None:
+def test_nobody_tells_how_another_fares(rig: BusFixture, tool: Tool) -> None:
     pretend(rig, "dashboard", {keys.HEALTH: partial(health, "safety")}, service="dashboard")
     result = tool("health")
     assert {line["service"]: line["alive"] for line in result.lines} == {
@@ -43,7 +43,7 @@ def answers() -> dict[str, bytes]:
 
 
 @pytest.fixture
-def safety(rig: Rig, answers: dict[str, bytes]) -> Bus:
+def safety(rig: BusFixture, answers: dict[str, bytes]) -> Bus:
     last = {keys.HEALTH.on(rig.robot, service="safety"): health("safety"), "another": None}
     answers[rig.robot] = msgspec.json.encode(last)
 
@@ -65,12 +65,12 @@ def test_one_is_asked_itself(safety: Bus, tool: Tool) -> None:
     assert shown.split()[1:4] == ["safety", "ok", "1"]
 
 
-def test_one_of_every_robot(rig: Rig, safety: Bus, tool: Tool) -> None:
+def test_one_of_every_robot(rig: BusFixture, safety: Bus, tool: Tool) -> None:
     assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [rig.robot]
 
 
 def test_one_that_has_only_just_begun_fares_well(
-    rig: Rig, safety: Bus, tool: Tool, answers: dict[str, bytes]
+    rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes]
 ) -> None:
     answers[rig.robot] = b"{}"
     result = tool("health", "safety")
@@ -79,7 +79,7 @@ def test_one_that_has_only_just_begun_fares_well(
 
 @pytest.mark.parametrize("nonsense", [b"\xff", b"[]", b'{"KEY": {"service": 1}}'])
 def test_an_answer_that_is_no_health(
-    rig: Rig, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
+    rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
 ) -> None:
     key = keys.HEALTH.on(rig.robot, service="safety")
     answers[rig.robot] = nonsense.replace(b"KEY", key.encode())
@@ -100,7 +100,7 @@ def test_one_that_is_not_there(tool: Tool, impatient: None) -> None:
 
 
 @pytest.fixture
-def held_up(rig: Rig, safety: Bus) -> Iterator[None]:
+def held_up(rig: BusFixture, safety: Bus) -> Iterator[None]:
     """Hold the loop of all services up while the test runs."""
     end = threading.Event()
 

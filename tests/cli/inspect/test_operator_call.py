@@ -14,7 +14,7 @@ from common import messages as m
 from common.bus.bus import Bus
 from common.bus.calls import Caller
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 
 CONTACT = m.Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=41)
 IDLE = m.Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.", id=40)
@@ -26,7 +26,7 @@ NOT_CONFIRMED = "not confirmed: safety's state does not show this reset"
 class Safety:
     """Publishes a state whose heartbeat rises, and serves calls as configured."""
 
-    def __init__(self, rig: Rig, *serves: Serve) -> None:
+    def __init__(self, rig: BusFixture, *serves: Serve) -> None:
         self.heartbeat = 100
         self.latched = True
         self.asked: list[Any] = []
@@ -68,7 +68,9 @@ def done(_: Safety, caller: Caller[m.Done]) -> None:
     caller.reply(m.Done(text="done"))
 
 
-def test_a_reset_names_what_is_latched_and_is_confirmed_by_the_state(rig: Rig, tool: Tool) -> None:
+def test_a_reset_names_what_is_latched_and_is_confirmed_by_the_state(
+    rig: BusFixture, tool: Tool
+) -> None:
     safety = Safety(rig, (keys.RESET, obey))
     result = tool("call", "safety/reset", "--text")
     assert (result.code, result.err) == (0, CLEARS)
@@ -80,7 +82,7 @@ def test_a_reset_names_what_is_latched_and_is_confirmed_by_the_state(rig: Rig, t
     assert 100 < request.echo <= safety.heartbeat
 
 
-def test_a_reset_without_effect_is_not_confirmed(rig: Rig, tool: Tool) -> None:
+def test_a_reset_without_effect_is_not_confirmed(rig: BusFixture, tool: Tool) -> None:
     Safety(rig, (keys.RESET, lie))
     result = tool("call", "safety/reset")
     assert result.code == 1
@@ -90,7 +92,7 @@ def test_a_reset_without_effect_is_not_confirmed(rig: Rig, tool: Tool) -> None:
 @pytest.mark.parametrize(
     "payload", [b"ok", codec.encode(m.Done(text="ok")), codec.encode(m.ResetDone(text="ok"))]
 )
-def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: Rig, tool: Tool) -> None:
+def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: BusFixture, tool: Tool) -> None:
     Safety(rig)
     key = keys.RESET.on(rig.robot)
 
@@ -118,7 +120,7 @@ def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: Rig, tool: Tool) -
     ],
 )
 def test_every_operator_call_echoes_the_newest_state(
-    words: tuple[str, ...], call: keys.Call[Any, Any], meant: Any, rig: Rig, tool: Tool
+    words: tuple[str, ...], call: keys.Call[Any, Any], meant: Any, rig: BusFixture, tool: Tool
 ) -> None:
     reply = m.Switches() if call is keys.SET_SWITCHES else m.Done(text="done")
     safety = Safety(rig, (call, lambda _, caller: caller.reply(reply)))
@@ -129,7 +131,7 @@ def test_every_operator_call_echoes_the_newest_state(
     assert asked == msgspec.structs.replace(meant, echo=asked.echo)
 
 
-def test_what_the_user_gives_is_left_as_it_is(rig: Rig, tool: Tool) -> None:
+def test_what_the_user_gives_is_left_as_it_is(rig: BusFixture, tool: Tool) -> None:
     safety = Safety(rig, (keys.RESET, obey), (keys.SET_POSE, done))
     assert tool("call", "odom/reset", '{"echo": 7}').code == 0
     assert tool("call", "safety/reset", '{"echo": 7, "causes": [8]}').err == ""
@@ -137,7 +139,7 @@ def test_what_the_user_gives_is_left_as_it_is(rig: Rig, tool: Tool) -> None:
 
 
 def test_without_a_state_an_operators_call_is_not_made(
-    rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(operator_call, "SEEN_S", 0.3)
     for key in ("safety/reset", "safety/release", "odom/reset", "bridge/switches"):
@@ -146,7 +148,7 @@ def test_without_a_state_an_operators_call_is_not_made(
         assert "no state of safety within 1 s" in result.err
 
 
-def test_who_lets_go_needs_no_state(rig: Rig, tool: Tool) -> None:
+def test_who_lets_go_needs_no_state(rig: BusFixture, tool: Tool) -> None:
     asked: list[m.ReleaseRequest] = []
 
     def take(request: m.ReleaseRequest, caller: Caller[m.Done]) -> None:
@@ -158,7 +160,7 @@ def test_who_lets_go_needs_no_state(rig: Rig, tool: Tool) -> None:
     assert asked == [m.ReleaseRequest(held=False)]
 
 
-def test_what_is_no_state_is_passed_over(rig: Rig, tool: Tool) -> None:
+def test_what_is_no_state_is_passed_over(rig: BusFixture, tool: Tool) -> None:
     safety = Safety(rig, (keys.RESET, obey))
     session = rig.session()
     rig.loop.post(

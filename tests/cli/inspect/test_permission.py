@@ -7,9 +7,10 @@ import pytest
 from cli.inspect import permission
 from cli.inspect.permission import is_loopback, reason
 from common import keys
-from common.messages import Drive, Link
+from common.messages import Drive
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
+from tests.factories import link
 from verification.harness.support import wait_until
 
 ROOT = "t2/v1/001"
@@ -42,14 +43,7 @@ def test_whose_board_is_a_simulated_one(board: str, simulated: bool) -> None:
     assert is_loopback(board) is simulated
 
 
-def link(board: str) -> Link:
-    return Link(
-        state="up", board=board, epoch=0, armed=True, waiting="", rates={}, rejected={},
-        round_trip=None,
-    )  # fmt: skip
-
-
-def commands(rig: Rig) -> list[Drive]:
+def commands(rig: BusFixture) -> list[Drive]:
     """Hear what is asked on any source."""
     heard: list[Drive] = []
     rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: heard.append(a.message), source="*"))
@@ -64,9 +58,9 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 ASKED = ("pub", "@cmd/drive/web", '{"linear": 0.1, "angular": 0, "echo": 3}', "--once")
 
 
-def test_a_command_is_refused(rig: Rig, tool: Tool) -> None:
+def test_a_command_is_refused(rig: BusFixture, tool: Tool) -> None:
     heard = commands(rig)
-    pretend(rig, "bridge", {keys.LINK: lambda: link("127.0.0.1:4003")})
+    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     result = tool(*ASKED)
     assert (result.code, result.out, heard) == (1, "", [])
     assert "@cmd/drive/web moves the wheels" in result.err
@@ -75,19 +69,19 @@ def test_a_command_is_refused(rig: Rig, tool: Tool) -> None:
 
 @pytest.mark.parametrize("boards", [["10.7.5.224:4002"], ["127.0.0.1:4003", "10.7.5.224:4002"], []])
 def test_a_command_for_a_simulator_never_reaches_a_real_board(
-    rig: Rig, tool: Tool, boards: list[str]
+    rig: BusFixture, tool: Tool, boards: list[str]
 ) -> None:
     heard = commands(rig)
     for board in boards:
-        pretend(rig, "bridge", {keys.LINK: partial(link, board)})
+        pretend(rig, "bridge", {keys.LINK: partial(link, board=board)})
     result = tool(*ASKED, "--simulator")
     assert (result.code, result.out, heard) == (1, "", [])
     assert ("a real one" if boards else "no bridge") in result.err
 
 
-def test_a_command_for_a_simulator(rig: Rig, tool: Tool) -> None:
+def test_a_command_for_a_simulator(rig: BusFixture, tool: Tool) -> None:
     heard = commands(rig)
-    pretend(rig, "bridge", {keys.LINK: lambda: link("127.0.0.1:4003")})
+    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     assert tool(*ASKED, "--simulator").code == 0
     wait_until(lambda: heard, "the command")
     assert [(each.linear, each.echo) for each in heard] == [(0.1, 3)]

@@ -8,7 +8,7 @@ from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.messages import Cause, Done, Limits, ReleaseRequest, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 from verification.harness.support import wait_until
 
 
@@ -20,7 +20,7 @@ def state(*latched: str) -> SafetyState:
     )  # fmt: skip
 
 
-def test_pub_fills_in_the_header(rig: Rig, tool: Tool) -> None:
+def test_pub_fills_in_the_header(rig: BusFixture, tool: Tool) -> None:
     watched: list[tuple[bytes, str]] = []
     session = rig.session()
     subscriber = session.declare_subscriber(
@@ -72,7 +72,7 @@ def test_what_is_for_one_robot_at_a_time(words: tuple[str, ...], tool: Tool) -> 
     assert "one robot at a time" in result.err
 
 
-def test_call(rig: Rig, tool: Tool) -> None:
+def test_call(rig: BusFixture, tool: Tool) -> None:
     def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
         if request.held:
             caller.refuse("the bumper is free")
@@ -112,7 +112,9 @@ def test_what_there_is_to_call(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
-def test_estop_is_sent_until_safety_confirms(words: tuple[str, ...], rig: Rig, tool: Tool) -> None:
+def test_estop_is_sent_until_safety_confirms(
+    words: tuple[str, ...], rig: BusFixture, tool: Tool
+) -> None:
     stopped: list[int] = []
 
     def latch(bus: Bus) -> None:
@@ -126,7 +128,7 @@ def test_estop_is_sent_until_safety_confirms(words: tuple[str, ...], rig: Rig, t
 
 
 def test_an_estop_that_nobody_confirms(
-    rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(estop, "PATIENCE_S", 0.3)
     pretend(rig, "safety", {keys.SAFETY: state})

@@ -15,7 +15,7 @@ from common.messages import Bumper, Event
 from common.motion import Command
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 
 
 def bumper() -> Bumper:
@@ -23,7 +23,7 @@ def bumper() -> Bumper:
 
 
 @pytest.fixture
-def bridge(rig: Rig) -> Bus:
+def bridge(rig: BusFixture) -> Bus:
     return pretend(rig, "bridge", {keys.BUMPER: bumper})
 
 
@@ -71,7 +71,7 @@ def test_echo_shows_one_field(bridge: Bus, tool: Tool) -> None:
     assert "pressed" in result.err
 
 
-def test_echo_shows_what_is_no_message(rig: Rig, tool: Tool) -> None:
+def test_echo_shows_what_is_no_message(rig: BusFixture, tool: Tool) -> None:
     session = rig.session()
     payloads = [(b"\xc1", "zenoh/bytes"), (b"\x81\xa1a\x01", codec.encoding(Bumper))]
 
@@ -94,7 +94,7 @@ def test_echo_shows_what_is_no_message(rig: Rig, tool: Tool) -> None:
     assert "DELETE" in shown
 
 
-def test_echo_shows_events_that_were_before_it(rig: Rig, tool: Tool) -> None:
+def test_echo_shows_events_that_were_before_it(rig: BusFixture, tool: Tool) -> None:
     def tell(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
             Event(name="x", level="info", text="long ago")
@@ -147,7 +147,7 @@ def test_it_tells_once_a_second_and_says_when_nothing_comes(
     assert "no message on" in result.err
 
 
-def test_ls_names_type_rate_and_publisher(rig: Rig, bridge: Bus, tool: Tool) -> None:
+def test_ls_names_type_rate_and_publisher(rig: BusFixture, bridge: Bus, tool: Tool) -> None:
     rig.bus(lambda bus: bus.publisher(keys.VELOCITY))  # declared, silent, by a stranger
     stranger = rig.session()
     rig.loop.post(
@@ -173,7 +173,7 @@ def test_ls_of_nothing(tool: Tool) -> None:
     assert "t2 doctor" in result.err
 
 
-def test_topic_info(bridge: Bus, rig: Rig, tool: Tool) -> None:
+def test_topic_info(bridge: Bus, rig: BusFixture, tool: Tool) -> None:
     rig.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
     (told,) = tool("topic", "info", "/tel/bridge/bumper").lines
     assert (told["type"], told["hz"], told["class"]) == ("Bumper", 50, "fast")
@@ -190,7 +190,7 @@ def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> N
 # --- services, schema -------------------------------------------------------------------------
 
 
-def test_services(rig: Rig, bridge: Bus, tool: Tool) -> None:
+def test_services(rig: BusFixture, bridge: Bus, tool: Tool) -> None:
     pretend(rig, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
     pretend(rig, "nav", {keys.MOTION: lambda: keys.MOTION.message(command=Command.STOP)})
     found = {line["name"]: line for line in tool("services").lines}
@@ -231,7 +231,9 @@ def test_a_type_that_there_is_not(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_without_a_word(number: signal.Signals, bridge: Bus, rig: Rig) -> None:
+def test_ctrl_c_ends_it_without_a_word(
+    number: signal.Signals, bridge: Bus, rig: BusFixture
+) -> None:
     where = ("--set", f"bus.connect={rig.endpoint}", "--robot", rig.robot)
     with subprocess.Popen(
         t2("echo", "bumper", *where), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -243,7 +245,7 @@ def test_ctrl_c_ends_it_without_a_word(number: signal.Signals, bridge: Bus, rig:
     assert (process.returncode, err) == (0, "")
 
 
-def test_a_reader_that_goes_away_ends_it_without_a_word(bridge: Bus, rig: Rig) -> None:
+def test_a_reader_that_goes_away_ends_it_without_a_word(bridge: Bus, rig: BusFixture) -> None:
     words = f"echo bumper -o json --set bus.connect={rig.endpoint} --robot {rig.robot}"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],

@@ -12,7 +12,7 @@ from common import keys
 from common.bus.bus import Bus
 from common.keys import Topic
 from common.messages import Health, Message
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
 
 
 def pretend(
-    rig: Rig,
+    rig: BusFixture,
     name: str,
     streams: dict[Topic[Any], Callable[[], Message]],
     declare: Callable[[Bus], object] = lambda _: None,

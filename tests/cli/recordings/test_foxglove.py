@@ -12,7 +12,7 @@ from websockets.typing import Subprotocol
 from common import keys
 from tests.cli.inspect.conftest import rig, shared_router, tool
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
 from verification.harness.support import PATIENCE_S, free_port, wait_until
 
@@ -73,7 +73,7 @@ class Viewer(threading.Thread):
     ],
 )
 def test_a_viewer_receives_live_messages(
-    rig: Rig, tool: Tool, topic: str, schema: str, field: str
+    rig: BusFixture, tool: Tool, topic: str, schema: str, field: str
 ) -> None:
     port = free_port()
     pretend(rig, "odom", {keys.ODOMETRY: samples.odometry})

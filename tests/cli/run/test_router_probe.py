@@ -14,8 +14,7 @@ import zenoh
 from msgspec.structs import replace
 
 from cli.run.router_probe import RouterProbe
-from common.bus import answering
-from common.bus.session import client_config, router
+from common.bus.session import answers, client_config, router, router_at
 from common.settings import BusSettings, Log
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
@@ -115,7 +114,7 @@ def _command(pid: int) -> bytes:
 def test_a_router_with_an_uplink_answers(endpoint: str) -> None:
     where = listening(endpoint, "tcp/127.0.0.1:1")  # without a router there
     with router(where):
-        assert answering.answers(answering.router_at(where))
+        assert answers(router_at(where))
 
 
 # --- a router that hangs ------------------------------------------------------------------------
@@ -136,16 +135,16 @@ def test_a_frozen_router_is_killed(endpoint: str) -> None:
 
 
 def test_no_router_no_answer(endpoint: str) -> None:
-    assert not answering.answers(at(endpoint))
+    assert not answers(at(endpoint))
 
 
 def test_the_probe_connects_to_the_routers_own_endpoint() -> None:
     bus = BusSettings(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
               insecure=True)  # fmt: skip
-    assert answering.router_at(bus).endpoints == ("tcp/127.0.0.1:1",)
+    assert router_at(bus).endpoints == ("tcp/127.0.0.1:1",)
     tls = replace(bus, listen=("tls/0.0.0.0:1", "unixsock-stream//x"), ca="a", certificate="b",
                   private_key="c", members="d")  # fmt: skip
-    assert answering.router_at(tls).endpoints == ("unixsock-stream//x",)
+    assert router_at(tls).endpoints == ("unixsock-stream//x",)
 
 
 def test_the_router_continues_without_a_probe(

@@ -12,7 +12,7 @@ import pytest
 
 from cli.run import supervisor as module
 from cli.run.supervisor import Child, Supervisor
-from common.backoff import BACKOFF_S
+from common.child_process import BACKOFF_S
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import alive, running, wait_gone
 from verification.harness.support import wait_until

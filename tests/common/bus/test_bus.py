@@ -12,13 +12,13 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
-from tests.common.bus_fixture import Rig, rising, until_heard
+from tests.common.bus_fixture import BusFixture, rising, until_heard
 from verification.harness.support import at, wait_until
 
 
-def bumper(rig: Rig) -> str:
+def bumper(buses: BusFixture) -> str:
     """Return the key of this robot's bumper."""
-    return keys.BUMPER.on(rig.robot)
+    return keys.BUMPER.on(buses.robot)
 
 
 def events(bus: Bus) -> Callable[[str], object]:
@@ -27,46 +27,46 @@ def events(bus: Bus) -> Callable[[str], object]:
     return lambda name: publisher.put(Event(name=name, level="info", text=name))
 
 
-def test_a_message_arrives_with_header_key_time_and_raw_frame(rig: Rig) -> None:
+def test_a_message_arrives_with_header_key_time_and_raw_frame(buses: BusFixture) -> None:
     heard: list[Arrival[Bumper]] = []
-    rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=9))
-    sender = rig.bus()
+    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=9))
+    sender = buses.bus()
     publisher = sender.publisher(keys.BUMPER)
     before_ns = time.monotonic_ns()
     until_heard(lambda: publisher.put(Bumper(pressed=True), b"GS\t\0"), lambda: heard, "a bumper")
     arrival = heard[0]
     assert arrival.message.pressed
     assert arrival.message.boot == sender.boot
-    assert arrival.key == bumper(rig)
+    assert arrival.key == bumper(buses)
     assert arrival.raw == b"GS\t\0"
     assert before_ns < arrival.message.mono_ns < arrival.received_ns < time.monotonic_ns()
 
 
-def test_messages_keep_their_order_and_are_counted_at_both_ends(rig: Rig) -> None:
+def test_messages_keep_their_order_and_are_counted_at_both_ends(buses: BusFixture) -> None:
     heard: list[Arrival[Bumper]] = []
-    hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=100))
-    sender = rig.bus()
+    hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=100))
+    sender = buses.bus()
     publisher = sender.publisher(keys.BUMPER)
     until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
     for _ in range(50):
         publisher.put(Bumper(pressed=False))
     wait_until(lambda: heard[-1].message.seq == publisher.next_seq - 1, "the last")
     assert rising(arrival.message.seq for arrival in heard)
-    assert hearer.counts[bumper(rig)] == len(heard)
-    assert sender.counts[bumper(rig)] == publisher.next_seq - 1
+    assert hearer.counts[bumper(buses)] == len(heard)
+    assert sender.counts[bumper(buses)] == publisher.next_seq - 1
     assert heard[0].raw is None
 
 
-def test_sources_that_nobody_knows_are_counted_together(rig: Rig) -> None:
+def test_sources_that_nobody_knows_are_counted_together(buses: BusFixture) -> None:
     heard: set[str] = set()
 
     def take(arrival: Arrival[Drive]) -> None:
         heard.add(arrival.key)
 
-    hearer = rig.bus(
+    hearer = buses.bus(
         lambda bus: bus.subscribe(keys.DRIVE, take, depth=100, known=["nav", "web"], source="*")
     )
-    sender = rig.bus()
+    sender = buses.bus()
     names = ["nav", *(f"made up {number}" for number in range(50))]
     publishers = [sender.publisher(keys.DRIVE, source=name) for name in names]
     until_heard(
@@ -74,16 +74,16 @@ def test_sources_that_nobody_knows_are_counted_together(rig: Rig) -> None:
         lambda: len(heard) == len(names),
         "all sources",
     )
-    everyone = keys.DRIVE.on(rig.robot, source="*")
-    assert set(hearer.counts) == {keys.DRIVE.on(rig.robot, source="nav"), everyone}
+    everyone = keys.DRIVE.on(buses.robot, source="*")
+    assert set(hearer.counts) == {keys.DRIVE.on(buses.robot, source="nav"), everyone}
     assert hearer.counts[everyone] >= 50
 
 
-def test_it_travels_as_plain_messagepack_with_its_encoding(rig: Rig) -> None:
+def test_it_travels_as_plain_messagepack_with_its_encoding(buses: BusFixture) -> None:
     samples: list[zenoh.Sample] = []
-    stranger = rig.session()
-    subscriber = stranger.declare_subscriber(bumper(rig), samples.append)
-    publisher = rig.bus().publisher(keys.BUMPER)
+    stranger = buses.session()
+    subscriber = stranger.declare_subscriber(bumper(buses), samples.append)
+    publisher = buses.bus().publisher(keys.BUMPER)
     until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: samples, "a sample")
     subscriber.undeclare()
     assert msgpack.unpackb(samples[0].payload.to_bytes())["pressed"] is True
@@ -92,19 +92,19 @@ def test_it_travels_as_plain_messagepack_with_its_encoding(rig: Rig) -> None:
     assert samples[0].congestion_control == zenoh.CongestionControl.DROP
 
 
-def test_every_source_is_heard_and_only_of_this_robot(rig: Rig) -> None:
+def test_every_source_is_heard_and_only_of_this_robot(buses: BusFixture) -> None:
     heard: set[str] = set()
 
     def hear(arrival: Arrival[Drive]) -> None:
         heard.add(arrival.key)
 
-    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, hear, depth=50, source="*"))
-    stranger = rig.session()
+    buses.bus(lambda bus: bus.subscribe(keys.DRIVE, hear, depth=50, source="*"))
+    stranger = buses.session()
     payload = msgpack.packb({"linear": 0.1, "angular": 0.0, "echo": 0})
-    ours = [keys.DRIVE.on(rig.robot, source=name) for name in ("web", "nav")]
+    ours = [keys.DRIVE.on(buses.robot, source=name) for name in ("web", "nav")]
 
     def put() -> None:
-        for key in (keys.DRIVE.on(f"{rig.robot}x", source="web"), *ours, "t2/**"):
+        for key in (keys.DRIVE.on(f"{buses.robot}x", source="web"), *ours, "t2/**"):
             stranger.put(key, payload)
 
     until_heard(put, lambda: len(heard) == 2, "both sources")
@@ -122,7 +122,7 @@ HOSTILE = {
 }
 
 
-def test_what_is_no_message_is_refused_counted_and_harmless(rig: Rig) -> None:
+def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -> None:
     heard: list[Arrival[Bumper]] = []
     refused: list[tuple[str, MessageError]] = []
 
@@ -130,34 +130,34 @@ def test_what_is_no_message_is_refused_counted_and_harmless(rig: Rig) -> None:
         bus.subscribe(keys.BUMPER, heard.append, depth=64, refused=lambda *why: refused.append(why))
         bus.subscribe(keys.EVENTS, lambda _: None, service="*")  # nobody asks what was refused
 
-    hearer = rig.bus(declare)
-    stranger = rig.session()
-    until_heard(lambda: stranger.put(bumper(rig), b""), lambda: refused, "the first")
+    hearer = buses.bus(declare)
+    stranger = buses.session()
+    until_heard(lambda: stranger.put(bumper(buses), b""), lambda: refused, "the first")
     count = len(refused)
     wait = zenoh.CongestionControl.BLOCK  # what is dropped on the way is not refused
     for payload in HOSTILE.values():
-        stranger.put(bumper(rig), payload, congestion_control=wait)
-    stranger.delete(bumper(rig), congestion_control=wait)
+        stranger.put(bumper(buses), payload, congestion_control=wait)
+    stranger.delete(bumper(buses), congestion_control=wait)
     wait_until(lambda: len(refused) >= count + len(HOSTILE) + 1, "all of them")
-    stranger.put(bumper(rig), msgpack.packb({"pressed": True, "later": {"a": [1]}}))
+    stranger.put(bumper(buses), msgpack.packb({"pressed": True, "later": {"a": [1]}}))
     wait_until(lambda: heard, "a good one after them")
     assert [arrival.message.pressed for arrival in heard] == [True]
-    assert {key for key, _ in refused} == {bumper(rig)}
+    assert {key for key, _ in refused} == {bumper(buses)}
     assert hearer.counters["undecodable"] == len(refused)
     until_heard(
-        lambda: stranger.put(keys.EVENTS.on(rig.robot, service="x"), b"\xc1"),
+        lambda: stranger.put(keys.EVENTS.on(buses.robot, service="x"), b"\xc1"),
         lambda: hearer.counters["undecodable"] > len(refused),
         "a refusal that nobody asked for",
     )
 
 
 @pytest.mark.parametrize("depth", [1, 4])
-def test_a_handler_that_is_behind_gets_the_newest(rig: Rig, depth: int) -> None:
+def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int) -> None:
     heard: list[int] = []
-    hearer = rig.bus(
+    hearer = buses.bus(
         lambda bus: bus.subscribe(keys.BUMPER, lambda a: heard.append(a.message.seq), depth=depth)
     )
-    publisher = rig.bus().publisher(keys.BUMPER)
+    publisher = buses.bus().publisher(keys.BUMPER)
     until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
     held, go_on = threading.Event(), threading.Event()
 
@@ -165,7 +165,7 @@ def test_a_handler_that_is_behind_gets_the_newest(rig: Rig, depth: int) -> None:
         held.set()
         go_on.wait(20)
 
-    rig.loop.post(hold)
+    buses.loop.post(hold)
     assert held.wait(20)
     for _ in range(30):
         publisher.put(Bumper(pressed=False))
@@ -178,13 +178,13 @@ def test_a_handler_that_is_behind_gets_the_newest(rig: Rig, depth: int) -> None:
     wait_until(lambda: heard[-1] == last + 1, "the one after")
 
 
-def test_late_joiners_get_the_events_that_were(rig: Rig) -> None:
+def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
     names = [f"event_{number}" for number in range(20)]
-    bus = Bus(at(rig.endpoint), rig.robot, rig.loop.post)
+    bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
     tell = events(bus)
     for name in names[:10]:
         tell(name)  # before there is a session
-    rig.opened(bus)
+    buses.opened(bus)
     for name in names[10:]:
         tell(name)
     heard: list[str] = []
@@ -192,16 +192,16 @@ def test_late_joiners_get_the_events_that_were(rig: Rig) -> None:
     def hear(arrival: Arrival[Event]) -> None:
         heard.append(arrival.message.name)
 
-    rig.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
+    buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
     wait_until(lambda: len(heard) >= 20, "the events that were")
     tell("one more")
     wait_until(lambda: "one more" in heard, "the next one")
     assert heard == [*names, "one more"]
 
 
-def test_late_joiners_get_no_motion(rig: Rig) -> None:
+def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
     """What moves the robot is never replayed."""
-    sender = rig.bus()
+    sender = buses.bus()
     drive, bump = sender.publisher(keys.DRIVE, source="web"), sender.publisher(keys.BUMPER)
     for _ in range(20):
         drive.put(Drive(linear=1.0, angular=0.0, echo=0))
@@ -212,22 +212,22 @@ def test_late_joiners_get_no_motion(rig: Rig) -> None:
         bus.subscribe(keys.DRIVE, driven.append, depth=50, source="*")
         bus.subscribe(keys.BUMPER, bumped.append)
 
-    rig.bus(declare)
+    buses.bus(declare)
     until_heard(lambda: bump.put(Bumper(pressed=False)), lambda: bumped, "something live")
     assert driven == []
 
 
-def test_any_put_and_any_delete_is_an_emergency_stop(rig: Rig) -> None:
+def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:
     stops: list[int] = []
-    rig.bus(lambda bus: bus.on_any(keys.estop_key(rig.robot), stops.append))
-    other, stranger = rig.bus(), rig.session()
-    one, fleet = keys.estop_key(rig.robot), keys.estop_key("*")
+    buses.bus(lambda bus: bus.on_any(keys.estop_key(buses.robot), stops.append))
+    other, stranger = buses.bus(), buses.session()
+    one, fleet = keys.estop_key(buses.robot), keys.estop_key("*")
     ways: list[Callable[[], object]] = [
         other.estop,
         lambda: stranger.put(one, b""),
         lambda: stranger.put(one, b"\xc1" * 1_000_000),
         lambda: stranger.put(fleet, "stop!"),
-        lambda: stranger.put(keys.estop_key(f"{rig.robot[0]}$*"), b""),
+        lambda: stranger.put(keys.estop_key(f"{buses.robot[0]}$*"), b""),
         lambda: stranger.put("t2/**", b""),
         lambda: stranger.delete(one),
         lambda: stranger.delete(fleet),
@@ -238,36 +238,36 @@ def test_any_put_and_any_delete_is_an_emergency_stop(rig: Rig) -> None:
     assert all(isinstance(received_ns, int) for received_ns in stops)
 
 
-def test_presence_appears_and_goes(rig: Rig) -> None:
+def test_presence_appears_and_goes(buses: BusFixture) -> None:
     seen: list[tuple[str, bool]] = []
-    key = keys.live_key(rig.robot, "bridge", "1a")
-    rig.bus(
+    key = keys.live_key(buses.robot, "bridge", "1a")
+    buses.bus(
         lambda bus: bus.watch_live(
-            keys.live_key(rig.robot, "*", "*"), lambda key, alive: seen.append((key, alive))
+            keys.live_key(buses.robot, "*", "*"), lambda key, alive: seen.append((key, alive))
         )
     )
-    bus = rig.bus(lambda bus: bus.live(key))
+    bus = buses.bus(lambda bus: bus.live(key))
     wait_until(lambda: (key, True) in seen, "the token")
     bus.close()
     wait_until(lambda: (key, False) in seen, "its end")
 
 
-def test_who_watches_late_sees_who_is_there(rig: Rig) -> None:
-    key = keys.live_key(rig.robot, "bridge", "1a")
-    rig.bus(lambda bus: bus.live(key))
+def test_who_watches_late_sees_who_is_there(buses: BusFixture) -> None:
+    key = keys.live_key(buses.robot, "bridge", "1a")
+    buses.bus(lambda bus: bus.live(key))
     seen: list[str] = []
-    rig.bus(
+    buses.bus(
         lambda bus: bus.watch_live(
-            keys.live_key(rig.robot, "*", "*"), lambda key, _: seen.append(key)
+            keys.live_key(buses.robot, "*", "*"), lambda key, _: seen.append(key)
         )
     )
     wait_until(lambda: key in seen, "the token")
 
 
-def test_a_closed_bus_calls_nobody_and_hurts_nobody(rig: Rig) -> None:
+def test_a_closed_bus_calls_nobody_and_hurts_nobody(buses: BusFixture) -> None:
     heard: list[Arrival[Bumper]] = []
-    hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=8))
-    publisher = rig.bus().publisher(keys.BUMPER)
+    hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=8))
+    publisher = buses.bus().publisher(keys.BUMPER)
     until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
     held, go_on = threading.Event(), threading.Event()
 
@@ -275,17 +275,17 @@ def test_a_closed_bus_calls_nobody_and_hurts_nobody(rig: Rig) -> None:
         held.set()
         go_on.wait(20)
 
-    rig.loop.post(hold)
+    buses.loop.post(hold)
     assert held.wait(20)
-    count = hearer.counts[bumper(rig)]
+    count = hearer.counts[bumper(buses)]
     publisher.put(Bumper(pressed=True))
-    wait_until(lambda: len(rig.loop._posted) > 0, "a sample that waits")
+    wait_until(lambda: len(buses.loop._posted) > 0, "a sample that waits")
     hearer.close()
     go_on.set()
     done = threading.Event()
-    rig.loop.post(done.set)
+    buses.loop.post(done.set)
     assert done.wait(20)
-    assert hearer.counts[bumper(rig)] == count
+    assert hearer.counts[bumper(buses)] == count
     assert not hearer.connected
     hearer.estop()
     hearer.ask(keys.RESET, ResetRequest(), print, print)
@@ -293,10 +293,10 @@ def test_a_closed_bus_calls_nobody_and_hurts_nobody(rig: Rig) -> None:
     assert hearer.publisher(keys.BUMPER).put(Bumper(pressed=False)).seq == 1
 
 
-def test_a_session_that_is_found_but_not_taken_over_is_closed(rig: Rig) -> None:
+def test_a_session_that_is_found_but_not_taken_over_is_closed(buses: BusFixture) -> None:
     posted: list[Callable[[], None]] = []
-    bus = Bus(at(rig.endpoint), rig.robot, posted.append)
-    bus.live(keys.live_key(rig.robot, "bridge", "1"))
+    bus = Bus(at(buses.endpoint), buses.robot, posted.append)
+    bus.live(keys.live_key(buses.robot, "bridge", "1"))
     bus.open()
     wait_until(lambda: posted, "a session")
     bus.close()

@@ -9,7 +9,7 @@ from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from verification.harness.support import at, wait_until
 
 
@@ -75,9 +75,9 @@ def server() -> Server:
 
 
 @pytest.fixture
-def asker(rig: Rig, server: Server) -> Asker:
-    rig.bus(server.serve)
-    asker = Asker(rig.bus())
+def asker(buses: BusFixture, server: Server) -> Asker:
+    buses.bus(server.serve)
+    asker = Asker(buses.bus())
     asker.ask_until_replied()
     return asker
 
@@ -109,7 +109,7 @@ def test_a_refusal_brings_its_reason(asker: Asker, server: Server) -> None:
 def test_who_does_not_answer_in_time_is_named(asker: Asker, server: Server) -> None:
     asker.ask(held=False, timeout_s=0.3)
     wait_until(lambda: asker.answers, "the timeout")
-    assert asker.refusals == ["safety does not answer; `t2 doctor` tells why"]
+    assert asker.refusals == ["safety does not answer; run `t2 doctor`"]
     wait_until(lambda: server.waiting, "the question, however late")
     server.waiting.pop().reply(Done(text="too late"))  # harmless, and nobody hears it
     asker.ask(timeout_s=20.0)
@@ -122,15 +122,15 @@ def test_the_router_s_own_timeout_is_no_refusal(asker: Asker) -> None:
     for count in range(1, 31):
         asker.ask(held=False, timeout_s=0.02)
         wait_until(lambda: asker.answers == count, "the timeout")  # noqa: B023
-    assert set(asker.refusals) == {"safety does not answer; `t2 doctor` tells why"}
+    assert set(asker.refusals) == {"safety does not answer; run `t2 doctor`"}
 
 
-def test_a_refusal_needs_no_encoding(rig: Rig) -> None:
+def test_a_refusal_needs_no_encoding(buses: BusFixture) -> None:
     def answer(query: zenoh.Query) -> None:
         query.reply_err("not with us")
 
-    queryable = rig.session().declare_queryable(keys.RELEASE.on(rig.robot), answer)
-    asker = Asker(rig.bus())
+    queryable = buses.session().declare_queryable(keys.RELEASE.on(buses.robot), answer)
+    asker = Asker(buses.bus())
 
     def refused() -> bool:
         asker.ask()
@@ -140,28 +140,28 @@ def test_a_refusal_needs_no_encoding(rig: Rig) -> None:
     queryable.undeclare()
 
 
-def test_nobody_there_is_said_at_once(rig: Rig) -> None:
-    asker = Asker(rig.bus())
+def test_nobody_there_is_said_at_once(buses: BusFixture) -> None:
+    asker = Asker(buses.bus())
     asker.ask(timeout_s=600.0)
     wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["safety does not answer; `t2 doctor` tells why"]
+    assert asker.refusals == ["safety does not answer; run `t2 doctor`"]
 
 
-def test_no_router_is_said_at_once(rig: Rig) -> None:
-    asker = Asker(Bus(at(rig.endpoint), rig.robot, rig.loop.post))  # never opened
+def test_no_router_is_said_at_once(buses: BusFixture) -> None:
+    asker = Asker(Bus(at(buses.endpoint), buses.robot, buses.loop.post))  # never opened
     asker.ask()
     wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["there is no router"]
+    assert asker.refusals == ["not connected to a router"]
 
 
-def test_a_reply_of_the_wrong_kind_is_a_refusal(rig: Rig) -> None:
-    key = keys.RELEASE.on(rig.robot)
+def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
+    key = keys.RELEASE.on(buses.robot)
 
     def answer(query: zenoh.Query) -> None:
         query.reply(key, msgpack.packb({"text": 5}))
 
-    queryable = rig.session().declare_queryable(key, answer)
-    asker = Asker(rig.bus())
+    queryable = buses.session().declare_queryable(key, answer)
+    asker = Asker(buses.bus())
 
     def refused() -> bool:
         asker.ask()
@@ -184,10 +184,10 @@ def test_a_reply_of_the_wrong_kind_is_a_refusal(rig: Rig) -> None:
     ids=["no msgpack", "wrong type", "unknown field", "deep", "big"],
 )
 def test_a_request_that_is_none_is_refused_with_its_fault(
-    rig: Rig, server: Server, asker: Asker, payload: bytes, reason: str
+    buses: BusFixture, server: Server, asker: Asker, payload: bytes, reason: str
 ) -> None:
     asked = len(server.asked)
-    replies = list(rig.session().get(keys.RELEASE.on(rig.robot), payload=payload))
+    replies = list(buses.session().get(keys.RELEASE.on(buses.robot), payload=payload))
     assert len(replies) == 1
     assert replies[0].err is not None
     assert reason in replies[0].err.payload.to_bytes().decode()
@@ -195,22 +195,22 @@ def test_a_request_that_is_none_is_refused_with_its_fault(
 
 
 def test_a_request_without_payload_is_one_of_defaults(
-    rig: Rig, server: Server, asker: Asker
+    buses: BusFixture, server: Server, asker: Asker
 ) -> None:
-    (reply,) = rig.session().get(keys.RELEASE.on(rig.robot))
+    (reply,) = buses.session().get(keys.RELEASE.on(buses.robot))
     assert reply.ok is not None
     assert msgpack.unpackb(reply.ok.payload.to_bytes()) == {"text": "held", "boot": 0}
     assert str(reply.ok.encoding) == "application/msgpack;t2.v1.Done"
     assert server.asked[-1] == ReleaseRequest()
 
 
-def test_a_required_field_is_missed(rig: Rig) -> None:
+def test_a_required_field_is_missed(buses: BusFixture) -> None:
     asked: list[LedRequest] = []
-    bus = rig.bus(lambda bus: bus.serve(keys.SET_LED, lambda request, _: asked.append(request)))
-    session = rig.session()
+    bus = buses.bus(lambda bus: bus.serve(keys.SET_LED, lambda request, _: asked.append(request)))
+    session = buses.session()
 
     def reasons() -> list[str]:
-        replies = session.get(keys.SET_LED.on(rig.robot))
+        replies = session.get(keys.SET_LED.on(buses.robot))
         return [reply.err.payload.to_bytes().decode() for reply in replies if reply.err]
 
     wait_until(lambda: any("missing required field `channel`" in said for said in reasons()), "it")
@@ -218,13 +218,13 @@ def test_a_required_field_is_missed(rig: Rig) -> None:
     assert bus.counters["undecodable"] >= 1
 
 
-def test_any_query_on_an_answer_is_answered(rig: Rig) -> None:
-    key = keys.info_key(rig.robot, "bridge", "schema")
-    rig.bus(lambda bus: bus.answer(key, lambda: b'{"a": 1}', "application/json"))
-    session = rig.session()
+def test_any_query_on_an_answer_is_answered(buses: BusFixture) -> None:
+    key = keys.info_key(buses.robot, "bridge", "schema")
+    buses.bus(lambda bus: bus.answer(key, lambda: b'{"a": 1}', "application/json"))
+    session = buses.session()
 
     def answers() -> list[zenoh.Sample]:
-        replies = session.get(keys.info_key(rig.robot, "*", "*"))
+        replies = session.get(keys.info_key(buses.robot, "*", "*"))
         return [reply.ok for reply in replies if reply.ok]
 
     found: list[zenoh.Sample] = []
@@ -234,9 +234,11 @@ def test_any_query_on_an_answer_is_answered(rig: Rig) -> None:
     assert str(found[0].encoding) == "application/json"
 
 
-def test_what_a_newcomer_asks_is_answered_as_it_stands(rig: Rig) -> None:
-    rig.bus(lambda bus: bus.answer(info_key(rig.robot, "bridge", "config"), lambda: b"{}", "text"))
-    asker = rig.bus()
+def test_what_a_newcomer_asks_is_answered_as_it_stands(buses: BusFixture) -> None:
+    buses.bus(
+        lambda bus: bus.answer(info_key(buses.robot, "bridge", "config"), lambda: b"{}", "text")
+    )
+    asker = buses.bus()
     answers: list[bytes] = []
 
     def once() -> bool:
@@ -249,8 +251,8 @@ def test_what_a_newcomer_asks_is_answered_as_it_stands(rig: Rig) -> None:
     assert answers == [b"{}"]
 
 
-def test_who_tells_nothing_is_named(rig: Rig) -> None:
+def test_who_tells_nothing_is_named(buses: BusFixture) -> None:
     refusals: list[str] = []
-    rig.bus().look_up("odom", "config", lambda _: None, refusals.append, timeout_s=0.3)
+    buses.bus().look_up("odom", "config", lambda _: None, refusals.append, timeout_s=0.3)
     wait_until(lambda: refusals, "the refusal")
-    assert refusals == ["odom does not answer; `t2 doctor` tells why"]
+    assert refusals == ["odom does not answer; run `t2 doctor`"]

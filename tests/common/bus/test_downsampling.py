@@ -7,14 +7,14 @@ import pytest
 import zenoh
 
 from common import keys
-from common.bus.downsampling import thinned
+from common.bus.downsampling import downsampling_rules
 from common.bus.session import router_config
 from common.keys import COMMAND, FAST, TOPICS
 from common.settings import BusSettings
 
 
 def rules(rate_hz: float) -> dict[str, float]:
-    (thin,) = thinned("007", rate_hz)["downsampling"]
+    (thin,) = downsampling_rules("007", rate_hz)["downsampling"]
     return {rule["key_expr"]: rule["freq"] for rule in thin["rules"]}
 
 
@@ -44,13 +44,13 @@ def test_every_so_manieth_passes_early_or_late_by_less_than_half(
 
 
 def test_a_rate_that_no_stream_exceeds_thins_nothing() -> None:
-    assert thinned("007", 50.0) == {}
+    assert downsampling_rules("007", 50.0) == {}
 
 
 def test_a_router_of_a_robot_thins_what_goes_out_by_tls_and_nothing_on_board() -> None:
     config = router_config(BusSettings(), robot="007")
     zenoh.Config.from_json5(json.dumps(config))  # which refuses what it does not know
-    (thin,) = thinned("007", BusSettings().laptop_rate)["downsampling"]
+    (thin,) = downsampling_rules("007", BusSettings().laptop_rate)["downsampling"]
     assert config["downsampling"] == [thin]
     assert (thin["flows"], thin["messages"]) == (["egress"], ["put"])
     assert not {"tcp", "unixsock-stream"} & set(thin["link_protocols"])

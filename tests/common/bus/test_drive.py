@@ -14,15 +14,15 @@ from common.freshness import NS_PER_S
 from common.messages import Bumper, Motion
 from common.motion import Command
 from common.settings import BusSettings as Settings
-from tests.common.bus_fixture import Rig, rising, until_heard
+from tests.common.bus_fixture import BusFixture, rising, until_heard
 from verification.harness.support import Lines, at, wait_until
 
 
 class Ends:
     """A bridge's and a safety's link, and what came."""
 
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
+    def __init__(self, buses: BusFixture) -> None:
+        self.buses = buses
         self.motions: list[Arrival[Motion]] = []
         self.bumpers: list[Arrival[Bumper]] = []
         self.bridge = self.bridge_end()
@@ -30,19 +30,19 @@ class Ends:
         self.linked()
 
     def bridge_end(self) -> DriveLink:
-        bus = Bus(at(self.rig.endpoint), self.rig.robot, self.rig.loop.post)
+        bus = Bus(at(self.buses.endpoint), self.buses.robot, self.buses.loop.post)
         link = DriveLink(bus, listens=True)
         link.subscribe(keys.MOTION, self.motions.append, depth=100)
         self.bumper = link.publisher(keys.BUMPER)
-        self.bridges_bus = self.rig.opened(bus)
+        self.bridges_bus = self.buses.opened(bus)
         return link
 
     def safety_end(self) -> DriveLink:
-        bus = Bus(at(self.rig.endpoint), self.rig.robot, self.rig.loop.post)
+        bus = Bus(at(self.buses.endpoint), self.buses.robot, self.buses.loop.post)
         link = DriveLink(bus, listens=False)
         link.subscribe(keys.BUMPER, self.bumpers.append, depth=100)
         self.motion = link.publisher(keys.MOTION)
-        self.safetys_bus = self.rig.opened(bus)
+        self.safetys_bus = self.buses.opened(bus)
         return link
 
     def linked(self) -> None:
@@ -58,8 +58,8 @@ CLEAR = Bumper(pressed=False)
 
 
 @pytest.fixture
-def ends(rig: Rig) -> Ends:
-    return Ends(rig)
+def ends(buses: BusFixture) -> Ends:
+    return Ends(buses)
 
 
 def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends) -> None:
@@ -71,7 +71,7 @@ def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends
     seqs = [arrival.message.seq for arrival in ends.bumpers]
     assert rising(seqs)
     assert ends.bumpers[-1].raw == b"raw"
-    key = keys.BUMPER.on(ends.rig.robot)
+    key = keys.BUMPER.on(ends.buses.robot)
     assert ends.bridges_bus.counts[key] == ends.bumper.next_seq - 1
     assert ends.safetys_bus.counts[key] >= len(ends.bumpers)
     assert ends.bumpers[-1].message.boot == ends.bridges_bus.boot == ends.bridge.boot
@@ -79,7 +79,7 @@ def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends
 
 def test_who_looks_on_the_bus_sees_each_message_once(ends: Ends) -> None:
     seen: list[Arrival[Motion]] = []
-    ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, seen.append, depth=100))
+    ends.buses.bus(lambda bus: bus.subscribe(keys.MOTION, seen.append, depth=100))
     until_heard(lambda: ends.motion.put(Motion(command=Command.STOP)), lambda: seen, "a motion")
     for _ in range(50):
         ends.motion.put(Motion(command=Command.STOP))
@@ -100,15 +100,15 @@ def test_nothing_of_a_burst_is_lost(ends: Ends) -> None:
 
 
 def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
-    stranger = ends.rig.session()
+    stranger = ends.buses.session()
     copied = Motion(command=Command.RUN, linear=0.9, seq=10**6, boot=ends.safetys_bus.boot)
     pressed = Bumper(pressed=True, seq=10**6, boot=ends.bridges_bus.boot)
     witnessed: list[Arrival[Motion]] = []
-    ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, witnessed.append, depth=100))
+    ends.buses.bus(lambda bus: bus.subscribe(keys.MOTION, witnessed.append, depth=100))
     until_heard(
         lambda: (
-            stranger.put(keys.MOTION.on(ends.rig.robot), codec.encode(copied)),
-            stranger.put(keys.BUMPER.on(ends.rig.robot), codec.encode(pressed)),
+            stranger.put(keys.MOTION.on(ends.buses.robot), codec.encode(copied)),
+            stranger.put(keys.BUMPER.on(ends.buses.robot), codec.encode(pressed)),
         ),
         lambda: any(arrival.message.linear for arrival in witnessed),
         "the forged motion, at a client of the router",
@@ -119,16 +119,16 @@ def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
     assert not any(arrival.message.pressed for arrival in ends.bumpers)
 
 
-def test_it_works_without_a_router_and_from_before_there_is_one(rig: Rig) -> None:
-    rig.endpoint = "tcp/127.0.0.1:1"
+def test_it_works_without_a_router_and_from_before_there_is_one(buses: BusFixture) -> None:
+    buses.endpoint = "tcp/127.0.0.1:1"
 
     def opened(bus: Bus) -> Bus:
         bus.open()
-        rig._stack.callback(bus.close)
+        buses._stack.callback(bus.close)
         return bus
 
-    rig.opened = opened  # type: ignore[method-assign]
-    ends = Ends(rig)
+    buses.opened = opened  # type: ignore[method-assign]
+    ends = Ends(buses)
     assert not ends.bridges_bus.connected
     assert ends.bridge.connected
     assert ends.motion.passed_on
@@ -157,9 +157,9 @@ def test_the_socket_is_the_users_own(ends: Ends) -> None:
     assert ends.bridge.socket.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_socket_left_by_a_killed_bridge_is_taken_over(rig: Rig, tmp_path: Path) -> None:
-    where = Settings(connect=(rig.endpoint,), drive=f"unixsock-stream/{tmp_path}/t2/d.sock")
-    bus = Bus(where, rig.robot, rig.loop.post)
+def test_a_socket_left_by_a_killed_bridge_is_taken_over(buses: BusFixture, tmp_path: Path) -> None:
+    where = Settings(connect=(buses.endpoint,), drive=f"unixsock-stream/{tmp_path}/t2/d.sock")
+    bus = Bus(where, buses.robot, buses.loop.post)
     link = DriveLink(bus, listens=True)
     link.socket.touch()
     with pytest.raises(ConfigError, match="is not a socket"):
@@ -167,29 +167,29 @@ def test_a_socket_left_by_a_killed_bridge_is_taken_over(rig: Rig, tmp_path: Path
     link.socket.unlink()
     with socket.socket(socket.AF_UNIX) as left:
         left.bind(str(link.socket))
-    rig.opened(bus)
+    buses.opened(bus)
     wait_until(lambda: link._session is not None, "it listens")
 
 
 def test_a_second_bridge_waits_and_says_why(ends: Ends, lines: Lines) -> None:
-    second = Bus(at(ends.rig.endpoint), ends.rig.robot, ends.rig.loop.post)
+    second = Bus(at(ends.buses.endpoint), ends.buses.robot, ends.buses.loop.post)
     link = DriveLink(second, listens=True)
-    ends.rig.opened(second)
+    ends.buses.opened(second)
     wait_until(lambda: lines, "a line")
     assert "cannot listen" in lines[0][1]
     assert lines[0][2] == {"socket": str(link.socket)}
     assert not link.connected
 
 
-def test_a_link_that_never_opened_closes(rig: Rig) -> None:
-    bus = Bus(at(rig.endpoint), rig.robot, rig.loop.post)
+def test_a_link_that_never_opened_closes(buses: BusFixture) -> None:
+    bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
     publisher = DriveLink(bus, listens=False).publisher(keys.MOTION)
     bus.close()
     publisher.put(Motion(command=Command.STOP))
 
 
-def test_an_end_that_dials_says_nothing_by_itself(rig: Rig) -> None:
-    link = DriveLink(Bus(at(rig.endpoint), rig.robot, rig.loop.post), listens=False)
+def test_an_end_that_dials_says_nothing_by_itself(buses: BusFixture) -> None:
+    link = DriveLink(Bus(at(buses.endpoint), buses.robot, buses.loop.post), listens=False)
     assert link.other == "bridge"
     assert isinstance(link._opener, DriveOpener)
 
@@ -202,17 +202,17 @@ def test_a_link_that_is_missing_lost_or_back_is_reported(lines: Lines) -> None:
     link, events = FakeLink(), []
     watch = LinkWatch(link, lambda name, level, text: events.append((name, level, text)))  # type: ignore[arg-type]
     for second in range(12):
-        watch.look(second * NS_PER_S)
+        watch.check(second * NS_PER_S)
     assert [line[1].split(";")[0] for line in lines] == ["no safety on the drive link"] * 2
     link.connected = True
-    watch.look(12 * NS_PER_S)
+    watch.check(12 * NS_PER_S)
     assert events == []  # it came for the first time
     link.connected = False
     for second in range(13, 19):
-        watch.look(second * NS_PER_S)
+        watch.check(second * NS_PER_S)
     assert len(lines) == 3
     link.connected = True
-    watch.look(19 * NS_PER_S)
+    watch.check(19 * NS_PER_S)
     assert [event[:2] for event in events] == [
         ("drive_link_lost", "error"), ("drive_link_up", "info"),
     ]  # fmt: skip

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from common.bus.bus import Bus
-from common.bus.host import BOOT_ID, host_id
+from common.bus.publisher import BOOT_ID, host_id
 from common.messages import Bumper
 from verification.harness.support import at
 
 
 @pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")
 def test_another_process_of_this_host_has_the_same() -> None:
-    code = "from common.bus.host import host_id; print(host_id())"
+    code = "from common.bus.publisher import host_id; print(host_id())"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert int(ran.stdout) == host_id() != 0
 

@@ -15,7 +15,7 @@ from common.bus.probe import probe
 from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from verification.harness.support import Lines, at, free_port, listening, wait_until
 
 
@@ -36,7 +36,7 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         return quick
 
     monkeypatch.setattr(session_module, "client_config", config)
-    monkeypatch.setattr(session_module, "RETRY_S", 0.01)
+    monkeypatch.setattr(session_module, "RETRY_PERIOD_S", 0.01)
     return made
 
 
@@ -52,14 +52,14 @@ def test_a_client_never_scouts_and_notices_a_silent_partition() -> None:
 def test_without_a_router_it_says_so_again_and_again(
     monkeypatch: pytest.MonkeyPatch, lines: Lines, tries: list[float]
 ) -> None:
-    monkeypatch.setattr(session_module, "COMPLAIN_S", 0.2)
+    monkeypatch.setattr(session_module, "WARN_PERIOD_S", 0.2)
     where = nowhere()
     bus = Bus(at(where), "001", lambda call: call())
     bus.open()
     wait_until(lambda: len(lines) >= 3, "three lines")
     assert not bus.connected
     bus.close()
-    said = "waiting for a router; `t2 doctor` looks further"
+    said = "waiting for a router; run `t2 doctor`"
     assert lines == [("warning", said, {"endpoints": [where]})] * len(lines)
 
 
@@ -68,28 +68,28 @@ def test_it_says_so_once_in_five_seconds(lines: Lines, tries: list[float]) -> No
     bus.open()
     wait_until(lambda: len(tries) >= 3, "three tries")
     bus.close()
-    assert len(lines) <= 1 + (tries[-1] - tries[0]) / session_module.COMPLAIN_S
+    assert len(lines) <= 1 + (tries[-1] - tries[0]) / session_module.WARN_PERIOD_S
 
 
-def test_a_router_that_comes_later_is_found(rig: Rig, lines: Lines) -> None:
+def test_a_router_that_comes_later_is_found(buses: BusFixture, lines: Lines) -> None:
     where = nowhere()
-    rig.endpoint = where
+    buses.endpoint = where
     heard: list[Arrival[Bumper]] = []
-    hearer = Bus(at(where), rig.robot, rig.loop.post)
+    hearer = Bus(at(where), buses.robot, buses.loop.post)
     hearer.subscribe(keys.BUMPER, heard.append)
     hearer.open()
     wait_until(lambda: lines, "the line that says so")
     with router(listening(where)):
-        publisher = rig.bus().publisher(keys.BUMPER)
+        publisher = buses.bus().publisher(keys.BUMPER)
         until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
         hearer.close()
 
 
-def test_a_router_behind_one_that_is_silent_is_found(rig: Rig) -> None:
+def test_a_router_behind_one_that_is_silent_is_found(buses: BusFixture) -> None:
     where = nowhere()
     with socket.create_server(("127.0.0.1", 0)) as silent, router(listening(where)):
         dead = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
-        bus = Bus(at(dead, where), rig.robot, rig.loop.post)
+        bus = Bus(at(dead, where), buses.robot, buses.loop.post)
         bus.open()
         wait_until(lambda: bus.connected, "the second one")
         bus.close()
@@ -97,22 +97,22 @@ def test_a_router_behind_one_that_is_silent_is_found(rig: Rig) -> None:
             assert opened.zid
 
 
-def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
-    rig.endpoint = nowhere()
+def test_after_a_routers_restart_all_is_as_it_was(buses: BusFixture) -> None:
+    buses.endpoint = nowhere()
     heard: list[Arrival[Bumper]] = []
     seen: list[str] = []
     replies: list[ResetDone] = []
     late: list[str] = []
-    token = keys.live_key(rig.robot, "bridge", "1")
+    token = keys.live_key(buses.robot, "bridge", "1")
 
     def declare(bus: Bus) -> None:
         bus.subscribe(keys.BUMPER, heard.append)
         bus.subscribe(keys.EVENTS, lambda a: late.append(a.message.name), depth=99, service="*")
         bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="done")))
-        bus.watch_live(keys.live_key(rig.robot, "*", "*"), lambda key, _: seen.append(key))
+        bus.watch_live(keys.live_key(buses.robot, "*", "*"), lambda key, _: seen.append(key))
 
-    with router(listening(rig.endpoint)):
-        hearer, sender = rig.bus(declare), rig.bus(lambda bus: bus.live(token))
+    with router(listening(buses.endpoint)):
+        hearer, sender = buses.bus(declare), buses.bus(lambda bus: bus.live(token))
         bumper = sender.publisher(keys.BUMPER)
         events = sender.publisher(keys.EVENTS, service="bridge")
         until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
@@ -121,7 +121,7 @@ def test_after_a_routers_restart_all_is_as_it_was(rig: Rig) -> None:
     bumper.put(Bumper(pressed=True))  # harmless
     heard.clear()
     seen.clear()
-    with router(listening(rig.endpoint)):
+    with router(listening(buses.endpoint)):
         wait_until(lambda: hearer.connected and sender.connected, "both back")
         until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
         wait_until(lambda: seen, "the token")
@@ -157,11 +157,11 @@ def test_a_taken_port_is_a_link_error() -> None:
     assert "/root/" not in str(caught.value)
 
 
-def test_a_router_on_a_unix_socket(rig: Rig, tmp_path: Path) -> None:
-    rig.endpoint = f"unixsock-stream/{tmp_path}/made/bus.sock"
+def test_a_router_on_a_unix_socket(buses: BusFixture, tmp_path: Path) -> None:
+    buses.endpoint = f"unixsock-stream/{tmp_path}/made/bus.sock"
     heard: list[Arrival[Bumper]] = []
-    with router(listening(rig.endpoint)):
-        hearer = rig.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
-        sender = rig.bus().publisher(keys.BUMPER)
+    with router(listening(buses.endpoint)):
+        hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
+        sender = buses.bus().publisher(keys.BUMPER)
         until_heard(lambda: sender.put(Bumper(pressed=True)), lambda: heard, "a bumper")
         hearer.close()

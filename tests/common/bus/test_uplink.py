@@ -8,7 +8,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.bus_fixture import Rig, until_heard
+from tests.common.bus_fixture import BusFixture, until_heard
 from verification.harness.support import at, free_port, listening, wait_until
 
 
@@ -20,9 +20,9 @@ def somewhere() -> str:
 class Onboard:
     """What is on a robot."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, buses: BusFixture) -> None:
         self.stops: list[int] = []
-        self.bus = rig.bus(self.declare)
+        self.bus = buses.bus(self.declare)
         self.bumper = self.bus.publisher(keys.BUMPER)
         events = self.bus.publisher(keys.EVENTS, service="safety")
         events.put(Event(name="old", level="info", text="before the site was there"))
@@ -39,12 +39,12 @@ class Onboard:
 class Room:
     """Somebody at the site."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, buses: BusFixture) -> None:
         self.heard: list[Arrival[Bumper]] = []
         self.late: list[str] = []
         self.tokens: list[str] = []
         self.replies: list[ResetDone] = []
-        self.bus = rig.bus(self.declare)
+        self.bus = buses.bus(self.declare)
 
     def declare(self, bus: Bus) -> None:
         bus.subscribe(keys.BUMPER, self.heard.append)
@@ -57,16 +57,16 @@ class Room:
         self.bus.ask(keys.RESET, ResetRequest(), self.replies.append, print)
 
 
-def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(rig: Rig) -> None:
+def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixture) -> None:
     site, own = somewhere(), somewhere()
-    rig.endpoint, rig.robot = own, "berlin-007"
+    buses.endpoint, buses.robot = own, "berlin-007"
     with router(listening(own, site)):  # which does without the site's
-        onboard = Onboard(rig)
+        onboard = Onboard(buses)
         for _ in range(2):  # the site's is restarted in between
             onboard.stops.clear()
             with router(listening(site)), zenoh.open(client_config(at(site))) as session:
-                rig.endpoint = site
-                room = Room(rig)
+                buses.endpoint = site
+                room = Room(buses)
                 until_heard(onboard.put, lambda r=room: r.heard, "a bumper")  # type: ignore[misc]
                 wait_until(lambda r=room: r.tokens, "the token")  # type: ignore[misc]
                 wait_until(lambda r=room: r.late, "the event")  # type: ignore[misc]
@@ -79,10 +79,10 @@ def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(rig: Rig) -> Non
                 room.bus.close()
 
 
-def test_without_its_site_a_robot_is_whole(rig: Rig) -> None:
-    rig.endpoint = somewhere()
-    with router(listening(rig.endpoint, somewhere())):
-        room, onboard = Room(rig), Onboard(rig)
+def test_without_its_site_a_robot_is_whole(buses: BusFixture) -> None:
+    buses.endpoint = somewhere()
+    with router(listening(buses.endpoint, somewhere())):
+        room, onboard = Room(buses), Onboard(buses)
         until_heard(onboard.put, lambda: room.heard, "a bumper")
         until_heard(onboard.bus.estop, lambda: onboard.stops, "a stop")
         until_heard(room.ask, lambda: room.replies, "a reply")
@@ -90,7 +90,7 @@ def test_without_its_site_a_robot_is_whole(rig: Rig) -> None:
             bus.close()
 
 
-def test_robots_do_not_hear_each_other(rig: Rig) -> None:
+def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
     """So the declarations of one cost the others nothing, and none can drive another."""
     site, first, second = somewhere(), somewhere(), somewhere()
     with ExitStack() as stack:

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from common.errors import WireError
 from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCommand, MotionKind
-from common.wire.frame import Frame, Kinds, Side
+from common.wire.frame import HEADER, MAGIC, OPENING, Frame, Kinds, Side
 from common.wire.framing import Covers, Framing, Reason, Received, Rejected, crc_function
-from common.wire.header import HEADER, MAGIC, OPENING
 from common.wire.reports import FROM_BOARD, BumperReport, LedReport
 from verification.harness.frame_strategies import COMMANDS, REPORTS, commands, read_all, reports
 

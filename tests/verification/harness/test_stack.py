@@ -7,12 +7,19 @@ from collections.abc import Iterator
 import pytest
 
 from sim.requests import Bumper
-from tests.drive_source import Stick, kinds_since, moves_since, push, stack, stick
+from tests.drive_source import (
+    ConstantSource,
+    drive_until_moving,
+    kinds_since,
+    moves_since,
+    source,
+    stack,
+)
 from verification.harness.stack import Chain, Witness, until_still_s
 from verification.harness.support import wait_until
 from verification.harness.teleop_terminal import Terminal, terminal
 
-__all__ = ["stack", "stick"]  # fixtures
+__all__ = ["source", "stack"]  # fixtures
 
 pytestmark = pytest.mark.alone
 
@@ -98,22 +105,22 @@ def test_the_death_of_any_part_stops_the_vehicle(stack: Chain, hand: Hand, victi
 
 
 def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(
-    stack: Chain, stick: Stick
+    stack: Chain, source: ConstantSource
 ) -> None:
-    push(stack, stick)
+    drive_until_moving(stack, source)
     stack.kill("sim")
     wait_until(lambda: "link_lost" in stack.log.read_text(), "the bridge misses the board")
     stack.trace_file.unlink()
     stack.start("sim")
     wait_until(stack.trace_file.exists, "a new trace")
     assert not moves_since(stack, 0)
-    push(stack, stick)
+    drive_until_moving(stack, source)
 
 
 def test_a_safety_that_comes_back_is_not_driven_by_what_is_still_asked(
-    stack: Chain, stick: Stick
+    stack: Chain, source: ConstantSource
 ) -> None:
-    push(stack, stick)
+    drive_until_moving(stack, source)
     stack.kill("safety")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     count = len(stack.trace().commands)
@@ -121,18 +128,20 @@ def test_a_safety_that_comes_back_is_not_driven_by_what_is_still_asked(
     wait_until(lambda: stack.log.read_text().count(STARTED) == 2, "the next safety")
     assert not moves_since(stack, count)
     assert not moves_since(stack, len(stack.trace().commands))
-    push(stack, stick)
+    drive_until_moving(stack, source)
 
 
-def test_a_hit_is_latched_until_a_reset_whatever_is_asked(stack: Chain, stick: Stick) -> None:
-    push(stack, stick)
+def test_a_hit_is_latched_until_a_reset_whatever_is_asked(
+    stack: Chain, source: ConstantSource
+) -> None:
+    drive_until_moving(stack, source)
     stack.control.do(Bumper(pressed=True))
     wait_until(lambda: stack.last() == "brake", "BREAK at the board")
     stack.control.do(Bumper(pressed=False))
-    stick.linear = 0.0
+    source.linear = 0.0
     count = len(stack.trace().commands)
     assert not moves_since(stack, count)
-    stick.linear = 0.5
+    source.linear = 0.5
     count = len(stack.trace().commands)
     assert not moves_since(stack, count)
     assert "run" not in kinds_since(stack, count)

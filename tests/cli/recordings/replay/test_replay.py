@@ -17,7 +17,8 @@ from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import Tool, pretend
-from tests.common.bus_fixture import Rig
+from tests.common.bus_fixture import BusFixture
+from tests.factories import link
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
 from verification.harness.support import wait_until
@@ -51,7 +52,7 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def came(rig: Rig) -> Iterator[list[zenoh.Sample]]:
+def came(rig: BusFixture) -> Iterator[list[zenoh.Sample]]:
     """All samples that arrive on the robot's keys."""
     found: list[zenoh.Sample] = []
     session = rig.session()
@@ -110,7 +111,7 @@ def test_nothing_to_play_is_an_error(path: Path, tool: Tool) -> None:
 
 @pytest.mark.parametrize("service", ["bridge", "safety"])
 def test_refused_while_bridge_or_safety_run(
-    path: Path, came: list[zenoh.Sample], rig: Rig, tool: Tool, service: str
+    path: Path, came: list[zenoh.Sample], rig: BusFixture, tool: Tool, service: str
 ) -> None:
     pretend(rig, service, {})
     result = tool("replay", str(path), *FAST)
@@ -121,7 +122,7 @@ def test_refused_while_bridge_or_safety_run(
 
 
 def test_a_service_that_starts_ends_the_replay(
-    path: Path, rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    path: Path, rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     play = targets.BusTarget.play
 
@@ -137,13 +138,6 @@ def test_a_service_that_starts_ends_the_replay(
     assert f"safety of robot {rig.robot} is running" in result.err
 
 
-def link(board: str) -> m.Link:
-    return m.Link(
-        state="up", board=board, epoch=0, armed=True, waiting="", rates={}, rejected={},
-        round_trip=None,
-    )  # fmt: skip
-
-
 def state(heartbeat: int) -> Callable[[], m.SafetyState]:
     return lambda: m.SafetyState(
         verdict="run", latched=(), causes=(), source=None, heartbeat=heartbeat, text="",
@@ -156,19 +150,21 @@ def state(heartbeat: int) -> Callable[[], m.SafetyState]:
     [(None, "no bridge of robot"), ("10.7.5.224:4002", "is at 10.7.5.224:4002: a real one")],
 )
 def test_a_real_vehicle_is_refused(
-    path: Path, rig: Rig, tool: Tool, board: str | None, printed: str
+    path: Path, rig: BusFixture, tool: Tool, board: str | None, printed: str
 ) -> None:
     asked: list[m.Drive] = []
     rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
     if board:
-        pretend(rig, "bridge", {keys.LINK: lambda: link(board)})
+        pretend(rig, "bridge", {keys.LINK: lambda: link(board=board)})
     result = tool("replay", str(path), "--simulator", *FAST)
     assert result.code == 1
     assert printed in result.err
     assert asked == []
 
 
-def test_a_simulated_vehicle_receives_current_requests(path: Path, rig: Rig, tool: Tool) -> None:
+def test_a_simulated_vehicle_receives_current_requests(
+    path: Path, rig: BusFixture, tool: Tool
+) -> None:
     asked: list[m.Drive] = []
     moved: list[Arrival[m.Motion]] = []
     stops: list[int] = []
@@ -179,7 +175,7 @@ def test_a_simulated_vehicle_receives_current_requests(path: Path, rig: Rig, too
         bus.on_any(keys.estop_key(rig.robot), stops.append)
 
     rig.bus(declare)
-    pretend(rig, "bridge", {keys.LINK: lambda: link("127.0.0.1:4003")})
+    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     pretend(rig, "safety", {keys.SAFETY: state(77)})
     result = tool("replay", str(path), "--simulator", "--rate", "20")
     assert (result.code, result.err) == (0, "played 6 messages\n")

@@ -63,14 +63,14 @@ class Board:
         return Velocity(linear=self.linear, angular=self.angular, boot=self.boot)
 
 
-class Listener:
+class OdomFixture:
     """An estimator beside a board."""
 
     def __init__(self, board: Board, settings: Odom | None = None) -> None:
         self.board = board
         self.estimator = Estimator(settings or Odom())
 
-    def hear(self, *, counters: bool = True, velocity: bool = True) -> Outcome | None:
+    def update(self, *, counters: bool = True, velocity: bool = True) -> Outcome | None:
         """Take what the board says now, in the order in which the bridge publishes it."""
         outcome = None
         if counters:
@@ -82,7 +82,7 @@ class Listener:
     def drive(self, ticks: int, *, counters: bool = True, velocity: bool = True) -> None:
         for _ in range(ticks):
             self.board.tick()
-            self.hear(counters=counters, velocity=velocity)
+            self.update(counters=counters, velocity=velocity)
 
     def odometry(self, after_ns: int = 0) -> Odometry:
         odometry = self.estimator.estimate(self.board.now_ns + after_ns)
@@ -114,16 +114,16 @@ def minors(rows: Sequence[float]) -> list[float]:
     return [a, d, f, a * d - b * b, a * f - c * c, d * f - e * e, whole]
 
 
-def started(**board: float) -> Listener:
-    """Return a listener that has heard the counters once, beside a board at rest."""
-    listener = Listener(Board(**board))  # type: ignore[arg-type]
-    listener.hear()
-    return listener
+def started(**board: float) -> OdomFixture:
+    """Return a odom that has heard the counters once, beside a board at rest."""
+    odom = OdomFixture(Board(**board))  # type: ignore[arg-type]
+    odom.update()
+    return odom
 
 
-def driving() -> Listener:
-    """Return a listener beside a board that has driven a while."""
-    listener = started(distance=70.0, heading=2.0)
-    listener.board.linear, listener.board.angular = 0.8, 0.3
-    listener.drive(100)
-    return listener
+def driving() -> OdomFixture:
+    """Return a odom beside a board that has driven a while."""
+    odom = started(distance=70.0, heading=2.0)
+    odom.board.linear, odom.board.angular = 0.8, 0.3
+    odom.drive(100)
+    return odom

@@ -6,8 +6,7 @@ import pytest
 from common.config import DEFAULT_FILE, Sources, load
 from common.errors import ConfigError
 from common.settings import Vehicle
-from sim.config import Config, Sim
-from sim.files import WORLDS, load_plan, load_script
+from sim.config import WORLDS, Config, Sim, load_plan, load_script
 from sim.geometry import Pose, Rectangle
 from sim.requests import Freeze
 from sim.world import World

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.backoff import BACKOFF_S, CALM_S, Backoff
+from common.child_process import BACKOFF_S, CALM_S, Backoff
 
 
 def test_the_first_restart_is_at_once_and_the_next_ones_ever_later() -> None:

@@ -3,7 +3,7 @@
 import tomllib
 from pathlib import Path
 
-from common.version import VERSION
+from common.cli_args import VERSION
 
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 

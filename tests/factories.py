@@ -1,0 +1,77 @@
+"""Factories of test messages: a valid message with default fields, except the given ones."""
+
+from typing import Any
+
+from common.messages import Cause, Limits, Link, Odometry, Release, SafetyState
+
+
+def safety_state(**fields: Any) -> SafetyState:
+    """Return a safety state without causes."""
+    usual: dict[str, Any] = {
+        "verdict": "run",
+        "latched": (),
+        "causes": (),
+        "source": "teleop",
+        "limits": Limits(forward=1.0, backward=0.5, angular=1.0),
+        "heartbeat": 7,
+        "text": "Driving.",
+    }
+    return SafetyState(**usual | fields)
+
+
+def release(**fields: Any) -> Release:
+    """Return the release state after a contact in forward motion."""
+    usual: dict[str, Any] = {
+        "believed_free": "backward",
+        "travelled": 0.43,
+        "age": 12.0,
+        "forbidden": (),
+        "left": 0.12,
+    }
+    return Release(**usual | fields)
+
+
+def contact_state(**fields: Any) -> SafetyState:
+    """Return a safety state with a latched contact."""
+    pressed = Cause(name="contact", action="brake", age=12.0, text="The bumper was hit.", id=42)
+    usual: dict[str, Any] = {
+        "verdict": "brake",
+        "latched": ("contact",),
+        "causes": (pressed,),
+        "source": None,
+        "text": "The bumper is pressed.",
+        "release": release(),
+    }
+    return safety_state(**usual | fields)
+
+
+def link(**fields: Any) -> Link:
+    """Return the state of an established link."""
+    usual: dict[str, Any] = {
+        "state": "up",
+        "board": "10.7.5.224:4002",
+        "epoch": 0,
+        "armed": True,
+        "waiting": "",
+        "rates": {"Velocity": 50.0, "Driver": 2.0},
+        "rejected": {},
+        "round_trip": 0.0008,
+    }
+    return Link(**usual | fields)
+
+
+def odometry(**fields: Any) -> Odometry:
+    """Return an odometry sample."""
+    usual: dict[str, Any] = {
+        "x": 1.234,
+        "y": -0.4,
+        "heading": 1.5708,
+        "linear": 0.2,
+        "angular": 0.0,
+        "pose_covariance": (0.0,) * 9,
+        "twist_covariance": (0.0,) * 4,
+        "epoch": 0,
+        "residual": 0.004,
+        "slip": False,
+    }
+    return Odometry(**usual | fields)
