@@ -29,9 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_CONFIG
     if config.robot.realtime:
         realtime.ask(realtime.GUARD)
-    log.configure(
-        config.log, "guard"
-    )  # after the priority: the log's thread holds Python's lock at times
+    # After the priority: the log's thread inherits it, and holds Python's lock at times.
+    log.configure(config.log, "guard")
     if config.robot.realtime:
         realtime.ask(realtime.GUARD, alone=True)
         realtime.limit()

@@ -46,9 +46,7 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
 
     unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
     lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message is valid
-    silence: Annotated[float, Meta(ge=0.05, le=10.0)] = (
-        0.2  # s without a frame until the link is lost
-    )
+    silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s without a frame: link lost
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port takes over
     # s without a heartbeat of the bridge until the guard brakes
     heartbeat: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2

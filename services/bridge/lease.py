@@ -74,9 +74,8 @@ class Lease(Struct, frozen=True):
     neutral: bool = False
     hit: int | None = None  # ``seq`` of the bumper sample to be acknowledged
     sent_ns: int = 0
-    latched_by: int | None = (
-        None  # owner of the latch that was not reset: an authority, or the bridge
-    )
+    # Owner of the latch that was not reset: an authority, or the bridge.
+    latched_by: int | None = None
     braked: bool = False  # whether the authority's last order was BREAK
     uncommanded: bool = False  # moved from standstill; safety has not latched it yet
 

@@ -42,9 +42,8 @@ class MotionOutput:
         self._brake = framing.pack(translator.command(BRAKE))
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
-        self._reported: set[tuple[Refusal, int]] = (
-            set()
-        )  # refused senders already reported by an event
+        # Refused senders already reported by an event.
+        self._reported: set[tuple[Refusal, int]] = set()
         self._lease_ns = round(settings.lease * NS_PER_S)
         self._silence_ns = round(settings.silence * NS_PER_S)
         self._standstill = Standstill(

@@ -87,9 +87,8 @@ class Timings:
             for reaction in REACTIONS
         }
         self._not_counted: Counter[str] = Counter()
-        self._hit: tuple[int, Receipt] | None = (
-            None  # ``seq`` of its message, and its receive times
-        )
+        # ``seq`` of its message, and its receive times.
+        self._hit: tuple[int, Receipt] | None = None
 
     def on_read(self, receipt: Receipt) -> None:
         """Record the read of a datagram."""

@@ -38,10 +38,8 @@ class Standstill:
         """Return the part of an arc that adds noise; at standstill one counter step in total."""
         if self._left is None:
             return segment
-        distance, turn = (
-            min(abs(segment.distance), self._left[0]),
-            min(abs(segment.turn), self._left[1]),
-        )
+        distance = min(abs(segment.distance), self._left[0])
+        turn = min(abs(segment.turn), self._left[1])
         self._left = self._left[0] - distance, self._left[1] - turn
         return replace(segment, distance=distance, turn=turn)
 
