@@ -1,4 +1,4 @@
-"""What is sent while a hold drives and after: the wish of an operator, tick by tick.
+"""Drive requests of an operator program, tick by tick: during a hold and after its release.
 
 On every tick, 20 times a second, at most one request goes out:
 
@@ -10,8 +10,8 @@ DRIVING    send the twist            send zero; RELEASING, two zeros are left
 RELEASING  send zero; DRIVING        send zero; SILENT once none is left
 ========== ========================= =========================================
 
-The zero ahead of a drive is neutral: it lets safety and the bridge arm. ``stop`` is RELEASING with
-three zeros, in any phase.
+The zero before a drive is neutral: it arms safety and the bridge. ``stop`` enters RELEASING with
+three zeros from any phase.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from enum import Enum
 
 from common.motion import STILL, Twist
 
-ZEROS = 3  # on release: one may be lost, two are a doubt
+ZEROS = 3  # on release; tolerates two lost ones
 
 
 class Phase(Enum):
-    """What the last tick left behind."""
+    """Phase after the last tick."""
 
     SILENT = "silent"
     DRIVING = "driving"
@@ -32,13 +32,13 @@ class Phase(Enum):
 
 @dataclass
 class Requests:
-    """What to send, tick by tick."""
+    """State machine of the requests."""
 
     phase: Phase = Phase.SILENT
     zeros: int = 0  # left to send while RELEASING
 
     def tick(self, held: Twist | None) -> Twist | None:
-        """Return the request to send now, or None for silence; ``held`` is None when let go."""
+        """Return the request to send now, or None for silence; ``held`` is None when released."""
         if held is not None:
             first = self.phase is not Phase.DRIVING
             self.phase = Phase.DRIVING
@@ -53,5 +53,5 @@ class Requests:
         return STILL
 
     def stop(self) -> None:
-        """Send zeros and then fall silent, whatever went before."""
+        """Send zeros, then fall silent, from any phase."""
         self.phase, self.zeros = Phase.RELEASING, ZEROS
