@@ -1,4 +1,4 @@
-"""Request sequence of a hold-to-run control, tick by tick.
+"""Drive requests of an operator program, tick by tick: during a hold and after its release.
 
 On every tick, 20 times a second, at most one request is sent:
 
@@ -10,8 +10,8 @@ DRIVING    send the twist            send zero; RELEASING, two zeros are left
 RELEASING  send zero; DRIVING        send zero; SILENT once none is left
 ========== ========================= =========================================
 
-The zero before a drive is neutral: it lets safety and the bridge arm. ``stop`` enters RELEASING
-with three zeros, in any phase.
+The zero before a drive is neutral: it arms safety and the bridge. ``stop`` enters RELEASING with
+three zeros from any phase.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from enum import Enum
 
 from common.motion import STILL, Twist
 
-ZEROS = 3  # on release: two of them may be lost
+ZEROS = 3  # on release; tolerates two lost ones
 
 
 class Phase(Enum):
-    """State after the last tick."""
+    """Phase after the last tick."""
 
     SILENT = "silent"
     DRIVING = "driving"
@@ -32,13 +32,13 @@ class Phase(Enum):
 
 @dataclass
 class Requests:
-    """State machine of the requests to send."""
+    """State machine of the requests."""
 
     phase: Phase = Phase.SILENT
     zeros: int = 0  # left to send while RELEASING
 
     def tick(self, held: Twist | None) -> Twist | None:
-        """Return the request to send now, or None for silence; ``held`` is None on release."""
+        """Return the request to send now, or None for silence; ``held`` is None when released."""
         if held is not None:
             first = self.phase is not Phase.DRIVING
             self.phase = Phase.DRIVING
@@ -53,5 +53,5 @@ class Requests:
         return STILL
 
     def stop(self) -> None:
-        """Send zeros and then nothing, from any phase."""
+        """Send zeros, then fall silent, from any phase."""
         self.phase, self.zeros = Phase.RELEASING, ZEROS
