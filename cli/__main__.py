@@ -31,7 +31,7 @@ GROUPS = {
         "robots": "the robots on the bus: verdict, speed, driver",
         "services": "the services on the bus, with publishers and readers of each key",
         "health": "service health",
-        "ls": "the keys that are alive: type, rate, publisher",
+        "ls": "the active keys: type, rate, publisher",
         "list": "the same as ls",
         "echo": "print messages received on a key",
         "hz": "rate, gaps and losses of a key",
@@ -64,16 +64,19 @@ GROUPS = {
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 INSPECT = (
-    "doctor", "ls", "echo", "hz", "delay", "bw", "pub", "call", "estop", "robots", "services",
-    "health", "schema", "topic", "completion",
+    "doctor", "ls", "echo", "pub", "call", "estop", "robots", "services", "health", "schema",
+    "topic", "completion",
 )  # fmt: skip
 PLACES = {
+    "bw": "inspect.measure",
     "checkout": "commission.command",
     "config": "settings",
     "dashboard": "run.services:dashboard",
+    "delay": "inspect.measure",
     "demo": "demo.command",
     "drive": "run.services:drive",
     "foxglove": "recordings.foxglove",
+    "hz": "inspect.measure",
     "info": "recordings.info",
     "install": "run.install",
     "keys": "keys.command",
@@ -92,6 +95,8 @@ EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand and return its exit code."""
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks for completions
+        complete()
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:
         words = ["--help"]
@@ -113,6 +118,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
     """Return the parsed options; exit with usage and code 2 if they are invalid."""
+    parser, subparsers = parsers()
+    named = words[0]
+    if named not in COMMANDS:
+        refuse(parser, words)
+    subparser = subparsers.add_parser(named, description=COMMANDS[named])
+    module(named).add_arguments(subparser)
+    options, unknown = parser.parse_known_args(words)
+    if unknown:
+        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
+
+
+def parsers() -> "tuple[argparse.ArgumentParser, argparse._SubParsersAction[Any]]":
+    """Return the parser of ``t2``, and the action that its subcommands are added to."""
     parser = argparse.ArgumentParser(
         prog="t2",
         usage="t2 COMMAND [OPTIONS]",
@@ -125,15 +144,20 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
     subparsers = parser.add_subparsers(
         prog="t2", dest="command", metavar="COMMAND", help=argparse.SUPPRESS
     )
-    named = words[0]
-    if named not in COMMANDS:
-        refuse(parser, words)
-    subparser = subparsers.add_parser(named, description=COMMANDS[named])
-    module(named).add_arguments(subparser)
-    options, unknown = parser.parse_known_args(words)
-    if unknown:
-        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    return options
+    return parser, subparsers
+
+
+def complete() -> None:
+    """Print the completions of the line in the shell, and end the process."""
+    from cli.inspect import completion
+
+    parser, subparsers = parsers()
+    typed = completion.typed_command()
+    for name, text in COMMANDS.items():
+        subparser = subparsers.add_parser(name, help=text)
+        if name == typed:
+            module(name).add_arguments(subparser)
+    completion.complete(parser)
 
 
 def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
-from cli.inspect.shell import add_output, wants_json
+from cli.inspect.session import add_output, wants_json
 from cli.interrupt import interruptible
 from common import keys, log
 from common.bus.bus import Arrival, Bus

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from cli.demo.script import Ask, Lap, View
+from cli.demo.script import Action, Lap, View
 from common import messages as m
 from common.freshness import NS_PER_S, Latest
 from common.operator import reset_request
@@ -157,7 +157,7 @@ class SimulatedStack:
             self._index, self._refusal, self._granted = self.lap.index, None, False
         self._request(ask, self._told.heartbeat)
 
-    def _request(self, ask: Ask, echo: int) -> None:
+    def _request(self, ask: Action, echo: int) -> None:
         self._seq["drive"] += 1
         linear, angular = ask.twist.linear, ask.twist.angular
         request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)

@@ -1,7 +1,7 @@
-"""The checkout on the bus: waits until something is so, asks, and drives while it waits.
+"""Bus session of the checkout: waits for conditions, calls services, and drives while it waits.
 
-Everything happens in one thread. The loop turns only while something is waited for; while the
-operator is asked a question it stands, and so does the vehicle: silence is a release.
+Everything runs in one thread. The loop turns only while the session waits. During a question to the
+operator the loop stands still and so does the vehicle: missing requests are a release.
 """
 
 import time
@@ -12,49 +12,55 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from cli.commission.message_log import Tape
+from cli.commission.latches import Reset
+from cli.commission.message_log import MessageLog
 from cli.commission.motion import too_fast
+from cli.commission.operator import Operator
+from common import keys
 from common.bus.bus import Bus
 from common.errors import LinkError
 from common.freshness import NS_PER_S
 from common.keys import Call
 from common.loop import Loop
 from common.motion import STILL, Twist, is_standing
+from common.operator import reset_request
 from common.settings import Shared
 from common.source import DriveSource
 
-SOURCE = "checkout"  # as safety's settings name it
-ASK_S, LOOK_S = 0.05, 0.02
+SOURCE = "checkout"  # as in safety's settings
+REQUEST_S, POLL_S = 0.05, 0.02
 ROUTER_S = 10.0
-READY_S = 8.0  # to be let through by safety; a cause that clears by itself needs half a second
-REST_S = 3.0  # to stand after the release
-ZEROS_S = 0.15  # three of them
+READY_S = 8.0  # wait for safety to grant motion; a cause that clears by itself needs 0.5 s
+REST_S = 3.0  # wait for standstill after the release
+ZEROS_S = 0.15  # three requests
+AFTER_S = 2.0  # wait for safety's state without a latch
+PHRASE = "reset"
 
-Settings = dict[str, Any]
+Settings = dict[str, tuple[Any, str]]  # value and origin by path
 
 
-class Bench:
-    """One run of the checkout on a bus."""
+class CheckoutSession:
+    """One checkout on a bus."""
 
     def __init__(self, config: Shared) -> None:
         self.loop = Loop()
         self.bus = Bus(config.bus, config.robot.id, self.loop.post)
-        self.tape = Tape(self.bus)
+        self.log = MessageLog(self.bus)
         self._endpoints = ", ".join(config.bus.endpoints)
         self._source = DriveSource(self.bus, SOURCE)
-        self._wish: Twist | None = None
+        self._requested: Twist | None = None
         self._done: Callable[[], object] = lambda: True
-        self.loop.every(ASK_S, self._ask)
-        self.loop.every(LOOK_S, self._look)
+        self.loop.every(REQUEST_S, self._request)
+        self.loop.every(POLL_S, self._poll)
 
     @contextmanager
-    def opened(self) -> "Iterator[Bench]":
-        """Keep the session open while the context lasts; raise ``LinkError`` without a stack."""
+    def opened(self) -> "Iterator[CheckoutSession]":
+        """Keep the session open during the context; raise ``LinkError`` without a stack."""
         self.bus.open()
         try:
-            if not self.until(lambda: self.tape.links and self.tape.safety, ROUTER_S):
+            if not self.until(lambda: self.log.links and self.log.safety, ROUTER_S):
                 raise LinkError(
-                    f"no bridge and no safety service are heard on {self._endpoints}; "
+                    f"no message of bridge and safety on {self._endpoints}; "
                     "start `t2 up --no-sim --config config/vehicle.toml` first"
                 )
             yield self
@@ -62,19 +68,19 @@ class Bench:
             self.bus.close()
             self.loop.close()
 
-    def until(self, true: Callable[[], object], patience_s: float) -> bool:
-        """Turn the loop until it is true, at most so long; return whether it is."""
-        end_ns = time.monotonic_ns() + round(patience_s * NS_PER_S)
-        self._done = lambda: true() or time.monotonic_ns() > end_ns
+    def until(self, condition: Callable[[], object], timeout_s: float) -> bool:
+        """Run the loop until the condition holds or the timeout expires; return the condition."""
+        end_ns = time.monotonic_ns() + round(timeout_s * NS_PER_S)
+        self._done = lambda: condition() or time.monotonic_ns() > end_ns
         self.loop.run()
-        return bool(true())
+        return bool(condition())
 
     def listen(self, seconds: float) -> None:
-        """Turn the loop for so long."""
+        """Run the loop for a time."""
         self.until(lambda: False, seconds)
 
     def call(self, call: Call[Any, Any], request: Struct) -> tuple[bool, str]:
-        """Make a call; return whether it was carried out, and the words."""
+        """Make a call; return whether it succeeded, and the text of the answer."""
         answers: list[tuple[bool, str]] = []
         self.bus.ask(
             call,
@@ -83,68 +89,92 @@ class Bench:
             lambda reason: answers.append((False, reason)),
         )
         self.until(lambda: answers, ROUTER_S)
-        return answers[0] if answers else (False, "there was no answer")
+        return answers[0] if answers else (False, "no answer")
 
-    def settings(self, service: str) -> dict[str, tuple[Any, str]]:
-        """Return a service's settings with their origin, by path; raise ``LinkError``."""
+    def settings(self, service: str) -> Settings:
+        """Return a service's settings; raise ``LinkError`` without an answer."""
         answers: list[bytes] = []
         refusals: list[str] = []
         self.bus.look_up(service, "config", answers.append, refusals.append)
         self.until(lambda: answers or refusals, ROUTER_S)
         if not answers:
-            reason = refusals[0] if refusals else "there was no answer"
-            raise LinkError(f"the settings of {service} cannot be had: {reason}")
-        told = msgspec.json.decode(answers[0], type=dict[str, dict[str, Any]])
-        return {path: (one["value"], str(one["origin"])) for path, one in told.items()}
+            reason = refusals[0] if refusals else "no answer"
+            raise LinkError(f"cannot read the settings of {service}: {reason}")
+        decoded = msgspec.json.decode(answers[0], type=dict[str, dict[str, Any]])
+        return {path: (one["value"], str(one["origin"])) for path, one in decoded.items()}
 
     def latched(self) -> tuple[str, ...]:
-        """Return what safety said last that it has latched."""
-        return self.tape.safety[-1].value.latched if self.tape.safety else ()
+        """Return the latched causes of safety's newest state."""
+        return self.log.safety[-1].value.latched if self.log.safety else ()
 
-    def drive(self, asked: Twist, seconds: float) -> int | None:
-        """Ask for a motion, then for zero until the vehicle stands.
+    def reset(self) -> Reset:
+        """Request a reset of the latched causes, and return what stays latched."""
+        log = self.log
+        log.mark()
+        self.until(lambda: log.safety, AFTER_S)
+        if not log.safety:
+            return Reset(log.mark(), False, "no state of safety arrives", ())
+        request = reset_request(log.safety[-1].value)
+        requested_ns = log.mark()
+        granted, text = self.call(keys.RESET, request)
+        self.until(lambda: log.safety and not (granted and self.latched()), AFTER_S)
+        return Reset(requested_ns, granted, text, self.latched())
 
-        Return when zero was asked for; None when safety did not let the source in at all.
+    def unlatch(self, operator: Operator) -> str:
+        """Reset earlier latches after confirmation; return the problem, or an empty string."""
+        self.log.mark()
+        self.until(lambda: self.log.safety, AFTER_S)
+        if not self.latched():
+            return ""
+        fact = f"Safety has latched before: {', '.join(self.latched())}. Reset it first."
+        if not operator.confirm(fact, PHRASE):
+            return "The earlier latch of safety was not reset."
+        done = self.reset()
+        return "" if done.granted and not done.latched else f"The reset was refused: {done.text}"
+
+    def drive(self, requested: Twist, seconds: float) -> int | None:
+        """Request a motion, then zero until the vehicle stands.
+
+        Return the time at which zero was first requested; None if safety did not grant motion.
         """
         try:
-            self._wish = STILL
-            if not self.until(self._let_in, READY_S):
+            self._requested = STILL
+            if not self.until(self._is_granted, READY_S):
                 return None
-            self._wish = asked
-            self.until(lambda: self._must_stop(asked), seconds)
+            self._requested = requested
+            self.until(lambda: self._must_stop(requested), seconds)
             released_ns = time.monotonic_ns()
-            self._wish = STILL
+            self._requested = STILL
             self.until(lambda: self._stands(released_ns), REST_S)
             self.listen(ZEROS_S)
             return released_ns
         finally:
-            # Whatever ended it: a last zero at once. What follows is silence, which is a release.
-            self._wish = None
+            # On every way out: a last zero at once. The silence after it is a release.
+            self._requested = None
             self._source.ask(0.0, 0.0)
 
-    def _let_in(self) -> bool:
-        if not self.tape.safety or not self.tape.links:
+    def _is_granted(self) -> bool:
+        if not self.log.safety or not self.log.links:
             return False
-        state, link = self.tape.safety[-1].value, self.tape.links[-1].value
+        state, link = self.log.safety[-1].value, self.log.links[-1].value
         return state.source == SOURCE and state.verdict in ("run", "slow") and link.armed
 
-    def _must_stop(self, asked: Twist) -> bool:
-        fast = bool(self.tape.velocities) and too_fast(asked, self.tape.velocities[-1].value)
+    def _must_stop(self, requested: Twist) -> bool:
+        velocities = self.log.velocities
+        fast = bool(velocities) and too_fast(requested, velocities[-1].value)
         return fast or bool(self.latched())
 
     def _stands(self, since_ns: int) -> bool:
-        if (
-            not self.tape.velocities
-            or self.tape.velocities[-1].received_ns < since_ns + NS_PER_S // 4
-        ):
+        velocities = self.log.velocities
+        if not velocities or velocities[-1].received_ns < since_ns + NS_PER_S // 4:
             return False
-        velocity = self.tape.velocities[-1].value
+        velocity = velocities[-1].value
         return is_standing(velocity.linear, velocity.angular)
 
-    def _ask(self, _: int) -> None:
-        if self._wish is not None:
-            self._source.ask(self._wish.linear, self._wish.angular)
+    def _request(self, _: int) -> None:
+        if self._requested is not None:
+            self._source.ask(self._requested.linear, self._requested.angular)
 
-    def _look(self, _: int) -> None:
+    def _poll(self, _: int) -> None:
         if self._done():
             self.loop.stop()

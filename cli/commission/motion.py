@@ -1,20 +1,20 @@
-"""Whether the wheels turn the right way and as fast as they are told, by the board's counters.
+"""Verdict on a motion: direction and speed of the wheels, by the board's counters. Pure.
 
-What is commanded, what the board measures as velocity and what it counts as distance and heading
-are three things. The counters are the truth: their unit is not in question. While safety lets the
-full speed through, and the vehicle had time to reach it, each pair gives a ratio:
+Three quantities are compared: the command, the velocity that the board measures, and the distance
+and heading that it counts. The counters are the reference: their unit is known. Ratios are taken
+while safety grants the full speed and after the vehicle had time to reach it:
 
 ================= ==================== =====================================================
-counted/commanded measured/counted     means
+counted/commanded measured/counted     meaning
 ================= ==================== =====================================================
-about 1           about 1              all is well
-negative          about 1              the motion is the wrong way round
-about 1           negative             the measured velocity is the wrong way round
-0                 -                    nothing turns, or the counter does not count this
-of another unit   -                    the firmware takes another unit than the setting
+about 1           about 1              correct
+negative          about 1              the motion is inverted
+about 1           negative             the measured velocity is inverted
+0                 -                    the wheels do not turn, or the counter does not count
+ratio of a unit   -                    the firmware's unit differs from the setting
                                        ``wire.command_angular_unit``
--                 another, inverted    it measures in another one than
-                                       ``wire.feedback_angular_unit``
+-                 inverse of a unit's  the firmware's unit differs from the setting
+                  ratio                ``wire.feedback_angular_unit``
 ================= ==================== =====================================================
 """
 
@@ -24,19 +24,19 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import mean
 
-from cli.commission.verdict import Row, Verdict, judged
+from cli.commission.report import Row, Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, SafetyState, Velocity
 from common.motion import Command, Twist, is_standing
 
-SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; much is known of no vehicle
+SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown vehicles
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
-FULL = 0.95  # of what was asked counts as let through
-NOTHING = 0.15  # of what was commanded
-RATIO = 0.25  # off 1 by more is wrong; the next unit is off by 0.43
-UNIT_MATCH = 0.15  # of a known unit's ratio
-STOP_NS = 2 * NS_PER_S  # to stand, after a speed of this tool
-# rad/s for one unit of the wire, by the name of the setting where there is one
+FULL = 0.95  # of the requested speed counts as granted
+NOTHING = 0.15  # of the commanded speed
+RATIO = 0.25  # allowed deviation from 1; that of the nearest other unit is 0.43
+UNIT_MATCH = 0.15  # allowed deviation from a known unit's ratio
+STOP_NS = 2 * NS_PER_S  # limit for standstill after the release
+# rad/s per unit of the wire; the first two are values of the setting
 UNITS = {
     "decidegree": math.radians(0.1),
     "milliradian": 0.001,
@@ -45,17 +45,17 @@ UNITS = {
     "1 deg/s": math.radians(1),
 }
 SETTINGS = ("decidegree", "milliradian")
-TOO_FAST = 3.0  # times what is asked ends the motion at once
+TOO_FAST = 3.0  # multiple of the requested speed that ends the motion at once
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One motion that was asked for, and all that was heard from its start to standstill."""
+    """One requested motion, with all messages from its start to standstill."""
 
-    asked: Twist  # one of the two is zero
+    requested: Twist  # one of the two is zero
     unit: str  # ``wire.command_angular_unit`` of the bridge
     feedback: str  # ``wire.feedback_angular_unit`` of the bridge
-    released_ns: int  # when zero was asked for
+    released_ns: int  # when zero was first requested
     motions: Sequence[Latest[Motion]]
     velocities: Sequence[Latest[Velocity]]
     mileages: Sequence[Latest[Mileage]]
@@ -64,51 +64,51 @@ class Run:
     @property
     def turns(self) -> bool:
         """Whether it is a turn."""
-        return self.asked.angular != 0
+        return self.requested.angular != 0
 
     def part(self, linear: float, angular: float) -> float:
-        """Return the one of the two that was asked for."""
+        """Return the value on the requested axis."""
         return angular if self.turns else linear
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Means over the window; m/s, or rad/s for a turn."""
+    """Mean values over the window; m/s, or rad/s for a turn."""
 
     commanded: float
     velocity: float
     counted: float
-    across: float  # what was counted on the other axis, in its own unit
+    across: float  # counted on the other axis, in its own unit
     seconds: float
 
 
-def too_fast(asked: Twist, velocity: Velocity) -> bool:
-    """Tell whether the vehicle moves so much faster than asked that the wheels must stop."""
-    linear = max(abs(asked.linear), 0.1)
-    angular = max(abs(asked.angular), 0.2)
+def too_fast(requested: Twist, velocity: Velocity) -> bool:
+    """Return whether the vehicle is so much faster than requested that it must stop."""
+    linear = max(abs(requested.linear), 0.1)
+    angular = max(abs(requested.angular), 0.2)
     return abs(velocity.linear) > TOO_FAST * linear or abs(velocity.angular) > TOO_FAST * angular
 
 
 def judge_motion(run: Run) -> Verdict:
-    """Judge one motion."""
+    """Return the verdict on one motion."""
     measured = measure(run)
     stood_s = stood_after_s(run)
     if measured is None:
-        return judged([_not_let_through(run)], "", [("stood still after", _seconds(stood_s))])
+        return judged([_not_granted(run)], "", [("standstill after", seconds(stood_s))])
     problems = [*_problems(run, measured), *_standing(stood_s)]
     unit = _unit(run)
-    fine = f"The board counts {measured.counted:.3f} {unit} of {measured.commanded:.3f} commanded."
-    return judged(problems, fine, _data(run, measured, stood_s))
+    text = f"The board counts {measured.counted:.3f} {unit} of {measured.commanded:.3f} commanded."
+    return judged(problems, text, _data(run, measured, stood_s))
 
 
 def measure(run: Run) -> Measured | None:
-    """Return the means while the full speed was let through; None when that was too short."""
-    asked = run.part(run.asked.linear, run.asked.angular)
+    """Return the means while the full speed was granted; None if that was too short."""
+    requested = run.part(run.requested.linear, run.requested.angular)
     full = [
         m.received_ns
         for m in run.motions
         if m.value.command is Command.RUN
-        and run.part(m.value.linear, m.value.angular) / asked >= FULL
+        and run.part(m.value.linear, m.value.angular) / requested >= FULL
     ]
     if not full:
         return None
@@ -119,21 +119,21 @@ def measure(run: Run) -> Measured | None:
     whole = len(motions) == sum(begin_ns <= at_ns <= end_ns for at_ns in full)
     if not whole or end_ns - begin_ns < WINDOW_NS or not velocities or len(counts) < 2:
         return None
-    # The bridge's own clock: what a network does to the times of arrival does not matter.
-    seconds = (counts[-1].mono_ns - counts[0].mono_ns) / NS_PER_S
+    # By the bridge's clock, which is independent of network delays.
+    span_s = (counts[-1].mono_ns - counts[0].mono_ns) / NS_PER_S
     way = counts[-1].distance - counts[0].distance
     turn = sum(_wrapped(b.heading - a.heading) for a, b in pairwise(counts))
     return Measured(
         commanded=mean(run.part(m.linear, m.angular) for m in motions),
         velocity=mean(run.part(v.linear, v.angular) for v in velocities),
-        counted=run.part(way, turn) / seconds,
-        across=run.part(turn, way) / seconds,
-        seconds=seconds,
+        counted=run.part(way, turn) / span_s,
+        across=run.part(turn, way) / span_s,
+        seconds=span_s,
     )
 
 
 def stood_after_s(run: Run) -> float | None:
-    """Return how long after the release the vehicle stood and stayed so; None when it did not."""
+    """Return the time from the release to lasting standstill; None without standstill."""
     stood_ns: int | None = None
     for velocity in run.velocities:
         if velocity.received_ns < run.released_ns:
@@ -146,7 +146,7 @@ def stood_after_s(run: Run) -> float | None:
 
 
 def unit_of(ratio: float, setting: str) -> str | None:
-    """Return the unit whose size explains a ratio of rates, when ``setting`` is what we reckon."""
+    """Return the unit that explains a ratio of rates; ``setting`` is the configured unit."""
     for name, size in UNITS.items():
         expected = size / UNITS[setting]
         if name != setting and abs(ratio / expected - 1) <= UNIT_MATCH:
@@ -174,14 +174,14 @@ def _nothing_counted(run: Run, it: Measured) -> str:
         if abs(it.across) >= NOTHING * (0.1 if run.turns else 0.2):
             other = " It drives instead of turning." if run.turns else " It turns instead."
         return f"No motion: neither the velocity nor the {counter} changes.{other}"
-    hint = " One that is taken from a gyroscope counts only on the ground." if run.turns else ""
-    return f"The velocity is there, but the {counter} does not count.{hint}"
+    hint = " A heading from a gyroscope counts only on the ground." if run.turns else ""
+    return f"The velocity changes, but the {counter} does not.{hint}"
 
 
 def _wrong_ratio(run: Run, ratio: float) -> str:
     if ratio < 0:
         way = "clockwise" if run.turns else "backward"
-        text = f"The sign is wrong: commanded the positive way, it goes {way}."
+        text = f"The sign is wrong: on a positive command it goes {way}."
         return text if abs(abs(ratio) - 1) <= RATIO else f"{text} {_factor(run, -ratio)}"
     return _factor(run, ratio)
 
@@ -193,18 +193,18 @@ def _factor(run: Run, ratio: float) -> str:
 
 def _wrong_velocity(run: Run, ratio: float) -> str:
     text = f"The measured velocity is {ratio:.2f} times the velocity of the counter."
-    # The larger the firmware's unit is, the smaller is what we read.
+    # A larger unit of the firmware makes our reading smaller.
     return _with_unit(run, text, unit_of(1 / ratio, run.feedback) if ratio else None, "feedback")
 
 
-def _with_unit(run: Run, text: str, unit: str | None, way: str) -> str:
+def _with_unit(run: Run, text: str, unit: str | None, direction: str) -> str:
     if not run.turns:
         return text
     if unit in SETTINGS:
-        setting = f"wire.{way}_angular_unit"
-        return f'{text} The firmware\'s unit is another: set {setting} = "{unit}".'
+        setting = f"wire.{direction}_angular_unit"
+        return f'{text} The firmware has another unit: set {setting} = "{unit}".'
     if unit is not None:
-        return f"{text} The firmware's unit seems to be {unit}, for which there is no setting."
+        return f"{text} The firmware's unit seems to be {unit}, which no setting supports."
     return text
 
 
@@ -213,13 +213,14 @@ def _standing(stood_s: float | None) -> Iterator[str]:
         yield f"It did not stand within {STOP_NS / NS_PER_S:g} s after the release."
 
 
-def _not_let_through(run: Run) -> str:
+def _not_granted(run: Run) -> str:
     texts = list(dict.fromkeys(s.value.text for s in run.states if s.value.verdict != "run"))
-    said = f" Safety said: {' '.join(texts[-3:])}" if texts else ""
+    reason = f" Safety reports: {' '.join(texts[-3:])}" if texts else ""
     speeds = [run.part(v.value.linear, v.value.angular) for v in run.velocities]
-    peak, asked = max(speeds, key=abs, default=0.0), run.part(run.asked.linear, run.asked.angular)
-    moved = f" At most {peak:.2f} {_unit(run)} were measured of {asked:.2f} asked."
-    return f"The full speed was not let through for long enough to measure.{moved}{said}"
+    peak = max(speeds, key=abs, default=0.0)
+    requested = run.part(run.requested.linear, run.requested.angular)
+    moved = f" Measured at most {peak:.2f} {_unit(run)} of {requested:.2f} requested."
+    return f"Safety did not grant the full speed for long enough to measure.{moved}{reason}"
 
 
 def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
@@ -229,18 +230,14 @@ def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
         (f"commanded, {unit}", f"{it.commanded:.3f}"),
         (f"counted, {unit}", f"{it.counted:.3f}"),
         (f"measured velocity, {unit}", f"{it.velocity:.3f}"),
-        ("counted by commanded", f"{it.counted / it.commanded:.3f}"),
+        ("counted / commanded", f"{it.counted / it.commanded:.3f}"),
         (f"counted on the other axis, {other}", f"{it.across:.3f}"),
-        ("stood still after", _seconds(stood_s)),
+        ("standstill after", seconds(stood_s)),
     ]
 
 
 def _unit(run: Run) -> str:
     return "rad/s" if run.turns else "m/s"
-
-
-def _seconds(value: float | None) -> str:
-    return "never" if value is None else f"{value:.2f} s"
 
 
 def _wrapped(angle: float) -> float:

@@ -1,14 +1,36 @@
-"""The report, in Markdown: what was checked on which vehicle, by whom, with which result."""
+"""Verdicts of the steps, and the report of a checkout in Markdown. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from cli.commission.verdict import Row, Verdict
+Outcome = Literal["passed", "failed", "skipped"]
+Row = tuple[str, str]  # a measured quantity, and its value with unit
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Outcome of a step, with reasons and data."""
+
+    outcome: Outcome
+    text: str
+    data: tuple[Row, ...] = ()
+
+
+def judged(problems: Iterable[str], passed: str, data: Iterable[Row] = ()) -> Verdict:
+    """Return ``failed`` with all problems; without problems ``passed`` with the given text."""
+    found = [problem for problem in problems if problem]
+    return Verdict("failed" if found else "passed", " ".join(found) or passed, tuple(data))
+
+
+def seconds(value: float | None, digits: int = 2) -> str:
+    """Return a time as text; None means that the event did not occur."""
+    return "never" if value is None else f"{value:.{digits}f} s"
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A step and what it came to."""
+    """A step with its verdict."""
 
     name: str
     title: str
@@ -17,7 +39,7 @@ class Checked:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that goes into the file."""
+    """Content of the report."""
 
     robot: str
     date: str
@@ -25,30 +47,36 @@ class Report:
     settings: Sequence[tuple[str, str, str]]  # path, value, origin
     operator: str = ""
     steps: Sequence[Checked] = ()
-    left_out: Sequence[str] = ()  # steps that were not asked for
-    aborted: str = ""  # why it ended early
+    left_out: Sequence[str] = ()  # steps excluded by --only
+    aborted: str = ""  # reason of an early end
     signed: str = ""  # the name typed at the end
     ended: str = ""  # date of the end
 
     @property
     def passed(self) -> bool:
-        """Whether each step that was asked for passed, to the end, and somebody signed."""
+        """Whether each selected step passed, to the end, with a signature."""
         good = all(step.verdict.outcome == "passed" for step in self.steps)
         return bool(self.steps) and good and not self.aborted and bool(self.signed)
 
 
 def render(report: Report) -> str:
-    """Return the report as a file's text."""
+    """Return the report as Markdown."""
     about = [("date", report.date), ("operator", report.operator), *report.facts]
+    steps = [(step.title, step.verdict.outcome, step.verdict.text) for step in report.steps]
+    signature = f"{_cell(report.signed)}, {report.ended}" if report.signed else "Not signed."
     parts = [
         [f"# Checkout of robot {_cell(report.robot)}", "", _headline(report)],
         _table(("what", "value"), about),
         ["## Steps", ""],
-        _table(("step", "result", "finding"), [_step(step) for step in report.steps]),
-        *(_measured(step) for step in report.steps if step.verdict.data),
-        ["## Settings in force", ""],
+        _table(("step", "result", "finding"), steps),
+        *(
+            [f"### {_cell(each.title)}", "", *_table(("measured", "value"), each.verdict.data)]
+            for each in report.steps
+            if each.verdict.data
+        ),
+        ["## Effective settings", ""],
         _table(("setting", "value", "from"), report.settings),
-        ["## Signed off", "", _signature(report)],
+        ["## Signed off", "", signature],
     ]
     return "\n\n".join("\n".join(part).rstrip("\n") for part in parts) + "\n"
 
@@ -58,22 +86,8 @@ def _headline(report: Report) -> str:
     if report.aborted:
         lines.append(f"Ended early: {_cell(report.aborted)}.")
     if report.left_out:
-        lines.append(f"Only a part: {', '.join(report.left_out)} were not asked for.")
+        lines.append(f"Partial checkout, left out: {', '.join(report.left_out)}.")
     return " ".join(lines)
-
-
-def _signature(report: Report) -> str:
-    if not report.signed:
-        return "Nobody has signed."
-    return f"{_cell(report.signed)}, {report.ended}"
-
-
-def _step(step: Checked) -> tuple[str, str, str]:
-    return step.title, step.verdict.outcome, step.verdict.text
-
-
-def _measured(step: Checked) -> list[str]:
-    return [f"### {_cell(step.title)}", "", *_table(("measured", "value"), step.verdict.data)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -82,5 +96,5 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _cell(text: str) -> str:
-    """Return a text that breaks no table."""
+    """Return a text with pipes escaped and line breaks removed."""
     return " ".join(text.replace("|", "\\|").split())

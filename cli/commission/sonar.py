@@ -1,7 +1,7 @@
-"""Which sonar answers to a hand, one after the other, and what a mix-up is called.
+"""Verdict on the sonars: each must detect a hand in front of it; a mix-up is named. Pure.
 
-A hand is seen by the sonars that became clearly nearer than they were at rest. It counts once the
-same ones have seen it for half a second: on the way to its place it passes others.
+A sonar detects a hand if its range is clearly below its range at rest. The detection counts after
+the same sonars have detected it for half a second, because a moving hand passes other sonars.
 """
 
 import math
@@ -9,94 +9,94 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from cli.commission.verdict import Row, Verdict, judged
+from cli.commission.report import Row, Verdict, judged
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Ultrasonic
 
 NEAR_M = 0.6  # a hand is held at 0.2 to 0.4 m
-CLEARLY_M = 0.2  # nearer than at rest: more than noise, less than a hand makes
+CLEARLY_M = 0.2  # below the range at rest: more than noise, less than the effect of a hand
 HOLD_NS = NS_PER_S // 2
-ROOM_M = NEAR_M + CLEARLY_M  # what must be free before a sonar, or a hand could not be told
+ROOM_M = NEAR_M + CLEARLY_M  # free space that the detection of a hand needs
 
-Rest = tuple[float | None, ...]  # m at rest, None for a faulty sonar
+Rest = tuple[float | None, ...]  # range at rest in m, None for a faulty sonar
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
-    """Waits until the same sonars have seen something for half a second."""
+class HandDetector:
+    """Sonars that detect a hand, and since when."""
 
     rest: Rest
     seen: frozenset[str] = frozenset()
     since_ns: int = 0
 
-    def take(self, sample: Ultrasonic, now_ns: int) -> "Watch":
-        """Return the watch after one sample."""
+    def take(self, sample: Ultrasonic, now_ns: int) -> "HandDetector":
+        """Return the detector after one sample."""
         seen = near(sample, self.rest)
         return self if seen == self.seen else replace(self, seen=seen, since_ns=now_ns)
 
     def settled(self, now_ns: int) -> bool:
-        """Tell whether what is seen has been so for long enough."""
+        """Return whether the same sonars have detected a hand for long enough."""
         return now_ns - self.since_ns >= HOLD_NS
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Which sonars answered to a hand before this one, and how near the nearest came, in m."""
+    """Sonars that detected the hand in front of sonar ``name``, and the nearest reading, m."""
 
     name: str
-    answered: tuple[str, ...]
+    detected_by: tuple[str, ...]
     nearest: float | None = None
 
 
 def at_rest(samples: Sequence[Ultrasonic]) -> Rest:
-    """Return what each sonar sees by itself; a sonar that is faulty half the time is faulty."""
+    """Return each sonar's range at rest; None if it is faulty in half of the samples."""
     columns = zip(*([_distance(one, i) for i in range(8)] for one in samples), strict=True)
     return tuple(_middle(column) for column in columns)
 
 
 def near(sample: Ultrasonic, rest: Rest) -> frozenset[str]:
-    """Return the names of the sonars that something was put before."""
+    """Return the sonars that detect a hand."""
     return frozenset(
         name for i, name in enumerate(SONAR_NAMES) if _is_near(_distance(sample, i), rest[i])
     )
 
 
 def nearest(sample: Ultrasonic) -> float | None:
-    """Return the nearest reading, in m; None when every sonar is faulty."""
+    """Return the nearest reading, m; None if every sonar is faulty."""
     distances = [_distance(sample, i) for i in range(8)]
     return min((one for one in distances if one is not None), default=None)
 
 
-def crowded(rest: Rest) -> str:
-    """Say what stands too near for a hand to be told from it; empty when there is room."""
+def obstructions(rest: Rest) -> str:
+    """Return a text that names sonars without free space; empty if all have it."""
     tight = [
         f"{_words(name)} {distance:.2f} m"
         for name, distance in zip(SONAR_NAMES, rest, strict=True)
         if distance is not None and distance < ROOM_M
     ]
-    return f"Make room, {ROOM_M:g} m all around: {', '.join(tight)}." if tight else ""
+    return f"Clear {ROOM_M:g} m all around: {', '.join(tight)}." if tight else ""
 
 
 def judge_sonars(rest: Rest, findings: Sequence[Finding]) -> Verdict:
-    """Judge by what answered at each sonar's turn."""
+    """Return the verdict on the findings of all sonars."""
     of_name = dict(zip(SONAR_NAMES, rest, strict=True))
     problems = [*_singly(of_name, findings), mixup(_one_for_one(findings))]
-    return judged(problems, "Each sonar answers in its place.", _data(of_name, findings))
+    return judged(problems, "Each sonar is in its place.", _data(of_name, findings))
 
 
-def mixup(answered: Mapping[str, str]) -> str:
-    """Name the mix-up in what answered (values) to a hand before which sonar (keys)."""
-    wrong = {name: other for name, other in answered.items() if name != other}
+def mixup(detected: Mapping[str, str]) -> str:
+    """Return a text that names the mix-up; maps the sonar with the hand to the detecting one."""
+    wrong = {name: other for name, other in detected.items() if name != other}
     if not wrong:
         return ""
-    pairs = [(SONAR_NAMES.index(name), SONAR_NAMES.index(to)) for name, to in answered.items()]
+    pairs = [(SONAR_NAMES.index(name), SONAR_NAMES.index(to)) for name, to in detected.items()]
     for words, sign, offset in _ARRANGEMENTS:
         if len(pairs) > 2 and all((sign * i + offset) % 8 == to for i, to in pairs):
-            return f"{words}: the order is not the manual's."
+            return f"{words}: the order differs from the manual's."
     swaps = {frozenset(pair) for pair in wrong.items() if wrong.get(pair[1]) == pair[0]}
     named = [" and ".join(sorted(map(_words, swap))) for swap in swaps]
     single = [
-        f"{_words(name)} comes as {_words(other)}"
+        f"{_words(name)} is reported as {_words(other)}"
         for name, other in wrong.items()
         if frozenset((name, other)) not in swaps
     ]
@@ -105,13 +105,13 @@ def mixup(answered: Mapping[str, str]) -> str:
     )
 
 
-# What answers to a hand before number i of the ring: (sign * i + offset) mod 8. The ring is counted
-# clockwise from the left: 0 left, 2 front, 4 right, 6 rear.
+# A hand in front of sonar i is detected by (sign * i + offset) mod 8. Sonars are numbered clockwise
+# from the left: 0 left, 2 front, 4 right, 6 rear.
 _ARRANGEMENTS = (
     ("Left and right are exchanged", -1, 4),
     ("Front and rear are exchanged", -1, 0),
     ("Front and rear are exchanged, and left and right too", 1, 4),
-    *((f"The ring is turned by {n} places clockwise", 1, n) for n in (1, 2, 3, 5, 6, 7)),
+    *((f"The ring is rotated by {n} places clockwise", 1, n) for n in (1, 2, 3, 5, 6, 7)),
 )
 
 
@@ -120,23 +120,22 @@ def _singly(rest: Mapping[str, float | None], findings: Sequence[Finding]) -> It
         name = _words(finding.name)
         if rest[finding.name] is None:
             yield f"{name} is faulty: the board reports 0xFFFF."
-        elif not finding.answered:
-            yield f"{name}: no sonar saw the hand."
-        elif finding.answered != (finding.name,):
-            yield f"{name}: the hand was seen by {' and '.join(map(_words, finding.answered))}."
+        elif not finding.detected_by:
+            yield f"{name}: no sonar detected the hand."
+        elif finding.detected_by != (finding.name,):
+            others = " and ".join(map(_words, finding.detected_by))
+            yield f"{name}: the hand was detected by {others}."
 
 
 def _one_for_one(findings: Sequence[Finding]) -> dict[str, str]:
-    return {each.name: each.answered[0] for each in findings if len(each.answered) == 1}
+    return {each.name: each.detected_by[0] for each in findings if len(each.detected_by) == 1}
 
 
 def _data(rest: Mapping[str, float | None], findings: Sequence[Finding]) -> Iterator[Row]:
     for finding in findings:
-        seen = ", ".join(map(_words, finding.answered)) or "none"
-        yield (
-            f"hand before {_words(finding.name)}",
-            f"seen by {seen}, at {_metres(finding.nearest)}; at rest {_metres(rest[finding.name])}",
-        )
+        names = ", ".join(map(_words, finding.detected_by)) or "none"
+        ranges = f"at {_metres(finding.nearest)}; at rest {_metres(rest[finding.name])}"
+        yield f"hand in front of {_words(finding.name)}", f"detected by {names}, {ranges}"
 
 
 def _distance(sample: Ultrasonic, index: int) -> float | None:

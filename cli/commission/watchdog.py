@@ -1,12 +1,12 @@
-"""The trial of the board's watchdog, with the stack down: this tool is the board's only master.
+"""Test of the board's own command watchdog, with the stack down and this tool as the only master.
 
-The bridge never stops sending, by design, so it cannot be asked what the board does when commands
-end. Here its ports are taken instead, which also proves that no bridge runs. Three things keep the
-wheels from being left with a RUN:
+The bridge never stops sending, so it cannot show what the board does when commands end. The test
+uses the bridge's ports instead, which also proves that no bridge runs. Three measures ensure that
+RUN is never the last command:
 
-- every way out of the trial sends BREAK, signals and bugs of this program included;
-- a second process holds the same sockets, and sends BREAK when this one dies or hangs;
-- the board's own emergency brakes are switched on first, and must be echoed.
+- every way out of the test sends BRAKE, signals and bugs of this program included;
+- a second process holds the same sockets, and sends BRAKE when this one dies or hangs;
+- the board's own emergency brakes are switched on first, and must be confirmed.
 """
 
 import os
@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from cli.commission.operator import Operator
-from cli.commission.verdict import Verdict, judged
-from cli.commission.watchdog_plan import BREAK, Sample, Trial, judge_trial
+from cli.commission.report import Verdict, judged
+from cli.commission.watchdog_plan import BRAKE, Sample, WatchdogPlan, judge_watchdog
 from cli.settings import Everything
 from common.errors import WireError
 from common.freshness import NS_PER_S
@@ -28,22 +28,22 @@ from common.wire.framing import Framing, Received
 from services.bridge.translate import Translator
 from services.bridge.udp import Sockets
 
-LOOK_S = 0.005
-HEARD_S = 3.0
+POLL_S = 0.005
+STANDSTILL_S = 3.0
 ECHO_S = 2.0
-AGAIN_S = 0.1
-WARN_S, GIVE_UP_S = 3.0, 10.0  # of BREAK, while it does not stand; the board holds the last one
-GUARD_S = 3.0  # the trial's RUN and silence take 2 s
-LAST_BREAKS, LAST_S = 10, 0.05
+REPEAT_S = 0.1
+WARN_S, GIVE_UP_S = 3.0, 10.0  # of BRAKE without standstill; the board keeps the last command
+GUARD_S = 3.0  # RUN and silence of the test take 2 s
+LAST_BRAKES, LAST_S = 10, 0.05
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PHRASE = "wheels off the ground"
 
 
-class Master:
-    """The board's only master, over the bridge's own ports."""
+class BoardMaster:
+    """The board's only master, on the bridge's UDP ports."""
 
     def __init__(self, config: Everything) -> None:
-        """Take the ports; raise ``LinkError`` when a bridge has them."""
+        """Bind the ports; raise ``LinkError`` if a bridge has them."""
         self._sockets = Sockets(config.board)
         self._framing = Framing(config.wire.crc, config.wire.crc_covers)
         limits = config.bridge.max_linear, config.bridge.max_angular
@@ -52,15 +52,15 @@ class Master:
         self.rejected = 0
 
     def close(self) -> None:
-        """Give the ports back."""
+        """Release the ports."""
         self._sockets.close()
 
     def send(self, frame: Frame) -> None:
-        """Send from the port that was heard last."""
+        """Send from the port that received last."""
         self._sockets.send(self._framing.pack(frame), self._port)
 
     def listen(self, seconds: float) -> Iterator[Frame]:
-        """Wait for the board, at most so long, and yield what it said."""
+        """Wait for frames of the board, at most for a time, and yield them."""
         ready, _, _ = select.select(self._sockets.sockets, [], [], seconds)
         for sock in ready:
             port = self._sockets.sockets.index(sock)
@@ -73,7 +73,7 @@ class Master:
                         self.rejected += 1
 
     def velocities(self, seconds: float) -> Iterator[Sample]:
-        """Wait likewise, and yield the velocities alone."""
+        """Wait for frames likewise, and yield the velocities."""
         for frame in self.listen(seconds):
             if isinstance(frame, reports.VelocityReport):
                 try:
@@ -82,78 +82,78 @@ class Master:
                     continue  # implausible: the header has no CRC
                 yield Sample(velocity.linear, velocity.angular, time.monotonic_ns())
 
-    def is_heard(self) -> str:
-        """Return why the trial cannot begin: the board is not heard, or the vehicle moves."""
-        end_s = time.monotonic() + HEARD_S
+    def wait_for_standstill(self) -> str:
+        """Brake until the board reports standstill; return the problem, or an empty string."""
+        end_s = time.monotonic() + STANDSTILL_S
         while time.monotonic() < end_s:
-            self.send(BREAK)
-            for sample in self.velocities(AGAIN_S):
+            self.send(BRAKE)
+            for sample in self.velocities(REPEAT_S):
                 if sample.stands:
                     return ""
-        bad = f"; {self.rejected} byte runs were no frames" if self.rejected else ""
-        return f"The board does not say that the vehicle stands, within {HEARD_S:g} s{bad}."
+        bad = f"; {self.rejected} invalid frames" if self.rejected else ""
+        return f"The board does not report standstill within {STANDSTILL_S:g} s{bad}."
 
-    def brakes_on(self) -> str:
-        """Switch the board's own emergency brakes on; return which were not echoed."""
+    def switch_brakes_on(self) -> str:
+        """Switch the board's emergency brakes on; return the problem, or an empty string."""
         kinds = (reports.UltrasonicBrakeReport, reports.BumperBrakeReport)
         echoed: set[type[Frame]] = set()
         end_s = time.monotonic() + ECHO_S
         while len(echoed) < len(kinds) and time.monotonic() < end_s:
             self.send(commands.UltrasonicBrakeSet(True))
             self.send(commands.BumperBrakeSet(True))
-            for frame in self.listen(AGAIN_S):
+            for frame in self.listen(REPEAT_S):
                 if isinstance(frame, kinds) and frame.on:
                     echoed.add(type(frame))
         missing = [kind.__name__ for kind in kinds if kind not in echoed]
         return f"The board did not send: {', '.join(missing)}." if missing else ""
 
 
-def watchdog(master: Master, operator: Operator) -> Verdict:
-    """Run the trial on an operator's typed word."""
-    fact = "The stack is down. The wheels will turn, and for a second nobody tells them to stop."
+def watchdog(master: BoardMaster, operator: Operator) -> Verdict:
+    """Run the test after the operator's confirmation."""
+    fact = "The stack is down. The wheels will turn, for a second of it without any command."
     if not operator.confirm(fact, PHRASE):
-        return judged(["Not confirmed: nothing was moved."], "")
-    if reason := master.is_heard() or master.brakes_on():
-        return judged([reason], "")
-    operator.say("Turning. ctrl-c stops.")
-    with guarded(lambda: master.send(BREAK)), signalled() as signals:
-        trial = _try(master, operator, signals)
-    verdict = judge_trial(trial)
-    if trial.phase != "over":
-        return judged([verdict.text, "IT DID NOT STAND after BREAK."], "", verdict.data)
+        return judged(["Not confirmed: no motion was commanded."], "")
+    if problem := master.wait_for_standstill() or master.switch_brakes_on():
+        return judged([problem], "")
+    operator.show("The wheels turn. Ctrl-C stops them.")
+    with guarded(lambda: master.send(BRAKE)), signalled() as signals:
+        plan = _execute(master, operator, signals)
+    verdict = judge_watchdog(plan)
+    if plan.phase != "over":
+        return judged([verdict.text, "NO STANDSTILL after BRAKE."], "", verdict.data)
     return verdict
 
 
-def _try(master: Master, operator: Operator, signals: list[int]) -> Trial:
-    trial = Trial(time.monotonic_ns())
+def _execute(master: BoardMaster, operator: Operator, signals: list[int]) -> WatchdogPlan:
+    plan = WatchdogPlan(time.monotonic_ns())
     warned = False
     try:
-        while trial.phase != "over":
+        while plan.phase != "over":
             if signals:
-                trial = trial.end("ctrl-c", time.monotonic_ns())
-            trial, command = trial.tick(time.monotonic_ns())
+                plan = plan.end("Ctrl-C", time.monotonic_ns())
+            plan, command = plan.tick(time.monotonic_ns())
             if command is not None:
                 master.send(command)
-            for sample in master.velocities(LOOK_S):
-                trial = trial.hear(sample)
-            braked_s = (time.monotonic_ns() - (trial.broken_ns or time.monotonic_ns())) / NS_PER_S
+            for sample in master.velocities(POLL_S):
+                plan = plan.add(sample)
+            braked_s = (time.monotonic_ns() - (plan.braked_ns or time.monotonic_ns())) / NS_PER_S
             if braked_s > WARN_S and not warned:
                 warned = True
-                operator.say("IT DOES NOT STAND: use the vehicle's own switch.")
+                operator.show("NO STANDSTILL: use the vehicle's own switch.")
             if braked_s > GIVE_UP_S:
                 break
-        return trial
+        return plan
     finally:
-        master.send(BREAK)
+        master.send(BRAKE)
 
 
 @contextmanager
 def signalled() -> Iterator[list[int]]:
-    """Note signals instead of dying of them, while the context lasts."""
-    came: list[int] = []
-    before = {one: signal.signal(one, lambda number, _: came.append(number)) for one in SIGNALS}
+    """Record signals during the context instead of ending the process."""
+    received: list[int] = []
+    before = {one: signal.signal(one, lambda number, _: received.append(number)) for one in SIGNALS}
     try:
-        yield came
+        yield received
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
@@ -161,10 +161,10 @@ def signalled() -> Iterator[list[int]]:
 
 @contextmanager
 def guarded(brake: Callable[[], None]) -> Iterator[None]:
-    """Have another process brake when this one ends, in any way, or takes too long.
+    """Fork a process that brakes when this one ends in any way, or takes too long.
 
-    It does so after a good end as well: one more BREAK does no harm, and no other rule is simpler.
-    This program must have no other thread here: the second process would not have it.
+    It also brakes after a regular end: one more BRAKE does no harm, and the rule stays simple.
+    This process must have a single thread here, because a fork copies only one.
     """
     mine, theirs = os.pipe()
     child = os.fork()
@@ -180,12 +180,12 @@ def guarded(brake: Callable[[], None]) -> Iterator[None]:
 
 
 def _guard(pipe: int, brake: Callable[[], None]) -> None:
-    """Brake once the other end of the pipe is closed; the life of the second process."""
+    """Brake when the other end of the pipe is closed; main function of the second process."""
     try:
-        for one in SIGNALS:  # ctrl-c reaches both, and the other one sees to it
+        for one in SIGNALS:  # Ctrl-C reaches both processes; the first one handles it
             signal.signal(one, signal.SIG_IGN)
         select.select([pipe], [], [], GUARD_S)
-        for _ in range(LAST_BREAKS):
+        for _ in range(LAST_BRAKES):
             brake()
             time.sleep(LAST_S)
     finally:

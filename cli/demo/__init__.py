@@ -1,1 +1,1 @@
-"""``t2 demo``: the plan of the lap, its driver, its picture and its score."""
+"""``t2 demo``: the steps of the lap, its driver, its display and its score."""

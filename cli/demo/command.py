@@ -28,13 +28,13 @@ from common.loop import Loop
 from sim.config import load_plan
 
 WORLD = "office"
-PATIENCE_S = 120.0  # a lap takes a third of that; a busy machine stops it now and then
-LOOK_S, DRAW_S = 0.1, 0.125
+TIMEOUT_S = 120.0  # a lap takes 40 s; scheduling stalls stop the vehicle now and then
+POLL_S, DRAW_S = 0.1, 0.125
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--fast", action="store_true", help="end before the way home, no plot")
+    parser.add_argument("--fast", action="store_true", help="end before the drive home, no plot")
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
     )
@@ -42,43 +42,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Drive the lap; 0 when all went as it should, 128 and the number after a signal."""
+    """Drive the lap; return 0 if it is good, 128 plus the signal's number after a signal."""
     try:
-        from cli.demo.show import Show
+        from cli.demo.display import LapDisplay
     except ImportError as error:
         raise RobotError(
-            f"the demo wants {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
+            f"the demo needs {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
         ) from None
     options.no_sim, options.world = False, WORLD
-    make_room(options)
-    holdup_s = host_stalls.measured()
+    prepare_folder(options)
+    stall_s = host_stalls.measured()
     options.sets = host_stalls.with_accepted_joined(
-        [*own_ports(), *host_stalls.settings(holdup_s), *options.sets]
+        [*own_ports(), *host_stalls.settings(stall_s), *options.sets]
     )
     config = load(Everything, sources(options)).config
-    # What the processes say goes to a file; on the terminal it would tear the picture.
+    # The processes log to a file; on the terminal it would destroy the live display.
     log.configure(replace(config.log, level="error"), "demo")
-    pace = PATIENT if holdup_s > host_stalls.LIMIT_S else QUICK
+    pace = PATIENT if stall_s > host_stalls.LIMIT_S else QUICK
     driven, plan = Lap(lap(options.fast, pace)), load_plan(WORLD, config.vehicle)
     with (
-        Show(plan, config.vehicle, options.out) as show,
+        LapDisplay(plan, config.vehicle, options.out) as display,
         closing(Loop()) as loop,
         closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
     ):
-        if holdup_s > host_stalls.LIMIT_S:
-            show.say(host_stalls.sentence(holdup_s))
-        driver = Driver(bus, driven, show.step)
+        if stall_s > host_stalls.LIMIT_S:
+            display.show(host_stalls.warning(stall_s))
+        driver = Driver(bus, driven, display.step)
         bus.open()
-        interrupted = drive(options, loop, driver, show.draw)
+        interrupted = drive(options, loop, driver, display.draw)
     if interrupted:
         return 128 + interrupted
     trace = read(trace_file(options)) if trace_file(options).exists() else None
     if trace is None or not trace.truth:
-        raise LinkError(f"the simulated vehicle never ran; see {log_file(options)}")
+        raise LinkError(f"the simulated vehicle did not run; see {log_file(options)}")
     rows = results(trace, driver.odometry, driven, options.fast)
     if not options.fast:
-        show.plot(trace, driver.odometry)
-    show.results(rows, driver)
+        display.plot(trace, driver.odometry)
+    display.results(rows, driver)
     return 0 if good(rows) else 1
 
 
@@ -88,18 +88,18 @@ def drive(
     driver: Driver,
     draw: Callable[[Driver, int], None],
 ) -> int:
-    """Keep the processes running until the lap is over, or patience is; return a signal or 0."""
+    """Run the processes until the end of the lap or the timeout; return a signal or 0."""
     began_ns = time.monotonic_ns()
     with log_file(options).open("wb") as output, interruptible(loop) as signals:
         supervisor = Supervisor(traced(options), output)
 
-        def look(now_ns: int) -> None:
+        def poll(now_ns: int) -> None:
             if supervisor.look(time.monotonic()):
                 raise LinkError(f"a process cannot run; see {output.name}")
-            if driver.lap.step is None or now_ns - began_ns > PATIENCE_S * NS_PER_S:
+            if driver.lap.step is None or now_ns - began_ns > TIMEOUT_S * NS_PER_S:
                 loop.stop()
 
-        loop.every(LOOK_S, look)
+        loop.every(POLL_S, poll)
         loop.every(PERIOD_S, driver.on_beat)
         loop.every(DRAW_S, lambda now_ns: draw(driver, now_ns))
         try:
@@ -109,8 +109,8 @@ def drive(
     return signals[0] if signals else 0
 
 
-def make_room(options: argparse.Namespace) -> None:
-    """Make the folder for what the demo writes; an earlier lap's trace is none of this one."""
+def prepare_folder(options: argparse.Namespace) -> None:
+    """Create the output folder, and delete the trace of an earlier lap."""
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         log_file(options).write_bytes(b"")
@@ -120,7 +120,7 @@ def make_room(options: argparse.Namespace) -> None:
 
 
 def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
-    """Return the processes of ``t2 up``, with a simulator that writes down what happens."""
+    """Return the processes of ``t2 up``, with a simulator that writes a trace."""
     trace = ["--trace", str(trace_file(options))]
     return [
         (name, [*command, *(trace if name == "sim" else [])]) for name, command in commands(options)
@@ -128,19 +128,19 @@ def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
 
 
 def trace_file(options: argparse.Namespace) -> Path:
-    """Return where the simulator writes."""
+    """Return the file of the simulator's trace."""
     out: Path = options.out
     return out / "trace.jsonl"
 
 
 def log_file(options: argparse.Namespace) -> Path:
-    """Return where the processes write what they have to say."""
+    """Return the log file of the processes."""
     out: Path = options.out
     return out / "processes.log"
 
 
 def own_ports() -> list[str]:
-    """Return settings with ports of the demo's own, so that it runs beside ``t2 up``."""
+    """Return settings with separate ports, so that the demo can run beside ``t2 up``."""
     board, first, second, router = free_ports(*[socket.SOCK_DGRAM] * 3, socket.SOCK_STREAM)
     return [
         f"board.port={board}",
@@ -153,7 +153,7 @@ def own_ports() -> list[str]:
 
 
 def free_ports(*kinds: socket.SocketKind) -> list[int]:
-    """Return ports of 127.0.0.1 that were free a moment ago, no two the same."""
+    """Return different free ports of 127.0.0.1."""
     with contextlib.ExitStack() as stack:
         socks = [stack.enter_context(socket.socket(socket.AF_INET, kind)) for kind in kinds]
         for sock in socks:

@@ -1,15 +1,15 @@
-"""How long this machine holds processes up, and what the demo does about it.
+"""Scheduling stalls of this host, and the demo's time limits for them.
 
-A vehicle's computer answers within milliseconds, and T2's time limits are made for one. On a
-virtual machine that is given a CPU only now and then, processes stand still for tenths of a second;
-safety then rightly stops the vehicle all the time. There the demo takes longer limits, and drives
-slower for it, because safety reckons with the longer reaction time.
+T2's time limits are made for a vehicle's computer, which answers within milliseconds. On a shared
+virtual machine processes stall for tenths of a second, and safety then stops the vehicle all the
+time. There the demo uses longer limits and drives slower, because safety's stopping distance
+includes the reaction time.
 """
 
 import time
 from collections.abc import Iterable
 
-LIMIT_S = 0.05  # up to this the shipped limits hold
+LIMIT_S = 0.05  # the shipped limits allow stalls up to this
 SAMPLES_S = 0.005
 
 AGES = (
@@ -19,7 +19,7 @@ SLOWER = ("switches_age", "driver_age")
 
 
 def measured(seconds: float = 1.5) -> float:
-    """Return how much longer than asked a short sleep took at most, in seconds."""
+    """Return the longest stall: how much longer a short sleep took than requested, in seconds."""
     worst, last = 0.0, time.monotonic()
     end = last + seconds
     while last < end:
@@ -29,12 +29,12 @@ def measured(seconds: float = 1.5) -> float:
     return worst
 
 
-def settings(holdup_s: float) -> list[str]:
-    """Return the settings that a machine wants, for ``--set``; none for a good one."""
-    if holdup_s <= LIMIT_S:
+def settings(stall_s: float) -> list[str]:
+    """Return the settings for stalls of this length, for ``--set``; none for short ones."""
+    if stall_s <= LIMIT_S:
         return []
-    longer = min(3.0, max(1.0, 3.0 * holdup_s))
-    react = min(1.5, max(0.5, 2.0 * holdup_s))
+    longer = min(3.0, max(1.0, 3.0 * stall_s))
+    react = min(1.5, max(0.5, 2.0 * stall_s))
     accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
                 "sources.teleop.lease", "sources.checkout.lease"]  # fmt: skip
     return [
@@ -59,7 +59,7 @@ def settings(holdup_s: float) -> list[str]:
 
 
 def with_accepted_joined(sets: Iterable[str]) -> list[str]:
-    """Return the settings with one ``unsafe_overrides`` a section; a later one would replace it."""
+    """Return the settings with the values of ``unsafe_overrides`` joined per section."""
     accepted: dict[str, list[str]] = {}
     others = []
     for given in sets:
@@ -71,9 +71,9 @@ def with_accepted_joined(sets: Iterable[str]) -> list[str]:
     return [*(f"{name}={','.join(values)}" for name, values in accepted.items()), *others]
 
 
-def sentence(holdup_s: float) -> str:
-    """Say why the lap is not driven with the shipped limits."""
+def warning(stall_s: float) -> str:
+    """Return the warning that the lap is not driven with the shipped limits."""
     return (
-        f"This machine holds processes up for as long as {holdup_s:.2f} s. "
-        f"The demo takes longer time limits and drives slower for it."
+        f"This host has scheduling stalls of up to {stall_s:.2f} s. "
+        f"The demo uses longer time limits and drives slower."
     )

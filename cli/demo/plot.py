@@ -1,4 +1,4 @@
-"""The lap on paper: the way through the room, and the speeds over time."""
+"""Plot of the lap: the path through the room, and the speeds over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,12 +26,12 @@ def save(
     trace: Trace,
     odometry: Sequence[Odometry],
 ) -> None:
-    """Draw the lap into each file, in the format that its name says."""
+    """Write the plot to each file, in the format of its suffix."""
     figure = Figure(figsize=(9, 9), layout="constrained")
     FigureCanvasAgg(figure)
     room, speeds = figure.subplots(2, 1, height_ratios=[3, 1])
     _draw_room(room, plan)
-    _draw_way(room, body, trace, odometry)
+    _draw_path(room, body, trace, odometry)
     _draw_speeds(speeds, trace)
     for file in files:
         figure.savefig(file, dpi=110)
@@ -55,7 +55,7 @@ def _draw_room(axes: Axes, plan: Plan) -> None:
     axes.set_title(f"A lap of T2 through {plan.title}", pad=28)
 
 
-def _draw_way(axes: Axes, body: Rectangle, trace: Trace, odometry: Sequence[Odometry]) -> None:
+def _draw_path(axes: Axes, body: Rectangle, trace: Trace, odometry: Sequence[Odometry]) -> None:
     truth = trace.truth
     axes.plot([x.x for x in truth], [x.y for x in truth], color=TRUE, linewidth=2, label="truth")
     axes.plot([p.x for p in odometry], [p.y for p in odometry], color=COUNTED, linewidth=1.2,
@@ -71,7 +71,7 @@ def _draw_way(axes: Axes, body: Rectangle, trace: Trace, odometry: Sequence[Odom
 
 
 def _draw_body(axes: Axes, body: Rectangle, at: t.Truth, color: str, label: str) -> None:
-    """Draw the vehicle's outline, with a stroke that shows its front."""
+    """Draw the vehicle's outline, with a line to its front."""
     pose = Pose(at.x, at.y, at.heading)
     corners = [pose.outward(x, y) for x, y in body.corners()]
     axes.add_patch(Polygon(corners, fill=False, edgecolor=color, linewidth=1.2, label=label))

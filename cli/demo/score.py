@@ -1,7 +1,7 @@
-"""What came of the lap: the trace of the simulator against what the services said.
+"""Score of the lap: the simulator's trace compared with the services' messages.
 
-The trace and the messages carry the same host's monotonic clock, so that a frame here and a message
-there can be told apart in time. Lengths in metres, times in seconds.
+Trace and messages use the same host's monotonic clock, so their times are comparable. Lengths in
+metres, times in seconds.
 """
 
 import math
@@ -16,20 +16,20 @@ from common.messages import Odometry
 from common.motion import Command
 from sim import trace as t
 
-Result = tuple[str, str, bool | None]  # what, how much, whether it is as it should be
+Result = tuple[str, str, bool | None]  # quantity, value, whether it is within its limit
 
-# The wall is seen by sonar: the margin of safety, less what noise and a step of braking take.
+# To an obstacle that sonar detects: safety's margin, minus noise and one step of braking.
 CLEARANCE_MIN = 0.05
 HOME_MAX = 0.25
 STOP_MAX = 0.1
 ODOMETRY_MAX = 0.15
 REST_SAMPLES = 20  # of the truth, which is written at 20 Hz
-REACTION_MAX = 0.5  # what must hold on a machine that is busy; docs/safety.md has the budget
+REACTION_MAX = 0.5  # limit for a busy host; docs/safety.md has the budget
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What the simulator wrote down, sorted by kind."""
+    """Records of the simulator by type."""
 
     truth: Sequence[t.Truth]
     commands: Sequence[t.Command]
@@ -38,15 +38,15 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A bumper hit and what followed."""
+    """A bumper hit with its reaction."""
 
-    reaction_s: float | None  # from the frame that says so to the BREAK frame
-    distance_m: float | None  # driven from that frame to standstill; None: it never stood
-    speed_mps: float  # when it was hit
+    reaction_s: float | None  # from the bumper frame to the BREAK frame
+    distance_m: float | None  # from that frame to standstill; None without standstill
+    speed_mps: float  # at the hit
 
 
 def read(file: Path) -> Trace:
-    """Read a trace, also one that is still being written."""
+    """Read a trace; the simulator may still be writing it."""
     records = t.read(file.read_bytes())
     return Trace(
         [r for r in records if isinstance(r, t.Truth)],
@@ -56,14 +56,14 @@ def read(file: Path) -> Trace:
 
 
 def stops(trace: Trace) -> list[Stop]:
-    """Return what followed each bumper hit."""
+    """Return the reaction to each bumper hit."""
     return [_stop(trace, hit.mono_ns) for hit in trace.bumper if hit.pressed]
 
 
 def odometry_errors(trace: Trace, odometry: Sequence[Odometry]) -> tuple[float, float]:
-    """Return how far odometry was from the truth at most, in metres: driving, and at rest.
+    """Return the largest odometry errors in metres: driving, and at rest.
 
-    While driving it holds the time that a frame takes on its way; at rest it does not.
+    The error while driving includes the transport delay of a frame; the error at rest does not.
     """
     times = [truth.mono_ns for truth in trace.truth]
     driving = resting = 0.0
@@ -80,17 +80,17 @@ def odometry_errors(trace: Trace, odometry: Sequence[Odometry]) -> tuple[float, 
 
 
 def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) -> list[Result]:
-    """Return the table of results; a lap is good when nothing in it is False."""
+    """Return the table of results; a lap is good without a False in it."""
     last = trace.truth[-1]
     wall = min((x.clearance for x in trace.truth if x.clearance is not None), default=math.inf)
     driving, resting = odometry_errors(trace, odometry)
     rows: list[Result] = [
         ("lap finished", f"{lap.index} of {len(lap.steps)} steps", lap.step is None),
         ("distance driven", f"{last.distance:.2f} m", last.distance > 1.0),
-        ("closest to what sonar sees", f"{wall:.2f} m", wall > CLEARANCE_MIN),
-        ("odometry off the truth, driving", f"{driving * 100:.1f} cm at most", None),
+        ("closest to an obstacle", f"{wall:.2f} m", wall > CLEARANCE_MIN),
+        ("odometry error, driving", f"{driving * 100:.1f} cm at most", None),
         (
-            "odometry off the truth, at rest",
+            "odometry error, at rest",
             f"{resting * 100:.1f} cm at most",
             resting < ODOMETRY_MAX,
         ),
@@ -108,13 +108,13 @@ def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) ->
         ]  # fmt: skip
     if not fast:
         home = math.hypot(last.x, last.y)
-        rows.append(("from home at the end", f"{home * 100:.1f} cm", home < HOME_MAX))
-    rows.append(("stops that were not planned", ", ".join(lap.unplanned) or "none", None))
+        rows.append(("distance from the start at the end", f"{home * 100:.1f} cm", home < HOME_MAX))
+    rows.append(("unplanned latches", ", ".join(lap.unplanned) or "none", None))
     return rows
 
 
 def good(rows: Sequence[Result]) -> bool:
-    """Tell whether the lap went as it should: all finished, and a contact was met."""
+    """Return whether all results are within their limits and a contact occurred."""
     met = any(what.startswith("contact") for what, _, _ in rows)
     return met and all(fine is not False for _, _, fine in rows)
 

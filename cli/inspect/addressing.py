@@ -1,4 +1,4 @@
-"""Which keys the operator means: short or whole, one robot or all."""
+"""Keys and robots on the command line: short or whole keys, one robot, a site or all robots."""
 
 import argparse
 import re
@@ -7,99 +7,94 @@ from common import keys
 from common.bus.probe import valid
 from common.messages import Message
 
-# An expression's `**` passes by what begins with "@", on purpose: both are needed for all.
+# `**` does not match a chunk that begins with "@" (verbatim in Zenoh): both are needed for all.
 EVERYTHING = ("**", "@cmd/**")
 EVERY_ROBOT = "*"
-# Robots of a site are called SITE-NUMBER. With a dash in its name, "north" would have the robots
-# of "north-east", too.
+# Robots of a site are called SITE-NUMBER. If a site's name could contain a dash, "north" would
+# match the robots of "north-east", too.
 SITE = re.compile(r"[A-Za-z0-9_.]+")
+WRONG_SERVICE = "the message names another service than the key"
 
 
 def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add the argument that names a key or many."""
+    """Add the argument KEY, a key or a key expression."""
     parser.add_argument(
-        "key", metavar="KEY", nargs="?" if optional else None, type=keys_meant,
+        "key", metavar="KEY", nargs="?" if optional else None, type=parse_key,
         help="tel/odom/odometry, odometry, 'tel/**', or a whole key t2/v1/001/...",
     )  # fmt: skip
 
 
-def keys_meant(word: str) -> str:
-    """Read a key or key expression; short ones are below a robot."""
+def parse_key(word: str) -> str:
+    """Check a key or key expression; short ones are relative to a robot."""
     if not word.strip("/") or not valid(expression(word, "001")):
-        raise argparse.ArgumentTypeError(f"{word!r} is no key; `t2 ls` shows what there is")
+        raise argparse.ArgumentTypeError(f"{word!r} is not a key; `t2 ls` lists the active keys")
     return word
 
 
-def one_key(word: str) -> str:
-    """Read a key that is no expression."""
-    if "*" in keys_meant(word):
-        raise argparse.ArgumentTypeError(f"{word!r} means many keys, name one")
+def parse_one_key(word: str) -> str:
+    """Check a key that has no wildcard."""
+    if "*" in parse_key(word):
+        raise argparse.ArgumentTypeError(f"{word!r} matches several keys; name one")
     return word
 
 
-def robots_of(site: str) -> str:
-    """Read a site's name; return what stands for its robots in a key expression."""
+def parse_site(site: str) -> str:
+    """Return the key expression chunk that matches the robots of a site."""
     if not SITE.fullmatch(site):
         raise argparse.ArgumentTypeError(
-            f"{site!r} is no site: letters, digits, _ and . alone, as in berlin for berlin-007"
+            f"{site!r} is not a site: use letters, digits, _ and . only, as berlin for berlin-007"
         )
     return f"{site}-$*"
 
 
 def is_many(robot: str) -> bool:
-    """Tell whether a robot's place in a key stands for more than one."""
+    """Return whether a robot's chunk of a key matches several robots."""
     return "*" in robot
 
 
 def expression(word: str, robot: str) -> str:
-    """Return the whole key or key expression for what was typed.
+    """Return the whole key or key expression for a typed key.
 
-    ``/tel/odom/odometry`` is taken for ``tel/odom/odometry``, as in ROS; the last parts will do
-    where one row of the table ends with them (``odometry``, ``safety/state``, ``safety/health``).
+    ``/tel/odom/odometry`` equals ``tel/odom/odometry``, as in ROS. The last chunks are enough where
+    exactly one topic ends with them (``odometry``, ``safety/state``, ``safety/health``).
     """
     path = word.strip("/")
     if path.startswith(f"{keys.ROOT}/"):
         return path
-    return f"{keys.ROOT}/{robot}/{_path(path)}"
+    return f"{keys.ROOT}/{robot}/{_completed(path)}"
 
 
 def short(key: str, robot: str) -> str:
-    """Return a key as it is shown: without what all keys of this robot begin with."""
+    """Return a key as displayed: without the prefix that all keys of this robot share."""
     return key.removeprefix(f"{keys.ROOT}/{robot}/")
 
 
 def chunks(key: str) -> tuple[str, str]:
-    """Return a whole key's robot and the path below it; two empty ones when it is none of ours."""
+    """Return robot and path of a whole key; two empty strings for a foreign key."""
     parts = key.split("/", 3)
     return (parts[2], parts[3]) if len(parts) == 4 and key.startswith(f"{keys.ROOT}/") else ("", "")
 
 
-PRETENDS = "the health of another service than the key's"
+def service_of(key: str) -> str:
+    """Return the service of a whole key ``tel/{service}/...``.
 
-
-def speaker(key: str) -> str:
-    """Return the service that a whole key of ``tel/{service}/...`` belongs to.
-
-    Access rules go by keys, so only the key proves who speaks; what a message says of itself is
-    anybody's.
+    Access rules protect keys, so only the key proves the sender. The name inside a message is not
+    protected.
     """
     return chunks(key)[1].split("/")[1]
 
 
 def topic_of(key: str) -> keys.Topic[Message] | None:
-    """Return the row of the table that a whole key belongs to."""
+    """Return the topic of a whole key."""
     path = chunks(key)[1].split("/")
     for topic in keys.TOPICS:
         row = topic.path.split("/")
-        same = len(row) == len(path) and all(
-            ours == theirs or ours.startswith("{") for ours, theirs in zip(row, path, strict=True)
-        )
-        if same:
+        if len(row) == len(path) and all(map(_matches, row, path)):
             return topic
     return None
 
 
-def _path(word: str) -> str:
+def _completed(word: str) -> str:
     typed = word.split("/")
     if "**" in typed:
         return word
@@ -108,12 +103,18 @@ def _path(word: str) -> str:
 
 
 def _ending(row: list[str], typed: list[str]) -> str:
-    """Return a row's path when it ends with what was typed, which fills its gaps; else nothing."""
+    """Return a topic's path if it ends with the typed chunks, which fill its placeholders."""
     rest, end = row[: -len(typed)], row[-len(typed) :]
-    matches = [ours == theirs for ours, theirs in zip(end, typed, strict=False)]
-    gaps = [ours.startswith("{") for ours in end]
-    if len(end) != len(typed) or not any(matches):
+    if len(end) != len(typed) or not any(map(str.__eq__, end, typed)):
         return ""
-    if not all(same or gap for same, gap in zip(matches, gaps, strict=True)):
+    if not all(map(_matches, end, typed)):
         return ""
-    return "/".join([*("*" if part.startswith("{") else part for part in rest), *typed])
+    return "/".join([*("*" if _is_placeholder(part) else part for part in rest), *typed])
+
+
+def _matches(part: str, typed: str) -> bool:
+    return part == typed or _is_placeholder(part)
+
+
+def _is_placeholder(part: str) -> bool:
+    return part.startswith("{")

@@ -1,24 +1,34 @@
-"""``t2 call``: make a call to a service; without a KEY, what there is to call.
+"""``t2 call``: call a service; without a KEY, list the calls.
 
-A call whose request has ``echo`` is an operator's. Where the user gives no echo, the newest state
-of safety fills it in, and the causes of a reset. A reset counts when safety's state confirms it.
+A request with ``echo`` is an operator's call. If the user gives no echo, safety's newest state
+fills it in, and the causes of a reset. A reset succeeds when safety's state confirms it.
 """
 
 import argparse
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import msgspec
 
-from cli.inspect import operator_call, output
-from cli.inspect.addressing import chunks, expression, one_key
+from cli.inspect import output
+from cli.inspect.addressing import chunks, expression, parse_one_key
 from cli.inspect.payload import read
 from cli.inspect.pub import json_object
-from cli.inspect.shell import Seat, add_options, positive, seated, wants_json
+from cli.inspect.session import BusSession, add_options, open_session, positive, wants_json
 from common import codec, keys
-from common.bus.probe import Answer
+from common.bus.probe import Answer, Probe
 from common.errors import MessageError, RobotError
 from common.keys import CALLS, Call
+from common.messages import ReleaseRequest, ResetDone, SafetyState
+from common.operator import CONFIRM_S, confirms, reset_request
+
+STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
+NO_STATE = (
+    "no state of safety within 1 s, and the call needs its heartbeat: is safety running? "
+    "run `t2 doctor`"
+)
+HEAD = ("key", "request", "reply", "does")
 
 Request = dict[str, Any]
 
@@ -26,23 +36,32 @@ Request = dict[str, Any]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "key", metavar="KEY", nargs="?", type=one_key, help="such as safety/reset; all without"
-    )
-    parser.add_argument(
-        "request", metavar="JSON", nargs="?", type=json_object, default={},
-        help="""a JSON object, such as '{"held": false}'; every default without; an operator's
-        call takes `echo` and `causes` from safety's newest state where they are left out""",
+        "key", metavar="KEY", nargs="?", type=parse_one_key,
+        help="such as safety/reset; lists the calls if omitted",
     )  # fmt: skip
     parser.add_argument(
-        "--timeout", type=positive, default=2.0, metavar="S", help="wait so long, 2 s by default"
+        "request", metavar="JSON", nargs="?", type=json_object, default={},
+        help="""a JSON object, such as '{"held": false}'; all defaults if omitted; an operator's
+        call takes `echo` and `causes` from safety's newest state if they are omitted""",
+    )  # fmt: skip
+    parser.add_argument(
+        "--timeout",
+        type=positive,
+        default=2.0,
+        metavar="S",
+        help="wait for S seconds, 2 by default",
     )
     add_options(parser, every=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Call and show the reply; 1 unless it is done and, for a reset, confirmed; 2 if wrong."""
+    """Call and show the reply; return 1 if it failed or is unconfirmed, 2 if invalid."""
     if not options.key:
-        show_all(wants_json(options))
+        rows = [
+            (each.path, each.request.__name__, each.reply.__name__, each.what) for each in CALLS
+        ]
+        things = [dict(zip(HEAD, row, strict=True)) for row in rows]
+        output.rows(things, HEAD, lambda row: list(row.values()), as_json=wants_json(options))
         return 0
     robot, below = chunks(options.key.strip("/"))
     path = below or options.key.strip("/")
@@ -51,46 +70,54 @@ def run(options: argparse.Namespace) -> int:
     try:
         packed(call, options.request)
     except MessageError as error:
-        print(f"t2 call: {error}; `t2 schema {path}` tells more", file=sys.stderr)
+        print(f"t2 call: {error}; see `t2 schema {path}`", file=sys.stderr)
         return 2
-    with seated(options) as seat:
-        trouble = make(seat, call, path, options)
-    if trouble:
-        print(f"t2 call: {trouble}", file=sys.stderr)
-    return 1 if trouble else 0
+    with open_session(options) as session:
+        problem = make(session, call, path, options)
+    if problem:
+        print(f"t2 call: {problem}", file=sys.stderr)
+    return 1 if problem else 0
 
 
-def make(seat: Seat, call: Call[Any, Any] | None, path: str, options: argparse.Namespace) -> str:
-    """Call and show what is replied; return what went wrong, or an empty text."""
+def make(
+    session: BusSession, call: Call[Any, Any] | None, path: str, options: argparse.Namespace
+) -> str:
+    """Call and show the replies; return the problem, or an empty string."""
     request, seen = options.request, None
-    if call and operator_call.wants_state(call, request):
-        seen = operator_call.newest(seat.probe, seat.robot)
+    if call and needs_state(call, request):
+        session.probe.listen(keys.SAFETY.on(session.robot))
+        seen = next(states(session.probe, STATE_S), None)
         if seen is None:
-            return operator_call.NO_STATE
-        request = operator_call.filled(call, request, seen)
-    key = call.on(seat.robot) if call else expression(path, seat.robot)
-    answers = seat.probe.ask(key, packed(call, request), options.timeout)
+            return NO_STATE
+        request = filled(call, request, seen)
+    key = call.on(session.robot) if call else expression(path, session.robot)
+    answers = session.probe.ask(key, packed(call, request), options.timeout)
     if not answers:
-        return unanswered(key, call)
-    refusals = show(answers, as_json=wants_json(options))
-    if refusals:
+        return no_answer(key, call)
+    if refusals := show(answers, as_json=wants_json(options)):
         return f"refused: {' '.join(refusals)}"
-    if seen and call is keys.RESET and not operator_call.confirmed(seat.probe, seen, answers):
+    if seen and call is keys.RESET and not is_confirmed(session.probe, seen, answers):
         return "not confirmed: safety's state does not show this reset; run `t2 doctor`"
     return ""
 
 
 def show(answers: list[Answer], *, as_json: bool) -> list[str]:
-    """Show each reply; return the refusals."""
+    """Print the replies; return the refusals."""
     for answer in answers:
         if not answer.refusal:
-            value = read(answer.payload, answer.encoding).value
-            output.line(value) if as_json else print(output.fields(value))
+            output.value(read(answer.payload, answer.encoding).value, as_json=as_json)
     return [answer.refusal for answer in answers if answer.refusal]
 
 
+def no_answer(key: str, call: Call[Any, Any] | None) -> str:
+    """Return the error text for a call without an answer."""
+    if call:
+        return f"{call.server} does not answer on {key}; run `t2 doctor`"
+    return f"no service answers on {key}; `t2 call` lists the calls"
+
+
 def known(path: str) -> Call[Any, Any] | None:
-    """Return the call that is meant, ``srv/safety/reset`` or shorter; None for another's."""
+    """Return the call for ``srv/safety/reset`` or a shorter path; None if it is not ours."""
     found = [call for call in CALLS if f"/{call.path}".endswith(f"/{path}")]
     if len(found) > 1:
         names = ", ".join(call.path.removeprefix("srv/") for call in found)
@@ -99,7 +126,7 @@ def known(path: str) -> Call[Any, Any] | None:
 
 
 def packed(call: Call[Any, Any] | None, request: Request) -> bytes:
-    """Return the request's bytes; raise ``MessageError`` for what the call does not take."""
+    """Return the encoded request; raise ``MessageError`` for an invalid one."""
     if call is None:
         return msgspec.msgpack.encode(request)
     try:
@@ -108,19 +135,47 @@ def packed(call: Call[Any, Any] | None, request: Request) -> bytes:
         raise MessageError(f"not a {call.request.__name__}: {error}") from None
 
 
-def unanswered(key: str, call: Call[Any, Any] | None) -> str:
-    """Say that nobody answers, and why that may be."""
-    if call:
-        return f"{call.server} does not answer on {key}: `t2 doctor` tells why"
-    return f"nobody answers on {key}; `t2 call` alone shows what there is"
+def needs_state(call: Call[Any, Any], request: Request) -> bool:
+    """Return whether a call needs safety's newest state; the end of a release does not."""
+    if "echo" not in call.request.__struct_fields__:
+        return False
+    if call.request is ReleaseRequest and request.get("held") is False:
+        return False
+    return call is keys.RESET or request.get("echo") is None
 
 
-def show_all(as_json: bool) -> None:
-    """Show what the robot's own services answer."""
-    rows = [(call.path, call.request.__name__, call.reply.__name__, call.what) for call in CALLS]
-    head = ("key", "request", "reply", "does")
-    if as_json:
-        for row in rows:
-            output.line(dict(zip(head, row, strict=True)))
-        return
-    print(output.table(head, rows))
+def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request:
+    """Return the request with defaults filled in; for a reset, print the causes it clears."""
+    given = {name: value for name, value in request.items() if value is not None}
+    if call is keys.RESET and "causes" not in given:
+        given["causes"] = list(reset_request(seen).causes)
+        for cause in seen.causes:
+            if cause.id in given["causes"]:
+                print(f"t2 call: clears {cause.name}: {cause.text}", file=sys.stderr)
+    return {"echo": seen.heartbeat, **given}
+
+
+def is_confirmed(probe: Probe, seen: SafetyState, answers: list[Answer]) -> bool:
+    """Return whether safety's state soon shows the reset that one of the answers claims."""
+    done = list(resets(answers))
+    return bool(done) and any(
+        confirms(seen, claim, state) for state in states(probe, CONFIRM_S) for claim in done
+    )
+
+
+def states(probe: Probe, seconds: float) -> Iterator[SafetyState]:
+    """Yield the valid states of safety."""
+    for sample in probe.samples(seconds):
+        try:
+            yield codec.decode(sample.payload, SafetyState)
+        except MessageError:
+            continue  # from another publisher
+
+
+def resets(answers: list[Answer]) -> Iterator[ResetDone]:
+    """Yield the answers that claim a reset."""
+    for answer in answers:
+        try:
+            yield codec.decode(answer.payload, ResetDone)
+        except MessageError:
+            continue

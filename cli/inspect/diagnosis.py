@@ -1,7 +1,7 @@
-"""From what was seen to findings, on the way from the laptop to the robot's services. Pure.
+"""Diagnosis from the laptop to the robot's services, from an observation of the bus. Pure.
 
-A finding is ``ok``, ``note`` (worth knowing, hinders nothing), ``wrong``, or ``unknown`` because
-something before it on the way is wrong.
+A finding is ``ok``, ``note`` (information, no effect), ``wrong``, or ``unknown`` because an earlier
+part of the path is wrong.
 """
 
 from collections.abc import Iterator
@@ -9,27 +9,19 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from cli.inspect import remedies
-from common.messages import (
-    Bumper,
-    Driver,
-    Health,
-    Link,
-    SafetyState,
-    Switches,
-    Ultrasonic,
-)
+from common import messages as m
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 
 NEEDED = ("bridge", "safety", "odom")
-LATE_S = 0.1  # a loop that is held up for longer
-CLOCK_S = 1.0  # clocks that differ by more
-SPREAD_S = 0.2  # half of what safety lets a request be under way
+LATE_S = 0.1  # loop lateness that is reported
+CLOCK_S = 1.0  # clock offset that is reported
+SPREAD_S = 0.2  # delay variation; half of safety's limit for the delay of a request
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at, and what to do about it."""
+    """One check with its result and remedy."""
 
     where: str
     level: Level
@@ -38,60 +30,79 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Dial:
-    """What came of dialling one endpoint: ``trouble`` is empty when something answers."""
+class Attempt:
+    """Connection attempt to one endpoint; ``trouble`` is empty on success."""
 
     endpoint: str
     trouble: str = ""
     todo: str = ""
     seconds: float = 0.0
-    tried: bool = True  # UDP cannot be tried by itself
+    tried: bool = True  # UDP cannot be tried
 
 
 @dataclass(slots=True)
-class Seen:
-    """What was seen on the bus while the doctor listened."""
+class Observation:
+    """Everything that the doctor has observed on the bus."""
 
     zenoh: str  # this laptop's versions
     t2: str
-    routers: list[str] = field(default_factory=list)  # their versions, where they tell
-    instances: dict[str, int] = field(default_factory=dict)  # by service, by liveliness
+    routers: list[str] = field(default_factory=list)  # their versions, where readable
+    instances: dict[str, int] = field(default_factory=dict)  # by service, from tokens
     may_drive: bool | None = None
     may_call: bool | None = None
-    health: dict[str, Health] = field(default_factory=dict)
-    one_clock: bool = False  # whether the robot is this very host
+    health: dict[str, m.Health] = field(default_factory=dict)
+    one_clock: bool = False  # whether the robot runs on this host
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
-    undecodable: dict[str, str] = field(default_factory=dict)  # why, by path
-    first_link: Link | None = None
-    link: Link | None = None
-    switches: Switches | None = None
-    bumper: Bumper | None = None
-    ultrasonic: Ultrasonic | None = None
-    drivers: dict[str, Driver] = field(default_factory=dict)  # by side
-    safety: SafetyState | None = None
-    asking: dict[str, set[int]] = field(default_factory=dict)  # boots by source
-    deciding: set[int] = field(default_factory=set)  # boots on @cmd/motion
+    undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
+    first_link: m.Link | None = None
+    link: m.Link | None = None
+    switches: m.Switches | None = None
+    bumper: m.Bumper | None = None
+    ultrasonic: m.Ultrasonic | None = None
+    drivers: dict[str, m.Driver] = field(default_factory=dict)  # motor drivers by side
+    safety: m.SafetyState | None = None
+    requests: dict[str, set[int]] = field(default_factory=dict)  # boots by source of requests
+    motion: set[int] = field(default_factory=set)  # boots on @cmd/motion
+
+    def add(self, message: m.Message, name: str) -> None:
+        """Keep the newest message of each type; ``name`` is the last chunk of its key."""
+        match message:
+            case m.Health():
+                self.health[message.service] = message
+            case m.Link():
+                self.first_link = self.first_link or message
+                self.link = message
+            case m.Driver():
+                self.drivers[name] = message
+            case m.SafetyState():
+                self.safety = message
+            case m.Drive():
+                self.requests.setdefault(name, set()).add(message.boot)
+            case m.Motion():
+                self.motion.add(message.boot)
+            case m.Switches() | m.Bumper() | m.Ultrasonic():
+                setattr(self, name, message)
 
 
-def network(dials: list[Dial]) -> Iterator[Finding]:
-    """Tell whether there is anything at the router's endpoints; one that answers will do."""
-    reached = any(not dial.trouble for dial in dials)
-    for dial in dials:
-        if dial.trouble:
+def network(attempts: list[Attempt]) -> Iterator[Finding]:
+    """Report the router's endpoints; one that answers is enough."""
+    reached = any(not attempt.trouble for attempt in attempts)
+    for attempt in attempts:
+        if attempt.trouble:
             level: Level = "note" if reached else "wrong"
-            yield Finding("network", level, f"{dial.endpoint}: {dial.trouble}", dial.todo)
-        elif dial.tried:
-            took = f"{dial.seconds * 1000:.1f} ms"
-            yield Finding("network", "ok", f"{dial.endpoint} answers in {took}")
+            yield Finding("network", level, f"{attempt.endpoint}: {attempt.trouble}", attempt.todo)
+        elif attempt.tried:
+            took = f"{attempt.seconds * 1000:.1f} ms"
+            yield Finding("network", "ok", f"{attempt.endpoint} answers in {took}")
         else:
-            yield Finding("network", "unknown", f"{dial.endpoint} cannot be tried by itself")
+            yield Finding("network", "unknown", f"{attempt.endpoint} cannot be tested by itself")
 
 
-def router(seen: Seen) -> Iterator[Finding]:
-    """Tell what router it is."""
+def router(seen: Observation) -> Iterator[Finding]:
+    """Report the router's version."""
     if not seen.routers:
-        yield Finding("router", "note", "it does not tell its version (its admin space is closed)")
+        yield Finding("router", "note", "version unknown (the router's admin space is closed)")
     for version in seen.routers:
         if version == seen.zenoh:
             yield Finding("router", "ok", f"Zenoh {version}, as on this laptop")
@@ -100,77 +111,76 @@ def router(seen: Seen) -> Iterator[Finding]:
             yield Finding("router", "note", text, remedies.UPDATE)
 
 
-def services(seen: Seen) -> Iterator[Finding]:
-    """Tell whether the robot's own services are there once each, and not stuck."""
+def services(seen: Observation) -> Iterator[Finding]:
+    """Report services that are missing, duplicate or hang."""
     for name in sorted({*NEEDED, *seen.instances}):
         count, health = seen.instances.get(name, 0), seen.health.get(name)
         if not count:
-            yield Finding("services", "wrong", f"{name} is not there", remedies.START)
+            yield Finding("services", "wrong", f"{name} is not running", remedies.START)
         elif count > 1 and name in NEEDED:
-            yield Finding("services", "wrong", f"{name} is there {count} times", remedies.TWICE)
+            yield Finding("services", "wrong", f"{name} is running {count} times", remedies.TWICE)
         elif not health:
-            text = f"{name} is there and tells nothing of its health: it hangs"
+            text = f"{name} is running and publishes no health: it hangs"
             yield Finding("services", "wrong", text, remedies.HANGS)
         elif health.lateness > LATE_S:
-            text = f"{name} is held up for {health.lateness:.2f} s at a time"
-            yield Finding("services", "note", text, remedies.HELD_UP)
+            text = f"{name} stalls for up to {health.lateness:.2f} s"
+            yield Finding("services", "note", text, remedies.STALLS)
         else:
             yield Finding("services", "ok", f"{name} is up for {health.uptime:.0f} s")
 
 
-def versions(seen: Seen) -> Iterator[Finding]:
-    """Tell whether robot and laptop are of one version."""
+def versions(seen: Observation) -> Iterator[Finding]:
+    """Report different versions on robot and laptop."""
     other = {name: h.version for name, h in seen.health.items() if h.version != seen.t2}
     for name, version in sorted(other.items()):
         text = f"{name} is T2 {version}, this laptop {seen.t2}"
         yield Finding("versions", "note", text, remedies.UPDATE)
     if seen.health and not other:
         yield Finding("versions", "ok", f"T2 {seen.t2} everywhere")
-    for path, why in sorted(seen.undecodable.items()):
-        yield Finding("versions", "wrong", f"{path}: {why}", remedies.UNDECODABLE)
+    for path, reason in sorted(seen.undecodable.items()):
+        yield Finding("versions", "wrong", f"{path}: {reason}", remedies.UNDECODABLE)
 
 
-def rights(seen: Seen) -> Iterator[Finding]:
-    """Tell what the router lets this laptop do."""
+def rights(seen: Observation) -> Iterator[Finding]:
+    """Report what the router allows this laptop to do."""
     if not seen.instances:
-        yield Finding(
-            "rights", "unknown", "nobody is there, or the router's list lacks this certificate"
-        )
+        text = "no service found, or the router's list lacks this certificate"
+        yield Finding("rights", "unknown", text)
         return
     if not seen.rates:
-        yield Finding("rights", "wrong", "services are there and nothing is heard", remedies.BLIND)
+        yield Finding("rights", "wrong", "services run, but no message arrives", remedies.BLIND)
         return
-    may = {"driving": seen.may_drive, "calls": seen.may_call}
-    barred = [what for what, allowed in may.items() if allowed is False]
+    allowed = {"driving": seen.may_drive, "calls": seen.may_call}
+    barred = [name for name, may in allowed.items() if may is False]
     if barred:
-        text = f"this laptop may watch; it has no way to safety for {' and '.join(barred)}"
+        text = f"this laptop may read; safety does not receive its {' and '.join(barred)}"
         yield Finding("rights", "note", text, remedies.RIGHTS)
-    elif None in may.values():
-        yield Finding("rights", "unknown", "driving and calls want safety")
+    elif None in allowed.values():
+        yield Finding("rights", "unknown", "driving and calls require safety")
     else:
-        yield Finding("rights", "ok", "this laptop may watch, call and drive")
+        yield Finding("rights", "ok", "this laptop may read, call and drive")
 
 
-def clock(seen: Seen) -> Iterator[Finding]:
-    """Tell how clocks differ and how much the way wavers."""
+def clock(seen: Observation) -> Iterator[Finding]:
+    """Report clock offset and delay variation."""
     if not seen.delays_s:
-        yield Finding("clock", "unknown", "nothing was heard")
+        yield Finding("clock", "unknown", "no message arrived")
         return
     least, most = min(seen.delays_s), max(seen.delays_s)
     if most - least > SPREAD_S:
         text = f"messages take up to {most - least:.2f} s longer than the fastest"
-        yield Finding("clock", "note", text, remedies.SLOW_WAY)
+        yield Finding("clock", "note", text, remedies.SLOW_LINK)
     if seen.one_clock:
-        yield Finding("clock", "ok", "the robot runs on this very host")
+        yield Finding("clock", "ok", "the robot runs on this host")
     elif abs(least) > CLOCK_S:
-        way = "behind" if least < 0 else "ahead of"
-        text = f"this laptop's clock is {abs(least):.1f} s {way} the robot's"
+        side = "behind" if least < 0 else "ahead of"
+        text = f"this laptop's clock is {abs(least):.1f} s {side} the robot's"
         yield Finding("clock", "note", text, remedies.CLOCK)
     else:
         yield Finding("clock", "ok", f"clocks agree to {abs(least) * 1000:.0f} ms")
 
 
-def on_the_way(seen: Seen) -> Iterator[Finding]:
+def diagnose_bus(seen: Observation) -> Iterator[Finding]:
     """Return all findings between the router and the services."""
-    for look in (router, services, versions, rights, clock):
-        yield from look(seen)
+    for check in (router, services, versions, rights, clock):
+        yield from check(seen)

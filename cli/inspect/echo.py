@@ -1,4 +1,4 @@
-"""``t2 echo``: what comes on a key, right or wrong."""
+"""``t2 echo``: print messages received on a key, valid or not."""
 
 import argparse
 import sys
@@ -9,12 +9,19 @@ from typing import Any
 from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
-from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json
+from cli.inspect.session import (
+    BusSession,
+    add_end,
+    add_options,
+    open_session,
+    until_interrupt,
+    wants_json,
+)
 from common.errors import MessageError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 
-SOON_S = 2.0  # the slowest streams come once a second
+FIRST_S = 2.0  # the slowest streams have 1 Hz
 ONCE_S = 10.0  # for --once without --duration
 HEADER = ("seq", "boot", "t_ns", "mono_ns", "host")
 
@@ -23,114 +30,112 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     add_key(parser)
     parser.add_argument(
-        "--once", action="store_true", help=f"show one and end; gives up after {ONCE_S:g} s"
+        "--once", action="store_true", help=f"print one message; give up after {ONCE_S:g} s"
     )
     parser.add_argument(
-        "--field", metavar="NAME", help="this field alone, such as x or causes.0.name"
+        "--field", metavar="NAME", help="print this field only, such as x or causes.0.name"
     )
-    parser.add_argument("--header", action="store_true", help="the whole header, too")
+    parser.add_argument("--header", action="store_true", help="print the whole header, too")
     add_end(parser)
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show what comes until it ends; 0 when anything came."""
+    """Print messages; return 0 if any arrived."""
     shown = 0
     most = 1 if options.once else options.count
     duration_s = options.duration or (ONCE_S if options.once else None)
-    with seated(options) as seat:
-        wanted = expression(options.key, seat.robot)
-        # Events are rare: those that their publishers have kept are shown first.
-        seat.probe.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
-        with quietly():
-            for heard in coming(seat, wanted, duration_s):
+    with open_session(options) as session:
+        wanted = expression(options.key, session.robot)
+        # Events are rare: those that their publishers have cached are shown first.
+        session.probe.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
+        with until_interrupt():
+            for sample in samples(session, wanted, duration_s):
                 shown += 1
-                show(heard, seat, options)
+                show(sample, session.robot, options)
                 if shown == most:
                     break
-        left_out = seat.probe.left_out
+        left_out = session.probe.left_out
     if left_out:
-        print(f"t2 echo: {left_out} more came faster than they could be shown", file=sys.stderr)
+        print(f"t2 echo: {left_out} messages dropped: output too slow", file=sys.stderr)
     if not shown:
         within = f" within {duration_s:g} s" if duration_s else ""
-        text = f"t2 echo: no message on {wanted}{within}; `t2 ls` lists the keys that are alive"
+        text = f"t2 echo: no message on {wanted}{within}; `t2 ls` lists the active keys"
         print(text, file=sys.stderr)
     return 0 if shown else 1
 
 
-def coming(seat: Seat, wanted: str, duration_s: float | None) -> Iterator[Sample]:
-    """Yield what comes; say so when nothing does at first."""
+def samples(session: BusSession, wanted: str, duration_s: float | None) -> Iterator[Sample]:
+    """Yield samples; print a notice if none arrives at first."""
     begun_s = time.monotonic()
-    first = seat.probe.take(SOON_S if duration_s is None else min(SOON_S, duration_s))
+    first = session.probe.take(FIRST_S if duration_s is None else min(FIRST_S, duration_s))
     if first is not None:
         yield first
-    elif duration_s is None or duration_s > SOON_S:
-        print(f"t2 echo: nothing on {wanted} yet; it goes on listening", file=sys.stderr)
+    elif duration_s is None or duration_s > FIRST_S:
+        print(f"t2 echo: no message on {wanted} yet; waiting", file=sys.stderr)
     left_s = None if duration_s is None else duration_s - (time.monotonic() - begun_s)
-    yield from seat.probe.samples(left_s)
+    yield from session.probe.samples(left_s)
 
 
-def show(heard: Sample, seat: Seat, options: argparse.Namespace) -> None:
-    """Print one sample."""
-    reading = read(heard.payload, heard.encoding)
+def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
+    """Print one sample in the format of the options."""
+    reading = read(sample.payload, sample.encoding)
     if options.field:
-        value = field(reading, heard, options.field)
-        output.line(value) if wants_json(options) else print(output.fields(value), flush=True)
+        output.value(field(reading, sample, options.field), as_json=wants_json(options))
     elif wants_json(options):
-        output.line(as_json(heard, reading, seat.robot))
-    elif options.output == "table":
-        print(as_row(heard, reading, seat.robot, options.header), flush=True)
+        output.line(as_json(sample, reading, robot))
     else:
-        print(as_text(heard, reading, seat.robot, options.header), flush=True)
+        form = as_line if options.output == "table" else as_text
+        print(form(sample, reading, robot, options.header), flush=True)
 
 
-def field(reading: Reading, heard: Sample, path: str) -> Any:
-    """Return one field; raise ``MessageError`` naming those that there are."""
+def field(reading: Reading, sample: Sample, path: str) -> Any:
+    """Return one field; raise ``MessageError`` naming the existing fields."""
     try:
         return at(reading.value, path)
     except MessageError as error:
-        raise MessageError(f"--field {path} of {heard.key} ({reading.kind}): {error}") from None
+        raise MessageError(f"--field {path} of {sample.key} ({reading.kind}): {error}") from None
 
 
-def as_json(heard: Sample, reading: Reading, robot: str) -> dict[str, Any]:
-    """Return a sample for programs."""
-    told = {"key": short(heard.key, robot), "type": reading.kind, "received_ns": heard.wall_ns}
-    if heard.deleted:
-        told["deleted"] = True
+def as_json(sample: Sample, reading: Reading, robot: str) -> dict[str, Any]:
+    """Return a sample as a JSON object."""
+    head = {"key": short(sample.key, robot), "type": reading.kind, "received_ns": sample.wall_ns}
+    if sample.deleted:
+        head["deleted"] = True
     if reading.complaint:
-        told["complaint"] = reading.complaint
-    return told | {"message": reading.value}
+        head["complaint"] = reading.complaint
+    return head | {"message": reading.value}
 
 
-def as_text(heard: Sample, reading: Reading, robot: str, header: bool) -> str:
-    """Return a sample for people: a line that names it, its fields, and ``---`` as in ROS."""
+def as_text(sample: Sample, reading: Reading, robot: str, header: bool) -> str:
+    """Return a sample as text: a title line, its fields, and ``---`` as in ROS."""
     value = reading.value
     seq = f"  seq {value['seq']}" if isinstance(value, dict) and "seq" in value else ""
-    what = "DELETE" if heard.deleted else reading.kind
-    lines = [f"# {short(heard.key, robot)}  {what}{seq}  {clock(heard)}"]
+    kind = "DELETE" if sample.deleted else reading.kind
+    lines = [f"# {short(sample.key, robot)}  {kind}{seq}  {clock(sample)}"]
     if reading.complaint:
-        lines.append(f"# not as it should be: {reading.complaint}")
+        lines.append(f"# invalid: {reading.complaint}")
     value = body(value, header)
     if value not in (None, {}):
         lines.append(output.fields(value))
     return "\n".join([*lines, "---"])
 
 
-def as_row(heard: Sample, reading: Reading, robot: str, header: bool) -> str:
+def as_line(sample: Sample, reading: Reading, robot: str, header: bool) -> str:
     """Return a sample as one line: time, key, and its fields as JSON."""
-    value = "DELETE" if heard.deleted else output.json(body(reading.value, header))
-    complaint = f"  # not as it should be: {reading.complaint}" if reading.complaint else ""
-    return f"{clock(heard)}  {short(heard.key, robot)}  {output.printable(value)}{complaint}"
+    value = "DELETE" if sample.deleted else output.json(body(reading.value, header))
+    complaint = f"  # invalid: {reading.complaint}" if reading.complaint else ""
+    return f"{clock(sample)}  {short(sample.key, robot)}  {output.printable(value)}{complaint}"
 
 
 def body(value: Any, header: bool) -> Any:
-    """Return a message without its header, unless that is wanted."""
+    """Return a message, without its header unless ``header`` is set."""
     if header or not isinstance(value, dict):
         return value
     return {name: each for name, each in value.items() if name not in HEADER}
 
 
-def clock(heard: Sample) -> str:
-    """Return the local time at which a sample was received, to the millisecond."""
-    wall = time.strftime("%H:%M:%S", time.localtime(heard.wall_ns // NS_PER_S))
-    return f"{wall}.{heard.wall_ns // 1_000_000 % 1000:03d}"
+def clock(sample: Sample) -> str:
+    """Return the local receive time, to the millisecond."""
+    wall = time.strftime("%H:%M:%S", time.localtime(sample.wall_ns // NS_PER_S))
+    return f"{wall}.{sample.wall_ns // 1_000_000 % 1000:03d}"

@@ -1,8 +1,8 @@
-"""``t2 estop``: stop the robot now, a site's or all; it stays so until an operator's reset.
+"""``t2 estop``: emergency stop of one robot, a site or all, latched until an operator's reset.
 
-The order is sent again and again until safety says that it has latched: a router that drops it, by
-its access rules or because the way is bad, does not tell. Who has many robots stopped hears of each
-whether it has. A robot that the router does not know of at this moment cannot be told of.
+The order is repeated until safety reports the latch: a router that drops it, by its access rules or
+on a bad link, reports nothing. Each addressed robot must confirm. Robots that the router does not
+know at this moment cannot be listed.
 """
 
 import argparse
@@ -10,17 +10,17 @@ import sys
 import time
 
 from cli.inspect.addressing import chunks, is_many
-from cli.inspect.shell import add_options, seated
+from cli.inspect.session import add_options, open_session
 from common import codec, keys
 from common.bus.probe import Probe
 from common.errors import LinkError, MessageError
 from common.messages import SafetyState
 from common.sample import Sample
 
-PATIENCE_S = 3.0
-AGAIN_S = 0.1
+TIMEOUT_S = 3.0
+REPEAT_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
-MOVES = ("bridge", "safety")  # a robot without either moves nothing
+MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,52 +29,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Stop it; 1 when one does not confirm."""
-    return insist(options)
+    """Stop; return 1 if a robot does not confirm."""
+    return stop_with_retry(options)
 
 
-def insist(options: argparse.Namespace, robot: str | None = None) -> int:
-    """Stop it, or another robot; a router that is not there may be about to come back."""
-    end_s = time.monotonic() + PATIENCE_S
+def stop_with_retry(options: argparse.Namespace, robot: str | None = None) -> int:
+    """Stop the robot of the options, or another one; retry while no router is reachable."""
+    end_s = time.monotonic() + TIMEOUT_S
     while True:
         try:
-            with seated(options) as seat:
-                return stop(seat.probe, robot or seat.robot)
+            with open_session(options) as session:
+                return stop(session.probe, robot or session.robot)
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
 
 
 def stop(probe: Probe, robot: str) -> int:
-    """Stop one robot, or many by an expression; return 1 when one does not confirm in time."""
+    """Stop one robot, or several by a key expression; return 1 if one does not confirm in time."""
     _order(probe, robot)  # before anything else
     probe.listen(keys.SAFETY.on(robot))
-    expected = there(probe, robot)
+    expected = expected_robots(probe, robot)
     confirmed: set[str] = set()
-    end_s = time.monotonic() + PATIENCE_S
+    end_s = time.monotonic() + TIMEOUT_S
     while not confirmed >= expected and time.monotonic() < end_s:
-        # By name, too: a driver may stop its own robots and not all.
+        # By name, too: a driver's certificate may allow its own robots only, not an expression.
         for each in (robot, *sorted(expected - confirmed - {robot})):
             _order(probe, each)
-        for heard in probe.samples(AGAIN_S):
-            if chunks(heard.key)[0] not in confirmed and _latched(heard):
-                confirmed.add(chunks(heard.key)[0])
-    tell(confirmed, expected)
+        for sample in probe.samples(REPEAT_S):
+            if chunks(sample.key)[0] not in confirmed and _latched(sample):
+                confirmed.add(chunks(sample.key)[0])
+    report(confirmed, expected)
     return 0 if confirmed and confirmed >= expected else 1
 
 
-def there(probe: Probe, robot: str) -> set[str]:
-    """Return who has to confirm: the robot that is named, and of many those that are there."""
+def expected_robots(probe: Probe, robot: str) -> set[str]:
+    """Return the robots that must confirm: the named one, or all present ones."""
     if not is_many(robot):
         return {robot}
     tokens = map(chunks, probe.alive(keys.live_key(robot, "*", "*")))
     return {name for name, path in tokens if path.split("/")[1] in MOVES}
 
 
-def tell(confirmed: set[str], expected: set[str]) -> None:
-    """Name each robot that has stopped, and loudly each that has not said so."""
+def report(confirmed: set[str], expected: set[str]) -> None:
+    """Print each stopped robot, and a warning for each robot that does not confirm."""
     for each in sorted(confirmed):
-        print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` lets it go on.")
+        print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` releases it.")
     missing = sorted(expected - confirmed)
     for each in missing:
         print(
@@ -86,16 +86,15 @@ def tell(confirmed: set[str], expected: set[str]) -> None:
         count = f"{len(missing)} of {len(expected)} robots"
         print(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}", file=sys.stderr)
     if not confirmed | expected:
-        print("t2 estop: sent, but no robot is there", file=sys.stderr)
+        print("t2 estop: sent, but no robot found", file=sys.stderr)
 
 
 def _order(probe: Probe, robot: str) -> None:
     probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
 
 
-def _latched(heard: Sample) -> bool:
+def _latched(sample: Sample) -> bool:
     try:
-        state = codec.decode(heard.payload, SafetyState)
+        return "estop" in codec.decode(sample.payload, SafetyState).latched
     except MessageError:
         return False
-    return "estop" in state.latched

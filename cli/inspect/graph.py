@@ -1,8 +1,9 @@
-"""Who is there, who publishes, who reads, who answers: from liveliness and the router. Pure.
+"""Graph of sessions on the bus with the keys that they publish, read and answer. Pure.
 
-The router's admin space names the sessions that have declared a key. A service's liveliness token
-is declared by its session, too, and so names it. A session without a token (a tool, safety's second
-one for the emergency stop) is shown by the beginning of its id.
+Sources are liveliness tokens and the router's admin space, which lists the sessions that have
+declared a key. A service's session also declares its token, which gives the session's name. A
+session without a token (a tool, safety's session for the emergency stop) has a part of its id for a
+name.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -13,12 +14,12 @@ from typing import Any
 from cli.inspect.addressing import chunks, short
 
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
-OWN = "@adv"  # what Zenoh itself declares behind a key
+ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
 
 
 @dataclass(slots=True)
 class Member:
-    """One session on the bus, with the keys that it has declared."""
+    """One session on the bus with its declared keys."""
 
     name: str
     zid: str = ""
@@ -31,7 +32,7 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One that publishes or calls to one that reads or answers, over a key."""
+    """A publisher and a reader of one key."""
 
     sender: str
     key: str
@@ -41,81 +42,81 @@ class Edge:
 def members(
     tokens: Iterable[str], declared: Mapping[str, Any], without: Iterable[str] = ()
 ) -> list[Member]:
-    """Return who is there: services by name, then sessions without one.
+    """Return services by name, then sessions without a service.
 
-    ``tokens`` are liveliness keys, ``declared`` the router's admin space by key; ``without`` are
-    ids of sessions to leave out, such as one's own.
+    ``tokens`` are liveliness keys, ``declared`` is the router's admin space by key. Session ids in
+    ``without`` are left out.
     """
-    named = _named(tokens)
+    named = _services(tokens)
     rows = [_declaration(key, value) for key, value in declared.items()]
     by_zid: dict[str, Member] = {}
     for role, key, zids in rows:
         if role == "token" and key in named:
             by_zid |= dict.fromkeys(zids, named[key])
     for role, key, zids in rows:
-        for zid in zids if role in ROLES and OWN not in key else ():
+        for zid in zids if role in ROLES and ZENOH_OWN not in key else ():
             if zid not in without:
                 member = by_zid.setdefault(zid, Member(zid[:8]))
                 member.zid = zid
                 getattr(member, ROLES[role]).add(key)
-    strangers = {each.zid: each for each in by_zid.values() if not each.instance}
+    unnamed = {each.zid: each for each in by_zid.values() if not each.instance}
     return [*sorted(named.values(), key=lambda each: (each.robot, each.name, each.instance)),
-            *sorted(strangers.values(), key=lambda each: each.zid)]  # fmt: skip
+            *sorted(unnamed.values(), key=lambda each: each.zid)]  # fmt: skip
 
 
-def title(member: Member, all_of_them: Sequence[Member]) -> str:
-    """Return a name that is one member's alone."""
-    same = [each for each in all_of_them if (each.robot, each.name) == (member.robot, member.name)]
+def title(member: Member, found: Sequence[Member]) -> str:
+    """Return a unique name of a member."""
+    same = [each for each in found if (each.robot, each.name) == (member.robot, member.name)]
     return f"{member.name}:{member.instance[:4]}" if len(same) > 1 else member.name
 
 
-def edges(who: Sequence[Member], meet: Callable[[str, str], bool]) -> list[Edge]:
-    """Return every way from one to another; ``meet`` tells whether two expressions intersect."""
-    found = {
-        Edge(title(sender, who), key, title(reader, who))
-        for sender in who
+def edges(found: Sequence[Member], intersects: Callable[[str, str], bool]) -> list[Edge]:
+    """Return all edges; ``intersects`` compares two key expressions."""
+    links = {
+        Edge(title(sender, found), key, title(reader, found))
+        for sender in found
         for key in sender.publishes
-        for reader in who
-        if reader is not sender and any(meet(key, read) for read in reader.reads)
+        for reader in found
+        if reader is not sender and any(intersects(key, read) for read in reader.reads)
     }
-    return sorted(found, key=lambda edge: (edge.sender, edge.key, edge.reader))
+    return sorted(links, key=lambda edge: (edge.sender, edge.key, edge.reader))
 
 
-def dot(who: Sequence[Member], ways: Iterable[Edge], robot: str) -> str:
-    """Return the graph in Graphviz's language: an arrow for each pair, with its keys."""
+def dot(found: Sequence[Member], links: Iterable[Edge], robot: str) -> str:
+    """Return the graph in the DOT language: one arrow per pair, labelled with its keys."""
     between: dict[tuple[str, str], list[str]] = {}
-    for way in ways:
-        between.setdefault((way.sender, way.reader), []).append(short(way.key, robot))
+    for link in links:
+        between.setdefault((link.sender, link.reader), []).append(short(link.key, robot))
     lines = ["digraph t2 {", "  rankdir=LR; node [shape=box];"]
-    for member in who:
+    for member in found:
         style = "" if member.instance else " [style=dashed]"
-        lines.append(f'  "{title(member, who)}"{style};')
+        lines.append(f'  "{title(member, found)}"{style};')
     for (sender, reader), keys in between.items():
-        words = "\\n".join(keys)
-        lines.append(f'  "{sender}" -> "{reader}" [label="{words}"];')
+        label = "\\n".join(keys)
+        lines.append(f'  "{sender}" -> "{reader}" [label="{label}"];')
     return "\n".join([*lines, "}"])
 
 
-def publishers(who: Sequence[Member]) -> dict[str, list[str]]:
-    """Return who has declared to publish each key."""
-    found: dict[str, list[str]] = {}
-    for member in who:
+def publishers(found: Sequence[Member]) -> dict[str, list[str]]:
+    """Return the declared publishers by key."""
+    names: dict[str, list[str]] = {}
+    for member in found:
         for key in member.publishes:
-            found.setdefault(key, []).append(title(member, who))
-    return found
+            names.setdefault(key, []).append(title(member, found))
+    return names
 
 
-def by_boot(who: Iterable[Member]) -> dict[int | None, Member]:
-    """Return whose messages bear which ``boot``: a service's token is named by it."""
-    found: dict[int | None, Member] = {}
-    for member in who:
-        with suppress(ValueError):  # a token of another make
-            found[int(member.instance, 16)] = member
-    return found
+def by_boot(found: Iterable[Member]) -> dict[int | None, Member]:
+    """Return the services by the ``boot`` of their messages, which is part of their tokens."""
+    boots: dict[int | None, Member] = {}
+    for member in found:
+        with suppress(ValueError):  # not a token of ours
+            boots[int(member.instance, 16)] = member
+    return boots
 
 
-def _named(tokens: Iterable[str]) -> dict[str, Member]:
-    """Return the services that liveliness tokens ``.../live/{service}/{instance}`` tell of."""
+def _services(tokens: Iterable[str]) -> dict[str, Member]:
+    """Return the services of liveliness tokens ``.../live/{service}/{instance}``."""
     named = {}
     for token in tokens:
         robot, path = chunks(token)
@@ -126,9 +127,9 @@ def _named(tokens: Iterable[str]) -> dict[str, Member]:
 
 
 def _declaration(key: str, value: Any) -> tuple[str, str, list[str]]:
-    """Return role, key and ids of the sessions of one entry ``@/ZID/MODE/ROLE/KEY``.
+    """Return role, key and session ids of one entry ``@/ZID/MODE/ROLE/KEY``.
 
-    All sessions are clients; what else has declared it is a router, which stands for its own.
+    All sessions are clients; other entries are routers that declare on behalf of their clients.
     """
     parts = key.split("/", 4)
     if len(parts) < 5 or not isinstance(value, dict):

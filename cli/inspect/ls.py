@@ -1,6 +1,6 @@
-"""``t2 ls``: the keys that are alive, with type, rate and publisher.
+"""``t2 ls``: the active keys with type, rate and publisher.
 
-Alive is what came while it listened, and what somebody has declared to publish.
+A key is active if a message arrives on it while the command listens, or if a publisher is declared.
 """
 
 import argparse
@@ -10,122 +10,115 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short, topic_of
-from cli.inspect.discovery import present
 from cli.inspect.graph import Member, by_boot, publishers, title
-from cli.inspect.measure import taken
-from cli.inspect.shell import Seat, add_options, positive, quietly, seated, wants_json
-from cli.inspect.stream_stats import Meter
+from cli.inspect.measure import WINDOW, stream_sample
+from cli.inspect.services import discover
+from cli.inspect.session import (
+    BusSession,
+    add_duration,
+    add_options,
+    open_session,
+    until_interrupt,
+    wants_json,
+)
+from cli.inspect.stream_stats import StreamStats
 from common import codec
 from common.bus.probe import intersects
 from common.sample import Sample
 
-LISTEN_S = 2.0  # two of the slowest streams
-WINDOW = 10_000
+LISTEN_S = 2.0  # two periods of the slowest streams
 NO_STREAMS = ("live/", "info/", "srv/")
+HEAD = ("key", "type", "Hz", "of", "publisher")
 
 
 @dataclass(slots=True)
 class Stream:
-    """What is known of one key."""
+    """One key with its type, rate and publishers."""
 
     kind: str = ""
-    meter: Meter = field(default_factory=lambda: Meter(WINDOW))
+    stats: StreamStats = field(default_factory=lambda: StreamStats(WINDOW))
     boots: set[int] = field(default_factory=set)
     publishers: set[str] = field(default_factory=set)
+
+    def add(self, sample: Sample) -> None:
+        """Add a sample."""
+        measured = stream_sample(sample, 0)
+        self.stats.add(measured)
+        self.kind = codec.kind_of(sample.encoding) or self.kind
+        if measured.boot:
+            self.boots.add(measured.boot)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     add_key(parser, optional=True)
-    parser.add_argument(
-        "--duration", type=positive, default=LISTEN_S, metavar="S",
-        help=f"listen so long, {LISTEN_S:g} s by default",
-    )  # fmt: skip
+    add_duration(parser, LISTEN_S)
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """List what is alive; 1 when nothing is."""
-    with seated(options) as seat:
+    """List the active keys; return 1 without any."""
+    with open_session(options) as session:
         words = [options.key] if options.key else EVERYTHING
-        wanted = [expression(word, seat.robot) for word in words]
-        streams = heard(seat, wanted, options.duration)
-        who = present(seat.probe, seat.robot)
-    name(streams, who, wanted)
+        wanted = [expression(word, session.robot) for word in words]
+        streams = listen(session, wanted, options.duration)
+        add_publishers(streams, discover(session.probe, session.robot), wanted)
     if not streams:
-        print(f"t2 ls: nothing is alive on {', '.join(wanted)}; try `t2 doctor`", file=sys.stderr)
+        print(f"t2 ls: no active key on {', '.join(wanted)}; try `t2 doctor`", file=sys.stderr)
         return 1
-    show(streams, seat.robot, wants_json(options))
+    rows = [as_json(key, streams[key], session.robot) for key in sorted(streams)]
+    output.rows(rows, HEAD, as_cells, as_json=wants_json(options))
     return 0
 
 
-def heard(seat: Seat, wanted: list[str], seconds: float) -> dict[str, Stream]:
-    """Return what came on these keys within so many seconds."""
+def listen(session: BusSession, wanted: list[str], seconds: float) -> dict[str, Stream]:
+    """Return the streams that arrive on these keys."""
     streams: dict[str, Stream] = {}
     for each in wanted:
-        seat.probe.listen(each)
-    with quietly():
-        for sample in seat.probe.samples(seconds):
-            _note(streams.setdefault(sample.key, Stream()), sample)
+        session.probe.listen(each)
+    with until_interrupt():
+        for sample in session.probe.samples(seconds):
+            streams.setdefault(sample.key, Stream()).add(sample)
     return streams
 
 
-def name(streams: dict[str, Stream], who: list[Member], wanted: list[str]) -> None:
-    """Add who publishes, and the keys that nobody has put anything on while we listened."""
-    boots = by_boot(who)
-    for key, names in publishers(who).items():
-        if any(intersects(key, each) for each in wanted) and _is_stream(key):
+def add_publishers(streams: dict[str, Stream], found: list[Member], wanted: list[str]) -> None:
+    """Add the publishers, and the declared keys on which no message arrived."""
+    boots = by_boot(found)
+    for key, names in publishers(found).items():
+        if any(intersects(key, each) for each in wanted) and is_stream(key):
             streams.setdefault(key, Stream()).publishers.update(names)
     for key, stream in streams.items():
-        stream.publishers |= {title(boots[boot], who) for boot in stream.boots if boot in boots}
+        stream.publishers |= {title(boots[boot], found) for boot in stream.boots if boot in boots}
         topic = topic_of(key)
         if topic and not stream.kind:
             stream.kind = topic.message.__name__
 
 
-def show(streams: dict[str, Stream], robot: str, as_json: bool) -> None:
-    """Print a line of JSON or a row for each key."""
-    rows = [_row(key, streams[key], robot) for key in sorted(streams)]
-    if as_json:
-        for row in rows:
-            output.line(row)
-        return
-    cells = [
-        [row["key"], row["type"] or "?", _hz(row["hz"]), _expected(row["expected_hz"]),
-         ", ".join(row["publishers"]) or "?"]
-        for row in rows
-    ]  # fmt: skip
-    print(output.table(["key", "type", "Hz", "of", "publisher"], cells))
-
-
-def _note(stream: Stream, sample: Sample) -> None:
-    one = taken(sample, 0)
-    stream.meter.take(one)
-    stream.kind = codec.kind_of(sample.encoding) or stream.kind
-    if one.boot:
-        stream.boots.add(one.boot)
-
-
-def _row(key: str, stream: Stream, robot: str) -> dict[str, Any]:
+def as_json(key: str, stream: Stream, robot: str) -> dict[str, Any]:
+    """Return one stream as a JSON object."""
     topic = topic_of(key)
     return {
         "key": short(key, robot),
         "type": stream.kind,
-        "hz": stream.meter.rate()["hz"],
+        "hz": stream.stats.rate()["hz"],
         "expected_hz": topic.rate_hz if topic else None,
         "publishers": sorted(stream.publishers),
     }
 
 
-def _is_stream(key: str) -> bool:
+def as_cells(row: output.Row) -> list[str]:
+    """Return one stream as table cells; a topic without a rate is published on change."""
+    hz, expected_hz = row["hz"], row["expected_hz"]
+    return [
+        row["key"],
+        row["type"] or "?",
+        "-" if hz is None else f"{hz:.1f}",
+        "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
+        ", ".join(row["publishers"]) or "?",
+    ]
+
+
+def is_stream(key: str) -> bool:
+    """Return whether messages are published on a key, as opposed to calls and tokens."""
     return not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
-
-
-def _hz(hz: float | None) -> str:
-    return "-" if hz is None else f"{hz:.1f}"
-
-
-def _expected(hz: float | None) -> str:
-    if hz is None:
-        return ""
-    return f"{hz:g}" if hz else "change"

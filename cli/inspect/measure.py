@@ -1,28 +1,41 @@
-"""The one loop behind ``t2 hz``, ``t2 delay`` and ``t2 bw``: listen, and tell once a second."""
+"""``t2 hz``, ``t2 delay`` and ``t2 bw``: rate, transport delay and bandwidth of keys.
+
+``hz`` shows the average rate, the gaps between two samples, and samples lost by ``seq``. ``delay``
+uses the host's monotonic clock where sender and receiver share it (clock ``host``), else both wall
+clocks, whose offset is then part of the result (clock ``wall``). ``bw`` counts payloads and
+attachments, without the protocol overhead.
+"""
 
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
 from cli.inspect.payload import read
-from cli.inspect.shell import Seat, add_end, add_options, quietly, seated, wants_json, whole
-from cli.inspect.stream_stats import Figures, Meter, Taken
+from cli.inspect.session import (
+    BusSession,
+    add_end,
+    add_options,
+    open_session,
+    until_interrupt,
+    wants_json,
+    whole,
+)
+from cli.inspect.stream_stats import StreamSample, StreamStats
 from common.bus.publisher import host_id
 from common.freshness import NS_PER_S
 from common.sample import Sample
 
-TELL_S = 1.0
+REPORT_S = 1.0
 WINDOW = 10_000
-
-Measure = Callable[[Meter], Figures]
+MEASURES = {"hz": StreamStats.rate, "delay": StreamStats.delay, "bw": StreamStats.bandwidth}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that the three have in common."""
+    """Add the options of the three commands."""
     add_key(parser)
     parser.add_argument(
         "--window", "-w", type=whole, default=WINDOW, metavar="N", help="of the last N samples"
@@ -31,64 +44,60 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
 
 
-def run(options: argparse.Namespace, name: str, measure: Measure) -> int:
-    """Tell once a second until it ends; 0 when anything was heard."""
-    with seated(options) as seat:
-        meters: dict[str, Meter] = {}
-        with quietly():
-            wanted = expression(options.key, seat.robot)
-            seat.probe.listen(wanted)
-            follow(seat, options, meters, name, measure)
-    if not meters:
-        print(
-            f"t2 {name}: no message on {wanted}; `t2 ls` lists the keys that are alive",
-            file=sys.stderr,
-        )
-    return 0 if meters else 1
+def run(options: argparse.Namespace) -> int:
+    """Report once a second; return 0 if any message arrived."""
+    streams: dict[str, StreamStats] = {}
+    name = getattr(options, "subcommand", options.command)  # `t2 topic hz` or `t2 hz`
+    with open_session(options) as session:
+        wanted = expression(options.key, session.robot)
+        with until_interrupt():
+            session.probe.listen(wanted)
+            follow(session, options, streams, name)
+    if not streams:
+        text = f"t2 {name}: no message on {wanted}; `t2 ls` lists the active keys"
+        print(text, file=sys.stderr)
+    return 0 if streams else 1
 
 
 def follow(
-    seat: Seat, options: argparse.Namespace, meters: dict[str, Meter], name: str, measure: Measure
+    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats], name: str
 ) -> None:
-    """Take samples and tell of them, until the duration or the count is over."""
+    """Measure and report until the duration or the count is reached."""
     host = host_id()
-    begun_s = told_s = time.monotonic()
+    begun_s = reported_s = time.monotonic()
     end_s = begun_s + (options.duration or float("inf"))
     silent = True
     while (now_s := time.monotonic()) < end_s:
-        heard = seat.probe.take(min(end_s, told_s + TELL_S) - now_s)
-        if heard:
+        sample = session.probe.take(min(end_s, reported_s + REPORT_S) - now_s)
+        if sample:
             silent = False
-            meter = meters.setdefault(short(heard.key, seat.robot), Meter(options.window))
-            meter.take(taken(heard, host))
-            if options.count and sum(each.count for each in meters.values()) >= options.count:
+            key = short(sample.key, session.robot)
+            streams.setdefault(key, StreamStats(options.window)).add(stream_sample(sample, host))
+            if options.count and sum(each.count for each in streams.values()) >= options.count:
                 break
-        if time.monotonic() - told_s >= TELL_S:
-            told_s += TELL_S
+        if time.monotonic() - reported_s >= REPORT_S:
+            reported_s += REPORT_S
             if silent:
                 print(f"t2 {name}: no new messages", file=sys.stderr)
             else:
-                tell(meters, options, measure)
+                report(streams, name, as_json=wants_json(options))
             silent = True
     if not silent:
-        tell(meters, options, measure)
+        report(streams, name, as_json=wants_json(options))
 
 
-def tell(meters: dict[str, Meter], options: argparse.Namespace, measure: Measure) -> None:
-    """Print the figures of every key, a JSON line or a row for each."""
-    figures = {key: measure(meter) for key, meter in sorted(meters.items())}
-    if wants_json(options):
-        for key, each in figures.items():
-            output.line({"key": key} | each)
-        return
-    head = [name.replace("_", " ") for name in next(iter(figures.values()))]
-    rows = [[key, *(shown(name, value) for name, value in each.items())]
-            for key, each in figures.items()]  # fmt: skip
-    print(output.table(["key", *head], rows), end="\n\n", flush=True)
+def report(streams: dict[str, StreamStats], name: str, *, as_json: bool) -> None:
+    """Print the figures of every key."""
+    measure = MEASURES[name]
+    rows = [{"key": key, **measure(stats)} for key, stats in sorted(streams.items())]
+    head = [column.replace("_", " ") for column in rows[0]]
+    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), as_json=as_json)
+    if not as_json:
+        print(flush=True)
 
 
-def shown(name: str, value: float | int | str | None) -> str:
-    """Return a figure for people."""
+def cell(name: str, value: float | int | str | None) -> str:
+    """Return a figure as text."""
     if value is None:
         return "-"
     if isinstance(value, str | int):
@@ -96,33 +105,23 @@ def shown(name: str, value: float | int | str | None) -> str:
     return f"{value:.2f}" if name in ("hz", "bytes_per_s") or value >= 10 else f"{value:.6f}"
 
 
-def taken(heard: Sample, host: int) -> Taken:
-    """Return what a meter wants to know of a sample: its header is read, whatever its type."""
-    header = read(heard.payload, heard.encoding).value
+def stream_sample(sample: Sample, host: int) -> StreamSample:
+    """Return the measured values of a sample; its header is read, whatever its type."""
+    header = read(sample.payload, sample.encoding).value
     if not isinstance(header, dict):
-        return Taken(heard.received_ns, heard.size)
-    delay_s, clock = delay(header, heard, host)
-    return Taken(
-        received_ns=heard.received_ns,
-        size=heard.size,
-        seq=number(header, "seq"),
-        boot=number(header, "boot"),
-        delay_s=delay_s,
-        clock=clock,
+        return StreamSample(sample.received_ns, sample.size)
+    number = partial(integer, header)
+    delay_s, clock = None, ""
+    if number("mono_ns") and host and header.get("host") == host:
+        delay_s, clock = (sample.received_ns - header["mono_ns"]) / NS_PER_S, "host"
+    elif number("t_ns"):
+        delay_s, clock = (sample.wall_ns - header["t_ns"]) / NS_PER_S, "wall"
+    return StreamSample(
+        sample.received_ns, sample.size, number("seq"), number("boot"), delay_s, clock
     )
 
 
-def delay(header: dict[str, Any], heard: Sample, host: int) -> tuple[float | None, str]:
-    """Return how long it was under way, and by which clock: this host's own, or two wall clocks."""
-    mono_ns, t_ns = number(header, "mono_ns"), number(header, "t_ns")
-    if mono_ns and host and header.get("host") == host:
-        return (heard.received_ns - mono_ns) / NS_PER_S, "host"
-    if t_ns:
-        return (heard.wall_ns - t_ns) / NS_PER_S, "wall"
-    return None, ""
-
-
-def number(header: dict[str, Any], name: str) -> int | None:
-    """Return a whole number of the header, None when it has none of that name."""
+def integer(header: dict[str, Any], name: str) -> int | None:
+    """Return an integer of the header; None if it is absent or of another type."""
     value = header.get(name)
     return value if isinstance(value, int) else None

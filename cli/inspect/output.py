@@ -1,28 +1,53 @@
-"""What is shown: aligned text for people, a line of JSON for programs. Needs no library."""
+"""Rendering of command output: aligned text for people, JSON lines for programs.
+
+Every table, value and JSON line of the inspection commands is printed here.
+"""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
 
+Row = Mapping[str, Any]
+
 
 def line(thing: object) -> None:
-    """Print one JSON line; what is no number becomes null, and bytes hexadecimal."""
+    """Print one JSON line."""
     sys.stdout.write(json(thing) + "\n")
     sys.stdout.flush()
 
 
+def value(thing: Any, *, as_json: bool) -> None:
+    """Print a value as one JSON line, or as lines ``name: value``."""
+    line(thing) if as_json else print(fields(thing), flush=True)
+
+
+def rows(
+    things: Iterable[Row],
+    head: Sequence[str],
+    cells: Callable[[Row], Sequence[str]],
+    *,
+    as_json: bool,
+) -> None:
+    """Print one JSON line per row, or a table whose cells ``cells`` returns."""
+    if as_json:
+        for each in things:
+            line(each)
+    else:
+        print(table(head, [cells(each) for each in things]), flush=True)
+
+
 def json(thing: object) -> str:
-    """Return it as JSON on one line; what is no number becomes null, and bytes hexadecimal."""
+    """Return one line of JSON; NaN and infinity become null, bytes become hexadecimal."""
     return msgspec.json.encode(plain(thing)).decode()
 
 
 def plain(thing: Any) -> Any:
-    """Return it in what JSON has: keys are text, bytes are hexadecimal."""
+    """Return a value made of JSON types only: keys are text, bytes are hexadecimal."""
     match thing:
         case dict():
-            return {str(plain(key)): plain(value) for key, value in thing.items()}
+            return {str(plain(key)): plain(each) for key, each in thing.items()}
         case list() | tuple():
             return [plain(each) for each in thing]
         case bytes():
@@ -34,53 +59,53 @@ def plain(thing: Any) -> Any:
 
 
 def printable(text: str) -> str:
-    """Return a text from the bus without what a terminal would obey."""
+    """Return a text from the bus with control characters escaped."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return aligned columns; those that hold numbers alone stand to the right."""
-    rows = [[printable(cell) for cell in row] for row in rows]
-    columns = list(zip(head, *rows, strict=True))
-    wide = [max(map(len, column)) for column in columns]
-    right = [bool(rows) and all(map(_is_number, column[1:])) for column in columns]
+def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    """Return aligned columns; columns with only numbers are right-aligned."""
+    body = [[printable(cell) for cell in row] for row in body]
+    columns = list(zip(head, *body, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    right = [bool(body) and all(map(_is_number, column[1:])) for column in columns]
     return "\n".join(
         "  ".join(
             cell.rjust(width) if to_right else cell.ljust(width)
-            for cell, width, to_right in zip(row, wide, right, strict=True)
+            for cell, width, to_right in zip(row, widths, right, strict=True)
         ).rstrip()
-        for row in (head, *rows)
+        for row in (head, *body)
     )
 
 
-def fields(value: Any, indent: str = "") -> str:
-    """Return a value as lines ``name: value``, nested ones below and indented."""
-    if isinstance(value, dict) and value:
-        return "\n".join(_field(f"{indent}{name}:", each, indent) for name, each in value.items())
-    if isinstance(value, list) and value:
-        return "\n".join(_field(f"{indent}-", each, indent) for each in value)
-    return f"{indent}{scalar(value)}"
+def fields(thing: Any, indent: str = "") -> str:
+    """Return a value as lines ``name: value``; nested values are indented below."""
+    if isinstance(thing, dict) and thing:
+        return "\n".join(_field(f"{indent}{name}:", each, indent) for name, each in thing.items())
+    if isinstance(thing, list) and thing:
+        return "\n".join(_field(f"{indent}-", each, indent) for each in thing)
+    return f"{indent}{scalar(thing)}"
 
 
-def scalar(value: Any) -> str:
-    """Return a single value for people: six digits are enough of a number."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, bytes):
-        return value.hex()
-    if isinstance(value, str) and value:
-        return printable(value)
-    return msgspec.json.encode(plain(value)).decode()
+def scalar(thing: Any) -> str:
+    """Return a single value as text; floats have six significant digits."""
+    if isinstance(thing, float):
+        return f"{thing:.6g}"
+    if isinstance(thing, bytes):
+        return thing.hex()
+    if isinstance(thing, str) and thing:
+        return printable(thing)
+    return json(thing)
 
 
-def _field(name: str, value: Any, indent: str) -> str:
-    if isinstance(value, list) and not any(isinstance(each, dict | list) for each in value):
-        return f"{name} [{', '.join(map(scalar, value))}]"
-    if isinstance(value, dict | list) and value:
-        return f"{name}\n{fields(value, indent + '  ')}"
-    return f"{name} {scalar(value)}"
+def _field(name: str, thing: Any, indent: str) -> str:
+    if isinstance(thing, list) and not any(isinstance(each, dict | list) for each in thing):
+        return f"{name} [{', '.join(map(scalar, thing))}]"
+    if isinstance(thing, dict | list) and thing:
+        return f"{name}\n{fields(thing, indent + '  ')}"
+    return f"{name} {scalar(thing)}"
 
 
 def _is_number(cell: str) -> bool:

@@ -1,4 +1,4 @@
-"""What a payload says: by its encoding, else as MessagePack, else in hexadecimal. Never raises."""
+"""Decoding of any payload: by its encoding, else as MessagePack, else as bytes. Never raises."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -16,32 +16,38 @@ UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueErr
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A payload, read; ``complaint`` says what is wrong with it, empty when nothing is."""
+    """A decoded payload; ``complaint`` is the reason why it is invalid, empty when valid."""
 
     kind: str  # Odometry, json, text, msgpack, bytes, empty
     value: Any
     complaint: str = ""
 
+    @property
+    def boot(self) -> Any:
+        """The sender's boot id from the header; None without one."""
+        return self.value.get("boot") if isinstance(self.value, dict) else None
+
 
 def read(payload: bytes, encoding: str) -> Reading:
-    """Read a payload as well as it can be read."""
+    """Decode a payload as far as possible."""
     if not payload:
         return Reading("empty", None)
-    if encoding.startswith("application/json"):
-        return _json(payload)
     if encoding.startswith("text/"):
         return Reading("text", payload.decode(errors="replace"))
-    name = codec.kind_of(encoding)
+    form = "JSON" if encoding.startswith("application/json") else "MessagePack"
     try:
+        if form == "JSON":
+            return Reading("json", msgspec.json.decode(payload))
         value = msgspec.msgpack.decode(payload)
     except UNREADABLE:
-        return Reading("bytes", payload, "no MessagePack")
-    return Reading(name or "msgpack", value, _complaint(payload, name))
+        return Reading("bytes", payload, f"not {form}")
+    name = codec.kind_of(encoding)
+    return Reading(name or "msgpack", value, _complaint(value, name))
 
 
 @cache
 def kinds() -> dict[str, type[Struct]]:
-    """Return every struct of the contract by its name."""
+    """Return every struct of the bus contract by its name."""
     of_calls: list[type[Struct]] = [k for call in keys.CALLS for k in (call.request, call.reply)]
     inner: tuple[type[Struct], ...] = (m.Cause, m.Limits, m.Timing, m.Durations, m.Message)
     of_topics: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
@@ -49,7 +55,7 @@ def kinds() -> dict[str, type[Struct]]:
 
 
 def at(value: Any, path: str) -> Any:
-    """Return what stands at ``causes.0.name``; raise ``MessageError`` naming what there is."""
+    """Return the value at ``causes.0.name``; raise ``MessageError`` naming the existing fields."""
     here = value
     for part in path.split("."):
         if isinstance(here, dict) and part in here:
@@ -57,32 +63,27 @@ def at(value: Any, path: str) -> Any:
         elif isinstance(here, list) and part.isdigit() and int(part) < len(here):
             here = here[int(part)]
         else:
-            raise MessageError(f"there is no {part!r} of {path!r}; there is: {_names(here)}")
+            raise MessageError(f"{path!r} has no field {part!r}; available: {_names(here)}")
     return here
 
 
-def _json(payload: bytes) -> Reading:
-    try:
-        return Reading("json", msgspec.json.decode(payload))
-    except UNREADABLE:
-        return Reading("bytes", payload, "no JSON")
-
-
-def _complaint(payload: bytes, name: str) -> str:
+def _complaint(value: Any, name: str) -> str:
+    """Check a decoded value against the type that its encoding names."""
+    if not name:
+        return ""
     kind = kinds().get(name)
-    if name and kind is None:
-        return f"{name} is unknown here"
+    if kind is None:
+        return f"unknown type {name}"
     try:
-        if kind:
-            codec.decode(payload, kind)
-    except MessageError as error:
-        return str(error)
+        msgspec.convert(value, kind)
+    except UNREADABLE as error:
+        return f"not a {name}: {error}"
     return ""
 
 
 def _names(value: Any) -> str:
     if isinstance(value, dict):
-        return ", ".join(map(str, value)) or "nothing in it"
+        return ", ".join(map(str, value)) or "none, it is empty"
     if isinstance(value, list):
-        return f"0 to {len(value) - 1}" if value else "nothing in it"
-    return "a single value"
+        return f"0 to {len(value) - 1}" if value else "none, it is empty"
+    return "none, it is a single value"

@@ -1,9 +1,12 @@
-"""``t2 pub``: publish on a key of your own, once a second unless told otherwise.
+"""``t2 pub``: publish on a key of your own, at 1 Hz by default.
 
-It speaks for no part of the robot, see ``permission``.
+Keys that command motion, and keys of the robot's own services, are refused. ``--simulator`` allows
+them for a simulated vehicle. The option alone is not enough: the bridge reports the address of its
+board, and a simulated board is on the bridge's own host.
 """
 
 import argparse
+import ipaddress
 import json
 import sys
 import time
@@ -13,81 +16,86 @@ from typing import Any
 import msgspec
 
 from cli.inspect import estop, output
-from cli.inspect.addressing import chunks, expression, one_key, short, topic_of
-from cli.inspect.permission import check
-from cli.inspect.shell import (
-    Seat,
+from cli.inspect.addressing import chunks, expression, parse_one_key, short, topic_of
+from cli.inspect.session import (
+    BusSession,
     add_end,
     add_options,
+    open_session,
     positive,
-    quietly,
-    seated,
     settings,
+    until_interrupt,
     wants_json,
 )
 from common import cli_codec, codec, keys
 from common.bus.probe import Probe
-from common.errors import MessageError
-from common.messages import Drive, SafetyState
+from common.errors import MessageError, RobotError
+from common.messages import Drive, Link, SafetyState
 from common.sample import Sample
 
-FIRST_S = 2.0  # until safety has told its heartbeat, twenty times a second
+FIRST_S = 2.0  # wait for safety's first heartbeat, which has 20 Hz
+LINK_S = 1.5  # the bridge publishes its link at 5 Hz; listen long enough to find a second bridge
+OWN_SERVICES = ("bridge", "safety", "odom")  # other services act on their messages
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("key", metavar="KEY", type=one_key, help="such as tel/mine/temperature")
+    parser.add_argument(
+        "key", metavar="KEY", type=parse_one_key, help="such as tel/mine/temperature"
+    )
     parser.add_argument(
         "message", metavar="JSON", nargs="?", type=json_object, default={},
         help="""a JSON object, such as '{"celsius": 21.5}'; the header is filled in""",
     )  # fmt: skip
-    parser.add_argument("--rate", "-r", type=positive, default=1.0, metavar="HZ", help="1 Hz")
-    parser.add_argument("--once", "-1", action="store_true", help="publish one and end")
+    parser.add_argument(
+        "--rate", "-r", type=positive, default=1.0, metavar="HZ", help="1 Hz by default"
+    )
+    parser.add_argument("--once", "-1", action="store_true", help="publish one message and end")
     parser.add_argument(
         "--simulator", action="store_true",
-        help="let it command a simulated vehicle; refused when the board is a real one",
+        help="allow commands to a simulated vehicle; refused if the board is real",
     )  # fmt: skip
     add_end(parser)
     add_options(parser, every=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Publish until it ends; 2 for what the key does not carry."""
+    """Publish until the end; return 2 for an invalid message."""
     robot, path = chunks(expression(options.key, settings(options).robot.id))
     if path == keys.ESTOP_PATH:
-        return estop.insist(options, robot)
-    with seated(options) as seat:
-        key = expression(options.key, seat.robot)
-        check(key, options.simulator, seat.probe)
+        return estop.stop_with_retry(options, robot)
+    with open_session(options) as session:
+        key = expression(options.key, session.robot)
+        check_permission(key, options.simulator, session.probe)
         try:
-            message = fitting(key, options.message)
+            check_message(key, options.message)
         except MessageError as error:
-            print(f"t2 pub: {error}; `t2 schema {options.key}` tells more", file=sys.stderr)
+            print(f"t2 pub: {error}; see `t2 schema {options.key}`", file=sys.stderr)
             return 2
-        if not seat.probe.has_reader(key):
-            print(f"t2 pub: nobody reads {short(key, seat.robot)} yet", file=sys.stderr)
-        with quietly():
-            publish(seat, key, message, options)
+        if not session.probe.has_reader(key):
+            print(f"t2 pub: no reader on {short(key, session.robot)} yet", file=sys.stderr)
+        with until_interrupt():
+            publish(session, key, options)
     return 0
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """Read the message."""
+    """Parse the message."""
     try:
         message = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is no JSON: {error}") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not JSON: {error}") from None
     if not isinstance(message, dict):
-        raise argparse.ArgumentTypeError(f"""{text!r} is no object, such as '{{"x": 1}}'""")
+        raise argparse.ArgumentTypeError(f"""{text!r} is not an object, such as '{{"x": 1}}'""")
     try:
         msgspec.msgpack.encode(message)
     except (OverflowError, RecursionError) as error:
-        raise argparse.ArgumentTypeError(f"MessagePack cannot carry it: {error}") from None
+        raise argparse.ArgumentTypeError(f"MessagePack cannot encode it: {error}") from None
     return message
 
 
-def fitting(key: str, message: dict[str, Any]) -> dict[str, Any]:
-    """Return the message; raise ``MessageError`` when the key carries another type."""
+def check_message(key: str, message: dict[str, Any]) -> None:
+    """Raise ``MessageError`` if the message does not match the type of its key."""
     topic = topic_of(key)
     if topic:
         whole = {"echo": 0} | message if topic.message is Drive else message
@@ -95,30 +103,28 @@ def fitting(key: str, message: dict[str, Any]) -> dict[str, Any]:
             msgspec.convert(whole, topic.message)
         except msgspec.ValidationError as error:
             raise MessageError(f"not a {topic.message.__name__}: {error}") from None
-    return message
 
 
-def publish(seat: Seat, key: str, message: dict[str, Any], options: argparse.Namespace) -> None:
-    """Put it at the rate until it has been enough."""
-    topic = topic_of(key)
+def publish(session: BusSession, key: str, options: argparse.Namespace) -> None:
+    """Publish the message at the rate; a drive request echoes safety's newest heartbeat."""
+    probe, message, topic = session.probe, options.message, topic_of(key)
     encoding = codec.encoding(topic.message) if topic else codec.ENCODING
     service = topic.service if topic else keys.SLOW
-    robot = chunks(key)[0]
+    safety = keys.SAFETY.on(chunks(key)[0])
     echoes = topic is not None and topic.message is Drive and "echo" not in message
     if echoes:
-        seat.probe.listen(keys.SAFETY.on(robot))
-    for number in moments(options):
-        echo = {"echo": newest_heartbeat(seat.probe, robot)} if echoes else {}
-        payload = cli_codec.encode(key, json.dumps(echo | message))
-        seat.probe.put(key, payload, encoding, service)
+        probe.listen(safety)
+    for number in publish_times(options):
+        echo = {"echo": newest_heartbeat(probe, safety)} if echoes else {}
+        probe.put(key, cli_codec.encode(key, json.dumps(echo | message)), encoding, service)
         if wants_json(options):
-            output.line({"key": short(key, seat.robot), "published": number})
+            output.line({"key": short(key, session.robot), "published": number})
         else:
-            print(f"published {number} on {short(key, seat.robot)}", flush=True)
+            print(f"published {number} on {short(key, session.robot)}", flush=True)
 
 
-def moments(options: argparse.Namespace) -> Iterator[int]:
-    """Yield 1, 2, 3 when each is due."""
+def publish_times(options: argparse.Namespace) -> Iterator[int]:
+    """Yield 1, 2, 3 when each message is due."""
     most = 1 if options.once else options.count
     begin_s, number = time.monotonic(), 0
     while number != most:
@@ -130,10 +136,56 @@ def moments(options: argparse.Namespace) -> Iterator[int]:
         yield number
 
 
-def newest_heartbeat(probe: Probe, robot: str) -> int:
-    """Return what a request has to echo; waits for the first one, and no longer for others."""
+def newest_heartbeat(probe: Probe, safety: str) -> int:
+    """Return the heartbeat that a request echoes; waits for the first one only."""
     newest: Sample | None = None
-    while heard := probe.take(0.0 if newest else FIRST_S):
-        if heard.key == keys.SAFETY.on(robot):
-            newest = heard
+    while sample := probe.take(0.0 if newest else FIRST_S):
+        if sample.key == safety:
+            newest = sample
     return codec.decode(newest.payload, SafetyState).heartbeat if newest else 0
+
+
+def check_permission(key: str, simulator: bool, probe: Probe) -> None:
+    """Raise ``RobotError`` for a key that a tool must not publish on."""
+    refusal = refused(key)
+    if not refusal:
+        return
+    if not simulator:
+        raise RobotError(
+            f"{chunks(key)[1]} {refusal}. `t2 drive` drives, `t2 estop` stops; "
+            "--simulator allows it for a simulated vehicle"
+        )
+    robot = chunks(key)[0]
+    found = boards(robot, probe)
+    if not found:
+        raise RobotError(f"--simulator: no bridge of robot {robot} reports its board")
+    for board in sorted(found):
+        if not is_loopback(board):
+            raise RobotError(f"--simulator: the board of robot {robot} is at {board}: a real one")
+
+
+def refused(key: str) -> str:
+    """Return why a tool must not publish on a key; an empty string if it may."""
+    if any(part.startswith("@") for part in key.split("/")):
+        return "moves the wheels"
+    kind, _, rest = chunks(key)[1].partition("/")
+    service = rest.partition("/")[0]
+    if kind in ("tel", "evt") and service in OWN_SERVICES:
+        return f"is reserved for {service}: other services act on it"
+    return ""
+
+
+def boards(robot: str, probe: Probe) -> set[str]:
+    """Return the boards, ``address:port``, that bridges of this robot report."""
+    key = keys.LINK.on(robot)
+    probe.listen(key)
+    samples = [sample for sample in probe.samples(LINK_S) if sample.key == key]
+    return {codec.decode(sample.payload, Link).board for sample in samples}
+
+
+def is_loopback(board: str) -> bool:
+    """Return whether an ``address:port`` is on the host itself."""
+    try:
+        return ipaddress.ip_address(board.rpartition(":")[0].strip("[]")).is_loopback
+    except ValueError:
+        return False

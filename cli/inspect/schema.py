@@ -1,6 +1,6 @@
-"""``t2 schema``: the fields of a message type, with units; JSON schema in a pipe.
+"""``t2 schema``: fields of a message type with units; with ``--json`` its JSON schema.
 
-The types are those of this installation, which need not be the robot's: `t2 doctor` compares.
+The types are those of this installation; `t2 doctor` compares it with the robot's version.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from msgspec import Struct
 from cli.inspect import output
 from cli.inspect.addressing import expression, topic_of
 from cli.inspect.payload import kinds
-from cli.inspect.shell import add_options, settings, wants_json
+from cli.inspect.session import add_options, settings, wants_json
 from common import messages
 from common.errors import RobotError
 from common.keys import CALLS, TOPICS
@@ -27,28 +27,32 @@ FIELD = re.compile(r"    (?P<name>\w+): (?P<type>.+?)(?: = (?P<default>.+?))?(?:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "type", nargs="?", metavar="TYPE", help="such as Odometry, or a key; all types without"
+        "type", nargs="?", metavar="TYPE", help="such as Odometry, or a key; all types if omitted"
     )
     add_options(parser, every=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show one type, or name all; raise ``RobotError`` for one that there is not."""
+    """Show one type, or list all; raise ``RobotError`` for an unknown type."""
     if not options.type:
-        show_all(wants_json(options))
+        rows = [{"type": name, "keys": paths} for name, paths in keys_by_type().items()]
+        output.rows(
+            rows, ("type", "on"), lambda row: [row["type"], ", ".join(row["keys"])],
+            as_json=wants_json(options),
+        )  # fmt: skip
         return 0
-    name = named(options.type, settings(options).robot.id)
-    if wants_json(options):
-        output.line(msgspec.json.schema(kinds()[name]))
-        return 0
+    name = find_type(options.type, settings(options).robot.id)
     kind = kinds()[name]
+    if wants_json(options):
+        output.line(msgspec.json.schema(kind))
+        return 0
     print(f"{name}: {(kind.__doc__ or '').splitlines()[0]}\n")
     print(output.table(("field", "type", "default", ""), fields_of(kind)) or "no fields")
     return 0
 
 
-def named(word: str, robot: str) -> str:
-    """Return the type that is meant: by its name in any case, or by its key."""
+def find_type(word: str, robot: str) -> str:
+    """Return the type for a type's name in any case, or for a key."""
     by_lower = {name.lower(): name for name in kinds()}
     if word.lower() in by_lower:
         return by_lower[word.lower()]
@@ -59,35 +63,29 @@ def named(word: str, robot: str) -> str:
     if topic:
         return topic.message.__name__
     near = difflib.get_close_matches(word.lower(), by_lower, n=1)
-    meant = f"did you mean {by_lower[near[0]]}? " if near else ""
-    raise RobotError(f"there is no type {word!r}; {meant}`t2 schema` names all")
+    hint = f"did you mean {by_lower[near[0]]}? " if near else ""
+    raise RobotError(f"unknown type {word!r}; {hint}`t2 schema` lists all types")
 
 
-def show_all(as_json: bool) -> None:
-    """Name every type and the keys that carry it."""
-    carried = {
-        name: [t.path for t in TOPICS if t.message is kind] for name, kind in kinds().items()
-    }
+def keys_by_type() -> dict[str, list[str]]:
+    """Return each type with the keys that carry it."""
+    paths = {name: [t.path for t in TOPICS if t.message is kind] for name, kind in kinds().items()}
     for call in CALLS:
-        carried[call.request.__name__].append(call.path)
-    if as_json:
-        for name, paths in carried.items():
-            output.line({"type": name, "keys": paths})
-        return
-    print(output.table(("type", "on"), [(n, ", ".join(paths)) for n, paths in carried.items()]))
+        paths[call.request.__name__].append(call.path)
+    return paths
 
 
 def fields_of(kind: type[Struct]) -> list[tuple[str, str, str, str]]:
-    """Return name, type, default and meaning of a struct's own fields, as its source tells them."""
+    """Return name, type, default and comment of a struct's own fields, from its source code."""
     found = filter(None, map(FIELD.match, inspect.getsource(kind).splitlines()))
     return [
-        (each["name"], spelt(each["type"]), each["default"] or "", each["why"] or "")
+        (each["name"], literals(each["type"]), each["default"] or "", each["why"] or "")
         for each in found
     ]
 
 
-def spelt(kind: str) -> str:
-    """Return a type with the words that it allows, where the source has a name for them."""
+def literals(kind: str) -> str:
+    """Return a type with its literal values, where the source names a Literal."""
     words = getattr(messages, kind, None)
     if isinstance(words, type) and issubclass(words, StrEnum):
         return " | ".join(repr(word.value) for word in words)

@@ -1,57 +1,107 @@
-"""``t2 services``: who is there, who publishes, who reads, who answers; ``--dot`` for Graphviz.
+"""``t2 services``: services on the bus with the keys that they publish, read and answer.
 
-From liveliness tokens and the router's admin space. A session without a token has its id for a
-name: a tool, zenoh-cli, or safety's second session, which hears the emergency stop.
+Sources are liveliness tokens and, where readable, the router's admin space. ``--dot`` prints the
+graph for Graphviz. A session without a token is named by its id: a tool, zenoh-cli, or safety's
+second session, which receives the emergency stop.
+
+The admin space lists declarations, not traffic; without it only the tokens are known. Keys that
+begin with ``@`` are missing from it (eclipse-zenoh 1.10.2), so publishers of commands are found by
+listening.
 """
 
 import argparse
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import short
-from cli.inspect.discovery import overhear, present
-from cli.inspect.graph import Edge, Member, dot, edges, title
-from cli.inspect.shell import add_options, seated, wants_json
-from common.bus.probe import intersects
+from cli.inspect.graph import Edge, Member, by_boot, dot, edges, members, title
+from cli.inspect.payload import read
+from cli.inspect.session import add_options, open_session, wants_json
+from common import keys
+from common.bus.probe import Probe, intersects
 
-CLOSED = "the router does not tell who reads and publishes (its admin space is closed to us)"
-QUIET = ("info/",)  # every service answers these
+# The router of a robot that connects to a site's router is a peer there.
+ADMIN = "@/*/*/*/t2/v1/{robot}/**"
+ROUTER = "@/*/*"
+LISTEN_S = 0.5
+UNKNOWN_READER = "unknown reader"  # the router reports a reader without its name
+CLOSED = "the router does not show readers and publishers (its admin space is closed)"
+INFO = ("info/",)  # every service answers these keys
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--dot", action="store_true", help="the graph, for Graphviz")
-    parser.add_argument("--info", action="store_true", help="the keys info/ too, on a terminal")
+    parser.add_argument("--dot", action="store_true", help="print the graph for Graphviz")
+    parser.add_argument("--info", action="store_true", help="show the keys info/ in text, too")
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show who is there; 1 when nobody is."""
-    with seated(options) as seat:
-        who = present(seat.probe, seat.robot)
-        commands = overhear(seat.probe, seat.robot, who)
-    if not who:
-        print("t2 services: nobody is there; try `t2 doctor`", file=sys.stderr)
+    """Show the services; return 1 without any."""
+    with open_session(options) as session:
+        found = discover(session.probe, session.robot)
+        commands = listen_to_commands(session.probe, session.robot, found)
+    if not found:
+        print("t2 services: no service found; try `t2 doctor`", file=sys.stderr)
         return 1
-    if not any(each.reads or each.publishes for each in who):
+    if not any(each.reads or each.publishes for each in found):
         print(f"t2 services: {CLOSED}", file=sys.stderr)
-    ways = edges(who, intersects) + commands
+    links = edges(found, intersects) + commands
     if options.dot:
-        print(dot(who, ways, seat.robot))
-    elif wants_json(options):
-        for member in who:
-            output.line(as_json(member, who, ways, seat.robot))
+        print(dot(found, links, session.robot))
+        return 0
+    rows = [as_json(each, found, links, session.robot) for each in found]
+    if wants_json(options):
+        for row in rows:
+            output.line(row)
     else:
-        print("\n\n".join(as_text(each, who, ways, seat.robot, options.info) for each in who))
+        print("\n\n".join(as_text(row, options.info) for row in rows))
     return 0
 
 
+def discover(probe: Probe, robot: str) -> list[Member]:
+    """Return the sessions on the bus except this one."""
+    tokens = probe.alive(keys.live_key(robot, "*", "*"))
+    declared = {
+        each.key: read(each.payload, each.encoding).value
+        for each in probe.ask(ADMIN.format(robot=robot))
+        if not each.refusal
+    }
+    return members(tokens, declared, without=(probe.zid,))
+
+
+def routers(probe: Probe) -> list[dict[str, Any]]:
+    """Return the admin record of each router; empty where the admin space is closed."""
+    records = (read(each.payload, each.encoding).value for each in probe.ask(ROUTER))
+    return [each for each in records if isinstance(each, dict)]
+
+
+def listen_to_commands(probe: Probe, robot: str, found: list[Member]) -> list[Edge]:
+    """Add the published commands to each member, and return their edges."""
+    boots, received = by_boot(found), set()
+    probe.listen(f"{keys.ROOT}/{robot}/@cmd/**")
+    for sample in probe.samples(LISTEN_S):
+        boot = read(sample.payload, sample.encoding).boot
+        if boot not in boots:
+            boots[boot] = Member(f"boot {boot}")
+            found.append(boots[boot])
+        boots[boot].publishes.add(sample.key)
+        received.add((boot, sample.key))
+    read_keys = {key for _, key in received if probe.has_reader(key)}
+    return [
+        Edge(title(boots[boot], found), key, UNKNOWN_READER)
+        for boot, key in received
+        if key in read_keys
+    ]
+
+
 def as_json(
-    member: Member, who: Sequence[Member], ways: Sequence[Edge], robot: str
-) -> dict[str, object]:
-    """Return one member for programs."""
-    own = title(member, who)
+    member: Member, found: Sequence[Member], links: Sequence[Edge], robot: str
+) -> dict[str, Any]:
+    """Return one member as a JSON object."""
+    own = title(member, found)
     return {
         "name": own,
         "service": bool(member.instance),
@@ -59,7 +109,9 @@ def as_json(
         "instance": member.instance,
         "session": member.zid,
         "publishes": {
-            short(key, robot): [w.reader for w in ways if (w.sender, w.key) == (own, key)]
+            short(key, robot): [
+                link.reader for link in links if (link.sender, link.key) == (own, key)
+            ]
             for key in sorted(member.publishes)
         },
         "reads": [short(key, robot) for key in sorted(member.reads)],
@@ -67,19 +119,12 @@ def as_json(
     }
 
 
-def as_text(
-    member: Member, who: Sequence[Member], ways: Sequence[Edge], robot: str, info: bool
-) -> str:
-    """Return one member for people."""
-    own = title(member, who)
-    what = f"instance {member.instance}" if member.instance else "a session without a service"
-    lines = [f"{own}  ({what})"]
-    for key in sorted(member.publishes):
-        readers = ", ".join(w.reader for w in ways if (w.sender, w.key) == (own, key))
-        lines.append(f"  publishes  {short(key, robot):28} -> {readers or 'nobody'}")
-    for key in sorted(member.reads):
-        lines.append(f"  reads      {short(key, robot)}")
-    for key in sorted(member.answers):
-        if info or not short(key, robot).startswith(QUIET):
-            lines.append(f"  answers    {short(key, robot)}")
+def as_text(row: dict[str, Any], info: bool) -> str:
+    """Return one member as text; ``info`` includes the keys info/."""
+    kind = f"instance {row['instance']}" if row["service"] else "session without a service"
+    lines = [f"{row['name']}  ({kind})"]
+    for key, readers in row["publishes"].items():
+        lines.append(f"  publishes  {key:28} -> {', '.join(readers) or 'no reader'}")
+    lines += [f"  reads      {key}" for key in row["reads"]]
+    lines += [f"  answers    {key}" for key in row["answers"] if info or not key.startswith(INFO)]
     return "\n".join(lines)

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import EVERYTHING, expression
-from cli.inspect.shell import add_end, add_options, quietly, seated
+from cli.inspect.session import add_end, add_options, open_session, until_interrupt
 from common.cli_args import sources
 from common.config import load
 from common.errors import LinkError, RobotError
@@ -38,20 +38,20 @@ def run(options: argparse.Namespace) -> int:
         ) from None
     encoder = Encoder(load(RecorderConfig, sources(options)).config.vehicle)
     context = foxglove.Context()
-    with seated(options) as seat:
+    with open_session(options) as session:
         try:
             server = foxglove.start_server(
-                name=f"T2 {seat.robot}", host=options.host, port=options.port, context=context
+                name=f"T2 {session.robot}", host=options.host, port=options.port, context=context
             )
         except (OSError, RuntimeError) as error:
             raise LinkError(f"cannot listen on {options.host}:{options.port}: {error}") from None
         print(f"connect Foxglove or Lichtblick to ws://{options.host}:{server.port}", flush=True)
         for word in EVERYTHING:
-            seat.probe.listen(expression(word, seat.robot))
+            session.probe.listen(expression(word, session.robot))
         sent, channels = 0, Channels(context)
         try:
-            with quietly():
-                for sample in seat.probe.samples(options.duration):
+            with until_interrupt():
+                for sample in session.probe.samples(options.duration):
                     for entry in encoder.entries(sample, sample.wall_ns):
                         channels.send(entry)
                     sent += 1

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
-from cli.inspect.shell import add_output, wants_json
+from cli.inspect.session import add_output, wants_json
 from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.keys import ROOT

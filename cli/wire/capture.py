@@ -1,8 +1,8 @@
-"""Where captured datagrams come from: hex text, or a pcap or pcapng file of UDP packets.
+"""Reader of captured datagrams: hex text, or UDP packets of a pcap or pcapng file.
 
-Hex on the command line is one datagram; a text has one a line. Spaces, colons, commas, dashes and
-0x are left out, and so is what follows a #. A pcapng file is read by the link type of its first
-interface.
+Hex on the command line is one datagram; a text file has one per line. Spaces, colons, commas,
+dashes and 0x are ignored, and comments after #. A pcapng file is read with the link type of its
+first interface.
 """
 
 import io
@@ -20,19 +20,19 @@ PCAP_MAGICS = tuple(
     bytes.fromhex(magic)
     for magic in ("a1b2c3d4", "d4c3b2a1", "a1b23c4d", "4d3cb2a1", "0a0d0d0a")  # the last: pcapng
 )
-RAW_IP = (12, 14, 101, 228, 229)  # link types without a header of their own; tcpdump.org has them
+RAW_IP = (12, 14, 101, 228, 229)  # link types without a link header, from tcpdump.org
 
 
 @dataclass(frozen=True, slots=True)
 class Datagram:
-    """The bytes of one datagram and where they stood."""
+    """The bytes of one datagram and their place in the source."""
 
     where: str
     data: bytes
 
 
 def read(source: str) -> list[Datagram]:
-    """Return the datagrams of ``-`` (standard input), of a file, or of hex itself."""
+    """Return the datagrams of ``-`` (standard input), a file, or a hex string."""
     if source == "-":
         return from_bytes("standard input", sys.stdin.buffer.read())
     data = _hex(source)
@@ -41,11 +41,11 @@ def read(source: str) -> list[Datagram]:
     try:
         return from_bytes(source, Path(source).read_bytes())
     except OSError as error:
-        raise RobotError(f"{source!r} is no hex and no file: {error.strerror}") from None
+        raise RobotError(f"{source!r} is neither hex nor a file: {error.strerror}") from None
 
 
 def from_bytes(name: str, content: bytes) -> list[Datagram]:
-    """Return the datagrams of a capture, or of a text of hex lines."""
+    """Return the datagrams of a capture, or of a text with hex lines."""
     if content.startswith(PCAP_MAGICS):
         datagrams = list(_from_pcap(name, content))
         kind = "UDP packets"
@@ -57,7 +57,7 @@ def from_bytes(name: str, content: bytes) -> list[Datagram]:
         datagrams = _from_text(name, text)
         kind = "hex lines"
     if not datagrams:
-        raise RobotError(f"{name}: has no {kind}")
+        raise RobotError(f"{name}: contains no {kind}")
     return datagrams
 
 
@@ -86,7 +86,7 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
         from dpkt import dpkt, ip, ip6, pcap, udp  # type: ignore[import-untyped]
     except ImportError:
         raise RobotError(
-            "reading a capture wants dpkt; `make` installs it, or pip install -e '.[inspect]'"
+            "reading a capture needs dpkt; `make` installs it, or pip install -e '.[inspect]'"
         ) from None
     number = 0
     try:
@@ -101,11 +101,11 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
                 ends = _ends(network.src, segment.sport, network.dst, segment.dport)
                 yield Datagram(f"packet {number} {ends}", bytes(segment.data))
     except (dpkt.Error, ValueError, KeyError) as error:
-        raise RobotError(f"{name}: broken after packet {number}: {error}") from None
+        raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
 
 
 def _link(name: str, kind: int) -> Callable[[bytes], Any]:
-    """Return what takes a packet's link header off."""
+    """Return the parser of a packet's link header."""
     from dpkt import ethernet, ip, ip6, loopback, pcap, sll, sll2
 
     def raw(packet: bytes) -> Any:
@@ -119,7 +119,7 @@ def _link(name: str, kind: int) -> Callable[[bytes], Any]:
         **dict.fromkeys(RAW_IP, raw),
     }
     if kind not in links:
-        raise RobotError(f"{name}: link type {kind} is not known here; capture on Ethernet")
+        raise RobotError(f"{name}: unsupported link type {kind}; capture on Ethernet")
     return links[kind]
 
 

@@ -1,7 +1,7 @@
-"""Which CRC captured frames carry: every 16-bit one that crcmod predefines, over both ranges.
+"""Identification of the CRC of captured frames: tries all 16-bit CRCs of crcmod over both ranges.
 
-A frame is taken by its magic and its size alone. An empty payload and one of zeros have the CRC 0
-under every CRC that starts at zero, whatever its polynomial: they prove nothing.
+Frames are found by magic and size only. An empty payload and a payload of zeros have the CRC 0 with
+every CRC that starts at zero, whatever its polynomial, so such frames are no evidence.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,7 +17,7 @@ from common.wire.framing import Covers, crc_function
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A CRC and a range, and how many frames they explain."""
+    """A CRC and a range, with the number of matching frames."""
 
     crc: str
     covers: Covers
@@ -26,20 +26,20 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What the frames say."""
+    """Result for the captured frames."""
 
     frames: int
-    telling: int  # those whose payload is not all zeros
-    fits: list[Fit]  # best first, none without a telling frame
+    nonzero: int  # frames with a payload that is not all zeros
+    fits: list[Fit]  # best first; empty without a nonzero frame
 
     @property
     def answers(self) -> list[Fit]:
-        """What explains every frame, if any frame tells anything."""
+        """The CRCs that match every frame."""
         return [fit for fit in self.fits if fit.frames == self.frames]
 
 
 def frames(datagrams: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield what looks like a frame by magic and size."""
+    """Yield the frames, by magic and size."""
     for datagram in datagrams:
         start = datagram.find(MAGIC)
         while start >= 0:
@@ -53,43 +53,43 @@ def frames(datagrams: Iterable[bytes]) -> Iterator[bytes]:
 def identify(captured: Iterable[bytes]) -> Findings:
     """Try every CRC over every range on the frames."""
     found = list(captured)
-    telling = [frame for frame in found if any(frame[PAYLOAD_OFFSET:])]
+    nonzero = [frame for frame in found if any(frame[PAYLOAD_OFFSET:])]
     fits = [
         Fit(name, covers, _count(name, covers, found))
         for name, covers in product(names(), get_args(Covers))
-        if _count(name, covers, telling)
+        if _count(name, covers, nonzero)
     ]
     fits.sort(key=lambda fit: (-fit.frames, fit.crc))
-    return Findings(len(found), len(telling), fits)
+    return Findings(len(found), len(nonzero), fits)
 
 
 def names() -> list[str]:
     """Return the 16-bit CRCs that crcmod predefines."""
-    definitions = crcmod.predefined._crc_definitions  # there is no public list
+    definitions = crcmod.predefined._crc_definitions  # crcmod has no public list
     return [each["name"] for each in definitions if each["poly"].bit_length() == 17]
 
 
 def report(findings: Findings) -> list[str]:
-    """Return the findings in words."""
-    silent = findings.frames - findings.telling
+    """Return the findings as text."""
+    zero = findings.frames - findings.nonzero
     lines = [
-        f"{findings.frames} frames; {silent} have an empty or all-zero payload, which proves "
-        "nothing: its CRC is 0 under every CRC that starts at zero"
+        f"{findings.frames} frames; {zero} have an empty or all-zero payload, which is no "
+        "evidence: its CRC is 0 with every CRC that starts at zero"
     ]
     lines += [
-        f"{fit.crc} over {fit.covers}: fits {fit.frames} of {findings.frames}"
+        f"{fit.crc} over {fit.covers}: matches {fit.frames} of {findings.frames}"
         for fit in findings.fits
     ]
     return [*lines, _verdict(findings)]
 
 
 def _verdict(findings: Findings) -> str:
-    if not findings.telling:
-        return "no verdict: capture frames with something in them, such as motion"
+    if not findings.nonzero:
+        return "inconclusive: capture frames with a nonzero payload, such as motion"
     if not findings.answers:
-        return "no CRC that crcmod predefines explains every frame"
+        return "no CRC of crcmod matches every frame"
     if len(findings.answers) > 1:
-        return "several explain every frame: capture more"
+        return "several match every frame: capture more"
     answer = findings.answers[0]
     return f'set: wire.crc = "{answer.crc}", wire.crc_covers = "{answer.covers}"'
 

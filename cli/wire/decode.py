@@ -1,7 +1,7 @@
-"""Datagrams to readable lines: each frame with its sender and units, each bad run with its reason.
+"""Decoding of datagrams to text: frames with sender and units, invalid runs with the reason.
 
-The same id means one frame from the PC and another one from the board; the sizes differ, except
-for those of the two emergency brake switches. So each frame is read both ways unless the sender is
+The same id means one frame from the PC and another one from the board. The sizes differ, except for
+the two emergency brake switches. So each frame is decoded for both senders unless the sender is
 known.
 """
 
@@ -22,7 +22,7 @@ from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
 TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
 SENDERS = (*TABLES, "both")
 
-# When neither reading takes a frame, the reason that got furthest says most.
+# If no sender matches, the reason of the latest check is the most useful one.
 FURTHEST = (
     Reason.BAD_VALUE, Reason.BAD_CRC, Reason.TRUNCATED, Reason.BAD_SIZE,
     Reason.UNKNOWN_ID, Reason.NO_MAGIC,
@@ -33,7 +33,7 @@ UNITS = {"_mmps": "mm/s", "_mm": "mm", "_ddeg": "deg", "_raw": ""}
 
 @dataclass(frozen=True, slots=True)
 class Good:
-    """A frame, and who may have sent it; more than one where the bytes do not tell."""
+    """A frame with its possible senders."""
 
     offset: int
     raw: bytes
@@ -42,7 +42,7 @@ class Good:
 
 @dataclass(frozen=True, slots=True)
 class Bad:
-    """A run of bytes that is no frame, and why."""
+    """An invalid run of bytes with the reason."""
 
     offset: int
     raw: bytes
@@ -51,7 +51,7 @@ class Bad:
 
 
 def parts(framing: Framing, datagram: bytes, sender: str) -> Iterator[Good | Bad]:
-    """Yield what a datagram holds, in order; all its bytes are in there."""
+    """Yield the parts of a datagram in order; together they contain all its bytes."""
     tables = TABLES if sender == "both" else {sender: TABLES[sender]}
     offset = 0
     while offset < len(datagram):
@@ -72,7 +72,7 @@ def _best(offset: int, read: Mapping[str, Received | Rejected]) -> Good | Bad:
 
 
 def as_text(part: Good | Bad, wire: Wire) -> str:
-    """Return one line."""
+    """Return a part as one line."""
     if isinstance(part, Bad):
         return f"+{part.offset:<4} BAD {part.reason}: {part.detail}: {part.raw.hex()}"
     senders = " or ".join(part.frames)
@@ -83,8 +83,8 @@ def as_text(part: Good | Bad, wire: Wire) -> str:
     return f"+{part.offset:<4} {senders:<5} {names} {', '.join(texts)}".rstrip()
 
 
-def as_table(part: Good | Bad, where: str) -> dict[str, Any]:
-    """Return one JSON object."""
+def as_json(part: Good | Bad, where: str) -> dict[str, Any]:
+    """Return a part as a JSON object."""
     place = {"where": where, "offset": part.offset, "hex": part.raw.hex()}
     if isinstance(part, Bad):
         return place | {"reason": part.reason, "detail": part.detail}
@@ -96,7 +96,7 @@ def as_table(part: Good | Bad, where: str) -> dict[str, Any]:
 
 
 def _fields(part: Good) -> list[tuple[str, Any]]:
-    """Return the fields; where two senders are possible, both frames have the same ones."""
+    """Return the fields; frames of two possible senders have the same fields."""
     frame = next(iter(part.frames.values()))
     return list(msgspec.structs.asdict(frame).items())
 

@@ -171,7 +171,7 @@ def test_without_the_extras(tmp_path: Path) -> None:
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     demo, demo_code, drive, drive_code, wire, wire_code = result.stderr.splitlines()
-    assert demo.startswith("t2 demo: the demo wants rich; ")
+    assert demo.startswith("t2 demo: the demo needs rich; ")
     assert demo.endswith("pip install -e '.[demo]'")
     assert drive.startswith("t2 drive: the screen needs ")
     assert wire.endswith("pip install -e '.[inspect]'")

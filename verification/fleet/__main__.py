@@ -21,7 +21,7 @@ import msgspec
 
 from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.estop import stop
-from cli.inspect.robots import look
+from cli.inspect.robots import discover
 from common.bus.probe import probe
 from verification.faults.machine import named
 from verification.fleet.figures import Window, markdown, shares, uplinks
@@ -125,7 +125,7 @@ def crowded(
 def stopped(ground: Ground, robots: int) -> str:
     """Stop them all, light ones alone by now, and say how long it took until all had confirmed."""
     with crowd(ground, robots, "peer", 0.0), probe(at(ground.site)) as opened:
-        found = len(look(opened, EVERY_ROBOT))
+        found = len(discover(opened, EVERY_ROBOT))
         with contextlib.redirect_stdout(io.StringIO()) as told:
             begin_s = time.monotonic()
             code = stop(opened, EVERY_ROBOT)

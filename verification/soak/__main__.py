@@ -12,7 +12,15 @@ from msgspec.structs import replace
 
 from cli.__main__ import EXIT_CODES
 from cli.demo import host_stalls
-from cli.demo.command import WORLD, free_ports, log_file, make_room, own_ports, trace_file, traced
+from cli.demo.command import (
+    WORLD,
+    free_ports,
+    log_file,
+    own_ports,
+    prepare_folder,
+    trace_file,
+    traced,
+)
 from cli.demo.script import PATIENT, QUICK
 from cli.interrupt import interruptible
 from cli.run.supervisor import Supervisor
@@ -72,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     if not (PROC / "self" / "stat").exists():
         raise RobotError("the soak reads /proc, which this system does not have; Linux does")
     options.no_sim, options.world = False, WORLD
-    make_room(options)
+    prepare_folder(options)
     holdup_s = host_stalls.measured()
     pace = PATIENT if holdup_s > host_stalls.LIMIT_S else QUICK
     (control,) = free_ports(socket.SOCK_DGRAM)
@@ -84,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     seconds = options.minutes * 60
     show = Show(seconds)
     if pace is PATIENT:
-        show.say(host_stalls.sentence(holdup_s).replace("demo", "soak"))
+        show.say(host_stalls.warning(holdup_s).replace("demo", "soak"))
     record = Record()
     interrupted = soak(options, config, pace is PATIENT, record, show.tell)
     limits = Limits(min(WARM_UP_S, seconds / 10), LAP_S[pace], 2 * STEP_S[pace] + 15)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cli.demo.picture import results_table
+from cli.demo.display import results_table
 from cli.demo.score import Result
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from cli.inspect.addressing import chunks
-from cli.inspect.shell import add_options, positive, quietly, seated
+from cli.inspect.session import add_options, open_session, positive, until_interrupt
 from cli.recordings.info import open_recording
 from cli.recordings.replay.plan import Selection
 from cli.recordings.replay.targets import BoardTarget, BusTarget, SimulatorTarget, Target
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     with open_recording(options.file) as reader, open_target(options) as (target, selection):
         pacer = Pacer(options.rate, target.check)
         played, over = 0, False
-        with quietly():
+        with until_interrupt():
             for each in reader:
                 path = chunks(each.key)[1]
                 over = selection.is_over(each.log_ns)
@@ -88,11 +88,11 @@ def open_target(options: argparse.Namespace) -> Iterator[tuple[Target, Selection
             board = load(BridgeConfig, sources(options)).config.board
             yield stack.enter_context(BoardTarget(board)), select("board")
             return
-        seat = stack.enter_context(seated(options))
+        session = stack.enter_context(open_session(options))
         if options.simulator:
-            yield SimulatorTarget(seat, seat.robot), select("simulator")
+            yield SimulatorTarget(session, session.robot), select("simulator")
         else:
-            bus = BusTarget(seat, seat.robot)
+            bus = BusTarget(session, session.robot)
             yield bus, select("bus", alive=bus.alive())
 
 

@@ -10,8 +10,8 @@ from typing import Protocol, Self
 from msgspec.structs import replace
 
 from cli.inspect.addressing import topic_of
-from cli.inspect.permission import check
-from cli.inspect.shell import Seat
+from cli.inspect.pub import check_permission
+from cli.inspect.session import BusSession
 from cli.recordings.replay.plan import refusal
 from common import codec, keys
 from common.bus.publisher import host_id
@@ -34,9 +34,9 @@ class Target(Protocol):
 class BusTarget:
     """The keys of a robot without a running bridge or safety service."""
 
-    def __init__(self, seat: Seat, robot: str) -> None:
+    def __init__(self, session: BusSession, robot: str) -> None:
         """Raise ``RobotError`` if one of them is running."""
-        self._probe = seat.probe
+        self._probe = session.probe
         self._robot = robot
         self.check()
 
@@ -68,13 +68,13 @@ class BusTarget:
 class SimulatorTarget(BusTarget):
     """The safety service of a simulated vehicle: receives the drive requests with new headers."""
 
-    def __init__(self, seat: Seat, robot: str) -> None:
+    def __init__(self, session: BusSession, robot: str) -> None:
         """Raise ``RobotError`` if the vehicle is not simulated."""
         self._boot, self._host, self._seq = secrets.randbits(63), host_id(), 0
         self._heartbeat = 0
-        check(keys.MOTION.on(robot), True, seat.probe)
-        super().__init__(seat, robot)
-        seat.probe.listen(keys.SAFETY.on(robot))
+        check_permission(keys.MOTION.on(robot), True, session.probe)
+        super().__init__(session, robot)
+        session.probe.listen(keys.SAFETY.on(robot))
 
     def check(self) -> None:
         """Accept running services: safety decides about the requests."""

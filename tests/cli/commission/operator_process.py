@@ -1,4 +1,4 @@
-"""The checkout as an operator runs it: the real program, answered through a pipe."""
+"""The checkout as a process, answered through a pipe."""
 
 import contextlib
 import signal
@@ -13,8 +13,8 @@ from verification.harness.support import wait_until
 PATIENCE_S = 60.0
 
 
-class Seat:
-    """Types answers, and reads what is said after the last thing that was waited for."""
+class OperatorProcess:
+    """Process of the checkout; ``wait`` reads its output from the last match on."""
 
     def __init__(self, words: Sequence[str]) -> None:
         self.process = subprocess.Popen(
@@ -30,16 +30,16 @@ class Seat:
         self._thread.start()
 
     def wait(self, *words: str) -> str:
-        """Wait until one of these is said, and return it; what was said before it is read."""
+        """Wait for one of these texts and return it; the output up to it counts as read."""
 
-        def said() -> bool:
+        def found() -> bool:
             assert self.process.poll() is None or any(w in self._news() for w in words), self.shown
             return any(word in self._news() for word in words)
 
         try:
-            wait_until(said, f"one of {words}", PATIENCE_S)
+            wait_until(found, f"one of {words}", PATIENCE_S)
         except AssertionError as error:
-            raise AssertionError(f"{error}; it said:\n{self.shown}") from None
+            raise AssertionError(f"{error}; its output:\n{self.shown}") from None
         news = self._news()
         first = min((w for w in words if w in news), key=news.index)
         self._read += news.index(first) + len(first)
@@ -49,7 +49,7 @@ class Seat:
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n".encode())
 
-    def hang_up(self) -> None:
+    def close_input(self) -> None:
         assert self.process.stdin is not None
         self.process.stdin.close()
 
@@ -57,7 +57,7 @@ class Seat:
         self.process.send_signal(number)
 
     def begin(self, name: str = "Ada") -> None:
-        """Answer what is asked before the first step."""
+        """Answer the questions before the first step."""
         self.wait("Your name:")
         self.type(name)
         self.wait("The firmware")
@@ -75,8 +75,8 @@ class Seat:
         self._thread.join(PATIENCE_S)
         return code
 
-    def leave(self) -> None:
-        """End it, whatever state it is in."""
+    def kill(self) -> None:
+        """Kill it, in any state."""
         self.process.kill()
         self.process.wait()
         self._thread.join(PATIENCE_S)
@@ -94,9 +94,9 @@ class Seat:
 
 
 @contextlib.contextmanager
-def seat(report: Path, *words: str) -> Iterator[Seat]:
-    it = Seat(["--report", str(report), *words])
+def checkout(report: Path, *words: str) -> Iterator[OperatorProcess]:
+    it = OperatorProcess(["--report", str(report), *words])
     try:
         yield it
     finally:
-        it.leave()
+        it.kill()

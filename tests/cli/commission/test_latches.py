@@ -1,10 +1,10 @@
-"""Trips of bumper and emergency stop: whole ones, and each thing that may be missing."""
+"""Latch tests of bumper and emergency stop: complete ones, and each missing part."""
 
 from dataclasses import replace
 
 import pytest
 
-from cli.commission.latches import PROMPT_S, Reset, Trip, judge_bumper, judge_estop
+from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_bumper, judge_estop
 from common.freshness import NS_PER_S, Latest
 from common.messages import Motion, SafetyState
 from common.motion import Command
@@ -22,8 +22,8 @@ def motion(after_s: float, command: Command) -> Latest[Motion]:
     return Latest(Motion(command=command), T + round(after_s * NS_PER_S))
 
 
-def trip(cause: str = "estop") -> Trip:
-    return Trip(
+def latch_test(cause: str = "estop") -> LatchTest:
+    return LatchTest(
         cause=cause,
         at_ns=T,
         gone=True,
@@ -37,31 +37,31 @@ def trip(cause: str = "estop") -> Trip:
     )
 
 
-def test_a_whole_trip_passes_with_its_times() -> None:
-    verdict = judge_estop(trip())
+def test_a_complete_test_passes_with_its_times() -> None:
+    verdict = judge_estop(latch_test())
     assert (verdict.outcome, verdict.text) == ("passed", "Stopped, latched, reset.")
     assert dict(verdict.data) == {
         "latched after": "0.020 s",
-        "BREAK commanded after": "0.010 s",
-        "BREAK commands heard": "2",
+        "BRAKE commanded after": "0.010 s",
+        "BRAKE commands received": "2",
         "reset": "Reset.",
     }
 
 
-def test_a_state_that_overtakes_its_cause_took_no_time() -> None:
-    verdict = judge_estop(replace(trip(), states=[state(-0.01, "estop")]))
+def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
+    verdict = judge_estop(replace(latch_test(), states=[state(-0.01, "estop")]))
     assert dict(verdict.data)["latched after"] == "0.000 s"
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "phrase"),
     [
         ({"states": [state(0.02)]}, "Safety did not latch estop."),
         ({"states": [state(0.02, "contact")]}, "Safety did not latch estop."),
-        ({"states": [state(PROMPT_S + 0.01, "estop")]}, "It took safety 0.51 s to latch estop"),
-        ({"motions": [motion(0.01, Command.STOP)]}, "Safety did not command BREAK."),
-        ({"motions": []}, "Safety did not command BREAK."),
-        ({"motions": [motion(0.6, Command.BRAKE)]}, "It took safety 0.60 s to command BREAK"),
+        ({"states": [state(LIMIT_S + 0.01, "estop")]}, "Safety took 0.51 s to latch estop"),
+        ({"motions": [motion(0.01, Command.STOP)]}, "Safety did not command BRAKE."),
+        ({"motions": []}, "Safety did not command BRAKE."),
+        ({"motions": [motion(0.6, Command.BRAKE)]}, "Safety took 0.60 s to command BRAKE"),
         (
             {
                 "motions": [
@@ -70,50 +70,48 @@ def test_a_state_that_overtakes_its_cause_took_no_time() -> None:
                     motion(0.05, Command.STOP),
                 ]
             },
-            "safety sent RUN, STOP in place of BREAK",
+            "safety sent RUN, STOP instead of BRAKE",
         ),
-        ({"reset": None}, "No reset was tried."),
+        ({"reset": None}, "No reset was requested."),
         ({"reset": replace(RESET, granted=False, text="It moves.")}, "was refused: It moves."),
-        ({"reset": replace(RESET, latched=("estop",))}, "still latched: estop."),
+        ({"reset": replace(RESET, latched=("estop",))}, "Still latched after the reset: estop."),
     ],
 )
-def test_what_is_missing_is_named(change: dict[str, object], said: str) -> None:
-    verdict = judge_estop(replace(trip(), **change))  # type: ignore[arg-type]
+def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None:
+    verdict = judge_estop(replace(latch_test(), **change))  # type: ignore[arg-type]
     assert verdict.outcome == "failed"
-    assert said in verdict.text
+    assert phrase in verdict.text
 
 
-def test_it_is_in_time_to_the_last_moment() -> None:
+def test_the_limit_itself_passes() -> None:
     late = replace(
-        trip(), states=[state(PROMPT_S, "estop")], motions=[motion(PROMPT_S, Command.BRAKE)]
+        latch_test(), states=[state(LIMIT_S, "estop")], motions=[motion(LIMIT_S, Command.BRAKE)]
     )
     assert judge_estop(late).outcome == "passed"
 
 
-def test_what_is_sent_after_the_reset_is_none_of_it() -> None:
-    more = [*trip().motions, motion(2.01, Command.STOP)]
-    assert judge_estop(replace(trip(), motions=more)).outcome == "passed"
+def test_commands_after_the_reset_are_ignored() -> None:
+    more = [*latch_test().motions, motion(2.01, Command.STOP)]
+    assert judge_estop(replace(latch_test(), motions=more)).outcome == "passed"
 
 
 # --- bumper ---------------------------------------------------------------------------------------
 
 
 def test_a_press_and_a_release_pass() -> None:
-    assert judge_bumper(trip("contact"), False).outcome == "passed"
+    assert judge_bumper(latch_test("contact"), False).outcome == "passed"
 
 
 @pytest.mark.parametrize(
-    ("change", "before", "said"),
+    ("change", "before", "phrase"),
     [
-        ({}, True, "pressed before anybody pressed it"),
-        ({"at_ns": None}, False, "No press was seen"),
+        ({}, True, "pressed before the test"),
+        ({"at_ns": None}, False, "No press was received"),
         ({"gone": False}, False, "stays pressed"),
         ({"states": []}, False, "Safety did not latch contact."),
     ],
 )
-def test_a_bumper_that_does_not_work_is_named(
-    change: dict[str, object], before: bool, said: str
-) -> None:
-    verdict = judge_bumper(replace(trip("contact"), **change), before)  # type: ignore[arg-type]
+def test_bumper_faults_are_named(change: dict[str, object], before: bool, phrase: str) -> None:
+    verdict = judge_bumper(replace(latch_test("contact"), **change), before)  # type: ignore[arg-type]
     assert verdict.outcome == "failed"
-    assert said in verdict.text
+    assert phrase in verdict.text

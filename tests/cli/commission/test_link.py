@@ -1,4 +1,4 @@
-"""Link and CRC: what a good board, a slow one, a silent one and another firmware come to."""
+"""Link and CRC of a good board, a slow one, a silent one and another firmware."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -7,14 +7,14 @@ import pytest
 
 from cli.commission.link import (
     CRC_FRAMES,
-    TELLING_FRAMES,
+    NONZERO_FRAMES,
     Ports,
-    asked_rates,
+    expected_rates,
     judge_crc,
     judge_link,
     rejected,
 )
-from cli.commission.verdict import Verdict
+from cli.commission.report import Verdict
 from common.freshness import NS_PER_S
 from common.messages import Link, Switches
 
@@ -24,7 +24,7 @@ SETTINGS = {
     "bridge.ultrasonic_rate": 20.0,
     "bridge.driver_rate": 2.0,
 }
-ASKED = asked_rates(SETTINGS)
+EXPECTED = expected_rates(SETTINGS)
 ON = Switches(ultrasonic_brake=True, bumper_brake=True)
 BOTH = Ports((4002, 4001), 200)
 
@@ -36,7 +36,7 @@ def link(**fields: Any) -> Link:
         "epoch": 0,
         "armed": True,
         "waiting": "",
-        "rates": dict(ASKED),
+        "rates": dict(EXPECTED),
         "rejected": {},
         "round_trip": 0.002,
     }
@@ -44,8 +44,8 @@ def link(**fields: Any) -> Link:
 
 
 @dataclass
-class Heard:
-    """Five seconds of a link; the last message differs in ``fields``."""
+class LinkMessages:
+    """Five seconds of link messages; the last one differs in ``fields``."""
 
     fields: dict[str, Any] = field(default_factory=dict)
 
@@ -55,34 +55,34 @@ class Heard:
 
 
 def judge(switches: Switches | None = ON, ports: Ports = BOTH, **last: Any) -> Verdict:
-    return judge_link(Heard(last).messages(), switches, ASKED, ports)
+    return judge_link(LinkMessages(last).messages(), switches, EXPECTED, ports)
 
 
 def test_a_good_link_passes_with_its_data() -> None:
     verdict = judge(rejected={"bad_value": 1})
-    assert (verdict.outcome, verdict.text) == ("passed", "The board is heard.")
+    assert (verdict.outcome, verdict.text) == ("passed", "The board's link is up.")
     data = dict(verdict.data)
-    assert data["BumperReport, Hz"] == "50 (asked 50)"
+    assert data["BumperReport, Hz"] == "50 (requested 50)"
     assert data["VelocityReport, Hz"] == "10 (at least 10)"
-    assert data["DriverReport, Hz"] == "4 (asked 4)"
+    assert data["DriverReport, Hz"] == "4 (requested 4)"
     assert data["round trip"] == "2.0 ms"
     assert data["rejected in this step"] == "bad_value 1"
     assert data["waiting for"] == "nothing"
 
 
 @pytest.mark.parametrize(
-    ("last", "said"),
+    ("last", "phrase"),
     [
         ({"state": "lost"}, "The link is lost"),
         ({"state": "never"}, "The link is never"),
-        ({"epoch": 1}, "started anew"),
-        ({"rejected": {"wrong_address": 20}}, "20 rejected as wrong_address"),
+        ({"epoch": 1}, "restarted during this step"),
+        ({"rejected": {"wrong_address": 20}}, "20 frames rejected as wrong_address"),
     ],
 )
-def test_what_is_wrong_is_named(last: dict[str, Any], said: str) -> None:
+def test_problems_are_named(last: dict[str, Any], phrase: str) -> None:
     verdict = judge(**last)
     assert verdict.outcome == "failed"
-    assert said in verdict.text
+    assert phrase in verdict.text
 
 
 @pytest.mark.parametrize(
@@ -93,22 +93,22 @@ def test_what_is_wrong_is_named(last: dict[str, Any], said: str) -> None:
         Switches(ultrasonic_brake=False, bumper_brake=True),
     ],
 )
-def test_the_emergency_brakes_must_be_echoed(switches: Switches | None) -> None:
+def test_the_emergency_brakes_must_be_confirmed(switches: Switches | None) -> None:
     verdict = judge(switches)
     assert verdict.outcome == "failed"
     assert "both its emergency brakes" in verdict.text
 
 
 @pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed"), (0, "failed")])
-def test_a_rate_must_be_near_what_was_asked(rate: float, outcome: str) -> None:
-    links = [link(rates=ASKED | {"UltrasonicReport": rate})] * 5
-    assert judge_link(links, ON, ASKED, BOTH).outcome == outcome
+def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
+    links = [link(rates=EXPECTED | {"UltrasonicReport": rate})] * 5
+    assert judge_link(links, ON, EXPECTED, BOTH).outcome == outcome
 
 
-def test_a_kind_that_never_comes_is_named() -> None:
-    rates = {name: rate for name, rate in ASKED.items() if name != "BumperReport"}
-    verdict = judge_link([link(rates=rates)], ON, ASKED, BOTH)
-    assert verdict.text == "BumperReport comes at 0 Hz, expected are 50."
+def test_a_missing_report_is_named() -> None:
+    rates = {name: rate for name, rate in EXPECTED.items() if name != "BumperReport"}
+    verdict = judge_link([link(rates=rates)], ON, EXPECTED, BOTH)
+    assert verdict.text == "BumperReport has 0 Hz, expected are 50 Hz."
 
 
 @pytest.mark.parametrize(("count", "outcome"), [(6, "passed"), (7, "failed")])
@@ -117,27 +117,27 @@ def test_one_in_a_hundred_may_be_damaged(count: int, outcome: str) -> None:
     assert judge(rejected={"truncated": count}).outcome == outcome
 
 
-def test_bad_crcs_are_the_next_step_s() -> None:
+def test_bad_crcs_are_left_to_the_next_step() -> None:
     assert judge(rejected={"bad_crc": 500}).outcome == "passed"
 
 
 @pytest.mark.parametrize(
-    ("ports", "said"),
+    ("ports", "phrase"),
     [
-        (BOTH, "4002 and 4001; both carry what the board says"),
-        (Ports((4002, 4001), 0), "4002 and 4001; only one carries what the board says"),
-        (Ports((4002, 4001), None), "4002 and 4001; which carry something is unknown"),
-        (Ports((4002,), 0), "4002, the only one that is set"),
+        (BOTH, "4002 and 4001; both receive frames"),
+        (Ports((4002, 4001), 0), "4002 and 4001; only one receives frames"),
+        (Ports((4002, 4001), None), "4002 and 4001; their traffic is unknown"),
+        (Ports((4002,), 0), "4002, the only configured one"),
     ],
 )
-def test_which_ports_carry_something(ports: Ports, said: str) -> None:
+def test_ports_with_traffic(ports: Ports, phrase: str) -> None:
     verdict = judge(ports=ports, round_trip=None)
     assert verdict.outcome == "passed"
-    assert dict(verdict.data)["ports"] == said
+    assert dict(verdict.data)["ports"] == phrase
     assert dict(verdict.data)["round trip"] == "unknown"
 
 
-def test_only_what_was_rejected_meanwhile_counts() -> None:
+def test_only_rejections_of_the_step_count() -> None:
     links = [
         link(rejected={"bad_crc": 3, "no_magic": 1}),
         link(rejected={"bad_crc": 5, "no_magic": 1}),
@@ -148,8 +148,8 @@ def test_only_what_was_rejected_meanwhile_counts() -> None:
 # --- CRC ----------------------------------------------------------------------------------------
 
 
-def crc(bad: int, frames: int = CRC_FRAMES, telling: int = TELLING_FRAMES) -> Verdict:
-    return judge_crc([link(), link(rejected={"bad_crc": bad} if bad else {})], frames, telling)
+def crc(bad: int, frames: int = CRC_FRAMES, nonzero: int = NONZERO_FRAMES) -> Verdict:
+    return judge_crc([link(), link(rejected={"bad_crc": bad} if bad else {})], frames, nonzero)
 
 
 def test_a_thousand_good_frames_pass() -> None:
@@ -158,25 +158,25 @@ def test_a_thousand_good_frames_pass() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frames", "telling"), [(CRC_FRAMES - 1, 900), (CRC_FRAMES, TELLING_FRAMES - 1), (0, 0)]
+    ("frames", "nonzero"), [(CRC_FRAMES - 1, 900), (CRC_FRAMES, NONZERO_FRAMES - 1), (0, 0)]
 )
-def test_too_few_prove_nothing(frames: int, telling: int) -> None:
-    verdict = crc(0, frames, telling)
+def test_too_few_frames(frames: int, nonzero: int) -> None:
+    verdict = crc(0, frames, nonzero)
     assert verdict.outcome == "failed"
-    assert verdict.text.startswith("Too few frames to tell")
+    assert verdict.text.startswith("Too few frames for a verdict")
 
 
 @pytest.mark.parametrize(
-    ("bad", "frames", "said"),
+    ("bad", "frames", "phrase"),
     [
-        (1, 1000, "look at the cable"),
-        (499, 501, "look at the cable"),
+        (1, 1000, "check the cable"),
+        (499, 501, "check the cable"),
         (500, 500, "t2 wire identify-crc"),
         (7, 0, "t2 wire identify-crc"),
     ],
 )
-def test_a_bad_cable_and_another_firmware_differ(bad: int, frames: int, said: str) -> None:
+def test_a_bad_cable_and_another_firmware_differ(bad: int, frames: int, phrase: str) -> None:
     verdict = crc(bad, frames)
     assert verdict.outcome == "failed"
-    assert said in verdict.text
+    assert phrase in verdict.text
     assert dict(verdict.data)["bad CRCs in this step"] == str(bad)

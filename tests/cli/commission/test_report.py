@@ -1,13 +1,12 @@
-"""The report: what passes, and what an operator's odd words do to its tables."""
+"""The report: conditions of a pass, and escaping of the operator's input."""
 
 from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Checked, Report, render
-from cli.commission.verdict import Verdict, judged
+from cli.commission.report import Checked, Report, Verdict, judged, render, seconds
 
-GOOD = Checked("link", "Link", Verdict("passed", "The board is heard.", (("state", "up"),)))
+GOOD = Checked("link", "Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
 SKIPPED = Checked("turn", "Turn", Verdict("skipped", "no blocks | today\nsorry"))
 REPORT = Report(
     robot="001",
@@ -39,7 +38,7 @@ def test_the_whole_report() -> None:
 
 | step | result | finding |
 | --- | --- | --- |
-| Link | passed | The board is heard. |
+| Link | passed | The board's link is up. |
 
 ### Link
 
@@ -47,7 +46,7 @@ def test_the_whole_report() -> None:
 | --- | --- |
 | state | up |
 
-## Settings in force
+## Effective settings
 
 | setting | value | from |
 | --- | --- | --- |
@@ -61,28 +60,32 @@ Ada, 2026-03-01 10:20:00 +0800
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "text"),
     [
         ({"steps": [GOOD, SKIPPED]}, "| Turn | skipped | no blocks \\| today sorry |"),
         ({"steps": []}, "**Not passed.**"),
         ({"aborted": "ctrl-c"}, "**Not passed.** Ended early: ctrl-c."),
-        ({"signed": ""}, "Nobody has signed."),
+        ({"signed": ""}, "Not signed."),
     ],
 )
-def test_what_does_not_pass(change: dict[str, object], said: str) -> None:
+def test_conditions_that_do_not_pass(change: dict[str, object], text: str) -> None:
     report = replace(REPORT, **change)  # type: ignore[arg-type]
     assert not report.passed
-    text = render(report)
-    assert "**Not passed.**" in text
-    assert said in text
+    shown = render(report)
+    assert "**Not passed.**" in shown
+    assert text in shown
 
 
-def test_a_part_may_pass_and_says_that_it_is_one() -> None:
+def test_a_partial_checkout_may_pass() -> None:
     report = replace(REPORT, left_out=["crc", "sonar"])
     assert report.passed
-    assert "Only a part: crc, sonar were not asked for." in render(report)
+    assert "Partial checkout, left out: crc, sonar." in render(report)
 
 
 def test_a_verdict_is_failed_by_any_problem() -> None:
-    assert judged(["", "A.", "B."], "fine") == Verdict("failed", "A. B.")
-    assert judged(["", ""], "fine") == Verdict("passed", "fine")
+    assert judged(["", "A.", "B."], "good") == Verdict("failed", "A. B.")
+    assert judged(["", ""], "good") == Verdict("passed", "good")
+
+
+def test_a_time_as_text() -> None:
+    assert [seconds(None), seconds(1.234), seconds(1.234, 3)] == ["never", "1.23 s", "1.234 s"]

@@ -1,4 +1,4 @@
-"""Hands before sonars: the right one, the wrong one, two at once, none, dead ones."""
+"""Hands in front of sonars: the right one, another one, two, none, faulty ones."""
 
 import math
 from collections.abc import Mapping
@@ -8,14 +8,14 @@ import pytest
 from cli.commission.sonar import (
     HOLD_NS,
     Finding,
+    HandDetector,
     Rest,
-    Watch,
     at_rest,
-    crowded,
     judge_sonars,
     mixup,
     near,
     nearest,
+    obstructions,
 )
 from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 
@@ -33,12 +33,12 @@ FRONT_REAR = {"front": "rear", "rear": "front"}
 LEFT_RIGHT = {"left": "right", "right": "left"}
 
 
-def sample(**seen: float | RangeStatus) -> Ultrasonic:
-    """Return eight sonars without an echo, but for these."""
+def sample(**values: float | RangeStatus) -> Ultrasonic:
+    """Return eight sonars without an echo, except the given ones."""
     status: list[RangeStatus] = []
     ranges: list[float | None] = []
     for name in SONAR_NAMES:
-        value = seen.get(name, "no_echo")
+        value = values.get(name, "no_echo")
         status.append("ok" if isinstance(value, float) else value)
         ranges.append(value if isinstance(value, float) else None)
     return Ultrasonic(ranges=tuple(ranges), status=tuple(status))
@@ -48,31 +48,32 @@ def turned(places: int) -> dict[str, str]:
     return {name: SONAR_NAMES[(i + places) % 8] for i, name in enumerate(SONAR_NAMES)}
 
 
-def findings(answered: Mapping[str, str]) -> list[Finding]:
-    return [Finding(name, (to,), 0.3) for name, to in answered.items()]
+def findings(detected: Mapping[str, str]) -> list[Finding]:
+    return [Finding(name, (to,), 0.3) for name, to in detected.items()]
 
 
 RIGHT = turned(0)
+DIFFERS = "the order differs from the manual's."
 
 
-# --- what is near ---------------------------------------------------------------------------------
+# --- detection ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("value", "is_near"),
     [(0.59, True), (0.6, False), ("too_near", True), ("fault", False), ("no_echo", False)],
 )
-def test_near_is_a_hand_s_distance(value: float | RangeStatus, is_near: bool) -> None:
+def test_distance_of_a_hand(value: float | RangeStatus, is_near: bool) -> None:
     assert near(sample(front=value), FREE) == ({"front"} if is_near else frozenset())
 
 
 @pytest.mark.parametrize(("rest", "is_near"), [(0.5, False), (0.51, True), (None, False)])
-def test_near_is_clearly_nearer_than_at_rest(rest: float | None, is_near: bool) -> None:
+def test_distance_below_the_range_at_rest(rest: float | None, is_near: bool) -> None:
     whole = (math.inf, math.inf, rest, *FREE[3:])
     assert bool(near(sample(front=0.3), whole)) is is_near
 
 
-def test_rest_is_the_median_and_a_sonar_that_is_mostly_faulty_is_faulty() -> None:
+def test_range_at_rest_is_the_median() -> None:
     samples = [
         sample(front=2.0, rear="fault", left="fault"),
         sample(front=2.2, rear="fault", left=1.5),
@@ -87,12 +88,12 @@ def test_a_sonar_that_is_faulty_half_the_time_is_faulty() -> None:
     assert at_rest([sample(front="fault"), sample(front=1.0)])[2] is None
 
 
-def test_there_must_be_room_for_a_hand() -> None:
-    assert crowded(FREE) == ""
-    assert crowded((None, *FREE[1:])) == ""
-    assert crowded((0.8, *FREE[1:])) == ""
-    assert crowded((0.79, *FREE[1:6], 0.2, math.inf)) == (
-        "Make room, 0.8 m all around: left 0.79 m, rear 0.20 m."
+def test_obstructions() -> None:
+    assert obstructions(FREE) == ""
+    assert obstructions((None, *FREE[1:])) == ""
+    assert obstructions((0.8, *FREE[1:])) == ""
+    assert obstructions((0.79, *FREE[1:6], 0.2, math.inf)) == (
+        "Clear 0.8 m all around: left 0.79 m, rear 0.20 m."
     )
 
 
@@ -102,13 +103,13 @@ def test_the_nearest_reading() -> None:
     assert nearest(Ultrasonic(ranges=(None,) * 8, status=("fault",) * 8)) is None
 
 
-def test_a_hand_counts_once_it_is_held() -> None:
-    watch = Watch(FREE, since_ns=0).take(sample(left=0.3), 10)  # on its way
-    watch = watch.take(sample(front=0.3), 20)
-    watch = watch.take(sample(front=0.31), HOLD_NS)
-    assert not watch.settled(19 + HOLD_NS)
-    assert watch.settled(20 + HOLD_NS)
-    assert watch.seen == {"front"}
+def test_a_hand_is_detected_after_a_time() -> None:
+    detector = HandDetector(FREE, since_ns=0).take(sample(left=0.3), 10)  # passing by
+    detector = detector.take(sample(front=0.3), 20)
+    detector = detector.take(sample(front=0.31), HOLD_NS)
+    assert not detector.settled(19 + HOLD_NS)
+    assert detector.settled(20 + HOLD_NS)
+    assert detector.seen == {"front"}
 
 
 # --- the verdict ----------------------------------------------------------------------------------
@@ -116,54 +117,57 @@ def test_a_hand_counts_once_it_is_held() -> None:
 
 def test_each_in_its_place_passes() -> None:
     verdict = judge_sonars(FREE, findings(RIGHT))
-    assert (verdict.outcome, verdict.text) == ("passed", "Each sonar answers in its place.")
-    assert verdict.data[0] == ("hand before left", "seen by left, at 0.30 m; at rest no echo")
+    assert (verdict.outcome, verdict.text) == ("passed", "Each sonar is in its place.")
+    assert verdict.data[0] == (
+        "hand in front of left",
+        "detected by left, at 0.30 m; at rest no echo",
+    )
 
 
-def test_a_dead_one_a_deaf_one_and_a_double_one_are_told_apart() -> None:
+def test_faulty_blind_and_double_detection() -> None:
     rest = (None, *FREE[1:])
     seen = [Finding("left", ()), Finding("front", ()), Finding("rear", ("rear", "rear_left"), 0.2)]
     verdict = judge_sonars(rest, seen)
     assert verdict.outcome == "failed"
     assert verdict.text == (
-        "left is faulty: the board reports 0xFFFF. front: no sonar saw the hand. "
-        "rear: the hand was seen by rear and rear left."
+        "left is faulty: the board reports 0xFFFF. front: no sonar detected the hand. "
+        "rear: the hand was detected by rear and rear left."
     )
     assert verdict.data[0] == (
-        "hand before left",
-        "seen by none, at no reading; at rest no reading",
+        "hand in front of left",
+        "detected by none, at no reading; at rest no reading",
     )
 
 
-def test_a_mixup_is_named_beside_what_is_wrong_with_each() -> None:
+def test_a_mixup_is_named_with_the_problems_of_each_sonar() -> None:
     verdict = judge_sonars(FREE, findings(MIRROR))
     assert verdict.outcome == "failed"
-    assert "left: the hand was seen by right." in verdict.text
-    assert verdict.text.endswith("Left and right are exchanged: the order is not the manual's.")
+    assert "left: the hand was detected by right." in verdict.text
+    assert verdict.text.endswith(f"Left and right are exchanged: {DIFFERS}")
 
 
 @pytest.mark.parametrize(
-    ("answered", "said"),
+    ("detected", "text"),
     [
         (RIGHT, ""),
         ({}, ""),
-        (MIRROR, "Left and right are exchanged: the order is not the manual's."),
-        (TURNOVER, "Front and rear are exchanged: the order is not the manual's."),
+        (MIRROR, f"Left and right are exchanged: {DIFFERS}"),
+        (TURNOVER, f"Front and rear are exchanged: {DIFFERS}"),
         (
             turned(4),
-            "Front and rear are exchanged, and left and right too: the order is not the manual's.",
+            f"Front and rear are exchanged, and left and right too: {DIFFERS}",
         ),
-        (turned(1), "The ring is turned by 1 places clockwise: the order is not the manual's."),
-        (turned(7), "The ring is turned by 7 places clockwise: the order is not the manual's."),
+        (turned(1), f"The ring is rotated by 1 places clockwise: {DIFFERS}"),
+        (turned(7), f"The ring is rotated by 7 places clockwise: {DIFFERS}"),
         (RIGHT | FRONT_REAR, "Exchanged: front and rear."),
         (RIGHT | LEFT_RIGHT, "Exchanged: left and right."),
-        (RIGHT | {"front": "front_left"}, "front comes as front left."),
-        ({"left": "right"}, "left comes as right."),  # one alone shows no arrangement
+        (RIGHT | {"front": "front_left"}, "front is reported as front left."),
+        ({"left": "right"}, "left is reported as right."),  # one alone shows no arrangement
         (
             RIGHT | FRONT_REAR | LEFT_RIGHT | {"rear_left": "left"},
-            "Exchanged: front and rear. Exchanged: left and right. rear left comes as left.",
+            "Exchanged: front and rear. Exchanged: left and right. rear left is reported as left.",
         ),
     ],
 )  # fmt: skip
-def test_mixups_have_names(answered: dict[str, str], said: str) -> None:
-    assert mixup(answered) == said
+def test_mixups_have_names(detected: dict[str, str], text: str) -> None:
+    assert mixup(detected) == text

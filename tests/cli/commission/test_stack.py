@@ -1,4 +1,4 @@
-"""The whole walk against the real stack; the simulator's requests play the operator's hand."""
+"""The whole checkout against the real stack; the simulator replaces the operator's hand."""
 
 import re
 import signal
@@ -11,13 +11,13 @@ from common.cli_args import EXIT_LINK
 from common.errors import LinkError
 from common.messages import SONAR_NAMES
 from sim.requests import Bumper, Sonar
-from tests.cli.commission.operator_process import Seat, seat
+from tests.cli.commission.operator_process import OperatorProcess, checkout
 from tests.cli.processes import ran
 from verification.harness.stack import Chain, chain
 from verification.harness.support import free_port, wait_until
 
-TRIES = 5  # a machine that is held up makes safety stop; an operator would try again, too
-BLOCKS = "wheels off the ground"
+TRIES = 5  # safety stops on scheduling stalls; an operator tries again, too
+PHRASE = "wheels off the ground"
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def at(stack: Chain) -> list[str]:
 
 
 def answers(stack: Chain) -> bool:
-    """Tell whether the simulator takes requests."""
+    """Return whether the simulator accepts requests."""
     try:
         stack.control.truth()
     except LinkError:
@@ -39,18 +39,18 @@ def answers(stack: Chain) -> bool:
     return True
 
 
-def passes(it: Seat) -> bool:
-    """Read a verdict; go on from a failed one to the next try."""
+def passes(it: OperatorProcess) -> bool:
+    """Read a verdict; wait for the prompt after a failed one."""
     if it.wait("passed:", "failed:") == "passed:":
         return True
-    it.wait("Enter tries again")
+    it.wait("Press Enter to try again")
     return False
 
 
-def tries(it: Seat, title: str) -> Iterator[None]:
-    """Begin a step and yield for each try of it; the last one must pass."""
+def tries(it: OperatorProcess, title: str) -> Iterator[None]:
+    """Begin a step and yield for each try; one of them must pass."""
     it.wait(f"] {title}\n", f"] {title}\r\n")
-    it.wait("Enter begins")
+    it.wait("Press Enter to begin")
     it.type("")
     for _ in range(TRIES):
         yield
@@ -60,7 +60,7 @@ def tries(it: Seat, title: str) -> Iterator[None]:
     raise AssertionError(it.shown)
 
 
-def hold_a_hand(stack: Chain, it: Seat) -> None:
+def hold_a_hand(stack: Chain, it: OperatorProcess) -> None:
     for name in SONAR_NAMES:
         it.wait(f"NOW the {name.replace('_', ' ')} sonar")
         stack.control.do(Sonar(name=name, range=0.3))  # type: ignore[arg-type]
@@ -68,9 +68,9 @@ def hold_a_hand(stack: Chain, it: Seat) -> None:
         stack.control.do(Sonar(name=name))  # type: ignore[arg-type]
 
 
-def test_from_the_first_question_to_the_signature(stack: Chain, tmp_path: Path) -> None:
+def test_a_complete_checkout(stack: Chain, tmp_path: Path) -> None:
     report = tmp_path / "out" / "report.md"
-    with seat(report, *at(stack)) as it:
+    with checkout(report, *at(stack)) as it:
         it.begin()
         for title in ("Link", "CRC"):
             for _ in tries(it, title):
@@ -80,19 +80,19 @@ def test_from_the_first_question_to_the_signature(stack: Chain, tmp_path: Path) 
         for _ in tries(it, "Bumper"):
             it.wait("NOW press the bumper")
             stack.control.do(Bumper(pressed=True))
-            it.wait("NOW let go")
+            it.wait("NOW release")
             stack.control.do(Bumper(pressed=False))
         for _ in tries(it, "Emergency stop"):
             pass
         for title in ("Forward", "Turn"):
             for _ in tries(it, title):
-                it.wait(f'Type "{BLOCKS}"')
-                it.type(BLOCKS)
+                it.wait(f'Type "{PHRASE}"')
+                it.type(PHRASE)
         assert it.sign() == 0, it.shown
     text = report.read_text(encoding="utf-8")
     assert "**Passed.**" in text
     assert text.count(" passed |") == 7
-    assert "| counted by commanded |" in text
+    assert "| counted / commanded |" in text
     assert "| wire.command_angular_unit | decidegree | config/t2.toml |" in text
     assert "T2 of bridge" in text
     assert text.rstrip().splitlines()[-1].startswith("Ada, ")
@@ -103,13 +103,13 @@ def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
     stack: Chain, tmp_path: Path
 ) -> None:
     stack.kill("sim")
-    for way in ("command", "feedback"):
-        stack.commands["sim"] += ["--set", f"wire.{way}_angular_unit=milliradian"]
+    for direction in ("command", "feedback"):
+        stack.commands["sim"] += ["--set", f"wire.{direction}_angular_unit=milliradian"]
     stack.start("sim")
     wait_until(lambda: answers(stack), "the simulator's control socket")
     stack.control.do(Sonar(name="rear", fault=True))
     report = tmp_path / "report.md"
-    with seat(report, *at(stack), "--only", "sonar", "--only", "turn") as it:
+    with checkout(report, *at(stack), "--only", "sonar", "--only", "turn") as it:
         it.begin()
         it.wait("] Sonars")
         it.type("")
@@ -117,7 +117,7 @@ def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
             if name == "rear":
                 it.wait("The rear sonar is faulty.")
                 continue
-            # left and right are exchanged, as far as a hand can tell
+            # left and right are exchanged
             other = name.replace("left", "?").replace("right", "left").replace("?", "right")
             it.wait(f"NOW the {name.replace('_', ' ')} sonar")
             stack.control.do(Sonar(name=other, range=0.3))  # type: ignore[arg-type]
@@ -125,29 +125,29 @@ def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
             stack.control.do(Sonar(name=other))  # type: ignore[arg-type]
         it.wait("failed:")
         it.wait("Left and right are exchanged")
-        it.wait("any word goes on")
+        it.wait("any word to continue")
         it.type("on")
         it.wait("] Turn")
         it.type("")
         for _ in range(TRIES):
-            if it.wait(f'Type "{BLOCKS}"', 'Type "reset"') == 'Type "reset"':
-                it.type("reset")  # it was held up so often that safety latched
-                it.wait(f'Type "{BLOCKS}"')
-            it.type(BLOCKS)
+            if it.wait(f'Type "{PHRASE}"', 'Type "reset"') == 'Type "reset"':
+                it.type("reset")  # stalls have caused a latch
+                it.wait(f'Type "{PHRASE}"')
+            it.type(PHRASE)
             it.wait("failed:")
-            if it.wait("wire.command_angular_unit = ", "not let through", "does not let") == (
+            if it.wait("wire.command_angular_unit = ", "did not grant", "does not grant") == (
                 "wire.command_angular_unit = "
             ):
                 break
-            it.wait("Enter tries again")
+            it.wait("Press Enter to try again")
             it.type("")
-        it.wait("any word goes on")
+        it.wait("any word to continue")
         it.type("on")
         assert it.sign() == 1
     text = report.read_text(encoding="utf-8")
-    assert "**Not passed.** Only a part: link, crc, bumper, estop, forward were not" in text
+    assert "**Not passed.** Partial checkout, left out: link, crc, bumper, estop, forward." in text
     assert "rear is faulty: the board reports 0xFFFF." in text
-    ratio = re.search(r"counted by commanded \| ([0-9.]+) ", text)
+    ratio = re.search(r"counted / commanded \| ([0-9.]+) ", text)
     assert ratio is not None
     assert float(ratio[1]) == pytest.approx(0.573, rel=0.15)  # 1 mrad in units of 0.1 deg
     assert 'wire.command_angular_unit = "milliradian".' in text
@@ -155,14 +155,14 @@ def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
 
 def test_ctrl_c_while_the_wheels_turn_stops_them(stack: Chain, tmp_path: Path) -> None:
     report = tmp_path / "report.md"
-    with seat(report, *at(stack), "--only", "estop", "--only", "forward") as it:
+    with checkout(report, *at(stack), "--only", "estop", "--only", "forward") as it:
         it.begin()
-        it.wait("Enter begins")
+        it.wait("Press Enter to begin")
         it.type("nobody | near the switch")
-        it.wait("Enter begins")
+        it.wait("Press Enter to begin")
         it.type("")
-        it.wait(f'Type "{BLOCKS}"')
-        it.type(BLOCKS)
+        it.wait(f'Type "{PHRASE}"')
+        it.type(PHRASE)
         wait_until(lambda: abs(stack.speed()) > 0.02, "the wheels turn")
         it.signal(signal.SIGINT)
         assert it.end() == 1
@@ -171,23 +171,23 @@ def test_ctrl_c_while_the_wheels_turn_stops_them(stack: Chain, tmp_path: Path) -
     text = report.read_text(encoding="utf-8")
     assert "Ended early: interrupted by the operator." in text
     assert "| Emergency stop | skipped | nobody \\| near the switch |" in text
-    assert "Nobody has signed." in text
+    assert "Not signed." in text
 
 
-def test_a_latch_from_before_is_reset_on_the_operator_s_word(stack: Chain, tmp_path: Path) -> None:
+def test_an_earlier_latch_is_reset_after_confirmation(stack: Chain, tmp_path: Path) -> None:
     stack.control.do(Bumper(pressed=True))
-    # The board is told BREAK at a bridge's start, too; only safety's word is of this hit.
+    # The bridge also sends BRAKE at its start; only safety's log entry proves this hit.
     wait_until(lambda: '"cause": "contact"' in stack.log.read_text(), "safety's latch")
     stack.control.do(Bumper(pressed=False))
-    with seat(tmp_path / "report.md", *at(stack), "--only", "estop") as it:
+    with checkout(tmp_path / "report.md", *at(stack), "--only", "estop") as it:
         it.begin()
-        it.wait("Enter begins")
+        it.wait("Press Enter to begin")
         it.type("")
-        it.wait("Safety holds, from before: contact.")
+        it.wait("Safety has latched before: contact.")
         it.type("no")
-        it.wait("failed: What safety held from before was not reset.")
+        it.wait("failed: The earlier latch of safety was not reset.")
         for _ in range(TRIES):
-            it.wait("Enter tries again")
+            it.wait("Press Enter to try again")
             it.type("")
             if it.wait('Type "reset"', "passed:") == "passed:":
                 break
@@ -197,11 +197,11 @@ def test_a_latch_from_before_is_reset_on_the_operator_s_word(stack: Chain, tmp_p
         assert it.sign("Eve") == 1  # not the name that was given at the start
 
 
-def test_without_a_stack_there_is_nothing_to_check(tmp_path: Path) -> None:
+def test_no_checkout_without_a_stack(tmp_path: Path) -> None:
     report = tmp_path / "report.md"
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     result = ran("checkout", "--set", f"bus.connect={endpoint}", "--report", str(report))
     assert result.returncode == EXIT_LINK
-    assert f"heard on {endpoint}" in result.stderr
+    assert f"no message of bridge and safety on {endpoint}" in result.stderr
     assert "t2 up --no-sim" in result.stderr
     assert not report.exists()

@@ -1,4 +1,4 @@
-"""The watchdog's trial as a process, against the simulated board; judged by what that received."""
+"""The watchdog test as a process against the simulated board, judged by the received frames."""
 
 import signal
 import socket
@@ -18,18 +18,18 @@ from common.wire.frame import Frame
 from sim.control import Control
 from sim.requests import Freeze
 from sim.trace import Command
-from tests.cli.commission.operator_process import PATIENCE_S, Seat, seat
+from tests.cli.commission.operator_process import PATIENCE_S, OperatorProcess, checkout
 from tests.cli.processes import ran, sets
 from verification.harness.fake_board import Board, board
 from verification.harness.support import free_port, wait_until
 
-BLOCKS = "wheels off the ground"
+PHRASE = "wheels off the ground"
 TRIES = 5
 
 
 @dataclass
 class Vehicle:
-    """The simulator as a process, and what its board has received."""
+    """The simulator as a process, and the frames that its board has received."""
 
     words: list[str]
     trace_file: Path
@@ -62,30 +62,30 @@ def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
             process.kill()
 
 
-def begin(it: Seat) -> None:
+def begin(it: OperatorProcess) -> None:
     it.begin()
-    it.wait("Enter begins")
+    it.wait("Press Enter to begin")
     it.type("")
-    it.wait(f'Type "{BLOCKS}"')
-    it.type(BLOCKS)
+    it.wait(f'Type "{PHRASE}"')
+    it.type(PHRASE)
 
 
-def passes(it: Seat) -> bool:
-    """Begin, and try again when a machine that is held up has cut the trial short."""
+def passes(it: OperatorProcess) -> bool:
+    """Begin, and try again if a scheduling stall has aborted the test."""
     begin(it)
     for _ in range(TRIES):
         if it.wait("passed:", "failed:") == "passed:":
             return True
-        it.wait("Enter tries again")
+        it.wait("Press Enter to try again")
         it.type("")
-        it.wait(f'Type "{BLOCKS}"')
-        it.type(BLOCKS)
+        it.wait(f'Type "{PHRASE}"')
+        it.type(PHRASE)
     return False
 
 
-def test_the_simulated_board_has_none(vehicle: Vehicle, tmp_path: Path) -> None:
+def test_a_board_without_a_watchdog(vehicle: Vehicle, tmp_path: Path) -> None:
     report = tmp_path / "report.md"
-    with seat(report, "watchdog", *vehicle.words) as it:
+    with checkout(report, "watchdog", *vehicle.words) as it:
         assert passes(it), it.shown
         assert it.sign() == 0, it.shown
     text = report.read_text(encoding="utf-8")
@@ -117,7 +117,7 @@ class Watched(Board):
         super().say(frame, sock)
 
 
-def test_a_board_that_has_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_with_a_watchdog(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("verification.harness.fake_board.Board", Watched)
     report = tmp_path / "report.md"
     with board() as dog:
@@ -125,45 +125,45 @@ def test_a_board_that_has_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
             f"board.port={dog.address[1]}",
             f"board.listen_ports={dog.ports[0]},{dog.ports[1]}",
         )
-        with seat(report, "watchdog", *words) as it:
+        with checkout(report, "watchdog", *words) as it:
             assert passes(it), it.shown
             assert it.sign() == 0, it.shown
         dog.wait_for(MotionKind.BREAK)
     assert "passed | Stops by itself after 0." in report.read_text(encoding="utf-8")
 
 
-def is_cut_short(it: Seat, vehicle: Vehicle, number: signal.Signals) -> bool:
-    """Send a signal in the first RUN; a machine that is held up may have ended the trial before."""
+def is_aborted(it: OperatorProcess, vehicle: Vehicle, number: signal.Signals) -> bool:
+    """Send a signal during RUN; a scheduling stall may have ended the test before."""
     before = vehicle.runs()
     begin(it)
     wait_until(lambda: vehicle.runs() > before, "a RUN")
     it.signal(number)
-    ends = ("Ended early: ctrl-c", "Ended early: The board", "passed:")
-    return it.wait(*ends) == "Ended early: ctrl-c"
+    ends = ("Ended early: Ctrl-C", "Ended early: The board", "passed:")
+    return it.wait(*ends) == "Ended early: Ctrl-C"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_brakes(vehicle: Vehicle, tmp_path: Path, number: signal.Signals) -> None:
     for attempt in range(TRIES):
         report = tmp_path / f"report{attempt}.md"
-        with seat(report, "watchdog", *vehicle.words) as it:
-            if not is_cut_short(it, vehicle, number):
+        with checkout(report, "watchdog", *vehicle.words) as it:
+            if not is_aborted(it, vehicle, number):
                 continue
             assert vehicle.is_braked()
-            it.wait("any word goes on")
+            it.wait("any word to continue")
             it.type("on")
             assert it.sign() == 1
         assert vehicle.is_braked()
-        assert "failed | Ended early: ctrl-c |" in report.read_text(encoding="utf-8")
+        assert "failed | Ended early: Ctrl-C |" in report.read_text(encoding="utf-8")
         return
-    raise AssertionError("no trial lasted until the signal")
+    raise AssertionError("no test lasted until the signal")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_its_death_and_its_hanging_brake(
+def test_a_killed_or_stopped_process_brakes(
     vehicle: Vehicle, tmp_path: Path, number: signal.Signals
 ) -> None:
-    with seat(tmp_path / "report.md", "watchdog", *vehicle.words) as it:
+    with checkout(tmp_path / "report.md", "watchdog", *vehicle.words) as it:
         begin(it)
         wait_until(vehicle.runs, "a RUN")
         it.signal(number)
@@ -171,52 +171,52 @@ def test_its_death_and_its_hanging_brake(
 
 
 def test_a_board_that_falls_silent_brakes(vehicle: Vehicle, tmp_path: Path) -> None:
-    with seat(tmp_path / "report.md", "watchdog", *vehicle.words) as it:
+    with checkout(tmp_path / "report.md", "watchdog", *vehicle.words) as it:
         begin(it)
         wait_until(vehicle.runs, "a RUN")
         vehicle.control.do(Freeze(seconds=1.5))
-        it.wait("Ended early: The board was not heard")
+        it.wait("Ended early: The board was silent")
         wait_until(vehicle.is_braked, "BREAK at the board, and standstill")
 
 
-def test_nothing_moves_without_the_operator_s_word(vehicle: Vehicle, tmp_path: Path) -> None:
+def test_no_motion_without_confirmation(vehicle: Vehicle, tmp_path: Path) -> None:
     report = tmp_path / "report.md"
-    with seat(report, "watchdog", *vehicle.words) as it:
+    with checkout(report, "watchdog", *vehicle.words) as it:
         it.begin()
-        it.wait("Enter begins")
+        it.wait("Press Enter to begin")
         it.type("")
-        it.wait(f'Type "{BLOCKS}"')
+        it.wait(f'Type "{PHRASE}"')
         it.type("yes")
-        it.wait("failed: Not confirmed: nothing was moved.")
-        it.hang_up()
+        it.wait("failed: Not confirmed: no motion was commanded.")
+        it.close_input()
         assert it.end() == 1
     assert vehicle.commands() == []
     assert "standard input has ended" in report.read_text(encoding="utf-8")
 
 
-def test_without_a_board_nothing_begins(tmp_path: Path) -> None:
+def test_no_test_without_a_board(tmp_path: Path) -> None:
     first, second = (free_port(socket.SOCK_DGRAM) for _ in range(2))
-    with seat(
+    with checkout(
         tmp_path / "report.md", "watchdog", *sets(f"board.listen_ports={first},{second}")
     ) as it:
         begin(it)
-        it.wait("failed: The board does not say that the vehicle stands")
-        it.wait("any word goes on")
+        it.wait("failed: The board does not report standstill")
+        it.wait("any word to continue")
         it.type("on")
         assert it.sign() == 1
 
 
-def test_the_brakes_must_be_echoed(tmp_path: Path) -> None:
+def test_the_brakes_must_be_confirmed(tmp_path: Path) -> None:
     with board() as mute:
         mute.echo = False
         words = sets(f"board.port={mute.address[1]}", f"board.listen_ports={mute.ports[0]}")
-        with seat(tmp_path / "report.md", "watchdog", *words) as it:
+        with checkout(tmp_path / "report.md", "watchdog", *words) as it:
             begin(it)
             it.wait("did not send: UltrasonicBrakeReport, BumperBrakeReport.")
         assert all(motion.kind is MotionKind.BREAK for motion in mute.motions)
 
 
-def test_a_running_bridge_is_in_the_way(tmp_path: Path) -> None:
+def test_a_running_bridge_is_refused(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -227,12 +227,12 @@ def test_a_running_bridge_is_in_the_way(tmp_path: Path) -> None:
     assert not (tmp_path / "report.md").exists()
 
 
-def test_a_report_is_not_written_over(tmp_path: Path) -> None:
+def test_a_report_is_not_overwritten(tmp_path: Path) -> None:
     report = tmp_path / "report.md"
     report.write_text("signed", encoding="utf-8")
     result = ran("checkout", "watchdog", "--report", str(report))
     assert result.returncode == EXIT_CONFIG
-    assert "is there already" in result.stderr
+    assert "exists already" in result.stderr
     assert report.read_text(encoding="utf-8") == "signed"
 
 
@@ -243,7 +243,7 @@ def test_a_report_needs_a_folder(tmp_path: Path) -> None:
     assert "cannot be written" in result.stderr
 
 
-def test_the_trial_has_no_steps() -> None:
+def test_the_watchdog_test_has_no_steps() -> None:
     result = ran("checkout", "watchdog", "--only", "link")
     assert result.returncode == EXIT_CONFIG
     assert "has no steps" in result.stderr

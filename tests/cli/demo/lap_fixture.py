@@ -1,4 +1,4 @@
-"""What a lap is about, made up: poses, verdicts, views, traces."""
+"""Artificial poses, states, views and traces of a lap."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ from sim import trace as t
 
 RUN, STOP, BRAKE = motion.Command
 
-TICK_NS = NS_PER_S // 20  # the simulator writes down the truth 20 times a second
+TICK_NS = NS_PER_S // 20  # the simulator records the truth at 20 Hz
 
 
 def odometry(**fields: Any) -> Odometry:
-    """Return a pose at the start, standing, unless said otherwise."""
+    """Return a standing pose at the start, with the given differences."""
     known: dict[str, Any] = dict.fromkeys(("x", "y", "heading", "linear", "angular"), 0.0)
     known |= {
         "pose_covariance": (0.0,) * 9,
@@ -28,7 +28,7 @@ def odometry(**fields: Any) -> Odometry:
 
 
 def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> SafetyState:
-    """Return safety's state with these causes; it runs when there is none."""
+    """Return safety's state with these causes; without causes the verdict is run."""
     known: dict[str, Any] = {
         "verdict": "stop" if causes or latched else "run",
         "latched": latched,
@@ -51,13 +51,13 @@ def view(
     refusal: str | None = None,
     **pose: float,
 ) -> View:
-    """Return what the driver knows."""
+    """Return the driver's input."""
     words = {} if verdict is None else {"verdict": verdict}
     return View(odometry(**pose), safety(*causes, latched=latched, **words), pressed, refusal)
 
 
 def truth(tick: int, **fields: Any) -> t.Truth:
-    """Return the truth at a tick: standing at the start with a metre around it."""
+    """Return the truth at a tick: standing at the start with 1 m clearance."""
     known: dict[str, Any] = dict.fromkeys(
         ("x", "y", "heading", "linear", "angular", "distance"), 0.0
     )
@@ -76,7 +76,7 @@ def truth(tick: int, **fields: Any) -> t.Truth:
 
 
 def command(at_ns: int, kind: motion.Command, linear: float = 0.0) -> t.Command:
-    """Return a command that the board took."""
+    """Return a command that the board accepted."""
     return t.Command(mono_ns=at_ns, kind=kind, linear=linear, angular=0.0)
 
 

@@ -1,4 +1,4 @@
-"""``t2 demo``: one real lap, ctrl-c in a terminal, and every way in which it cannot run."""
+"""``t2 demo``: one real lap, Ctrl-C in a terminal, and failures at the start."""
 
 import contextlib
 import fcntl
@@ -22,12 +22,12 @@ from common.config import Sources, load
 from tests.cli.processes import PATIENCE_S, children, ran, sets, t2, wait_gone
 from verification.harness.support import wait_until
 
-LAP_S = 200.0  # on a machine that is held up; a good one takes a quarter of it
+LAP_S = 200.0  # with scheduling stalls; without them a quarter of it
 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the measuring of the machine out."""
+    """Skip the measurement of stalls."""
     monkeypatch.setattr(host_stalls, "measured", lambda: 0.0)
 
 
@@ -63,7 +63,7 @@ def test_a_lap(tmp_path: Path) -> None:
 # --- ctrl-c -----------------------------------------------------------------------------------
 
 
-def test_ctrl_c_ends_it_at_once_and_gives_the_terminal_back(tmp_path: Path) -> None:
+def test_ctrl_c_ends_it_and_restores_the_terminal(tmp_path: Path) -> None:
     outer, inner = os.openpty()
     fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
     before = termios.tcgetattr(inner)
@@ -83,7 +83,9 @@ def test_ctrl_c_ends_it_at_once_and_gives_the_terminal_back(tmp_path: Path) -> N
         return words.encode() in shown
 
     try:
-        wait_until(lambda: shows("T2 drives a lap") and shows("✓ wait"), "the picture", PATIENCE_S)
+        wait_until(
+            lambda: shows("T2 drives a lap") and shows("✓ wait"), "the live display", PATIENCE_S
+        )
         pids = children(process.pid)
         assert set(pids) == {"router", "sim", "bridge", "safety", "odom"}
         os.write(outer, b"\x03")
@@ -113,7 +115,7 @@ def test_ctrl_c_before_anything_runs(
     assert capsys.readouterr().err == ""
 
 
-# --- what cannot run --------------------------------------------------------------------------
+# --- failures --------------------------------------------------------------------------
 
 
 def test_a_process_that_cannot_run_ends_it_and_names_the_log(tmp_path: Path) -> None:
@@ -149,7 +151,7 @@ def test_a_folder_that_cannot_be_written_is_named(
 @pytest.mark.parametrize(
     ("number", "code"), [(0, EXIT_LINK), (signal.SIGINT, 130), (signal.SIGTERM, 143)]
 )
-def test_an_earlier_trace_is_not_taken_for_this_lap(
+def test_an_earlier_trace_is_deleted(
     number: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "trace.jsonl").write_text("an earlier lap\n")
@@ -161,7 +163,7 @@ def test_an_earlier_trace_is_not_taken_for_this_lap(
 # --- the parts --------------------------------------------------------------------------------
 
 
-def test_ports_are_its_own_whatever_the_files_say() -> None:
+def test_separate_ports_override_the_files() -> None:
     vehicle = Path("config/vehicle.toml")
     config = load(
         Everything, Sources(files=(vehicle,), environ={}, sets=command.own_ports())

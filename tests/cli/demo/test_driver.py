@@ -1,4 +1,4 @@
-"""The driver at the wheel: asks at every beat, presses buttons, keeps what is answered."""
+"""The driver of the lap: drive requests, calls, and their answers."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,12 +16,12 @@ from tests.cli.demo.lap_fixture import odometry, safety
 from verification.harness.support import at
 
 
-class Desk(Bus):
-    """A bus without a router, whose calls are answered by hand."""
+class FakeBus(Bus):
+    """A bus without a router; the test answers its calls."""
 
     def __init__(self) -> None:
         super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-        self.asked: list[tuple[str, Callable[[Any], None], Callable[[str], None]]] = []
+        self.calls: list[tuple[str, Callable[[Any], None], Callable[[str], None]]] = []
 
     def ask(
         self,
@@ -31,12 +31,12 @@ class Desk(Bus):
         on_refusal: Callable[[str], None],
         timeout_s: float = 2.0,
     ) -> None:
-        self.asked.append((call.path, on_reply, on_refusal))
+        self.calls.append((call.path, on_reply, on_refusal))
 
 
 @pytest.fixture
-def desk() -> Desk:
-    return Desk()
+def bus() -> FakeBus:
+    return FakeBus()
 
 
 def never(_: View, __: m.Odometry) -> bool:
@@ -48,83 +48,83 @@ RELEASE = Step("release", still, never, "release", latched=True)
 DRIVE = Step("drive", lambda *_: Twist(0.5, 0.1), never)
 
 
-def driver_of(desk: Desk, *steps: Step) -> tuple[Driver, list[str]]:
-    """Return a driver who sees safety and the start, and the names of the steps that begin."""
-    told: list[str] = []
-    driver = Driver(desk, Lap(steps), lambda step: told.append(step.name))
+def driver_of(bus: FakeBus, *steps: Step) -> tuple[Driver, list[str]]:
+    """Return a driver at the start, and a list that collects the names of its steps."""
+    started: list[str] = []
+    driver = Driver(bus, Lap(steps), lambda step: started.append(step.name))
     driver.safety, driver.odometry = safety(), [odometry()]
-    return driver, told
+    return driver, started
 
 
-def asked_for(desk: Desk) -> m.Drive | None:
-    """Return the newest request to move."""
-    (source,) = (p for p in desk.publishers if p.topic is keys.DRIVE)
+def newest_request(bus: FakeBus) -> m.Drive | None:
+    """Return the newest drive request."""
+    (source,) = (p for p in bus.publishers if p.topic is keys.DRIVE)
     assert source.key == "t2/v1/001/@cmd/drive/demo"
     return source.last
 
 
-def test_nothing_is_asked_before_anything_is_seen(desk: Desk) -> None:
-    driver = Driver(desk, Lap(lap(fast=True)), lambda _: None)
+def test_no_request_before_the_first_messages(bus: FakeBus) -> None:
+    driver = Driver(bus, Lap(lap(fast=True)), lambda _: None)
     driver.on_beat(0)
     driver.safety = safety()
     driver.on_beat(0)
-    assert asked_for(desk) is None
+    assert newest_request(bus) is None
     assert driver.lap.times_ns == []
 
 
-def test_every_beat_asks_and_a_step_is_told_once(desk: Desk) -> None:
-    driver, told = driver_of(desk, DRIVE)
+def test_a_request_per_beat_and_one_start_per_step(bus: FakeBus) -> None:
+    driver, started = driver_of(bus, DRIVE)
     for beat in range(3):
         driver.on_beat(beat)
-    request = asked_for(desk)
+    request = newest_request(bus)
     assert request is not None
     assert (request.linear, request.angular, request.seq) == (0.5, 0.1, 3)
-    assert driver.asked == Twist(0.5, 0.1)
-    assert told == ["drive"]
-    assert desk.asked == []
+    assert driver.requested == Twist(0.5, 0.1)
+    assert started == ["drive"]
+    assert bus.calls == []
 
 
-def test_after_the_end_zero_is_asked(desk: Desk) -> None:
-    driver, told = driver_of(desk)
+def test_zero_is_requested_after_the_end(bus: FakeBus) -> None:
+    driver, started = driver_of(bus)
     driver.on_beat(0)
-    assert driver.asked == STILL
-    assert told == []
+    assert driver.requested == STILL
+    assert started == []
 
 
-def test_a_button_is_pressed_again_in_time_for_a_held_release(desk: Desk) -> None:
-    driver, _ = driver_of(desk, RELEASE)
+def test_a_call_is_repeated_in_time_for_a_held_release(bus: FakeBus) -> None:
+    driver, _ = driver_of(bus, RELEASE)
     for now_ns in (NS_PER_S, NS_PER_S + PRESS_NS - 1, NS_PER_S + PRESS_NS):
         driver.on_beat(now_ns)
-    assert [path for path, _, _ in desk.asked] == [keys.RELEASE.path] * 2
+    assert [path for path, _, _ in bus.calls] == [keys.RELEASE.path] * 2
     assert PRESS_NS < 0.3 * NS_PER_S
 
 
-def test_a_refusal_moves_on_the_step_that_waits_for_it(desk: Desk) -> None:
-    driver, told = driver_of(desk, RESET, DRIVE)
+def test_a_refusal_ends_the_step_that_waits_for_it(bus: FakeBus) -> None:
+    driver, started = driver_of(bus, RESET, DRIVE)
     driver.on_beat(NS_PER_S)
-    ((path, _, refuse),) = desk.asked
+    ((path, _, refuse),) = bus.calls
     assert path == keys.RESET.path
     refuse("still pressed")
     driver.on_beat(2 * NS_PER_S)
-    assert told == ["reset", "drive"]
+    assert started == ["reset", "drive"]
     assert driver.answers == [("reset", "reset", False, "still pressed")]
 
 
-def test_an_answer_that_comes_after_its_step_is_kept_and_moves_nothing(desk: Desk) -> None:
-    driver, told = driver_of(desk, RESET, RESET, DRIVE)
+def test_a_late_answer_is_kept_and_ends_no_step(bus: FakeBus) -> None:
+    driver, started = driver_of(bus, RESET, RESET, DRIVE)
     driver.on_beat(NS_PER_S)
-    refuse = desk.asked[0][2]
+    refuse = bus.calls[0][2]
     refuse("still pressed")
     driver.on_beat(2 * NS_PER_S)
     refuse("late")
     driver.on_beat(3 * NS_PER_S)
-    assert told == ["reset", "reset"]
+    assert started == ["reset", "reset"]
     assert [words for _, _, _, words in driver.answers] == ["still pressed", "late"]
 
 
-def test_the_same_answer_again_is_told_once(desk: Desk) -> None:
-    driver, _ = driver_of(desk, RELEASE)
+def test_the_same_answer_again_is_started_once(bus: FakeBus) -> None:
+    driver, _ = driver_of(bus, RELEASE)
     driver.on_beat(NS_PER_S)
     for _ in range(2):
-        desk.asked[0][1](m.Done(text="creeping"))
+        bus.calls[0][1](m.Done(text="creeping"))
     assert driver.answers == [("release", "release", True, "creeping")]

@@ -1,4 +1,4 @@
-"""The results on traces made by hand: what was measured, and when the lap was good."""
+"""Results of artificial traces: measured values, and the condition of a good lap."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -32,24 +32,24 @@ def test_a_good_lap() -> None:
     assert named(rows) == {
         "lap finished": ("9 of 9 steps", True),
         "distance driven": ("2.04 m", True),
-        "closest to what sonar sees": ("1.00 m", True),
-        "odometry off the truth, driving": ("0.0 cm at most", None),
-        "odometry off the truth, at rest": ("0.0 cm at most", True),
+        "closest to an obstacle": ("1.00 m", True),
+        "odometry error, driving": ("0.0 cm at most", None),
+        "odometry error, at rest": ("0.0 cm at most", True),
         "contact 1: frame to BREAK frame": ("20.0 ms", True),
         "contact 1: stopped within": ("4.0 cm from 0.80 m/s", True),
-        "stops that were not planned": ("none", None),
+        "unplanned latches": ("none", None),
     }
     assert good(rows)
 
 
 def wrong(trace: Trace, driven: Lap | None = None, fast: bool = True) -> set[str]:
-    """Return what is wrong with a lap that is not good."""
+    """Return the failed results of a lap."""
     rows = results(trace, [], driven or finished(), fast)
     assert not good(rows)
     return {what for what, _, fine in rows if fine is False}
 
 
-def test_a_lap_that_was_not_finished() -> None:
+def test_an_unfinished_lap() -> None:
     assert wrong(hit_lap(), Lap(lap(fast=True), index=3)) == {"lap finished"}
 
 
@@ -59,7 +59,7 @@ def test_a_vehicle_that_brakes_without_a_frame() -> None:
     assert stops(trace)[0].reaction_s is None
 
 
-def test_a_vehicle_that_never_stands_has_not_stopped_within_nothing() -> None:
+def test_a_vehicle_without_standstill() -> None:
     trace = hit_lap(stands=False)
     assert wrong(trace) == {"contact 1: stopped within"}
     amount, _ = named(results(trace, [], finished(), fast=True))["contact 1: stopped within"]
@@ -82,21 +82,21 @@ def test_a_lap_without_a_contact_is_not_good() -> None:
     assert wrong(trace) == set()
 
 
-def test_too_near_the_wall_and_no_way_driven() -> None:
+def test_too_close_and_not_driven() -> None:
     near = replace(hit_lap(), truth=[truth(0, clearance=None), truth(1, clearance=0.05)])
-    assert {"closest to what sonar sees", "distance driven"} <= wrong(near)
+    assert {"closest to an obstacle", "distance driven"} <= wrong(near)
 
 
 @pytest.mark.parametrize(("x", "home"), [(0.24, True), (0.26, False)])
-def test_the_whole_lap_ends_at_home(x: float, home: bool) -> None:
+def test_the_whole_lap_ends_at_the_start(x: float, home: bool) -> None:
     trace = hit_lap()
     back = replace(trace, truth=[*trace.truth, truth(91, x=x, distance=4.0)])
     rows = results(back, [], finished(), fast=False)
-    assert named(rows)["from home at the end"] == (f"{x * 100:.1f} cm", home)
+    assert named(rows)["distance from the start at the end"] == (f"{x * 100:.1f} cm", home)
     assert good(rows) is home
 
 
-def test_stops_that_were_not_planned_are_named() -> None:
+def test_unplanned_latches_are_named() -> None:
     driven = finished()
     driven.unplanned.append("runaway")
     assert results(hit_lap(), [], driven, fast=True)[-1][1] == "runaway"
@@ -105,14 +105,14 @@ def test_stops_that_were_not_planned_are_named() -> None:
 # --- odometry ---------------------------------------------------------------------------------
 
 
-def test_odometry_is_compared_between_two_truths() -> None:
+def test_odometry_is_compared_with_interpolated_truth() -> None:
     half = odometry(mono_ns=round(30.5 * TICK_NS), x=30.5 * 0.04)
     driving, resting = odometry_errors(hit_lap(), [half])
     assert driving == pytest.approx(0.0, abs=1e-9)
     assert resting == 0.0
 
 
-def test_odometry_off_while_driving_is_no_fault_and_at_rest_is_one() -> None:
+def test_only_the_odometry_error_at_rest_fails() -> None:
     moving = odometry(mono_ns=30 * TICK_NS, x=30 * 0.04 - 0.3, y=0.4)
     standing = odometry(mono_ns=80 * TICK_NS, x=2.04 - 0.16)
     assert list(odometry_errors(hit_lap(), [moving])) == pytest.approx([0.5, 0.0])
@@ -129,7 +129,7 @@ def test_odometry_outside_of_the_trace_is_left_out(tick: int) -> None:
 # --- the file ---------------------------------------------------------------------------------
 
 
-def test_a_trace_is_read_by_kind_up_to_the_last_whole_line(tmp_path: Path) -> None:
+def test_a_trace_is_read_up_to_the_last_whole_line(tmp_path: Path) -> None:
     trace = hit_lap()
     file = tmp_path / "trace.jsonl"
     lines = [*trace.truth, *trace.commands, *trace.bumper]

@@ -1,11 +1,11 @@
-"""The lap step by step: what each asks for, when it is over, and what a stop does to it."""
+"""Steps of the lap: requests, end conditions, and the effect of stops."""
 
 import math
 
 import pytest
 from msgspec.structs import astuple
 
-from cli.demo.script import PATIENT, QUICK, Ask, Lap, Step, View, lap, still, wrap
+from cli.demo.script import PATIENT, QUICK, Action, Lap, Step, View, lap, still, wrap
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
 from tests.cli.demo.lap_fixture import odometry, safety, view
@@ -20,12 +20,12 @@ NAMES = [
 WAIT, OFF, BACK, LEFT, ON, REFUSED, RELEASE, RESET, CLEAR, TURN_HOME, HOME, AS_AT_START = STEPS
 
 
-def test_the_steps_and_what_the_fast_lap_leaves_out() -> None:
+def test_steps_of_both_laps() -> None:
     assert [step.name for step in STEPS] == NAMES
     assert [step.name for step in lap(fast=True)] == NAMES[:9]
 
 
-# --- what each step asks for ------------------------------------------------------------------
+# --- request of each step ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -34,9 +34,9 @@ def test_the_steps_and_what_the_fast_lap_leaves_out() -> None:
         (WAIT, {}, STILL),
         (OFF, {}, Twist(0.8, 0.0)),
         (OFF, {"heading": 0.1}, Twist(0.8, -0.2)),
-        (OFF, {"heading": -1.0}, Twist(0.8, 0.3)),  # as much as it steers
+        (OFF, {"heading": -1.0}, Twist(0.8, 0.3)),  # limited steering
         (BACK, {}, Twist(-0.4, 0.0)),
-        (LEFT, {}, Twist(0.0, 0.8)),  # as fast as it spins
+        (LEFT, {}, Twist(0.0, 0.8)),  # limited rate
         (LEFT, {"heading": math.pi / 2 + 0.1}, Twist(0.0, -0.2)),
         (LEFT, {"heading": -math.pi}, Twist(0.0, -0.8)),  # the shorter way round
         (ON, {}, Twist(0.8, 0.0)),
@@ -48,13 +48,13 @@ def test_the_steps_and_what_the_fast_lap_leaves_out() -> None:
         (TURN_HOME, {"x": 2.0, "heading": math.pi - 0.1}, Twist(0.0, 0.2)),
         (HOME, {"x": 2.0, "heading": math.pi}, Twist(0.8, 0.0)),
         (HOME, {"x": 0.5, "heading": math.pi}, Twist(0.4, 0.0)),  # slower when near
-        (HOME, {"x": 2.0, "heading": math.pi - 0.6}, Twist(0.0, 0.8)),  # looks home first
+        (HOME, {"x": 2.0, "heading": math.pi - 0.6}, Twist(0.0, 0.8)),  # turns first
         (AS_AT_START, {"heading": -0.1}, Twist(0.0, 0.2)),
     ],
 )
-def test_what_a_step_asks_for(step: Step, pose: dict[str, float], twist: Twist) -> None:
-    asked = step.drive(View(odometry(**pose), safety(), pressed=False), START)
-    assert astuple(asked) == pytest.approx(astuple(twist))
+def test_request_of_a_step(step: Step, pose: dict[str, float], twist: Twist) -> None:
+    requested = step.drive(View(odometry(**pose), safety(), pressed=False), START)
+    assert astuple(requested) == pytest.approx(astuple(twist))
 
 
 def test_a_patient_lap_is_slower() -> None:
@@ -65,7 +65,7 @@ def test_a_patient_lap_is_slower() -> None:
     assert PATIENT.facing > QUICK.facing
 
 
-# --- when each step is over -------------------------------------------------------------------
+# --- end of each step -------------------------------------------------------------------
 
 NORTH, WEST = math.pi / 2, math.pi
 
@@ -111,11 +111,11 @@ NORTH, WEST = math.pi / 2, math.pi
         (AS_AT_START, view(heading=0.04), False),
     ],
 )
-def test_when_a_step_is_over(step: Step, seen: View, over: bool) -> None:
+def test_end_of_a_step(step: Step, seen: View, over: bool) -> None:
     assert step.done(seen, START) is over
 
 
-def test_a_step_measures_from_where_it_began() -> None:
+def test_a_step_is_relative_to_its_start() -> None:
     began = odometry(x=2.0, heading=0.5)
     assert not BACK.done(view(x=1.6), began)
     assert BACK.done(view(x=1.5), began)
@@ -130,23 +130,23 @@ def test_angles_are_wrapped(angle: float, wrapped: float) -> None:
 # --- from step to step ------------------------------------------------------------------------
 
 
-def test_a_step_begins_where_the_vehicle_is_and_its_time_is_kept() -> None:
+def test_start_pose_and_time_of_a_step() -> None:
     it = Lap(lap(fast=True))
     assert it.seconds(NS_PER_S) == 0.0
-    assert it.advance(view(verdict="stop"), 5 * NS_PER_S) == Ask()
-    assert it.advance(view(), 6 * NS_PER_S) == Ask()  # over: the next begins at the next beat
+    assert it.advance(view(verdict="stop"), 5 * NS_PER_S) == Action()
+    assert it.advance(view(), 6 * NS_PER_S) == Action()  # over: the next begins at the next beat
     assert (it.index, it.began, it.times_ns) == (1, None, [5 * NS_PER_S])
-    assert it.advance(view(x=0.1), 7 * NS_PER_S) == Ask(Twist(0.8, 0.0))
+    assert it.advance(view(x=0.1), 7 * NS_PER_S) == Action(Twist(0.8, 0.0))
     assert it.began == odometry(x=0.1)
     assert it.times_ns == [5 * NS_PER_S, 7 * NS_PER_S]
     assert it.seconds(9 * NS_PER_S) == 4.0
 
 
-def test_the_end_is_the_end() -> None:
+def test_no_action_after_the_end() -> None:
     it = Lap((Step("only", still, lambda *_: True),))
     it.advance(view(), 0)
     assert it.step is None
-    assert it.advance(view(), NS_PER_S) == Ask()
+    assert it.advance(view(), NS_PER_S) == Action()
     assert it.index == 1
 
 
@@ -155,31 +155,31 @@ def at(name: str) -> Lap:
     return Lap(STEPS, index=NAMES.index(name))
 
 
-def test_a_step_about_a_latch_presses_its_button() -> None:
-    assert at("reset, refused").advance(view(latched=("contact",)), 0) == Ask(press="reset")
-    assert at("release").advance(view(latched=("contact",)), 0) == Ask(press="release")
+def test_a_step_with_a_latch_makes_its_call() -> None:
+    assert at("reset, refused").advance(view(latched=("contact",)), 0) == Action(press="reset")
+    assert at("release").advance(view(latched=("contact",)), 0) == Action(press="release")
 
 
-def test_what_safety_wants_neutral_is_neutral() -> None:
-    assert at("drive on").advance(view("neutral"), 0) == Ask()
-    assert at("release").advance(view("neutral"), 0) == Ask(press="release")
+def test_neutral_is_requested_if_safety_requires_it() -> None:
+    assert at("drive on").advance(view("neutral"), 0) == Action()
+    assert at("release").advance(view("neutral"), 0) == Action(press="release")
 
 
-def test_a_stop_that_passes_is_waited_for() -> None:
+def test_a_temporary_stop() -> None:
     it = at("drive on")
-    assert it.advance(view("bumper_old"), 0) == Ask(Twist(0.8, 0.0))
+    assert it.advance(view("bumper_old"), 0) == Action(Twist(0.8, 0.0))
     assert it.unplanned == []
 
 
-def test_a_latch_that_was_not_meant_is_reset_and_counted_once() -> None:
+def test_an_unplanned_latch_is_reset_and_counted_once() -> None:
     it = at("drive off to the wall")
     for _ in range(3):
-        assert it.advance(view(latched=("runaway",)), 0) == Ask(press="reset")
+        assert it.advance(view(latched=("runaway",)), 0) == Action(press="reset")
     assert it.unplanned == ["runaway"]
-    assert it.advance(view(latched=("runaway", "estop")), 0) == Ask(press="reset")
+    assert it.advance(view(latched=("runaway", "estop")), 0) == Action(press="reset")
     assert it.unplanned == ["runaway", "runaway, estop"]
     assert it.index == 1
-    assert it.advance(view(), 0) == Ask(Twist(0.8, 0.0))
+    assert it.advance(view(), 0) == Action(Twist(0.8, 0.0))
 
 
 def test_the_same_latch_again_counts_again() -> None:

@@ -1,4 +1,4 @@
-"""The buses of ``tests/common``, and ``t2`` to look at its robot."""
+"""The rig of ``tests/common``, and ``t2`` on its robot."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Short keys, whole keys, and what is none."""
+"""Short keys, whole keys and invalid keys."""
 
 import argparse
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from cli.inspect.addressing import chunks, expression, keys_meant, one_key, short, topic_of
+from cli.inspect.addressing import chunks, expression, parse_key, parse_one_key, short, topic_of
 from common import keys
 
 
@@ -31,31 +31,31 @@ from common import keys
         ("t2/v1/2/tel/**", "t2/v1/2/tel/**"),
     ],
 )
-def test_what_is_meant(word: str, key: str) -> None:
-    assert keys_meant(word) == word
+def test_whole_key_of_a_typed_key(word: str, key: str) -> None:
+    assert parse_key(word) == word
     assert expression(word, "7") == key
 
 
 @pytest.mark.parametrize("word", ["", "/", "tel//odom", "tel/a*b", "tel/#", "tel/$*$*"])
-def test_what_is_no_key(word: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="is no key"):
-        keys_meant(word)
+def test_invalid_keys(word: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="is not a key"):
+        parse_key(word)
 
 
-def test_many_keys_are_not_one() -> None:
-    assert one_key("tel/x") == "tel/x"
-    with pytest.raises(argparse.ArgumentTypeError, match="many keys"):
-        one_key("tel/*")
+def test_an_expression_is_not_one_key() -> None:
+    assert parse_one_key("tel/x") == "tel/x"
+    with pytest.raises(argparse.ArgumentTypeError, match="several keys"):
+        parse_one_key("tel/*")
 
 
-def test_keys_as_they_are_shown() -> None:
+def test_displayed_keys() -> None:
     assert short("t2/v1/7/tel/x", "7") == "tel/x"
     assert short("t2/v1/8/tel/x", "7") == "t2/v1/8/tel/x"
     assert chunks("t2/v1/7/tel/x") == ("7", "tel/x")
     assert chunks("other/v1/7/tel/x") == chunks("t2/v1/7") == ("", "")
 
 
-def test_the_row_of_the_table() -> None:
+def test_topic_of_a_key() -> None:
     assert topic_of("t2/v1/7/tel/bridge/driver/left") is keys.DRIVER
     assert topic_of("t2/v1/7/tel/mine/health") is keys.HEALTH
     assert topic_of("t2/v1/7/@cmd/drive/web") is keys.DRIVE
@@ -68,16 +68,16 @@ ROOT = Path(__file__).parents[3]
 NAMED = re.compile(r"t2 (?:echo|hz|delay|bw) +'?([a-z@][\w/*@]*)")
 
 
-def test_every_key_that_a_document_names_is_one_of_the_table() -> None:
+def test_documents_name_existing_keys() -> None:
     texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("services/*/*.md"),
              *ROOT.glob("deploy/**/*.md"), *ROOT.glob("deploy/**/*.yml")]  # fmt: skip
     rows = [
         zenoh.KeyExpr(re.sub(r"\{\w+\}", "*", f"{keys.ROOT}/7/{row.path}")) for row in keys.TOPICS
     ]
     named = {word for text in texts for word in NAMED.findall(text.read_text(encoding="utf-8"))}
-    deaf = [
+    unknown = [
         word
         for word in named
         if not any(zenoh.KeyExpr(expression(word, "7")).intersects(row) for row in rows)
     ]
-    assert (deaf, len(named) > 3) == ([], True)
+    assert (unknown, len(named) > 3) == ([], True)

@@ -1,74 +1,100 @@
-"""The scripts for shells; bash's is run."""
+"""Shell completion: bash's script is run; zsh's and fish's queries are sent to ``t2``."""
 
+import os
 import shutil
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from cli.__main__ import COMMANDS, main
 from verification.harness.support import PATIENCE_S
 
-
-@pytest.fixture(scope="module")
-def script() -> str:
-    return written("bash")
+PATH = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+EVERYWHERE = {"--help", "--version"}
 
 
-def written(shell: str) -> str:
-    """Return what ``t2 completion`` prints."""
-    import contextlib
-    import io
-
-    with contextlib.redirect_stdout(io.StringIO()) as out:
-        assert main(["completion", shell]) == 0
-    return out.getvalue()
+def script(shell: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the output of ``t2 completion``."""
+    assert main(["completion", shell]) == 0
+    return capsys.readouterr().out
 
 
-def offered(script: str, *words: str) -> list[str]:
-    """Return what bash would offer for the last of the words."""
-    typed = " ".join(f"'{word}'" for word in ("t2", *words))
-    asked = (
-        f"COMP_WORDS=({typed}); COMP_CWORD={len(words)}; _t2; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    )
+def completed(line: str, **environment: str) -> str:
+    """Run a program in bash with the variables of a completion; return its output."""
+    program = environment.pop("program")
     done = subprocess.run(
-        ["bash", "--norc", "-c", f"{script}\n{asked}"],
+        ["bash", "--norc", "-c", program],
+        env={**os.environ, "PATH": PATH, "COMP_LINE": line, "COMP_POINT": str(len(line)),
+             "COMP_TYPE": "9", **environment},
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
-    assert done.stderr == ""
-    return done.stdout.split()
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
 
 
-@pytest.mark.skipif(not shutil.which("bash"), reason="there is no bash here")
+def offered(shell_script: str, *words: str) -> set[str]:
+    """Return the candidates of bash for the last word."""
+    program = f"{shell_script}\n_python_argcomplete t2; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    return set(completed(" ".join(("t2", *words)), program=program).split())
+
+
+@pytest.mark.skipif(not shutil.which("bash"), reason="bash is not installed")
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
         (("ech",), {"echo"}),
-        (("",), set(COMMANDS)),
+        (("",), {*COMMANDS, *EVERYWHERE}),
         (("echo", "tel/o"), {"tel/odom/odometry", "tel/odom/health"}),
-        (("echo", "@cmd/m"), {"@cmd/motion"}),
         (("echo", "odometry", "--fi"), {"--field"}),
         (("call", "safety/r"), {"safety/reset", "safety/release"}),
         (("schema", "Odo"), {"Odometry"}),
         (("topic", "li"), {"list"}),
         (("topic", "echo", "tel/bridge/b"), {"tel/bridge/bumper"}),
         (("wire", "dec"), {"decode"}),
-        (("echo", "--config", ""), set()),  # bash offers files
+        (("echo", "--config", "pyproject.t"), {"pyproject.toml"}),
+        (("wire", "decode", "pyproject.t"), {"pyproject.toml"}),
+        (("echo", "-o", "j"), {"json"}),
+        (("pub", "tel/o"), set()),
         (("completion", "f"), {"fish"}),
     ],
 )
-def test_bash(script: str, words: tuple[str, ...], expected: set[str]) -> None:
-    assert set(offered(script, *words)) == expected
+def test_bash(
+    words: tuple[str, ...], expected: set[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert offered(script("bash", capsys), *words) == expected
 
 
-def test_zsh_takes_the_script_of_bash(script: str) -> None:
-    shown = written("zsh")
-    assert "bashcompinit" in shown
-    assert shown.endswith(script)
+@pytest.mark.skipif(not shutil.which("bash"), reason="bash is not installed")
+def test_bash_completes_the_part_of_a_key_after_a_word_break(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shell_script = f"COMP_WORDBREAKS=$' \\t\\n@'\n{script('bash', capsys)}"
+    assert offered(shell_script, "echo", "@cmd/m") == {"cmd/motion"}
 
 
-def test_fish_has_a_line_for_each_command_and_option() -> None:
-    lines = written("fish").splitlines()
-    for name in COMMANDS:
-        assert any(f"-a {name} " in line for line in lines), name
-    assert any("from echo' -l field " in line for line in lines)
-    assert any("topic ; and __fish_seen_subcommand_from hz' -l window " in line for line in lines)
+@pytest.mark.parametrize(
+    ("shell", "registration"),
+    [("zsh", "compdef _python_argcomplete t2"), ("fish", "complete --command t2 -f -a")],
+)
+def test_script_of_a_shell_registers_the_command(
+    shell: str, registration: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown = script(shell, capsys)
+    assert registration in shown
+    assert ("compinit" in shown) == (shell == "zsh")
+
+
+@pytest.mark.parametrize(("shell", "separator"), [("fish", "\t"), ("zsh", ":")])
+def test_candidates_have_descriptions(shell: str, separator: str) -> None:
+    def lines(line: str) -> list[str]:
+        return completed(
+            line, program="t2 8>&1 9>/dev/null", _ARGCOMPLETE="1", _ARGCOMPLETE_SHELL=shell,
+            _ARGCOMPLETE_IFS="\n", _ARGCOMPLETE_SUPPRESS_SPACE="1",
+            **({"_ARGCOMPLETE_DFS": separator} if shell == "fish" else {}),
+        ).splitlines()  # fmt: skip
+
+    assert f"echo{separator}{COMMANDS['echo']}" in lines("t2 ec")
+    assert any(line.startswith(f"--window{separator}of the last") for line in lines("t2 hz x --w"))
+    assert f"tel/bridge/bumper{separator}the bumper strip" in lines("t2 echo tel/bridge/b")

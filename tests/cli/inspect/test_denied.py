@@ -1,4 +1,4 @@
-"""What members see of their rights, on their own robot and through their site's router."""
+"""Members' rights, on their own robot and through their site's router."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -20,12 +20,12 @@ from verification.harness.support import at, joined, running, wait_until
 
 
 class OnBoard:
-    """Safety's ears on one robot: what arrives there."""
+    """Subscriptions of safety on one robot."""
 
     def __init__(self, bus: Bus) -> None:
-        self.heard: list[Arrival[Drive]] = []
+        self.received: list[Arrival[Drive]] = []
         self.estops: list[int] = []
-        bus.subscribe(keys.DRIVE, self.heard.append, source="*")
+        bus.subscribe(keys.DRIVE, self.received.append, source="*")
         for source in ("teleop", "web", "nav"):  # as safety does for each configured source
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
@@ -39,16 +39,16 @@ class Member:
     def __init__(self, bus: Bus, source: str) -> None:
         self.bus = bus
         self.source = DriveSource(bus, source)
-        self.told: list[str] = []
+        self.answers: list[str] = []
 
     def reset(self) -> str:
-        """Ask for a reset, and return what came of it."""
-        self.told.clear()
+        """Request a reset, and return the answer."""
+        self.answers.clear()
         self.bus.ask(
-            keys.RESET, ResetRequest(), lambda done: self.told.append(done.text),
-            self.told.append, timeout_s=1.0,
+            keys.RESET, ResetRequest(), lambda done: self.answers.append(done.text),
+            self.answers.append, timeout_s=1.0,
         )  # fmt: skip
-        return wait_until(lambda: self.told, "an answer")[0]
+        return wait_until(lambda: self.answers, "an answer")[0]
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def loop() -> Iterator[Loop]:
 
 @pytest.fixture
 def join(loop: Loop) -> Iterator[Callable[..., Bus]]:
-    """Let programs join the bus, each with its declarations."""
+    """Return a function that joins the bus with a program's declarations."""
     with ExitStack() as closing:
         yield lambda where, robot, declare: closing.enter_context(
             joined(where, robot, loop, declare)
@@ -94,10 +94,10 @@ def member(
 
 
 def drives(it: Member, robot: OnBoard) -> bool:
-    """Let a member ask until safety has it, or the member knows that it never will."""
+    """Return whether a member's request reaches safety; repeat until it does or is barred."""
 
     def came() -> bool:
-        return any(arrival.message.boot == it.bus.boot for arrival in robot.heard)
+        return any(arrival.message.boot == it.bus.boot for arrival in robot.received)
 
     def settled() -> bool:
         robot.state.put(safety_state(heartbeat=1))
@@ -108,9 +108,7 @@ def drives(it: Member, robot: OnBoard) -> bool:
     return came()
 
 
-def test_a_driver_drives_and_a_viewer_is_told_that_it_may_not(
-    site: Site, join: Callable[..., Bus]
-) -> None:
+def test_a_driver_drives_and_a_viewer_is_refused(site: Site, join: Callable[..., Bus]) -> None:
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         robot = on_board(join, onboard)
         anna = member(join, dialling(site.settings("driver", "anna"), secured))
@@ -141,7 +139,7 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
         assert anna.source.barred
 
 
-def test_through_the_sites_router_each_reaches_its_own(
+def test_members_reach_their_own_robots_through_the_sites_router(
     site: Site, join: Callable[..., Bus]
 ) -> None:
     with (
@@ -162,32 +160,32 @@ def test_through_the_sites_router_each_reaches_its_own(
         wait_until(stopped, "all robots stopped")
 
 
-def test_what_is_safetys_alone_does_not_come_down_the_uplink(site: Site) -> None:
+def test_motion_does_not_pass_the_uplink(site: Site) -> None:
     motion, stop = keys.MOTION.on("001"), keys.estop_key("001")
-    heard: list[str] = []
+    received: list[str] = []
     with (
         site.router(site.settings("site", "berlin")) as (center, room),
         site.router(site.settings("robot", "001"), center) as (_, onboard),
         zenoh.open(client_config(at(onboard))) as safety,
-        zenoh.open(client_config(at(room))) as somebody,
+        zenoh.open(client_config(at(room))) as site_member,
     ):
-        ears = [safety.declare_subscriber(key, lambda s: heard.append(str(s.key_expr)))
+        subscribers = [safety.declare_subscriber(key, lambda s: received.append(str(s.key_expr)))
                 for key in (motion, stop)]  # fmt: skip
 
         def passed() -> bool:
             for key in (motion, stop):
-                somebody.put(key, b"", congestion_control=zenoh.CongestionControl.BLOCK)
-            return bool(heard)
+                site_member.put(key, b"", congestion_control=zenoh.CongestionControl.BLOCK)
+            return bool(received)
 
         wait_until(passed, "a stop from the site")
-        assert set(heard) == {stop}
-        for ear in ears:
-            ear.undeclare()
+        assert set(received) == {stop}
+        for subscriber in subscribers:
+            subscriber.undeclare()
 
 
 @contextmanager
 def revoked(site: Site, tmp_path: Path) -> Iterator[None]:
-    """Take Anna off the list while the context lasts."""
+    """Revoke Anna's certificate during the context."""
     listed = site.folder / "members.json"
     before = listed.read_bytes()
     site.keys("revoke", "driver", "anna")
@@ -197,7 +195,7 @@ def revoked(site: Site, tmp_path: Path) -> Iterator[None]:
         listed.write_bytes(before)
 
 
-def test_a_revoked_certificate_passes_and_may_do_nothing(
+def test_a_revoked_certificate_has_no_rights(
     site: Site, join: Callable[..., Bus], tmp_path: Path
 ) -> None:
     with (
@@ -207,8 +205,8 @@ def test_a_revoked_certificate_passes_and_may_do_nothing(
         robot = on_board(join, onboard)
         anna = member(join, dialling(site.settings("driver", "anna"), secured))
         hall = member(join, dialling(site.settings("viewer", "hall"), secured))
-        assert not drives(hall, robot)  # and it has heard safety by then
+        assert not drives(hall, robot)  # by then it has received safety's state
         for _ in range(20):
             anna.source.ask(0.1, 0.0)
-        assert anna.source.ask(0.1, 0.0).echo == 0  # it hears nothing
-        assert not robot.heard
+        assert anna.source.ask(0.1, 0.0).echo == 0  # it receives no heartbeat
+        assert not robot.received

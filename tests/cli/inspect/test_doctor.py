@@ -1,4 +1,4 @@
-"""``t2 doctor`` on the real stack, with one fault after the other; and before there is a stack."""
+"""``t2 doctor`` on the real stack with injected faults, and without a stack."""
 
 import signal
 import socket
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from cli.inspect import remedies
-from cli.inspect.connect_probe import dial
+from cli.inspect.connect_probe import connect
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
@@ -33,25 +33,25 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
 def doctor(stack: Chain, capsys: pytest.CaptureFixture[str]) -> Callable[[], "list[Any]"]:
     tool = Tool(stack.endpoint, "001", capsys)
 
-    def look() -> list[Any]:
+    def diagnose() -> list[Any]:
         result = tool("doctor", "--duration", "2")
         assert result.err == ""
         assert result.code == (1 if wrong(result.lines) else 0)
         return result.lines
 
-    return look
+    return diagnose
 
 
 Doctor = Callable[[], "list[Any]"]
 
 
 def wrong(found: list[Any]) -> list[tuple[str, str]]:
-    """Return where something is wrong and what to do about it."""
+    """Return places and remedies of the problems."""
     return [(each["where"], each["todo"]) for each in found if each["level"] == "wrong"]
 
 
 def until_wrong(doctor: Doctor, where: str, todo: str) -> list[Any]:
-    """Look until that is found; a fault takes a moment, on these machines sometimes more."""
+    """Repeat the diagnosis until it finds the problem; a fault takes time to show."""
     found: list[Any] = []
     begin_s = time.monotonic()
     while (where, todo) not in wrong(found):
@@ -60,14 +60,14 @@ def until_wrong(doctor: Doctor, where: str, todo: str) -> list[Any]:
     return found
 
 
-def until_well(doctor: Doctor) -> None:
+def until_healthy(doctor: Doctor) -> None:
     begin_s = time.monotonic()
     while wrong(found := doctor()):
         assert time.monotonic() - begin_s < TRIES_S, found
 
 
-def test_all_is_well_but_for_a_bumper_and_a_sonar(stack: Chain, doctor: Doctor) -> None:
-    until_well(doctor)
+def test_a_pressed_bumper_and_a_faulty_sonar(stack: Chain, doctor: Doctor) -> None:
+    until_healthy(doctor)
 
     stack.control.do(Bumper(pressed=True))
     found = until_wrong(doctor, "bumper", remedies.BUMPER)
@@ -82,12 +82,12 @@ def test_all_is_well_but_for_a_bumper_and_a_sonar(stack: Chain, doctor: Doctor) 
 
 
 def reset(doctor: Doctor, stack: Chain) -> None:
-    """Reset as the doctor says, until safety does."""
+    """Reset as the remedy says, until safety does."""
     from cli.__main__ import main
 
     where = ["--set", f"bus.connect={stack.endpoint}"]
     wait_until(lambda: main(["call", "safety/reset", *where]) == 0, "a reset")
-    until_well(doctor)
+    until_healthy(doctor)
 
 
 def test_a_frozen_board(stack: Chain, doctor: Doctor) -> None:
@@ -100,7 +100,7 @@ def test_a_frozen_board(stack: Chain, doctor: Doctor) -> None:
 def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
     sources: list[Any] = []
 
-    def ask(_: int) -> None:
+    def request(_: int) -> None:
         for source in sources:
             source.put(Drive(linear=0.0, angular=0.0, echo=0))
 
@@ -112,14 +112,12 @@ def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
         bus_on(stack.endpoint, loop, declare),
         bus_on(stack.endpoint, loop, declare),
     ):
-        loop.post(lambda: loop.every(0.05, ask))
+        loop.post(lambda: loop.every(0.05, request))
         until_wrong(doctor, "driving", remedies.ONE_DRIVER)
 
 
-def test_services_that_are_not_there_and_all_is_well_once_they_are(
-    stack: Chain, doctor: Doctor
-) -> None:
-    # A process that is stopped whole is given up by the router; one whose loop hangs is not.
+def test_missing_services_and_their_return(stack: Chain, doctor: Doctor) -> None:
+    # The router drops a stopped process, but not one whose loop hangs.
     stack.processes["odom"].send_signal(signal.SIGSTOP)
     begin_s = time.monotonic()
     while not wrong(found := doctor()):
@@ -131,7 +129,7 @@ def test_services_that_are_not_there_and_all_is_well_once_they_are(
     found = until_wrong(doctor, "services", remedies.START)
     assert ("link", "unknown") in {(each["where"], each["level"]) for each in found}
     stack.start("bridge")
-    until_well(doctor)
+    until_healthy(doctor)
 
 
 # --- without a stack --------------------------------------------------------------------------
@@ -142,12 +140,12 @@ def test_no_router(capsys: pytest.CaptureFixture[str]) -> None:
     assert (result.code, result.err) == (1, "")
     lines = result.out.splitlines()
     assert "WRONG" in lines[0]
-    assert "nothing listens" in lines[0]
+    assert "connection refused" in lines[0]
     assert lines[1].strip() == f"-> {remedies.REFUSED}"
-    assert lines[-1] == "1 thing wrong."
+    assert lines[-1] == "1 problem found."
 
 
-def test_a_router_and_nobody_on_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_router_without_services(capsys: pytest.CaptureFixture[str]) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with router_process(endpoint):
         result = Tool(endpoint, "001", capsys)("doctor", "--duration", "0.2")
@@ -155,7 +153,7 @@ def test_a_router_and_nobody_on_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert wrong(result.lines) == [("services", remedies.START)] * 3
 
 
-def test_what_answers_is_no_router(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_endpoint_that_is_not_a_router(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         result = Tool(f"tcp/127.0.0.1:{port}", "001", capsys)("doctor")
@@ -163,22 +161,22 @@ def test_what_answers_is_no_router(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not dial("udp/127.0.0.1:7447", at()).tried
-    assert dial(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == remedies.NO_SOCKET
-    assert dial(f"unixsock-stream/{tmp_path}", at()).trouble == ""
+    assert not connect("udp/127.0.0.1:7447", at()).tried
+    assert connect(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == remedies.NO_SOCKET
+    assert connect(f"unixsock-stream/{tmp_path}", at()).trouble == ""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        reached = dial(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at())
+        reached = connect(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at())
     assert (reached.trouble, reached.tried) == ("", True)
     for error, todo in (
         (socket.gaierror(), remedies.NO_NAME),
-        (TimeoutError(), remedies.NO_WAY),
-        (OSError(101, "Network is unreachable"), remedies.NO_WAY),
+        (TimeoutError(), remedies.NO_ROUTE),
+        (OSError(101, "Network is unreachable"), remedies.NO_ROUTE),
     ):
 
         def fail(*_: object, error: OSError = error) -> None:
             raise error
 
         monkeypatch.setattr(socket, "create_connection", fail)
-        told = dial("tcp/robot:7447", at())
-        assert told.trouble
-        assert told.todo == todo
+        attempt = connect("tcp/robot:7447", at())
+        assert attempt.trouble
+        assert attempt.todo == todo

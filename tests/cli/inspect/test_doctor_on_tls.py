@@ -1,4 +1,4 @@
-"""What the doctor finds out about certificates: whose fault it is, and what to do."""
+"""Diagnosis of certificates: the invalid one, and its remedy."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,12 +36,12 @@ def endpoint(site: Site, driver: BusSettings) -> Iterator[str]:
 
 
 def found(member: BusSettings, endpoint: str) -> list[tuple[str, str, str]]:
-    """Return where something is, how it is, and what is said of it."""
+    """Return place, level and text of the findings."""
     config = Shared(bus=dialling(member, endpoint))
     return [(each.where, each.level, each.text) for each in findings(config, 0.5)]
 
 
-def test_a_certificate_that_is_taken(driver: BusSettings, endpoint: str) -> None:
+def test_a_valid_certificate(driver: BusSettings, endpoint: str) -> None:
     first, *rest = found(driver, endpoint)
     assert first[:2] == ("network", "ok")
     assert ("router", "ok") in {each[:2] for each in rest}
@@ -50,7 +50,7 @@ def test_a_certificate_that_is_taken(driver: BusSettings, endpoint: str) -> None
 def test_a_router_of_another_site(stranger: BusSettings, endpoint: str) -> None:
     (where, level, text), *_ = found(stranger, endpoint)
     assert (where, level) == ("network", "wrong")
-    assert f"{endpoint}: the router's certificate is not to be trusted: " in text
+    assert f"{endpoint}: the router's certificate is not trusted: " in text
 
 
 def test_a_certificate_of_another_site(
@@ -64,7 +64,7 @@ def test_a_certificate_of_another_site(
     assert first.todo == remedies.KEYS
 
 
-def test_a_router_at_an_address_that_its_certificate_does_not_name(
+def test_a_router_at_an_address_that_its_certificate_lacks(
     driver: BusSettings, endpoint: str
 ) -> None:
     (_, level, text), *_ = found(driver, endpoint.replace("127.0.0.1", "127.0.0.2"))
@@ -72,8 +72,8 @@ def test_a_router_at_an_address_that_its_certificate_does_not_name(
     assert "127.0.0.2" in text
 
 
-def test_files_that_are_of_no_use(driver: BusSettings, endpoint: str, tmp_path: Path) -> None:
+def test_invalid_files(driver: BusSettings, endpoint: str, tmp_path: Path) -> None:
     missing = msgspec.structs.replace(driver, private_key=str(tmp_path / "no.key"))
     (_, level, text), *_ = found(missing, endpoint)
     assert level == "wrong"
-    assert "bus.private_key is of no use: No such file or directory" in text
+    assert "bus.private_key is invalid: No such file or directory" in text

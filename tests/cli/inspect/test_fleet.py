@@ -1,4 +1,4 @@
-"""Many robots: who is there, and an emergency stop for one, a site's, or all."""
+"""Several robots: their list, and an emergency stop of one, a site or all."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
 
 
 class Robot:
-    """Safety of one robot, which latches when it is told to."""
+    """Safety of one robot; it latches on an emergency stop if ``obeys``."""
 
     def __init__(self, rig: BusFixture, obeys: bool = True) -> None:
         self.stops: list[int] = []
@@ -41,7 +41,7 @@ class Robot:
 
 @pytest.fixture
 def join(shared_router: str) -> Iterator[Join]:
-    """Give a robot of that name, on the router that all share."""
+    """Return a robot of that name, on the shared router."""
     with contextlib.ExitStack() as stack:
 
         def made(name: str) -> BusFixture:
@@ -54,14 +54,14 @@ def join(shared_router: str) -> Iterator[Join]:
 
 @pytest.fixture
 def t2(shared_router: str, capsys: pytest.CaptureFixture[str]) -> Tool:
-    """Run ``t2`` on no robot by name."""
+    """Run ``t2`` without a robot's name."""
     return Tool(shared_router, "", capsys)
 
 
 # --- estop ------------------------------------------------------------------------------------
 
 
-def test_a_site_is_stopped_and_no_other(join: Join, t2: Tool) -> None:
+def test_stop_of_one_site(join: Join, t2: Tool) -> None:
     berlin = [Robot(join(name)) for name in ("berlin-001", "berlin-002")]
     others = [Robot(join(name)) for name in ("munich-001", "berlinale-001", "001")]
     result = t2("estop", "--site", "berlin")
@@ -71,7 +71,7 @@ def test_a_site_is_stopped_and_no_other(join: Join, t2: Tool) -> None:
     assert not any(robot.stops for robot in others)
 
 
-def test_all_are_stopped(join: Join, t2: Tool) -> None:
+def test_stop_of_all(join: Join, t2: Tool) -> None:
     for name in ("berlin-001", "munich-001", "001"):
         Robot(join(name))
     result = t2("estop", "--all")
@@ -81,14 +81,14 @@ def test_all_are_stopped(join: Join, t2: Tool) -> None:
     ]  # fmt: skip
 
 
-def test_who_does_not_confirm_is_named(
+def test_unconfirmed_robots_are_named(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Robot(join("berlin-001"))
     Robot(join("berlin-002"), obeys=False)
     pretend(join("berlin-003"), "bridge", {})  # its safety has died
     pretend(join("berlin-004"), "dashboard", {})  # a laptop
-    monkeypatch.setattr(estop, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(estop, "TIMEOUT_S", 1.0)
     result = t2("estop", "--site", "berlin")
     assert result.code == 1
     assert "Robot berlin-001 is stopped." in result.out
@@ -99,10 +99,10 @@ def test_who_does_not_confirm_is_named(
     assert "berlin-004" not in result.err
 
 
-def test_a_driver_of_some_robots_stops_these_by_name(
+def test_a_driver_of_some_robots_stops_them_by_name(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Access rules let it put on the keys of its own robots, and not on one that means more."""
+    """Access rules allow the keys of its own robots, but not a key expression."""
     robot = Robot(join("berlin-001"))
     order = estop._order
     monkeypatch.setattr(estop, "_order", lambda probe, to: None if "*" in to else order(probe, to))
@@ -110,31 +110,31 @@ def test_a_driver_of_some_robots_stops_these_by_name(
     assert robot.stops
 
 
-def test_nobody_to_stop(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(estop, "PATIENCE_S", 0.2)
+def test_stop_of_an_empty_site(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estop, "TIMEOUT_S", 0.2)
     result = t2("estop", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
-    assert result.err == "t2 estop: sent, but no robot is there\n"
+    assert result.err == "t2 estop: sent, but no robot found\n"
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "phrase"),
     [
-        (("estop", "--site", "north-east"), "'north-east' is no site"),
+        (("estop", "--site", "north-east"), "'north-east' is not a site"),
         (("estop", "--site", "berlin", "--all"), "not allowed with"),
         (("call", "safety/reset", "--robot", "berlin-$*"), "one robot at a time"),
     ],
 )
-def test_what_is_no_good_is_said(words: tuple[str, ...], said: str, t2: Tool) -> None:
+def test_invalid_arguments(words: tuple[str, ...], phrase: str, t2: Tool) -> None:
     result = t2(*words)
     assert (result.code, result.out) == (2, "")
-    assert said in result.err
+    assert phrase in result.err
 
 
 # --- robots -----------------------------------------------------------------------------------
 
 
-def test_robots_are_listed_with_what_they_do(join: Join, t2: Tool) -> None:
+def test_list_of_robots(join: Join, t2: Tool) -> None:
     one = join("berlin-001")
     Robot(one)
     pretend(one, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
@@ -154,9 +154,7 @@ def test_robots_are_listed_with_what_they_do(join: Join, t2: Tool) -> None:
     assert rows[1] == ["berlin-001", "bridge", "safety", "run", "0.50", "web", "Drives."]
 
 
-def test_a_robot_that_tells_nothing_is_told_of(
-    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_silent_robots_are_listed(join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robots, "LISTEN_S", 0.3)
     pretend(join("a"), "safety", {})
     pretend(join("b"), "bridge", {})
@@ -168,7 +166,7 @@ def test_a_robot_that_tells_nothing_is_told_of(
     }  # fmt: skip
 
 
-def test_what_is_no_word_of_safety_is_said(
+def test_an_invalid_state_is_reported(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robots, "LISTEN_S", 0.3)
@@ -184,16 +182,16 @@ def test_what_is_no_word_of_safety_is_said(
 def test_no_robots(t2: Tool) -> None:
     result = t2("robots", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
-    assert "nobody is there" in result.err
+    assert "no robot found" in result.err
 
 
-@pytest.mark.parametrize("seat", ["on board", "at the site"])
+@pytest.mark.parametrize("place", ["on board", "at the site"])
 def test_services_of_a_robot_that_dials_a_site(
-    seat: str, capsys: pytest.CaptureFixture[str]
+    place: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its router is a peer, and no member by itself, neither on board nor at the site."""
+    """Its router is a peer and not listed as a member, neither on board nor at the site."""
     own, site = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
-    tool = Tool({"on board": own, "at the site": site}[seat], "berlin-001", capsys)
+    tool = Tool({"on board": own, "at the site": site}[place], "berlin-001", capsys)
 
     def found() -> dict[str, Any]:
         return {line["name"]: line["publishes"] for line in tool("services").lines}

@@ -1,4 +1,4 @@
-"""Who is there, from tokens and the router's admin space."""
+"""Members of the bus, from tokens and the router's admin space."""
 
 from typing import Any
 
@@ -28,43 +28,43 @@ DECLARED = dict(
 )  # fmt: skip
 
 
-def who() -> list[Member]:
+def found() -> list[Member]:
     return members(TOKENS, DECLARED, without=("me",))
 
 
-def same(one: str, other: str) -> bool:
+def intersects(one: str, other: str) -> bool:
     return one == other or other.endswith("**")
 
 
-def test_services_bear_their_names_and_strangers_their_ids() -> None:
-    bridge, safety, stranger = who()
+def test_services_have_names_and_other_sessions_ids() -> None:
+    bridge, safety, other = found()
     assert (bridge.name, bridge.robot, bridge.instance, bridge.zid) == ("bridge", "7", "1a", "zb")
     assert bridge.publishes == {"t2/v1/7/tel/bridge/bumper"}
     assert safety.reads == {"t2/v1/7/tel/bridge/bumper"}
     assert safety.answers == {"t2/v1/7/srv/safety/reset"}
-    assert (stranger.name, stranger.instance) == ("stranger", "")
+    assert (other.name, other.instance) == ("stranger", "")
 
 
-def test_without_the_admin_space_the_tokens_are_left() -> None:
+def test_tokens_are_enough_without_the_admin_space() -> None:
     assert [each.name for each in members(TOKENS, {})] == ["bridge", "safety"]
 
 
-def test_every_way_from_one_to_another() -> None:
-    assert edges(who(), same) == [
+def test_edges() -> None:
+    assert edges(found(), intersects) == [
         Edge("bridge", "t2/v1/7/tel/bridge/bumper", "safety"),
         Edge("bridge", "t2/v1/7/tel/bridge/bumper", "stranger"),
         Edge("safety", "t2/v1/7/tel/safety/state", "stranger"),
     ]
 
 
-def test_two_of_one_name_are_told_apart() -> None:
+def test_members_of_one_name_have_unique_titles() -> None:
     two = [Member("safety", robot="7", instance=each) for each in ("aaaa1", "bbbb2")]
     assert [title(each, two) for each in two] == ["safety:aaaa", "safety:bbbb"]
     assert title(two[0], [two[0], Member("safety", robot="8", instance="cc")]) == "safety"
 
 
-def test_the_graph_for_graphviz() -> None:
-    shown = dot(who(), edges(who(), same), "7")
+def test_dot() -> None:
+    shown = dot(found(), edges(found(), intersects), "7")
     assert shown.startswith("digraph t2 {")
     assert '  "bridge" -> "safety" [label="tel/bridge/bumper"];' in shown
     assert '  "stranger" [style=dashed];' in shown
@@ -72,9 +72,9 @@ def test_the_graph_for_graphviz() -> None:
 
 
 def test_publishers_by_key_and_by_boot() -> None:
-    assert publishers(who())["t2/v1/7/tel/bridge/bumper"] == ["bridge"]
+    assert publishers(found())["t2/v1/7/tel/bridge/bumper"] == ["bridge"]
     strange = Member("x", instance="no number")
-    assert {boot: member.name for boot, member in by_boot([*who(), strange]).items()} == {
+    assert {boot: member.name for boot, member in by_boot([*found(), strange]).items()} == {
         0x1A: "bridge",
         0x2B: "safety",
     }

@@ -1,4 +1,4 @@
-"""``t2 health``: all of them by what they tell, one of them by its own answer."""
+"""``t2 health``: all services by their messages, one service by its answer."""
 
 import threading
 from collections.abc import Iterator
@@ -27,18 +27,18 @@ def test_health(rig: BusFixture, tool: Tool) -> None:
     assert "it hangs" in result.err
 
 
-def test_nobody_tells_how_another_fares(rig: BusFixture, tool: Tool) -> None:
+def test_health_of_another_service_is_refused(rig: BusFixture, tool: Tool) -> None:
     pretend(rig, "dashboard", {keys.HEALTH: partial(health, "safety")}, service="dashboard")
     result = tool("health")
     assert {line["service"]: line["alive"] for line in result.lines} == {
         "bridge": False, "safety": False, "odom": False, "dashboard": True,
     }  # fmt: skip
-    assert "tel/dashboard/health: the health of another service than the key's" in result.err
+    assert "tel/dashboard/health: the message names another service than the key" in result.err
 
 
 @pytest.fixture
 def answers() -> dict[str, bytes]:
-    """What safety of that robot answers when it is asked for its last values, by robot."""
+    """Safety's answers to a query for its last messages, by robot."""
     return {}
 
 
@@ -54,7 +54,7 @@ def safety(rig: BusFixture, answers: dict[str, bytes]) -> Bus:
     return pretend(rig, "safety", {}, answer)
 
 
-def test_one_is_asked_itself(safety: Bus, tool: Tool) -> None:
+def test_query_of_one_service(safety: Bus, tool: Tool) -> None:
     result = tool("health", "safety")
     assert (result.code, result.err) == (0, "")
     (line,) = result.lines
@@ -65,11 +65,11 @@ def test_one_is_asked_itself(safety: Bus, tool: Tool) -> None:
     assert shown.split()[1:4] == ["safety", "ok", "1"]
 
 
-def test_one_of_every_robot(rig: BusFixture, safety: Bus, tool: Tool) -> None:
+def test_query_of_every_robot(rig: BusFixture, safety: Bus, tool: Tool) -> None:
     assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [rig.robot]
 
 
-def test_one_that_has_only_just_begun_fares_well(
+def test_a_service_without_health_yet(
     rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes]
 ) -> None:
     answers[rig.robot] = b"{}"
@@ -78,14 +78,14 @@ def test_one_that_has_only_just_begun_fares_well(
 
 
 @pytest.mark.parametrize("nonsense", [b"\xff", b"[]", b'{"KEY": {"service": 1}}'])
-def test_an_answer_that_is_no_health(
+def test_an_invalid_answer(
     rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
 ) -> None:
     key = keys.HEALTH.on(rig.robot, service="safety")
     answers[rig.robot] = nonsense.replace(b"KEY", key.encode())
     result = tool("health", "safety")
     assert (result.code, result.lines[0]["alive"]) == (1, False)
-    assert f"safety of robot {rig.robot} answers what is no health" in result.err
+    assert f"safety of robot {rig.robot} answers with an invalid health message" in result.err
 
 
 @pytest.fixture
@@ -93,15 +93,15 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "ANSWER_S", 0.3)
 
 
-def test_one_that_is_not_there(tool: Tool, impatient: None) -> None:
+def test_an_absent_service(tool: Tool, impatient: None) -> None:
     result = tool("health", "odom")
     assert (result.code, result.lines[0]["alive"]) == (1, False)
     assert f"odom of robot {tool.robot} does not answer" in result.err
 
 
 @pytest.fixture
-def held_up(rig: BusFixture, safety: Bus) -> Iterator[None]:
-    """Hold the loop of all services up while the test runs."""
+def stalled(rig: BusFixture, safety: Bus) -> Iterator[None]:
+    """Block the loop of all services while the test runs."""
     end = threading.Event()
 
     def hang() -> None:
@@ -112,13 +112,15 @@ def held_up(rig: BusFixture, safety: Bus) -> Iterator[None]:
     end.set()
 
 
-def test_one_whose_loop_hangs_does_not_answer(held_up: None, tool: Tool, impatient: None) -> None:
+def test_a_service_with_a_blocked_loop_does_not_answer(
+    stalled: None, tool: Tool, impatient: None
+) -> None:
     result = tool("health", "safety")
     assert result.code == 1
     assert "does not answer" in result.err
 
 
-def test_the_router_answers_by_letting_us_in(tool: Tool) -> None:
+def test_health_of_the_router(tool: Tool) -> None:
     result = tool("health", "router", "--text")
     assert (result.code, result.err) == (0, "")
     assert result.out.splitlines()[1].split() == [tool.robot, "router", "ok"]

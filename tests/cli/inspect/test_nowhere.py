@@ -1,4 +1,4 @@
-"""The tools where there is no router, nobody who speaks, and nothing that can be carried."""
+"""Commands without a router, without a publisher, and with an unencodable message."""
 
 import contextlib
 import threading
@@ -21,16 +21,16 @@ def test_without_a_router(word: str, tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
-def test_a_stop_that_cannot_be_sent_says_what_else_stops_it(
+def test_an_unsent_stop_names_the_switch(
     words: tuple[str, ...], tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(estop, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(estop, "TIMEOUT_S", 0.1)
     result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", tool.capsys)(*words)
     assert (result.code, result.out) == (EXIT_LINK, "")
     assert "NOT SENT, USE THE VEHICLE'S OWN SWITCH" in result.err
 
 
-def test_a_stop_waits_for_a_router_that_comes_back(tool: Tool) -> None:
+def test_a_stop_waits_for_a_restarted_router(tool: Tool) -> None:
     where = f"tcp/127.0.0.1:{free_port()}"
     with contextlib.ExitStack() as stack:
         late = threading.Timer(1.0, lambda: stack.enter_context(router_process(where)))
@@ -40,14 +40,16 @@ def test_a_stop_waits_for_a_router_that_comes_back(tool: Tool) -> None:
     assert "sent, but safety of robot 001 does not confirm" in result.err
 
 
-def test_a_number_that_messagepack_cannot_carry_is_refused(tool: Tool) -> None:
+def test_a_number_beyond_messagepack_is_refused(tool: Tool) -> None:
     result = tool("pub", "tel/mine/x", '{"a": 99999999999999999999999}')
     assert result.code == 2
-    assert "MessagePack cannot carry it" in result.err
+    assert "MessagePack cannot encode it" in result.err
 
 
-def test_echo_says_that_nothing_comes_yet(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(echo, "SOON_S", 0.1)
+def test_echo_reports_that_no_message_arrived_yet(
+    tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(echo, "FIRST_S", 0.1)
     result = tool("echo", "tel/nothing", "--duration", "0.3")
     assert result.code == 1
-    assert "yet; it goes on listening" in result.err
+    assert "yet; waiting" in result.err

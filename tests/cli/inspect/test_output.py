@@ -7,17 +7,17 @@ import pytest
 from cli.inspect import output
 
 
-def test_a_table_is_aligned_and_numbers_stand_to_the_right() -> None:
+def test_a_table_is_aligned_with_numbers_to_the_right() -> None:
     shown = output.table(("key", "Hz"), [("tel/a", "5.0"), ("b", "120.5"), ("c", "-")])
     assert shown.splitlines() == ["key       Hz", "tel/a    5.0", "b      120.5", "c          -"]
 
 
-def test_nothing_from_the_bus_steers_the_terminal() -> None:
+def test_control_characters_are_escaped() -> None:
     assert output.table(["a"], [["\x1b[2Jgone\n"]]) == "a\n\\x1b[2Jgone\\n"
     assert output.fields({"text": "急停\x07"}) == "text: 急停\\x07"
 
 
-def test_a_table_without_rows_is_its_head() -> None:
+def test_an_empty_table() -> None:
     assert output.table(("a", "b"), []) == "a  b"
 
 
@@ -38,7 +38,7 @@ def test_fields(value: object, shown: str) -> None:
     assert output.fields(value) == shown
 
 
-def test_a_line_is_json_whatever_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_any_value_is_a_json_line(capsys: pytest.CaptureFixture[str]) -> None:
     output.line({"a": float("nan"), 1: b"\x01\xff", "s": {2}, "t": (1, 2)})
     shown = json.loads(capsys.readouterr().out)
     assert shown == {"a": None, "1": "01ff", "s": "{2}", "t": [1, 2]}

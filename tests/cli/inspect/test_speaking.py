@@ -1,4 +1,4 @@
-"""The tools that speak: what is put, asked and stopped, on a real router."""
+"""Commands that publish, call and stop, on a real router."""
 
 import pytest
 
@@ -39,34 +39,34 @@ def test_pub_fills_in_the_header(rig: BusFixture, tool: Tool) -> None:
     subscriber.undeclare()
 
 
-def test_pub_says_when_nobody_reads(tool: Tool) -> None:
+def test_pub_reports_a_missing_reader(tool: Tool) -> None:
     result = tool("pub", "tel/mine/t", "--once", "--text")
     assert (result.code, result.out) == (0, "published 1 on tel/mine/t\n")
-    assert "nobody reads tel/mine/t" in result.err
+    assert "no reader on tel/mine/t" in result.err
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "phrase"),
     [
-        (("pub", "tel/*", "{}"), "means many keys"),
-        (("pub", "tel/mine", "{"), "is no JSON"),
-        (("pub", "tel/mine", "[1]"), "is no object"),
+        (("pub", "tel/*", "{}"), "matches several keys"),
+        (("pub", "tel/mine", "{"), "is not JSON"),
+        (("pub", "tel/mine", "[1]"), "is not an object"),
         (("pub", "tel/mine/health", '{"service": 1}'), "not a Health"),
         (("pub", "tel/mine", "--rate", "0"), "--rate"),
-        (("echo", "tel//x"), "is no key"),
+        (("echo", "tel//x"), "is not a key"),
         (("echo", "tel/x", "--count", "0"), "--count"),
         (("hz", "tel/x", "--duration", "nan"), "--duration"),
         (("call", "bridge/led", '{"chanel": 1}'), "not a LedRequest"),
     ],
 )
-def test_what_is_no_good_is_said(words: tuple[str, ...], said: str, tool: Tool) -> None:
+def test_invalid_arguments(words: tuple[str, ...], phrase: str, tool: Tool) -> None:
     result = tool(*words)
     assert (result.code, result.out) == (2, "")
-    assert said in result.err
+    assert phrase in result.err
 
 
 @pytest.mark.parametrize("words", [("call", "safety/reset"), ("pub", "tel/mine"), ("doctor",)])
-def test_what_is_for_one_robot_at_a_time(words: tuple[str, ...], tool: Tool) -> None:
+def test_commands_for_one_robot(words: tuple[str, ...], tool: Tool) -> None:
     result = tool(*words, robot="*")
     assert (result.code, result.out) == (2, "")
     assert "one robot at a time" in result.err
@@ -92,11 +92,11 @@ def test_call(rig: BusFixture, tool: Tool) -> None:
     assert result.err == "t2 call: refused: the bumper is free\n"
 
 
-def test_a_call_that_nobody_answers(tool: Tool) -> None:
+def test_a_call_without_an_answer(tool: Tool) -> None:
     result = tool("call", "bridge/led", '{"channel": 1, "mode": 0}', "--timeout", "0.3")
     assert (result.code, result.out) == (1, "")
     assert "bridge does not answer" in result.err
-    assert "nobody answers" in tool("call", "mine/x", "--timeout", "0.3").err
+    assert "no service answers" in tool("call", "mine/x", "--timeout", "0.3").err
 
 
 def test_a_short_name_of_two_calls_is_ambiguous(tool: Tool) -> None:
@@ -106,13 +106,13 @@ def test_a_short_name_of_two_calls_is_ambiguous(tool: Tool) -> None:
     )  # fmt: skip
 
 
-def test_what_there_is_to_call(tool: Tool) -> None:
+def test_list_of_calls(tool: Tool) -> None:
     assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
     assert "clear the causes that are named" in tool("call", "--text").out
 
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
-def test_estop_is_sent_until_safety_confirms(
+def test_estop_repeats_until_safety_confirms(
     words: tuple[str, ...], rig: BusFixture, tool: Tool
 ) -> None:
     stopped: list[int] = []
@@ -127,10 +127,8 @@ def test_estop_is_sent_until_safety_confirms(
     assert stopped
 
 
-def test_an_estop_that_nobody_confirms(
-    rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(estop, "PATIENCE_S", 0.3)
+def test_an_unconfirmed_estop(rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estop, "TIMEOUT_S", 0.3)
     pretend(rig, "safety", {keys.SAFETY: state})
     result = tool("estop")
     assert (result.code, result.out) == (1, "")

@@ -1,4 +1,4 @@
-"""The tools on a real router, looking at services that only pretend to be there."""
+"""Inspection commands on a real router with simulated services."""
 
 import json
 import signal
@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from cli.inspect import info, measure
+from cli.inspect import measure, topic
 from common import codec, keys
 from common.bus.bus import Bus
 from common.messages import Bumper, Event
@@ -30,7 +30,7 @@ def bridge(rig: BusFixture) -> Bus:
 # --- echo -------------------------------------------------------------------------------------
 
 
-def test_echo_shows_a_message_as_json_in_a_pipe(bridge: Bus, tool: Tool) -> None:
+def test_echo_as_json(bridge: Bus, tool: Tool) -> None:
     result = tool("echo", "bumper", "--once")
     (line,) = result.lines
     assert (result.code, result.err) == (0, "")
@@ -38,14 +38,14 @@ def test_echo_shows_a_message_as_json_in_a_pipe(bridge: Bus, tool: Tool) -> None
     assert (line["message"]["pressed"], line["message"]["boot"]) == (True, bridge.boot)
 
 
-def test_echo_shows_a_message_to_people(bridge: Bus, tool: Tool) -> None:
+def test_echo_as_text(bridge: Bus, tool: Tool) -> None:
     head, *fields = tool("echo", "bumper", "--once", "--text").out.splitlines()
     assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
     assert fields == ["pressed: true", "lost: 0", "---"]
     assert "boot: " in tool("echo", "bumper", "--once", "--text", "--header").out
 
 
-def test_echo_shows_a_message_as_one_line(bridge: Bus, tool: Tool) -> None:
+def test_echo_as_one_line(bridge: Bus, tool: Tool) -> None:
     first, second = tool("echo", "bumper", "--count", "2", "-o", "table").out.splitlines()
     clock, key, fields = first.split(maxsplit=2)
     assert time.strptime(clock.partition(".")[0], "%H:%M:%S")
@@ -67,11 +67,11 @@ def test_echo_shows_one_field(bridge: Bus, tool: Tool) -> None:
     assert tool("echo", "bumper", "--field", "pressed", "--count", "2").out == "true\ntrue\n"
     result = tool("echo", "bumper", "--field", "presed")
     assert (result.code, result.out) == (1, "")
-    assert "there is no 'presed'" in result.err
+    assert "no field 'presed'" in result.err
     assert "pressed" in result.err
 
 
-def test_echo_shows_what_is_no_message(rig: BusFixture, tool: Tool) -> None:
+def test_echo_shows_invalid_messages(rig: BusFixture, tool: Tool) -> None:
     session = rig.session()
     payloads = [(b"\xc1", "zenoh/bytes"), (b"\x81\xa1a\x01", codec.encoding(Bumper))]
 
@@ -86,25 +86,25 @@ def test_echo_shows_what_is_no_message(rig: BusFixture, tool: Tool) -> None:
         ("bytes", '"c1"'), ("Bumper", '{"a": 1}'), ("empty", "null"),
     }  # fmt: skip
     complaints = {line["type"]: line.get("complaint", "") for line in lines}
-    assert complaints["bytes"] == "no MessagePack"
+    assert complaints["bytes"] == "not MessagePack"
     assert "pressed" in complaints["Bumper"]
     assert any(line.get("deleted") for line in lines)
     shown = tool("echo", "tel/x", "--count", "6", "--text").out
-    assert "# not as it should be: not a Bumper" in shown
+    assert "# invalid: not a Bumper" in shown
     assert "DELETE" in shown
 
 
-def test_echo_shows_events_that_were_before_it(rig: BusFixture, tool: Tool) -> None:
-    def tell(bus: Bus) -> None:
+def test_echo_shows_earlier_events(rig: BusFixture, tool: Tool) -> None:
+    def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
             Event(name="x", level="info", text="long ago")
         )
 
-    rig.bus(tell)
+    rig.bus(publish)
     assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
 
 
-def test_silence_is_said(tool: Tool) -> None:
+def test_echo_reports_silence(tool: Tool) -> None:
     result = tool("echo", "tel/none", "--duration", "0.2")
     assert (result.code, result.out) == (1, "")
     assert "no message on t2/v1/" in result.err
@@ -121,7 +121,7 @@ def test_silence_is_said(tool: Tool) -> None:
         ("bw", {"bytes_per_s", "mean", "min", "max", "window"}),
     ],
 )
-def test_what_is_measured(word: str, fields: set[str], bridge: Bus, tool: Tool) -> None:
+def test_measured_fields(word: str, fields: set[str], bridge: Bus, tool: Tool) -> None:
     result = tool(word, "tel/**", "--count", "20")
     assert (result.code, result.err) == (0, "")
     line = result.lines[-1]
@@ -137,10 +137,8 @@ def test_the_delay_is_by_the_host_s_own_clock_where_it_is_shared(bridge: Bus, to
     assert 0 < line["min"] < 5
 
 
-def test_it_tells_once_a_second_and_says_when_nothing_comes(
-    tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(measure, "TELL_S", 0.05)
+def test_silence_is_reported_once_a_second(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measure, "REPORT_S", 0.05)
     result = tool("hz", "tel/none", "--duration", "0.3")
     assert (result.code, result.out) == (1, "")
     assert "t2 hz: no new messages" in result.err
@@ -155,10 +153,10 @@ def test_ls_names_type_rate_and_publisher(rig: BusFixture, bridge: Bus, tool: To
     )
     found = {line["key"]: line for line in tool("ls", "--duration", "1").lines}
     assert found.keys() == {"tel/bridge/bumper", "tel/bridge/velocity", "tel/x"}
-    told = found["tel/bridge/bumper"]
-    assert (told["type"], told["expected_hz"]) == ("Bumper", 50)
-    assert told["publishers"] == ["bridge"]
-    assert told["hz"] > 1
+    row = found["tel/bridge/bumper"]
+    assert (row["type"], row["expected_hz"]) == ("Bumper", 50)
+    assert row["publishers"] == ["bridge"]
+    assert row["hz"] > 1
     assert (found["tel/bridge/velocity"]["hz"], found["tel/x"]["expected_hz"]) == (None, None)
     shown = tool("list", "bumper", "--duration", "0.5", "--text").out.splitlines()
     assert shown[0].split() == ["key", "type", "Hz", "of", "publisher"]
@@ -167,7 +165,7 @@ def test_ls_names_type_rate_and_publisher(rig: BusFixture, bridge: Bus, tool: To
     assert keys.BUMPER.on(rig.robot) in {line["key"] for line in every}
 
 
-def test_ls_of_nothing(tool: Tool) -> None:
+def test_ls_without_keys(tool: Tool) -> None:
     result = tool("ls", "--duration", "0.2")
     assert (result.code, result.out) == (1, "")
     assert "t2 doctor" in result.err
@@ -175,14 +173,14 @@ def test_ls_of_nothing(tool: Tool) -> None:
 
 def test_topic_info(bridge: Bus, rig: BusFixture, tool: Tool) -> None:
     rig.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
-    (told,) = tool("topic", "info", "/tel/bridge/bumper").lines
-    assert (told["type"], told["hz"], told["class"]) == ("Bumper", 50, "fast")
-    assert told["publishers"] == ["bridge"]
-    assert len(told["readers"]) == 1
+    (row,) = tool("topic", "info", "/tel/bridge/bumper").lines
+    assert (row["type"], row["hz"], row["class"]) == ("Bumper", 50, "fast")
+    assert row["publishers"] == ["bridge"]
+    assert len(row["readers"]) == 1
 
 
-def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(info, "LISTEN_S", 0.1)
+def test_topic_info_of_an_unknown_key(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(topic, "LISTEN_S", 0.1)
     result = tool("topic", "info", "tel/none")
     assert (result.code, result.lines[0]["publishers"]) == (1, [])
 
@@ -201,13 +199,13 @@ def test_services(rig: BusFixture, bridge: Bus, tool: Tool) -> None:
     assert '"bridge" -> "safety" [label="tel/bridge/bumper"];' in tool("services", "--dot").out
     shown = tool("services", "--text").out
     assert "publishes  tel/bridge/bumper            -> safety" in shown
-    assert "publishes  @cmd/motion                  -> nobody" in shown
+    assert "publishes  @cmd/motion                  -> no reader" in shown
 
 
-def test_nobody_is_there(tool: Tool) -> None:
+def test_no_services(tool: Tool) -> None:
     result = tool("services")
     assert (result.code, result.out) == (1, "")
-    assert "nobody is there" in result.err
+    assert "no service found" in result.err
 
 
 def test_schema_by_type_and_by_key(tool: Tool) -> None:
@@ -221,7 +219,7 @@ def test_schema_by_type_and_by_key(tool: Tool) -> None:
     assert "Odometry" in {line["type"] for line in tool("schema").lines}
 
 
-def test_a_type_that_there_is_not(tool: Tool) -> None:
+def test_an_unknown_type(tool: Tool) -> None:
     result = tool("schema", "Odomtry")
     assert (result.code, result.out) == (1, "")
     assert "did you mean Odometry?" in result.err
@@ -231,9 +229,7 @@ def test_a_type_that_there_is_not(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_without_a_word(
-    number: signal.Signals, bridge: Bus, rig: BusFixture
-) -> None:
+def test_ctrl_c_ends_it_silently(number: signal.Signals, bridge: Bus, rig: BusFixture) -> None:
     where = ("--set", f"bus.connect={rig.endpoint}", "--robot", rig.robot)
     with subprocess.Popen(
         t2("echo", "bumper", *where), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -245,7 +241,7 @@ def test_ctrl_c_ends_it_without_a_word(
     assert (process.returncode, err) == (0, "")
 
 
-def test_a_reader_that_goes_away_ends_it_without_a_word(bridge: Bus, rig: BusFixture) -> None:
+def test_a_closed_pipe_ends_it_silently(bridge: Bus, rig: BusFixture) -> None:
     words = f"echo bumper -o json --set bus.connect={rig.endpoint} --robot {rig.robot}"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],

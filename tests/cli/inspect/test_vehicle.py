@@ -1,12 +1,12 @@
-"""From what was seen to findings: bridge to wheels."""
+"""Diagnosis of an observation: bridge to wheels."""
 
 from typing import Any, get_args
 
 import pytest
 
 from cli.inspect import remedies
-from cli.inspect.diagnosis import Finding, Seen
-from cli.inspect.vehicle import STREAMS, at_the_vehicle, drivers, driving, link, safety, switches
+from cli.inspect.diagnosis import Finding, Observation
+from cli.inspect.vehicle import STREAMS, diagnose_vehicle, drivers, driving, link, safety, switches
 from common import messages as m
 from common.messages import FaultName
 from services.safety.causes import RULES
@@ -15,9 +15,9 @@ CLEAR: Any = ("ok",) * 8
 
 
 def link_of(state: Any = "up", **given: Any) -> m.Link:
-    well: dict[str, Any] = {"board": "10.7.5.224:4002", "epoch": 0, "armed": True, "waiting": "",
+    healthy: dict[str, Any] = {"board": "10.7.5.224:4002", "epoch": 0, "armed": True, "waiting": "",
                             "rates": {}, "rejected": {}, "round_trip": 0.002}  # fmt: skip
-    return m.Link(state=state, **(well | given))
+    return m.Link(state=state, **(healthy | given))
 
 
 def state_of(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
@@ -34,9 +34,9 @@ def state_of(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
     )  # fmt: skip
 
 
-def seen(**given: Any) -> Seen:
-    """Return a robot that is well, but for what is given."""
-    well: dict[str, Any] = {
+def seen(**given: Any) -> Observation:
+    """Return the observation of a healthy robot, with the given differences."""
+    healthy: dict[str, Any] = {
         "link": link_of(), "switches": m.Switches(ultrasonic_brake=True, bumper_brake=True),
         "bumper": m.Bumper(pressed=False),
         "ultrasonic": m.Ultrasonic(ranges=(1.0,) * 8, status=CLEAR),
@@ -44,139 +44,142 @@ def seen(**given: Any) -> Seen:
         "instances": {"bridge": 1}, "safety": state_of("no_request"),
         "rates": {topic.path: topic.rate_hz for topic in STREAMS},
     }  # fmt: skip
-    return Seen(zenoh="1", t2="1", **(well | given))
+    return Observation(zenoh="1", t2="1", **(healthy | given))
 
 
 def wrong(found: Any) -> list[tuple[str, str]]:
-    """Return what is wrong and what to do."""
+    """Return problems and remedies."""
     return [(each.text, each.todo) for each in found if each.level == "wrong"]
 
 
-def test_all_is_well() -> None:
-    assert {each.level for each in at_the_vehicle(seen())} == {"ok"}
+def test_a_healthy_vehicle() -> None:
+    assert {each.level for each in diagnose_vehicle(seen())} == {"ok"}
 
 
-def test_without_a_bridge_nothing_is_known() -> None:
-    found = list(at_the_vehicle(Seen(zenoh="1", t2="1")))
+def test_without_a_bridge_the_board_is_unknown() -> None:
+    found = list(diagnose_vehicle(Observation(zenoh="1", t2="1")))
     assert [(each.where, each.level) for each in found] == [
         ("link", "unknown"), ("driving", "ok"), ("safety", "unknown"),
     ]  # fmt: skip
 
 
-def test_a_bridge_that_tells_nothing() -> None:
-    (found,) = (each for each in at_the_vehicle(seen(link=None)) if each.where == "link")
-    assert (found.level, found.text) == ("unknown", "the bridge tells nothing of the board")
+def test_a_bridge_without_link_messages() -> None:
+    (found,) = (each for each in diagnose_vehicle(seen(link=None)) if each.where == "link")
+    assert (found.level, found.text) == ("unknown", "the bridge does not report the board")
 
 
 @pytest.mark.parametrize(
     ("state", "todo"), [("never", remedies.BOARD_NEVER), ("lost", remedies.BOARD_LOST)]
 )
-def test_a_board_that_is_not_there(state: str, todo: str) -> None:
-    found = list(at_the_vehicle(seen(link=link_of(state), bumper=m.Bumper(pressed=True))))
+def test_an_absent_board(state: str, todo: str) -> None:
+    found = list(diagnose_vehicle(seen(link=link_of(state), bumper=m.Bumper(pressed=True))))
     assert [each[1] for each in wrong(found)] == [todo]
-    assert Finding("sensors", "unknown", "not to be read without the board") in found
+    assert Finding("sensors", "unknown", "no sensor data without the board") in found
 
 
-def test_frames_that_are_refused_while_it_listens() -> None:
+def test_frames_rejected_during_the_observation() -> None:
     before, now = link_of(rejected={"bad_crc": 4, "no_magic": 1}), {"bad_crc": 9, "no_magic": 1}
     first, second = link(link_of(rejected=now), before)
     assert (first.level, first.todo) == ("note", remedies.BOARD_REFUSED)
-    assert first.text.endswith("sends: 5 bad_crc")
-    assert second.text.endswith("is there, answers in 2.0 ms")
+    assert first.text.endswith("of the board: 5 bad_crc")
+    assert second.text.endswith("is up, answers in 2.0 ms")
     assert [each.level for each in link(link_of(round_trip=None), None)] == ["ok"]
 
 
-def test_datagrams_that_the_system_refuses_to_send_while_it_listens() -> None:
+def test_datagrams_unsent_during_the_observation() -> None:
     first, second = link(link_of(send_errors=7), link_of(send_errors=4))
     assert (first.level, first.todo) == ("wrong", remedies.SEND_ERRORS)
-    assert first.text == "the system refused to send 3 datagrams to the board"
+    assert first.text == "the system failed to send 3 datagrams to the board"
     assert second.level == "ok"
     assert [each.level for each in link(link_of(send_errors=7), link_of(send_errors=7))] == ["ok"]
 
 
-def test_a_bridge_that_waits() -> None:
+def test_a_bridge_that_accepts_no_motion() -> None:
     found = list(link(link_of(armed=False, waiting="link lost"), None))
     assert found[-1].level == "note"
     assert "link lost" in found[-1].text
 
 
 @pytest.mark.parametrize(
-    ("told", "said"),
+    ("message", "phrase"),
     [
         (m.Switches(ultrasonic_brake=False, bumper_brake=True), ["ultrasonic brake is off"]),
         (m.Switches(ultrasonic_brake=True), ["bumper brake is not confirmed"]),
         (None, ["ultrasonic brake is not confirmed", "bumper brake is not confirmed"]),
     ],
 )
-def test_switches(told: m.Switches | None, said: list[str]) -> None:
-    found = wrong(switches(seen(switches=told)))
-    assert [text for text, _ in found] == [f"the board's {each}" for each in said]
+def test_switches(message: m.Switches | None, phrase: list[str]) -> None:
+    found = wrong(switches(seen(switches=message)))
+    assert [text for text, _ in found] == [f"the board's {each}" for each in phrase]
     assert {todo for _, todo in found} == {remedies.SWITCHES}
 
 
-def test_streams_that_are_missing_or_thin() -> None:
+def test_streams_that_are_missing_or_slow() -> None:
     rates = {topic.path: topic.rate_hz for topic in STREAMS}
     rates |= {"tel/bridge/bumper": 0.0, "tel/bridge/mileage": 24.0, "tel/bridge/velocity": 25.0}
-    found = [each for each in at_the_vehicle(seen(rates=rates)) if each.where == "sensors"]
+    found = [each for each in diagnose_vehicle(seen(rates=rates)) if each.where == "sensors"]
     assert [(each.level, each.text) for each in found] == [
-        ("note", "tel/bridge/mileage comes at 24 of 50 Hz"),
-        ("wrong", "tel/bridge/bumper comes at 0 of 50 Hz"),
+        ("note", "tel/bridge/mileage has 24 of 50 Hz"),
+        ("wrong", "tel/bridge/bumper has 0 of 50 Hz"),
     ]
 
 
-def test_what_is_not_heard_has_no_words() -> None:
-    where = {each.where for each in at_the_vehicle(seen(bumper=None, ultrasonic=None))}
+def test_no_finding_without_a_message() -> None:
+    where = {each.where for each in diagnose_vehicle(seen(bumper=None, ultrasonic=None))}
     assert not where & {"bumper", "sonar"}
 
 
-def test_a_pressed_bumper_and_sonars_that_cannot_be_trusted() -> None:
+def test_a_pressed_bumper_and_untrusted_sonars() -> None:
     status: Any = ("fault", "too_near", "no_echo", *CLEAR[3:])
-    told = m.Ultrasonic(ranges=(None,) * 3 + (1.0,) * 5, status=status)
-    found = wrong(at_the_vehicle(seen(bumper=m.Bumper(pressed=True), ultrasonic=told)))
+    message = m.Ultrasonic(ranges=(None,) * 3 + (1.0,) * 5, status=status)
+    found = wrong(diagnose_vehicle(seen(bumper=m.Bumper(pressed=True), ultrasonic=message)))
     assert found == [
         ("the bumper is pressed", remedies.BUMPER),
         ("the left sonar is faulty", remedies.SONAR_FAULT),
-        ("the front left sonar sees something too near to measure", remedies.SONAR_NEAR),
+        (
+            "the front left sonar is covered: an object is below its minimum range",
+            remedies.SONAR_NEAR,
+        ),
     ]
 
 
-def test_driver_faults_say_what_they_mean() -> None:
-    told = {"left": m.Driver(faults=("encoder", "bit_9"), bits=0x204)}
-    texts = [text for text, _ in wrong(drivers(told))]
-    assert "left driver reports encoder: its encoder is not understood" in texts[0]
-    assert "bit_9: a bit that the manual does not explain" in texts[1]
+def test_driver_faults_have_their_meaning() -> None:
+    message = {"left": m.Driver(faults=("encoder", "bit_9"), bits=0x204)}
+    texts = [text for text, _ in wrong(drivers(message))]
+    assert "left motor driver reports encoder: invalid encoder signal" in texts[0]
+    assert "bit_9: not documented in the manual" in texts[1]
 
 
-def test_one_driver_too_many() -> None:
-    (found,) = driving(seen(asking={"web": {1, 2}}))
+def test_duplicate_sources() -> None:
+    (found,) = driving(seen(requests={"web": {1, 2}}))
     assert (found.level, found.todo) == ("wrong", remedies.ONE_DRIVER)
-    (found,) = driving(seen(asking={"web": {1}, "teleop": {2}}))
-    assert (found.level, found.text.split(" ask")[0]) == ("note", "teleop, web")
-    (found,) = driving(seen(asking={"web": {1}}))
-    assert (found.level, found.text) == ("ok", "web asks to move")
-    found = next(driving(seen(deciding={1, 2})))
+    (found,) = driving(seen(requests={"web": {1}, "teleop": {2}}))
+    assert (found.level, found.text.split(" request")[0]) == ("note", "teleop, web")
+    (found,) = driving(seen(requests={"web": {1}}))
+    assert (found.level, found.text) == ("ok", "web requests motion")
+    found = next(driving(seen(motion={1, 2})))
     assert (found.level, found.todo) == ("wrong", remedies.TWICE)
 
 
-def test_safety_s_causes_with_what_to_do() -> None:
+def test_causes_of_safety_have_remedies() -> None:
     latched, passing = safety(seen(safety=state_of("contact", "neutral", latched=("contact",))))
     assert (latched.level, latched.todo) == ("wrong", remedies.BUMPER)
     assert latched.text == "The bumper was hit. (brake, latched)"
     assert (passing.level, passing.todo) == ("note", remedies.CAUSES["neutral"])
 
 
-def test_a_cause_of_a_newer_safety() -> None:
+def test_an_unknown_cause() -> None:
     (found,) = safety(seen(safety=state_of("smoke", latched=("smoke",))))
     assert (found.level, found.todo) == ("wrong", remedies.RESET)
     (found,) = safety(seen(safety=state_of("smoke")))
     assert (found.level, found.todo) == ("wrong", "")
 
 
-def test_nothing_holds_it_back() -> None:
+def test_no_cause() -> None:
     (found,) = safety(seen(safety=state_of()))
     assert (found.level, found.text) == ("ok", "All is well.")
 
 
-def test_every_cause_and_every_fault_has_its_advice() -> None:
+def test_every_cause_and_every_fault_has_a_remedy() -> None:
     assert remedies.CAUSES.keys() == {rule.name for rule in RULES}
     assert remedies.FAULTS.keys() == set(get_args(FaultName))

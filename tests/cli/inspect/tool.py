@@ -1,4 +1,4 @@
-"""``t2`` in this process, and services that only pretend to be there."""
+"""``t2`` in this process, and simulated services."""
 
 import json
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from tests.common.bus_fixture import BusFixture
 
 @dataclass(frozen=True)
 class Result:
-    """What a command gave."""
+    """Exit code and output of a command."""
 
     code: int
     out: str
@@ -25,34 +25,34 @@ class Result:
 
     @property
     def lines(self) -> list[Any]:
-        """Read JSON lines."""
+        """Parse the output as JSON lines."""
         return [json.loads(line) for line in self.out.splitlines()]
 
 
 @dataclass(frozen=True)
 class Tool:
-    """Runs ``t2`` on one robot; on those that the words name when it is called nothing."""
+    """Runs ``t2`` on one robot; an empty name leaves the robot to the arguments."""
 
     endpoint: str
     robot: str
     capsys: pytest.CaptureFixture[str]
 
     def __call__(self, *words: str, robot: str | None = None) -> Result:
-        """Run it to its end; it shows JSON unless the words want another form."""
+        """Run it to its end, with JSON output unless the arguments choose another format."""
         named = robot or self.robot
         where = ("--set", f"bus.connect={self.endpoint}", *(("--robot", named) if named else ()))
         self.capsys.readouterr()
         try:
             form = () if {"--text", "-o"} & {*words} else ("-o", "json")
             code = main([*words, *form, *where])
-        except SystemExit as end:  # the command line is no good
+        except SystemExit as end:  # invalid arguments
             code = int(str(end.code))
-        told = self.capsys.readouterr()
-        return Result(code, told.out, told.err)
+        captured = self.capsys.readouterr()
+        return Result(code, captured.out, captured.err)
 
 
 def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
-    """Return what a service tells of itself."""
+    """Return a health message."""
     return Health(
         service=service, version=version, uptime=3.0, rates={}, counters={"overrun": 2},
         lateness=lateness, rss=5_000_000, priority=53,
@@ -67,7 +67,7 @@ def pretend(
     hz: float = 50.0,
     **names: str,
 ) -> Bus:
-    """Be a service of that name, which puts these messages again and again."""
+    """Start a simulated service that publishes these messages periodically."""
     publishers: list[tuple[Any, Callable[[], Message]]] = []
 
     def everything(bus: Bus) -> None:

@@ -1,4 +1,4 @@
-"""Datagrams out of hex, text, pcap and pcapng; errors that name file and line."""
+"""Datagrams from hex, text, pcap and pcapng; errors with file and line."""
 
 import contextlib
 import io
@@ -41,21 +41,21 @@ ENDS = "10.7.5.224:4002 > 10.7.5.220:4001"
         "\t4753\n0800",
     ],
 )
-def test_hex_in_any_dress(text: str) -> None:
+def test_hex_formats(text: str) -> None:
     assert capture.read(text) == [Datagram("", b"GS\x08\x00")]
 
 
-def test_long_hex_is_no_file_name() -> None:
+def test_long_hex_is_not_taken_for_a_file() -> None:
     assert capture.read(RUN.hex() * 100) == [Datagram("", RUN * 100)]
 
 
 @pytest.mark.parametrize("text", ["no/such/file", "zz", ""])
 def test_neither_hex_nor_file(text: str) -> None:
-    with pytest.raises(RobotError, match="is no hex and no file"):
+    with pytest.raises(RobotError, match="is neither hex nor a file"):
         capture.read(text)
 
 
-def test_text_has_a_datagram_a_line(tmp_path: Path) -> None:
+def test_text_with_one_datagram_per_line(tmp_path: Path) -> None:
     file = tmp_path / "frames.txt"
     file.write_text("# captured by hand\n4753 # magic\n\n00 01\n", encoding="utf-8")
     assert capture.read(str(file)) == [
@@ -70,7 +70,7 @@ def test_a_bad_line_is_named() -> None:
 
 
 def test_text_without_hex_is_refused() -> None:
-    with pytest.raises(RobotError, match="frames: has no hex lines"):
+    with pytest.raises(RobotError, match="frames: contains no hex lines"):
         capture.from_bytes("frames", b"# nothing\n")
 
 
@@ -110,7 +110,7 @@ def loopback(network: object) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("link", "dress"),
+    ("link", "wrap"),
     [
         (pcap.DLT_LINUX_SLL, cooked),
         (pcap.DLT_LINUX_SLL2, cooked_again),
@@ -121,20 +121,20 @@ def loopback(network: object) -> bytes:
 )
 @pytest.mark.parametrize("write", [as_pcap, as_pcapng])
 def test_other_links(
-    link: int, dress: Callable[[object], bytes], write: Callable[..., bytes]
+    link: int, wrap: Callable[[object], bytes], write: Callable[..., bytes]
 ) -> None:
-    content = write([dress(packet(RUN))], link)
+    content = write([wrap(packet(RUN))], link)
     assert capture.from_bytes("trip", content) == [Datagram(f"packet 1 {ENDS}", RUN)]
 
 
-@pytest.mark.parametrize(("link", "dress"), [(pcap.DLT_EN10MB, on_ethernet), (pcap.DLT_RAW, bytes)])
-def test_ipv6(link: int, dress: Callable[[object], bytes]) -> None:
-    content = as_pcap([dress(packet(RUN, "::1", "fe80::2"))], link)
+@pytest.mark.parametrize(("link", "wrap"), [(pcap.DLT_EN10MB, on_ethernet), (pcap.DLT_RAW, bytes)])
+def test_ipv6(link: int, wrap: Callable[[object], bytes]) -> None:
+    content = as_pcap([wrap(packet(RUN, "::1", "fe80::2"))], link)
     (datagram,) = capture.from_bytes("trip", content)
     assert datagram == Datagram("packet 1 ::1:4002 > fe80::2:4001", RUN)
 
 
-def test_other_packets_are_passed_over() -> None:
+def test_other_packets_are_ignored() -> None:
     other = packet(b"")
     other.p, other.data = 6, tcp.TCP()
     arp_packet = bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_ARP, data=arp.ARP()))
@@ -144,22 +144,22 @@ def test_other_packets_are_passed_over() -> None:
 
 
 def test_a_capture_without_udp_is_refused() -> None:
-    with pytest.raises(RobotError, match="trip: has no UDP packets"):
+    with pytest.raises(RobotError, match="trip: contains no UDP packets"):
         capture.from_bytes("trip", as_pcap([]))
 
 
 def test_an_unknown_link_is_named() -> None:
-    with pytest.raises(RobotError, match="trip: link type 105 is not known"):
+    with pytest.raises(RobotError, match="trip: unsupported link type 105"):
         capture.from_bytes("trip", as_pcap([b"x"], 105))
 
 
-def test_a_broken_packet_is_counted_to() -> None:
+def test_an_invalid_packet_is_reported_with_its_number() -> None:
     content = as_pcap([on_ethernet(packet(RUN)), b"\x01"])
-    with pytest.raises(RobotError, match="trip: broken after packet 2"):
+    with pytest.raises(RobotError, match="trip: invalid after packet 2"):
         capture.from_bytes("trip", content)
 
 
-def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dpkt", None)
     with pytest.raises(RobotError, match="\\[inspect\\]"):
         capture.from_bytes("trip", as_pcap([on_ethernet(packet(RUN))]))

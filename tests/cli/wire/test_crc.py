@@ -1,4 +1,4 @@
-"""Which CRC frames carry: found by trying, and not claimed when nothing proves it."""
+"""Identification of the CRC: found by trying, and not claimed without evidence."""
 
 from typing import get_args
 
@@ -20,7 +20,7 @@ def captured(crc: str, covers: Covers) -> list[bytes]:
     return [framing.pack(frame) for frame in (*TELLING, DistanceQuery(), BumperQuery())]
 
 
-def test_all_and_only_the_16_bit_ones_are_tried() -> None:
+def test_exactly_the_16_bit_crcs_are_tried() -> None:
     assert len(names()) >= 19
     assert {"crc-16", "modbus", "xmodem", "kermit", "x-25"} <= set(names())
     for name in names():
@@ -35,33 +35,33 @@ def test_each_is_found_again(crc: str, covers: Covers) -> None:
     assert report(findings)[-1] == f'set: wire.crc = "{crc}", wire.crc_covers = "{covers}"'
 
 
-def test_zeros_prove_nothing() -> None:
+def test_zeros_are_no_evidence() -> None:
     findings = identify(Framing().pack(frame) for frame in (DistanceQuery(), BumperQuery()))
-    assert (findings.frames, findings.telling, findings.fits) == (2, 0, [])
+    assert (findings.frames, findings.nonzero, findings.fits) == (2, 0, [])
     first, verdict = report(findings)
-    assert "2 have an empty or all-zero payload, which proves nothing" in first
-    assert verdict.startswith("no verdict")
+    assert "2 have an empty or all-zero payload, which is no evidence" in first
+    assert verdict.startswith("inconclusive")
 
 
-def test_a_frame_that_no_crc_explains_is_told() -> None:
+def test_a_frame_without_a_matching_crc() -> None:
     wrong = bytearray(Framing().pack(TELLING[0]))
     wrong[6] ^= 0xFF
     findings = identify([*captured("crc-16", "payload"), bytes(wrong)])
     assert findings.answers == []
     lines = report(findings)
-    assert "crc-16 over payload: fits 5 of 6" in lines
-    assert lines[-1] == "no CRC that crcmod predefines explains every frame"
+    assert "crc-16 over payload: matches 5 of 6" in lines
+    assert lines[-1] == "no CRC of crcmod matches every frame"
 
 
-def test_several_that_fit_want_more_frames() -> None:
+def test_several_matches_need_more_frames() -> None:
     payload = b"\x01\x00\x00\x00\x00"
     crc = crc_function("crc-16")(payload)
     findings = identify([b"GS\x0d\x00\x26\x74" + crc.to_bytes(2, "little") + payload])
     findings.fits.append(Fit("another", "payload", 1))
-    assert report(findings)[-1] == "several explain every frame: capture more"
+    assert report(findings)[-1] == "several match every frame: capture more"
 
 
-def test_frames_are_taken_by_magic_and_size() -> None:
+def test_frames_are_found_by_magic_and_size() -> None:
     first, second = Framing().pack(TELLING[0]), Framing().pack(TELLING[1])
     inner = b"GS\xff\xff\x00\x00" + b"GS\x04\x00"  # too long, too short
     assert list(frames([b"\x01" + first + second, inner, b"", b"GS"])) == [first, second]

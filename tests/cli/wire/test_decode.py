@@ -1,4 +1,4 @@
-"""Frames in words: senders, fields with units, reasons of bad runs."""
+"""Frames as text: senders, fields with units, reasons of invalid runs."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cli.wire.decode import Bad, Good, as_table, as_text, parts
+from cli.wire.decode import Bad, Good, as_json, as_text, parts
 from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
@@ -46,7 +46,7 @@ TEXTS = [
 
 
 @pytest.mark.parametrize(("frame", "text"), TEXTS)
-def test_a_frame_in_words(frame: Frame, text: str) -> None:
+def test_a_frame_as_text(frame: Frame, text: str) -> None:
     assert lines(framing.pack(frame)) == [f"+0    {text}"]
 
 
@@ -65,7 +65,7 @@ def test_the_other_angular_unit() -> None:
 @pytest.mark.parametrize(
     ("sender", "name"), [("pc", "BumperBrakeSet"), ("board", "BumperBrakeReport")]
 )
-def test_a_known_sender_leaves_no_doubt(sender: str, name: str) -> None:
+def test_a_known_sender(sender: str, name: str) -> None:
     (line,) = lines(framing.pack(c.BumperBrakeSet(True)), sender)
     assert line == f"+0    {sender:<5} {name} on yes"
 
@@ -86,7 +86,7 @@ def test_frames_and_garbage_with_their_offsets() -> None:
     ]
 
 
-def test_the_reason_that_got_furthest_is_told() -> None:
+def test_the_reason_of_the_latest_check() -> None:
     raw = bytearray(framing.pack(r.DistanceReport(5, 5)))
     raw[-1] ^= 1
     (part,) = parts(framing, bytes(raw), "both")
@@ -96,7 +96,7 @@ def test_the_reason_that_got_furthest_is_told() -> None:
 
 def test_json() -> None:
     good, bad = parts(framing, framing.pack(r.BumperBrakeReport(True)) + b"\xff", "both")
-    assert json.loads(json.dumps(as_table(good, "line 1"))) == {
+    assert json.loads(json.dumps(as_json(good, "line 1"))) == {
         "where": "line 1",
         "offset": 0,
         "hex": "475309000476c1c001",
@@ -104,7 +104,7 @@ def test_json() -> None:
         "frame": ["BumperBrakeSet", "BumperBrakeReport"],
         "fields": {"on": True},
     }
-    assert json.loads(json.dumps(as_table(bad, "line 1"))) == {
+    assert json.loads(json.dumps(as_json(bad, "line 1"))) == {
         "where": "line 1",
         "offset": 9,
         "hex": "ff",
@@ -114,7 +114,7 @@ def test_json() -> None:
 
 
 @given(st.lists(st.sampled_from([*COMMANDS, *REPORTS]).map(framing.pack) | st.binary(max_size=9)))
-def test_every_byte_is_accounted_for(pieces: list[bytes]) -> None:
+def test_every_byte_is_in_a_part(pieces: list[bytes]) -> None:
     raw = b"".join(pieces)
     found = list(parts(framing, raw, "both"))
     assert b"".join(part.raw for part in found) == raw
@@ -123,7 +123,7 @@ def test_every_byte_is_accounted_for(pieces: list[bytes]) -> None:
     ]
     for part in found:
         assert as_text(part, Wire())
-        assert json.dumps(as_table(part, ""))
+        assert json.dumps(as_json(part, ""))
 
 
 @pytest.mark.parametrize("frame", [*COMMANDS, *REPORTS])

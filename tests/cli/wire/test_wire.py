@@ -1,4 +1,4 @@
-"""``t2 wire`` from the command line: output, exit codes, friendly errors."""
+"""``t2 wire`` from the command line: output, exit codes, errors."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from tests.cli.captures import DISTANCE, QUERY, RUN, VELOCITY, as_pcap, on_ether
 from verification.harness.frame_strategies import COMMANDS
 
 
-def test_decode_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str]) -> None:
+def test_decode_prints_one_line_per_frame(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "decode", (RUN + QUERY).hex()]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "+0    pc    MotionCommand kind RUN, linear 500 mm/s, angular 30.0 deg/s",
@@ -20,7 +20,9 @@ def test_decode_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str]) -> Non
     ]
 
 
-def test_decode_says_where_in_a_capture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decode_shows_the_place_in_a_capture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "trip.pcap"
     file.write_bytes(as_pcap([on_ethernet(packet(VELOCITY + DISTANCE))]))
     assert main(["wire", "decode", "--from", "board", str(file)]) == 0
@@ -29,7 +31,7 @@ def test_decode_says_where_in_a_capture(tmp_path: Path, capsys: pytest.CaptureFi
     assert "+12   board DistanceReport distance 1234 mm, heading -90.5 deg" in second
 
 
-def test_a_bad_run_makes_the_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_invalid_run_gives_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "decode", RUN.hex() + "ff"]) == 1
     assert "+13   BAD no_magic" in capsys.readouterr().out
 
@@ -41,7 +43,7 @@ def test_json_lines(capsys: pytest.CaptureFixture[str]) -> None:
     assert tables[0]["fields"] == {"kind": 1, "linear_mmps": 500, "angular_raw": 300}
 
 
-def test_the_settings_of_the_wire_hold(capsys: pytest.CaptureFixture[str]) -> None:
+def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
     raw = Framing("modbus", "header_and_payload").pack(COMMANDS[0]).hex()
     sets = ["--set", "wire.crc=modbus", "--set", "wire.crc_covers=header_and_payload"]
     assert main(["wire", "decode", raw]) == 1
@@ -50,9 +52,9 @@ def test_the_settings_of_the_wire_hold(capsys: pytest.CaptureFixture[str]) -> No
     assert "wire" in capsys.readouterr().err
 
 
-def test_what_cannot_be_read_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unreadable_source_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "decode", "no/such.pcap"]) == 1
-    assert "t2 wire: 'no/such.pcap' is no hex and no file" in capsys.readouterr().err
+    assert "t2 wire: 'no/such.pcap' is neither hex nor a file" in capsys.readouterr().err
 
 
 def test_identify_crc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,11 +66,13 @@ def test_identify_crc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert 'set: wire.crc = "crc-16", wire.crc_covers = "payload"' in out
 
 
-def test_identify_crc_without_proof_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+def test_identify_crc_without_evidence_gives_exit_code_1(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main(["wire", "identify-crc", QUERY.hex()]) == 1
-    assert "no verdict" in capsys.readouterr().out
+    assert "inconclusive" in capsys.readouterr().out
 
 
-def test_identify_crc_without_frames_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_identify_crc_without_frames(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "identify-crc", "0102"]) == 1
-    assert "nothing starts with 47 53" in capsys.readouterr().err
+    assert "the magic 47 53 is missing" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from cli.inspect import permission
+from cli.inspect import pub
 from cli.recordings.replay import targets
 from common import keys
 from common import messages as m
@@ -28,7 +28,7 @@ FAST = ("--rate", "1000")
 
 @pytest.fixture(autouse=True)
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "LOOK_S", 0.5)
+    monkeypatch.setattr(pub, "LINK_S", 0.5)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What all these tools share: their options, their session, their end."""
+"""Options and bus session that the inspection commands share."""
 
 import argparse
 import signal
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from cli.inspect.addressing import EVERY_ROBOT, is_many, robots_of
+from cli.inspect.addressing import EVERY_ROBOT, is_many, parse_site
 from common.bus.probe import Probe, probe
 from common.cli_args import add_sources, sources
 from common.config import load
@@ -14,20 +14,20 @@ from common.settings import Shared
 
 
 @dataclass(frozen=True, slots=True)
-class Seat:
-    """Where a tool sits: its session, and the robot that it looks at, or an expression for many."""
+class BusSession:
+    """Bus session of a command, and its robot or a key expression for several robots."""
 
     probe: Probe
     robot: str
 
 
 def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
-    """Add the options that every tool takes; ``every`` says whether all robots will do."""
+    """Add the options of every command; ``every`` allows several robots at a time."""
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--robot", type=str if every else one_robot, help="which robot, such as 001")
     if every:
         which.add_argument(
-            "--site", dest="robot", type=robots_of, help="all robots of a site, such as berlin"
+            "--site", dest="robot", type=parse_site, help="all robots of a site, such as berlin"
         )
         which.add_argument(
             "--all", dest="robot", action="store_const", const=EVERY_ROBOT, help="all robots"
@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
-    """Add the option that chooses the form of the output; the same on a terminal and in a pipe."""
+    """Add the output format options; the default is the same on a terminal and in a pipe."""
     parser.add_argument(
         "-o", "--output", choices=["text", "table", "json"], default="text",
         help="text (default), table: one line per message where text has several, json: JSON lines",
@@ -51,61 +51,68 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def one_robot(text: str) -> str:
-    """Read a robot's name where all of them will not do."""
+    """Check the name of one robot, for commands that work on one robot at a time."""
     if is_many(text):
-        raise argparse.ArgumentTypeError("this is for one robot at a time, name it")
+        raise argparse.ArgumentTypeError("this command works on one robot at a time; name it")
     return text
 
 
-def add_end(parser: argparse.ArgumentParser) -> None:
-    """Add the options that end a tool by itself."""
-    parser.add_argument("--duration", type=positive, metavar="S", help="end after so long")
+def add_duration(parser: argparse.ArgumentParser, default_s: float) -> None:
+    """Add the option for how long a command listens."""
     parser.add_argument(
-        "--count", "--times", "-n", "-t", type=whole, metavar="N", help="end after so many"
+        "--duration", type=positive, default=default_s, metavar="S",
+        help=f"listen for S seconds, {default_s:g} by default",
+    )  # fmt: skip
+
+
+def add_end(parser: argparse.ArgumentParser) -> None:
+    """Add the options that limit how long a command runs."""
+    parser.add_argument("--duration", type=positive, metavar="S", help="end after S seconds")
+    parser.add_argument(
+        "--count", "--times", "-n", "-t", type=whole, metavar="N", help="end after N messages"
     )
 
 
 def positive(text: str) -> float:
-    """Read seconds or hertz: more than none, and finite."""
+    """Parse seconds or hertz: positive and finite."""
     number = float(text)
     if not 0 < number < 1e9:
-        raise argparse.ArgumentTypeError(f"{text} should be more than 0 and less than 1e9")
+        raise argparse.ArgumentTypeError(f"{text} must be more than 0 and less than 1e9")
     return number
 
 
 def whole(text: str) -> int:
-    """Read a count of one or more."""
+    """Parse a count of one or more."""
     number = int(text)
     if number < 1:
-        raise argparse.ArgumentTypeError(f"{text} should be 1 or more")
+        raise argparse.ArgumentTypeError(f"{text} must be 1 or more")
     return number
 
 
 def wants_json(options: argparse.Namespace) -> bool:
-    """Return whether the output is JSON lines."""
+    """Return whether the output format is JSON lines."""
     return bool(options.output == "json")
 
 
 def settings(options: argparse.Namespace) -> Shared:
-    """Return the shared settings in force; ``--robot`` names one robot there, too."""
+    """Return the effective shared settings; ``--robot`` with one name sets ``robot.id``."""
     if options.robot and not is_many(options.robot):
         options.sets = [*options.sets, f"robot.id={options.robot}"]
     return load(Shared, sources(options)).config
 
 
 @contextmanager
-def seated(options: argparse.Namespace) -> Iterator[Seat]:
-    """Join the bus while the context lasts; raise ``LinkError`` without a router."""
+def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
+    """Open a bus session for the context; raise ``LinkError`` without a router."""
     config = settings(options)
-    named = options.robot and is_many(options.robot)
-    robot = options.robot if named else config.robot.id
+    many = options.robot and is_many(options.robot)
     with probe(config.bus) as opened:
-        yield Seat(opened, robot)
+        yield BusSession(opened, options.robot if many else config.robot.id)
 
 
 @contextmanager
-def quietly() -> Iterator[None]:
-    """Let ctrl-c or SIGTERM end what is inside, and go on behind it."""
+def until_interrupt() -> Iterator[None]:
+    """End the body on Ctrl-C or SIGTERM and continue after it."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield

@@ -1,11 +1,11 @@
-"""On which keys a tool may speak."""
+"""Keys that a tool may publish on."""
 
 from functools import partial
 
 import pytest
 
-from cli.inspect import permission
-from cli.inspect.permission import is_loopback, reason
+from cli.inspect import pub
+from cli.inspect.pub import is_loopback, refused
 from common import keys
 from common.messages import Drive
 from tests.cli.inspect.tool import Tool, pretend
@@ -17,19 +17,19 @@ ROOT = "t2/v1/001"
 
 
 @pytest.mark.parametrize("topic", keys.TOPICS)
-def test_no_key_of_the_robot_s_own_services(topic: keys.Topic[Drive]) -> None:
+def test_keys_of_own_services_are_refused(topic: keys.Topic[Drive]) -> None:
     key = topic.on("001", service="safety", side="left", source="web")
-    assert reason(key)
+    assert refused(key)
 
 
 @pytest.mark.parametrize("path", ["tel/mine/x", "evt/mine", "tel/teleop/health", "tel/bridge2/x"])
-def test_keys_of_one_s_own(path: str) -> None:
-    assert reason(f"{ROOT}/{path}") == ""
+def test_other_keys_are_allowed(path: str) -> None:
+    assert refused(f"{ROOT}/{path}") == ""
 
 
 @pytest.mark.parametrize("path", ["@cmd/motion", "@cmd/drive/x", "@cmd/new", "a/@cmd/b"])
-def test_no_command(path: str) -> None:
-    assert reason(f"{ROOT}/{path}") == "moves the wheels"
+def test_commands_are_refused(path: str) -> None:
+    assert refused(f"{ROOT}/{path}") == "moves the wheels"
 
 
 @pytest.mark.parametrize(
@@ -39,30 +39,30 @@ def test_no_command(path: str) -> None:
         ("0.0.0.0:1", False), ("localhost:1", False), ("", False), ("127.0.0.1.evil:1", False),
     ],
 )  # fmt: skip
-def test_whose_board_is_a_simulated_one(board: str, simulated: bool) -> None:
+def test_simulated_boards(board: str, simulated: bool) -> None:
     assert is_loopback(board) is simulated
 
 
 def commands(rig: BusFixture) -> list[Drive]:
-    """Hear what is asked on any source."""
-    heard: list[Drive] = []
-    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: heard.append(a.message), source="*"))
-    return heard
+    """Collect the requests of any source."""
+    received: list[Drive] = []
+    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: received.append(a.message), source="*"))
+    return received
 
 
 @pytest.fixture(autouse=True)
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(permission, "LOOK_S", 0.5)
+    monkeypatch.setattr(pub, "LINK_S", 0.5)
 
 
 ASKED = ("pub", "@cmd/drive/web", '{"linear": 0.1, "angular": 0, "echo": 3}', "--once")
 
 
 def test_a_command_is_refused(rig: BusFixture, tool: Tool) -> None:
-    heard = commands(rig)
+    received = commands(rig)
     pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     result = tool(*ASKED)
-    assert (result.code, result.out, heard) == (1, "", [])
+    assert (result.code, result.out, received) == (1, "", [])
     assert "@cmd/drive/web moves the wheels" in result.err
     assert "t2 drive" in result.err
 
@@ -71,17 +71,17 @@ def test_a_command_is_refused(rig: BusFixture, tool: Tool) -> None:
 def test_a_command_for_a_simulator_never_reaches_a_real_board(
     rig: BusFixture, tool: Tool, boards: list[str]
 ) -> None:
-    heard = commands(rig)
+    received = commands(rig)
     for board in boards:
         pretend(rig, "bridge", {keys.LINK: partial(link, board=board)})
     result = tool(*ASKED, "--simulator")
-    assert (result.code, result.out, heard) == (1, "", [])
+    assert (result.code, result.out, received) == (1, "", [])
     assert ("a real one" if boards else "no bridge") in result.err
 
 
 def test_a_command_for_a_simulator(rig: BusFixture, tool: Tool) -> None:
-    heard = commands(rig)
+    received = commands(rig)
     pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     assert tool(*ASKED, "--simulator").code == 0
-    wait_until(lambda: heard, "the command")
-    assert [(each.linear, each.echo) for each in heard] == [(0.1, 3)]
+    wait_until(lambda: received, "the command")
+    assert [(each.linear, each.echo) for each in received] == [(0.1, 3)]

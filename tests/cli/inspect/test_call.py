@@ -1,4 +1,4 @@
-"""``t2 call`` of an operator: what it takes from safety's state, and when it confirms."""
+"""Operator's calls by ``t2 call``: defaults from safety's state, and confirmation."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,7 +8,7 @@ import msgspec
 import pytest
 import zenoh
 
-from cli.inspect import operator_call
+from cli.inspect import call as command
 from common import codec, keys
 from common import messages as m
 from common.bus.bus import Bus
@@ -60,7 +60,7 @@ def obey(safety: Safety, caller: Caller[m.ResetDone]) -> None:
 
 
 def lie(safety: Safety, caller: Caller[m.ResetDone]) -> None:
-    """Answer with all values of safety's public state, and clear nothing."""
+    """Answer with values of safety's public state, and clear nothing."""
     caller.reply(m.ResetDone(text="Reset.", boot=safety.bus.boot, cleared=(41,)))
 
 
@@ -68,7 +68,7 @@ def done(_: Safety, caller: Caller[m.Done]) -> None:
     caller.reply(m.Done(text="done"))
 
 
-def test_a_reset_names_what_is_latched_and_is_confirmed_by_the_state(
+def test_a_reset_names_the_latched_causes_and_is_confirmed_by_the_state(
     rig: BusFixture, tool: Tool
 ) -> None:
     safety = Safety(rig, (keys.RESET, obey))
@@ -131,24 +131,24 @@ def test_every_operator_call_echoes_the_newest_state(
     assert asked == msgspec.structs.replace(meant, echo=asked.echo)
 
 
-def test_what_the_user_gives_is_left_as_it_is(rig: BusFixture, tool: Tool) -> None:
+def test_given_values_are_kept(rig: BusFixture, tool: Tool) -> None:
     safety = Safety(rig, (keys.RESET, obey), (keys.SET_POSE, done))
     assert tool("call", "odom/reset", '{"echo": 7}').code == 0
     assert tool("call", "safety/reset", '{"echo": 7, "causes": [8]}').err == ""
     assert safety.asked == [m.PoseRequest(echo=7), m.ResetRequest(echo=7, causes=(8,))]
 
 
-def test_without_a_state_an_operators_call_is_not_made(
+def test_no_operators_call_without_a_state(
     rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(operator_call, "SEEN_S", 0.3)
+    monkeypatch.setattr(command, "STATE_S", 0.3)
     for key in ("safety/reset", "safety/release", "odom/reset", "bridge/switches"):
         result = tool("call", key)
         assert (result.code, result.out) == (1, "")
         assert "no state of safety within 1 s" in result.err
 
 
-def test_who_lets_go_needs_no_state(rig: BusFixture, tool: Tool) -> None:
+def test_the_end_of_a_release_needs_no_state(rig: BusFixture, tool: Tool) -> None:
     asked: list[m.ReleaseRequest] = []
 
     def take(request: m.ReleaseRequest, caller: Caller[m.Done]) -> None:
@@ -160,7 +160,7 @@ def test_who_lets_go_needs_no_state(rig: BusFixture, tool: Tool) -> None:
     assert asked == [m.ReleaseRequest(held=False)]
 
 
-def test_what_is_no_state_is_passed_over(rig: BusFixture, tool: Tool) -> None:
+def test_invalid_states_are_ignored(rig: BusFixture, tool: Tool) -> None:
     safety = Safety(rig, (keys.RESET, obey))
     session = rig.session()
     rig.loop.post(

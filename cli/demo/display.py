@@ -1,30 +1,85 @@
-"""The lap in a terminal: the room from above, the vehicle in it, and what safety says."""
+"""Display of the lap: a live map on a terminal, one line per step elsewhere, and the results."""
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Self
 
-from rich.console import Group, RenderableType
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from cli.demo import plot
 from cli.demo.driver import Driver
-from cli.demo.score import Result
-from common.messages import SONAR_NAMES, Ultrasonic
-from sim.geometry import Pose, Segment
+from cli.demo.score import Result, Trace
+from cli.demo.script import Step
+from common.messages import SONAR_NAMES, Odometry, Ultrasonic
+from common.settings import Vehicle
+from sim.geometry import Pose, Rectangle, Segment
 from sim.world import Plan, World
 
 SIDE_COLUMNS = 46
 FRAME_COLUMNS = 6
 COLUMNS_MAX = 58
-ROWS_PER_COLUMN = 0.38  # a character is higher than wide
+ROWS_PER_COLUMN = 0.38  # aspect ratio of a character
 ARROWS = "→↗↑↖←↙↓↘"
 STYLES = {"run": "bold green", "slow": "bold yellow", "stop": "bold red",
           "brake": "bold white on red", "inhibited": "bold magenta"}  # fmt: skip
-BODY = Pose(0.0, 0.0, 0.0)
 
 
-class Canvas:
-    """A room in characters; y is up."""
+class LapDisplay:
+    """Display of one lap; a context manager, because the live map must restore the terminal."""
+
+    def __init__(self, plan: Plan, vehicle: Vehicle, out: Path) -> None:
+        self._plan = plan
+        self._body = Rectangle(vehicle.length / 2, vehicle.width / 2)
+        self._out = out
+        self._console = Console(highlight=False, markup=False)  # texts may contain brackets
+        self._map = RoomMap(plan, self._console.width)
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._live.start()
+        else:
+            self._console.print("starting simulator, router, bridge, safety and odometry")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._live.stop()
+
+    def show(self, text: str) -> None:
+        """Print a line."""
+        self._console.print(text)
+
+    def step(self, step: Step) -> None:
+        """Print the start of a step, except on a terminal."""
+        if not self._console.is_terminal:
+            self._console.print(f"  {step.name}")
+
+    def draw(self, driver: Driver, now_ns: int) -> None:
+        """Redraw the live display."""
+        if self._console.is_terminal:
+            self._live.update(panel(self._map, driver, now_ns), refresh=True)
+
+    def results(self, rows: Sequence[Result], driver: Driver) -> None:
+        """Print the results, and safety's answers."""
+        for step, press, granted, text in driver.answers:
+            result = "granted" if granted else "refused"
+            self._console.print(f"{step}: {press} {result}: {text}")
+        self._console.print(results_table(list(rows)))
+
+    def plot(self, trace: Trace, odometry: Sequence[Odometry]) -> None:
+        """Write the plots and print their names."""
+        files = [self._out / "lap.png", self._out / "lap.svg"]
+        plot.save(files, self._plan, self._body, trace, odometry)
+        self._console.print(f"plots: {', '.join(map(str, files))}", soft_wrap=True)
+
+
+class RoomMap:
+    """Map of a room in characters; y is up."""
 
     def __init__(self, plan: Plan, console_columns: int) -> None:
         free = console_columns - SIDE_COLUMNS - FRAME_COLUMNS
@@ -44,9 +99,9 @@ class Canvas:
             mark = ("▒", "yellow") if segment in low else ("█", "bright_black")
             self._draw(segment, mark)
 
-    def picture(self, way: list[tuple[float, float]], pose: Pose | None) -> Text:
-        """Return the room with the way so far and the vehicle."""
-        cells = dict.fromkeys((self._cell(x, y) for x, y in way), ("·", "cyan")) | self._room
+    def render(self, path: list[tuple[float, float]], pose: Pose | None) -> Text:
+        """Return the room with the path and the vehicle."""
+        cells = dict.fromkeys((self._cell(x, y) for x, y in path), ("·", "cyan")) | self._room
         if pose is not None:
             turn = round(pose.heading / (math.pi / 4)) % 8
             cells[self._cell(pose.x, pose.y)] = (ARROWS[turn], "bold bright_green")
@@ -70,16 +125,16 @@ class Canvas:
         return round((x - self._left) / self._per_column), round((self._top - y) / self._per_row)
 
 
-def picture(canvas: Canvas, driver: Driver, now_ns: int) -> RenderableType:
-    """Return the whole picture of one moment."""
+def panel(room: RoomMap, driver: Driver, now_ns: int) -> RenderableType:
+    """Return the live display at one time."""
     poses = driver.odometry
-    way = [(p.x, p.y) for p in poses[::10]]
+    path = [(p.x, p.y) for p in poses[::10]]
     pose = Pose(poses[-1].x, poses[-1].y, poses[-1].heading) if poses else None
     side = Group(_steps(driver, now_ns), Text(), _state(driver), Text(), _ranges(driver.ranges))
     grid = Table.grid(padding=(0, 2))
     grid.add_column()
     grid.add_column(width=SIDE_COLUMNS)
-    grid.add_row(canvas.picture(way, pose), side)
+    grid.add_row(room.render(path, pose), side)
     return Panel(grid, title="T2 drives a lap", border_style="bright_black", expand=False)
 
 
@@ -106,7 +161,8 @@ def _steps(driver: Driver, now_ns: int) -> Text:
 def _state(driver: Driver) -> RenderableType:
     table = Table.grid(padding=(0, 1))
     measured = driver.velocity
-    table.add_row("asked", f"{driver.asked.linear:5.2f} m/s  {driver.asked.angular:5.2f} rad/s")
+    requested = driver.requested
+    table.add_row("requested", f"{requested.linear:5.2f} m/s  {requested.angular:5.2f} rad/s")
     if measured is not None:
         table.add_row("measured", f"{measured.linear:5.2f} m/s  {measured.angular:5.2f} rad/s")
     if driver.safety is not None:
@@ -114,9 +170,9 @@ def _state(driver: Driver) -> RenderableType:
         table.add_row("safety", Text(safety.verdict.upper(), STYLES[safety.verdict]))
         table.add_row("", Text(safety.text, overflow="fold"))
     if driver.answers:
-        _, press, granted, words = driver.answers[-1]
-        said = "granted" if granted else "refused"
-        table.add_row(press, Text(f"{said}: {words}", "green" if granted else "yellow"))
+        _, press, granted, answer = driver.answers[-1]
+        result = "granted" if granted else "refused"
+        table.add_row(press, Text(f"{result}: {answer}", "green" if granted else "yellow"))
     return table
 
 
