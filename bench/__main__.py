@@ -13,9 +13,6 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from bench.codec import page as codec_page
-from bench.codec import part as codec_part
-from bench.codec import plot as codec_plot
 from bench.command import part as command_part
 from bench.growth import page as growth_page
 from bench.growth import part as growth_part
@@ -34,11 +31,10 @@ from bench.start import plot as start_plot
 from bench.telemetry import page as telemetry_page
 from bench.telemetry import part as telemetry_part
 from common.freshness import NS_PER_S
-from verification.faults.machine import HoldUps, named
+from verification.harness.host import StallRecorder, description
 
 PAGE = Path(__file__).with_name("page.md")
 UNMEASURED = 3  # exit code where something to measure, or to tell, is not there
-WHOLE = 0.95  # of a core; who got less has shared it
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +45,6 @@ class Part:
     versions: Callable[[], str]
     blocks: Callable[[Sequence[Series]], dict[str, str]]
     draw: Callable[[Path, Sequence[Series]], None]
-    waits: bool = False  # for other processes: how much of a core this one got says nothing
 
 
 PARTS = {
@@ -58,32 +53,22 @@ PARTS = {
         reaction_part.versions,
         reaction_page.blocks,
         partial(reaction_plot.draw, what="contact to BREAK"),
-        waits=True,
     ),
-    "start": Part(
-        start_part.measure, start_part.versions, start_page.blocks, start_plot.draw, waits=True
-    ),
+    "start": Part(start_part.measure, start_part.versions, start_page.blocks, start_plot.draw),
     "command": Part(
         command_part.measure,
         command_part.versions,
         path_page.blocks,
         partial(reaction_plot.draw, what="request to frame"),
-        waits=True,
     ),
     "telemetry": Part(
         telemetry_part.measure,
         telemetry_part.versions,
         telemetry_page.blocks,
         partial(reaction_plot.draw, what="frame to consumer"),
-        waits=True,
     ),
-    "codec": Part(codec_part.measure, codec_part.versions, codec_page.blocks, codec_plot.draw),
-    "load": Part(
-        load_part.measure, load_part.versions, load_page.blocks, load_plot.draw, waits=True
-    ),
-    "growth": Part(
-        growth_part.measure, growth_part.versions, growth_page.blocks, growth_plot.draw, waits=True
-    ),
+    "load": Part(load_part.measure, load_part.versions, load_page.blocks, load_plot.draw),
+    "growth": Part(growth_part.measure, growth_part.versions, growth_page.blocks, growth_plot.draw),
 }
 
 
@@ -116,18 +101,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 def measured(part: Part) -> Measured:
     """Measure a part, with a witness of what else the machine does."""
     versions = part.versions()
-    with HoldUps() as holdups:
-        begin_ns, ran_ns = time.monotonic_ns(), time.process_time_ns()
+    with StallRecorder() as holdups:
+        begin_ns = time.monotonic_ns()
         series = part.measure()
         seconds = (time.monotonic_ns() - begin_ns) / NS_PER_S
-        core = (time.process_time_ns() - ran_ns) / NS_PER_S / seconds
         held_ms = 1000 * holdups.worst_s(begin_ns, seconds)
-    shared = "The machine was shared" if core < WHOLE else "The machine had nothing else to do"
-    share = f"{shared}: this run got {core:.0%} of a core, and a" if not part.waits else "A"
     return Measured(
-        where=f"{datetime.now(UTC):%Y-%m-%d}: {named()}, Python {platform.python_version()}; "
+        where=f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}; "
         f"{versions}; {seconds / 60:.0f} minutes",
-        noise=f"{share} process that only sleeps was held up for {held_ms:.0f} ms at worst",
+        noise=f"A process that only sleeps was held up for {held_ms:.0f} ms at worst",
         series=series,
     )
 

@@ -18,7 +18,7 @@ from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
 from tools import rights_table, safety_states
-from verification.harness.markdown import filled
+from verification.harness.results import filled
 
 DOCS = Path(__file__).parent.parent / "docs"
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from bench.growth.page import CONSUMERS, KEYS, ROBOTS, SIZES
 from bench.load.board import SHIPPED, board
-from bench.load.gauges import Shares
 from bench.load.stack import Pids, Ports, guarded, stack
 from bench.load.throughput import listening
 from bench.series import Series
 from common import keys
 from verification.fleet.child import Part
 from verification.fleet.topology import crowd, site
+from verification.harness.process_stats import CpuShares
 
 COUNTS = {
     CONSUMERS: (1, 2, 5, 10, 20, 50),
@@ -106,7 +106,7 @@ def watched(pids: Pids, parts: Sequence[Part], seconds: float) -> dict[str, int]
     """Let them count for so long; return what these processes took of a core meanwhile, in ns/s."""
     for each in parts:
         each.begin()
-    with Shares(pids) as shares:
+    with CpuShares(pids) as shares:
         time.sleep(seconds)
     return shares.ns
 
@@ -122,6 +122,6 @@ def point(
     if arrived < LEAST:
         note = f"{arrived:.0%} arrived"
     return [
-        Series(name=(*name, "delay"), calls=1, samples_ns=ages_ns, note=note),
-        *(Series(name=(*name, who), calls=1, samples_ns=[ns]) for who, ns in shares.items()),
+        Series(name=(*name, "delay"), samples_ns=ages_ns, note=note),
+        *(Series(name=(*name, who), samples_ns=[ns]) for who, ns in shares.items()),
     ]

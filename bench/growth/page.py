@@ -50,7 +50,7 @@ def bends(by_name: ByName, curve: str) -> str:
 def points(by_name: ByName, curve: str, what: str, share: float = 0.5) -> list[Point]:
     """Return a curve: what this share of a row's samples does not exceed, in ns, by its number."""
     return [
-        (float(name[1]), one.call_ns(share))
+        (float(name[1]), one.percentile_ns(share))
         for name, one in by_name.items()
         if (name[0], name[2]) == (curve, what) and one.samples_ns
     ]

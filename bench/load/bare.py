@@ -16,7 +16,7 @@ from typing import Any
 
 import msgpack
 
-from bench.codec.frame_struct import REPORTS, Kinds, framed, motion, read
+from bench.load.frames import REPORTS, Kinds, framed, motion, read
 
 RUN, SPEED_MMPS = 1, 300
 MOTION_S = 0.02

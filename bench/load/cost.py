@@ -13,14 +13,14 @@ from functools import partial
 from pathlib import Path
 
 from bench.load.board import SHIPPED, TENFOLD, board
-from bench.load.gauges import Shares, memory
 from bench.load.page import BARE, BUS, CHAIN, TOGETHER
 from bench.load.stack import Pids, Ports, stack
 from bench.path.processes import robots_python
 from bench.series import Series
 from verification.fleet.child import Part
-from verification.harness.support import router_process, wait_until
-from verification.soak.process_stats import tree
+from verification.harness.bus import router_process
+from verification.harness.process_stats import CpuShares, memory, tree
+from verification.harness.waiting import wait_until
 
 TURNS = 3
 WATCHED_S = 5.0  # of each at each rate in a turn
@@ -42,7 +42,7 @@ def measure(program: Path, turns: int = TURNS, seconds: float = WATCHED_S) -> li
             for what, values in made.items():
                 for who, value in {**values, TOGETHER: sum(values.values())}.items():
                     samples[name, what, who].append(value)
-    return [Series(name=name, calls=1, samples_ns=some) for name, some in samples.items()]
+    return [Series(name=name, samples_ns=some) for name, some in samples.items()]
 
 
 def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int]]:
@@ -55,7 +55,7 @@ def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int
         for rate, says in RATES.items():
             with board(program, ports.board, ports.bridge, says):
                 wait_until(steady, "all at work", PATIENCE_S)
-                with Shares(pids) as shares:
+                with CpuShares(pids) as shares:
                     time.sleep(seconds)
             if not pids.keys() <= shares.ns.keys():
                 return {}

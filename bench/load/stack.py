@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from bench.path.processes import robots_python
-from verification.harness.support import free_port, router_process, wait_until
-from verification.soak.process_stats import tree
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
+from verification.harness.process_stats import tree
+from verification.harness.waiting import wait_until
 
 CHAIN = ("bridge", "safety", "odom")
 

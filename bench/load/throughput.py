@@ -15,14 +15,14 @@ import zenoh
 
 from bench.load.board import STANDS, Board, board
 from bench.load.consumer import plain
-from bench.load.gauges import Shares, drops
 from bench.load.loss import Passage, highest
 from bench.load.stack import Pids, Ports, guarded, stack
 from bench.series import Series
 from common import keys
 from common.wire.frame import Frame
 from verification.fleet.child import Part
-from verification.harness.support import wait_until
+from verification.harness.process_stats import CpuShares, udp_drops
+from verification.harness.waiting import wait_until
 
 CONSUMERS = (1, 5, 20)
 RATES = (
@@ -84,19 +84,19 @@ def measure(
 def trial(ground: Ground, hz: int, seconds: float) -> list[Series]:
     """Send at a rate for so long; return the delay, with what was lost as a note, and the CPU."""
     name = "frames", str(len(ground.consumers)), str(hz)
-    published, dropped = ground.published(), drops(ground.ports.bridge)
+    published, dropped = ground.published(), udp_drops(ground.ports.bridge)
     pids = {"router": ground.pids["router"], "bridge": guarded(ground.pids["guard"])}
     for each in ground.consumers:
         each.begin()
-    with Shares(pids) as shares:
+    with CpuShares(pids) as shares:
         sent = round(hz * seconds)
         pace = ground.board.send(hz, sent) / hz
     heard = settled(ground.consumers)
     if guarded(ground.pids["guard"]) != pids["bridge"]:
-        return [Series(name=(*name, "delay"), calls=1, samples_ns=[], note=ANEW)]
+        return [Series(name=(*name, "delay"), samples_ns=[], note=ANEW)]
     passage = Passage(
         sent=sent,
-        dropped=drops(ground.ports.bridge) - dropped,
+        dropped=udp_drops(ground.ports.bridge) - dropped,
         published=ground.published() - published,
         received=[sum(came for came, *_ in each["keys"].values()) for each in heard],
         late_s=max(late_s(each["ages_ns"]) for each in heard),
@@ -104,8 +104,8 @@ def trial(ground: Ground, hz: int, seconds: float) -> list[Series]:
     )
     ages_ns = list(chain.from_iterable(each["ages_ns"] for each in heard))
     return [
-        Series(name=(*name, "delay"), calls=1, samples_ns=ages_ns, note=passage.words),
-        *(Series(name=(*name, who), calls=1, samples_ns=[ns]) for who, ns in shares.ns.items()),
+        Series(name=(*name, "delay"), samples_ns=ages_ns, note=passage.words),
+        *(Series(name=(*name, who), samples_ns=[ns]) for who, ns in shares.ns.items()),
     ]
 
 

@@ -12,7 +12,8 @@ from typing import Protocol, cast
 
 from bench.path.processes import answers, given, module, running
 from bench.path.twist import Say
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 class Carrier(Protocol):

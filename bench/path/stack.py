@@ -10,8 +10,9 @@ from pathlib import Path
 
 from bench.path.processes import Command, given, module, running
 from common.settings import BusSettings
+from verification.harness.bus import at
 from verification.harness.certificates import ADDRESS, Site, dialling
-from verification.harness.support import at, free_port
+from verification.harness.ports import free_port
 
 ROBOT = "001"
 BRIDGE, SAFETY = "services.bridge", "services.safety"

@@ -65,4 +65,4 @@ def series(name: tuple[str, str], taken_ns: Sequence[int]) -> Series:
     samples_ns = [each for each in taken_ns if each >= 0]
     lost = len(taken_ns) - len(samples_ns)
     note = f"{lost} of {len(taken_ns):,}" if lost else ""
-    return Series(name=name, calls=1, samples_ns=samples_ns, note=note)
+    return Series(name=name, samples_ns=samples_ns, note=note)

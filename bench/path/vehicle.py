@@ -9,7 +9,7 @@ from bench.path import processes
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 SOURCE = Path(__file__).with_name("vehicle.c")
 FRAMING = Framing("crc-16", "payload")

@@ -13,7 +13,7 @@ from bench.reaction.page import LOADS
 from bench.reaction.responders import RESPONDERS, Responder
 from bench.series import Series
 from common import realtime
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 SEED = 20_240_607
 BLOCKS, HITS, WARM = 2, 750, 20
@@ -36,9 +36,7 @@ def measure(blocks: int = BLOCKS, hits: int = HITS) -> list[Series]:
                 with processes.loaded(BUSY if load == "busy" else 0):
                     samples[responder.name, load] += block(programs, responder, hits)
     note = "granted" if is_granted() else "not granted, so that these rows say nothing"
-    return [
-        Series(name=name, calls=1, samples_ns=some, note=note) for name, some in samples.items()
-    ]
+    return [Series(name=name, samples_ns=some, note=note) for name, some in samples.items()]
 
 
 def block(programs: Programs, responder: Responder, hits: int) -> list[int]:

@@ -10,7 +10,8 @@ from bench.path import bus
 from bench.path.processes import lacking, module, running
 from bench.path.stack import BRIDGE, SAFETY, plain, services
 from bench.reaction.board import BREAK, HIT, STOP, Programs
-from verification.harness.support import at, free_port
+from verification.harness.bus import at
+from verification.harness.ports import free_port
 
 Start = Callable[[Programs, int, int], AbstractContextManager[None]]  # its port, the board's
 

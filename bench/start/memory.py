@@ -9,7 +9,8 @@ from bench.start.processes import children, settings, started
 from bench.start.rows import ODOM, ROUTER, SAFETY
 from common.wire.commands import MotionKind
 from verification.harness.fake_board import board
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 SETTLED_S = 5.0  # by then each has told its health some times
 GUARD, BRIDGE = "T2, guard", "T2, bridge"

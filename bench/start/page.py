@@ -31,7 +31,7 @@ def table(starts: Sequence[Series]) -> str:
     (script,) = (each for each in starts if each.name == BARE)
     lines = [["started", "until", *FIGURES, "of the script's"], ["---"] * 6]
     for one in sorted(starts, key=lambda each: each.p50_ns):
-        told = {name: f"{one.call_ns(share) / 1e6:.0f}" for name, share in FIGURES.items()}
+        told = {name: f"{one.percentile_ns(share) / 1e6:.0f}" for name, share in FIGURES.items()}
         if len(one.samples_ns) < ENOUGH:
             told["p99"] = ""
         lines.append([*one.name, *told.values(), f"× {one.ratio(script):.1f}"])

@@ -25,9 +25,9 @@ def measure(rounds: int = ROUNDS) -> list[Series]:
             for row in rows:
                 for name, ns in row(here).items():
                     samples[name] += [ns] if number >= WARM_UP else []
-    times = [Series(name=name, calls=1, samples_ns=some) for name, some in sorted(samples.items())]
+    times = [Series(name=name, samples_ns=some) for name, some in sorted(samples.items())]
     memory = [
-        Series(name=(MEMORY, name), calls=1, samples_ns=(), note=f"{rss} {pss}")
+        Series(name=(MEMORY, name), samples_ns=(), note=f"{rss} {pss}")
         for name, (rss, pss) in held().items()
     ]
     return times + memory

@@ -20,7 +20,7 @@ def draw(file: Path, series: Sequence[Series]) -> None:
     axes = figure.subplots()
     names = [", ".join(each.name).replace("`", "") for each in starts]
     medians = [each.p50_ns / 1e6 for each in starts]
-    late = [each.call_ns(0.9) / 1e6 - each.p50_ns / 1e6 for each in starts]
+    late = [each.percentile_ns(0.9) / 1e6 - each.p50_ns / 1e6 for each in starts]
     axes.barh(names, medians, xerr=[[0.0] * len(late), late], color="0.7")
     axes.axvline(TO_REACH_MS, linestyle="--", color="tab:red")
     axes.set_xlabel("from the start, ms")

@@ -12,7 +12,9 @@ from bench.start.processes import settings, started
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from verification.harness.support import PATIENCE_S, bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S
 
 Name = tuple[str, str]  # who, and until what
 Times = dict[Name, int]  # ns

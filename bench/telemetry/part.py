@@ -16,7 +16,7 @@ from bench.reaction.page import LOADS
 from bench.series import Series
 from bench.telemetry.page import AGE
 from common.settings import BusSettings
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 BLOCKS, ROUNDS = 2, 200
 DECISIONS = 1_000
@@ -94,9 +94,7 @@ def ages(load: str, decisions: int) -> list[Series]:
         with running(vehicle), stack.local(ports.board, ports.to, safety=noting):
             wait_until(file.exists, f"{decisions} decisions", PATIENCE_S)
             noted = msgspec.json.decode(file.read_bytes(), type=dict[str, list[int]])
-    return [
-        Series(name=(stream, AGE, load), calls=1, samples_ns=some) for stream, some in noted.items()
-    ]
+    return [Series(name=(stream, AGE, load), samples_ns=some) for stream, some in noted.items()]
 
 
 def versions() -> str:

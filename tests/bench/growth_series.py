@@ -13,5 +13,5 @@ def made_up() -> list[Series]:
             point = curves.point((name, str(number)), {"router": ns}, [ns] * 5, 1.0, note)
             made += [one for one in point if name != page.ROBOTS or one.name[2] == "router"]
             if name == page.ROBOTS:
-                made.append(Series(name=(name, str(number), "delay"), calls=1, samples_ns=[]))
+                made.append(Series(name=(name, str(number), "delay"), samples_ns=[]))
     return made

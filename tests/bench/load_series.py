@@ -17,9 +17,9 @@ def made_up() -> list[Series]:
     made = []
     for (count, hz), note in tried.items():
         name = "frames", count, str(hz)
-        made.append(Series(name=(*name, "delay"), calls=1, samples_ns=[400_000] * 9, note=note))
+        made.append(Series(name=(*name, "delay"), samples_ns=[400_000] * 9, note=note))
         for who in ("router", "bridge", "machine"):
-            made.append(Series(name=(*name, who), calls=1, samples_ns=[250_000_000]))
+            made.append(Series(name=(*name, who), samples_ns=[250_000_000]))
     for who, each in ((page.CHAIN, 30), (page.BARE, 20), (page.BUS, 25)):
         for what, value in (("shipped", 1e6), ("tenfold", 1e7), ("rss", 3e6), ("pss", 1e6)):
             for name_of in PROCESSES[who]:
@@ -29,4 +29,4 @@ def made_up() -> list[Series]:
 
 
 def sample(who: str, what: str, process: str, value: float) -> Series:
-    return Series(name=(who, what, process), calls=1, samples_ns=[round(value)] * 3)
+    return Series(name=(who, what, process), samples_ns=[round(value)] * 3)

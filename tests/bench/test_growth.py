@@ -11,7 +11,8 @@ from bench.growth.bend import Point, bend
 from bench.load.board import compiled
 from tests.bench.growth_series import made_up
 from verification.fleet.child import Part
-from verification.harness.support import free_port, router_process
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
 
 
 def curve(*costs: float) -> list[Point]:

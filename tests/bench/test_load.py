@@ -12,10 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from bench.codec.frame_struct import read
 from bench.load import bare, cost, loss, page, throughput
 from bench.load.board import ANSWERS, FRAMING, STANDS, board, compiled
-from bench.load.gauges import Shares, drops, memory
+from bench.load.frames import read
 from bench.load.loss import Passage
 from bench.load.stack import Ports
 from common.wire import commands
@@ -23,7 +22,9 @@ from common.wire.framing import Received
 from services.bridge.config import Bridge
 from services.bridge.schedule import queries
 from tests.bench.load_series import made_up
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.process_stats import CpuShares, memory, udp_drops
+from verification.harness.waiting import wait_until
 
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
@@ -44,7 +45,7 @@ def sock() -> Iterator[socket.socket]:
 
 def bound(port: int) -> bool:
     try:
-        return drops(port) == 0
+        return udp_drops(port) == 0
     except LookupError:
         return False
 
@@ -112,21 +113,21 @@ def test_both_are_measured_in_turns(program: Path) -> None:
 
 def test_what_the_kernel_had_no_room_for_is_counted(sock: socket.socket) -> None:
     port = sock.getsockname()[1]
-    before = drops(port)
+    before = udp_drops(port)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for _ in range(100):
             other.sendto(b"x" * 1000, ("127.0.0.1", port))
-    assert 0 < drops(port) - before < 100
+    assert 0 < udp_drops(port) - before < 100
     with pytest.raises(LookupError):
-        drops(0)
+        udp_drops(0)
 
 
 def test_time_and_memory_of_a_process() -> None:
     waits = [sys.executable, "-c", "input()"]
     with (
         subprocess.Popen(waits, stdin=subprocess.PIPE) as other,
-        Shares({"me": os.getpid(), "other": other.pid}) as shares,
+        CpuShares({"me": os.getpid(), "other": other.pid}) as shares,
     ):
         begin_s = time.process_time()
         while time.process_time() - begin_s < 0.1:

@@ -97,7 +97,7 @@ def test_the_ages_are_those_of_a_stack_that_runs() -> None:
 
 
 def made_up(*name: str, times_us: int = 10) -> Series:
-    return Series(name=name, calls=1, samples_ns=[1000 * times_us] * 9 + [2000 * times_us])
+    return Series(name=name, samples_ns=[1000 * times_us] * 9 + [2000 * times_us])
 
 
 def path() -> list[Series]:

@@ -40,7 +40,7 @@ def test_each_answers_every_hit(responder: Responder, tmp_path: Path) -> None:
 
 
 def made_up(name: str, load: str, *times_us: int) -> Series:
-    return Series(name=(name, load), calls=1, samples_ns=[1000 * us for us in times_us])
+    return Series(name=(name, load), samples_ns=[1000 * us for us in times_us])
 
 
 def test_the_verdict_names_each_figure() -> None:

@@ -24,7 +24,7 @@ from bench.start.rows import (
     site,
 )  # fmt: skip
 from tests.bench.start_series import made_up
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

@@ -15,7 +15,8 @@ from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.wire.commands import MotionKind
 from verification.harness.fake_board import Board
-from verification.harness.support import safety_state, wait_until
+from verification.harness.support import safety_state
+from verification.harness.waiting import wait_until
 
 
 @dataclass

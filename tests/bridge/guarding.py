@@ -5,7 +5,7 @@ from pathlib import Path
 
 from common.wire.commands import MotionKind
 from verification.harness.fake_board import Board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 PROC = Path("/proc")
 

@@ -8,7 +8,7 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from tests.bridge.bridge_fixture import Rig
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def switches(rig: Rig, **brakes: bool) -> m.SwitchesRequest:

@@ -28,7 +28,7 @@ from services.bridge.udp import Sockets
 from tests.bridge.bridge_fixture import Rig, bridge_process
 from tests.bridge.guarding import PROC, breaks_since, bridge_pid
 from verification.harness.fake_board import Board, board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def test_break_goes_first_then_the_bridges_stop() -> None:

@@ -16,7 +16,7 @@ from tests.bridge.bridge_fixture import Rig, bridge_command, bridge_process
 from tests.bridge.guarding import breaks_since, bridge_pid
 from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 Watched = tuple[Board, "subprocess.Popen[bytes]", Manager]
 

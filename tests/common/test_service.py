@@ -19,7 +19,9 @@ from common.version import VERSION
 from tests.common.bus_fixture import Rig
 from tests.common.example_options import SPECIMEN, on
 from tests.common.program import Program, program
-from verification.harness.support import free_port, listening, wait_until
+from verification.harness.bus import listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 # --- settings -----------------------------------------------------------------------------------
 

@@ -11,7 +11,8 @@ from common.loop import Loop
 from common.messages import Drive
 from common.source import BARRED_AFTER, DriveSource
 from tests.teleop.support import FakeBus, safety_state
-from verification.harness.support import at, bus_on, running, wait_until
+from verification.harness.bus import at, bus_on, running
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

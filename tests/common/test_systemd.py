@@ -13,7 +13,8 @@ from common.systemd import BEATS, Systemd
 from tests.common.example_options import SPECIMEN, on
 from tests.common.program import program
 from tests.common.systemd_manager import PATIENCE_US, Manager
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 PERIOD_NS = PATIENCE_US * 1000 // BEATS
 

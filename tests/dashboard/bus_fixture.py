@@ -9,7 +9,7 @@ from common.loop import Loop
 from common.messages import Cause, Drive, Release
 from tests.teleop.support import safety_state
 from verification.harness.dashboard import Eye
-from verification.harness.support import PATIENCE_S, wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 HOLD = {"x": 1.0, "y": 0.0}
 

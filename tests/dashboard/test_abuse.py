@@ -25,7 +25,7 @@ from services.dashboard.listener import RESERVE
 from tests.dashboard.bus_fixture import World
 from verification.harness.dashboard import Eye, Site, dashboard, eye
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open, is_closed
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst
 TRIES = 4

@@ -9,7 +9,7 @@ from common.messages import Cause
 from tests.dashboard.bus_fixture import World
 from tests.dashboard.servers import CONTACT, NEWER, Servers, serving
 from verification.harness.dashboard import Eye, Site, eye
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
 

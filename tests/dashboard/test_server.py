@@ -15,7 +15,7 @@ from common.freshness import NS_PER_S
 from services.dashboard.fleet import ROBOTS_MAX
 from tests.dashboard.bus_fixture import HOLD, World, drive
 from verification.harness.dashboard import Eye, Site, dashboard, eye
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

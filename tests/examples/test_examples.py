@@ -11,7 +11,9 @@ from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.messages import Odometry, Ultrasonic
-from verification.harness.support import PATIENCE_S, bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S
 
 RANGES = (2.0, 1.5, 0.62, None, 3.0, None, None, 4.0)
 

@@ -18,8 +18,8 @@ from services.teleop.app import Panel
 from services.teleop.config import Teleop
 from services.teleop.controller import Desk
 from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
-from verification.harness.support import PATIENCE_S
 from verification.harness.teleop_app import NearApp
+from verification.harness.waiting import PATIENCE_S
 
 
 class Bench:

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from tests.cli.processes import ran, sets
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 REST = Path(__file__).parent.parent.parent / "deploy" / "zenohd" / "rest.json5"
 ABSENT = "no zenohd: ZENOHD names none and there is none on PATH; see deploy/zenohd/README.md"

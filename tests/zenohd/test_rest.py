@@ -18,9 +18,11 @@ from common.loop import Loop
 from common.messages import Odometry
 from tests.common.bus_fixture import rising
 from tests.zenohd.router import Rest, command, found, rest
+from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
-from verification.harness.stack import Chain
-from verification.harness.support import at, free_port, joined, running, wait_until
+from verification.harness.ports import free_port
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.alone
 
@@ -28,7 +30,7 @@ ODOMETRY = keys.ODOMETRY.on("001")
 
 
 @pytest.fixture(scope="module")
-def http(stack: Chain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rest]:
+def http(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rest]:
     log = tmp_path_factory.mktemp("rest") / "rest.log"
     with rest(found(), log, stack.endpoint) as it:
         yield it

@@ -11,24 +11,25 @@ from common.loop import Loop
 from common.messages import Event, ResetRequest
 from tests.cli.processes import ran, sets
 from tests.drive_source import Stick, moves_since, push
-from verification.harness.stack import Chain
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.alone
 
 
-def t2(stack: Chain, *words: str) -> tuple[int, str]:
+def t2(stack: RunningStack, *words: str) -> tuple[int, str]:
     """Run the command on that stack; return its exit code and what it said."""
     done = ran(*words, *sets(f"bus.connect={stack.endpoint}"))
     return done.returncode, done.stdout + done.stderr
 
 
-def reset(stack: Chain) -> None:
+def reset(stack: RunningStack) -> None:
     """Clear what is latched, as an operator does who keeps asking."""
     wait_until(lambda: t2(stack, "call", "safety/reset")[0] == 0, "a reset")
 
 
-def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, stick: Stick) -> None:
+def test_it_drives_and_an_emergency_stop_stops_it(stack: RunningStack, stick: Stick) -> None:
     push(stack, stick)
     code, said = t2(stack, "estop")
     assert code == 0, said
@@ -40,7 +41,9 @@ def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, stick: Stick) ->
     push(stack, stick)
 
 
-def test_the_routers_death_stops_it_and_the_next_one_takes_over(stack: Chain, stick: Stick) -> None:
+def test_the_routers_death_stops_it_and_the_next_one_takes_over(
+    stack: RunningStack, stick: Stick
+) -> None:
     push(stack, stick)
     stack.kill("router")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
@@ -54,7 +57,7 @@ def test_the_routers_death_stops_it_and_the_next_one_takes_over(stack: Chain, st
     push(stack, stick)
 
 
-def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: Chain) -> None:
+def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: RunningStack) -> None:
     code, said = t2(stack, "services", "--json")
     assert code == 0, said
     who = {row["name"]: row for row in map(json.loads, said.splitlines()) if row["service"]}
@@ -64,7 +67,7 @@ def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: Chain) -> 
     assert "srv/safety/reset" in who["safety"]["answers"]
 
 
-def test_the_doctor_gets_to_the_robot(stack: Chain) -> None:
+def test_the_doctor_gets_to_the_robot(stack: RunningStack) -> None:
     """How the robot fares is another matter: it may be held up, or latched."""
     _, said = t2(stack, "doctor", "--json")
     found = [json.loads(line) for line in said.splitlines()]
@@ -77,7 +80,7 @@ def test_the_doctor_gets_to_the_robot(stack: Chain) -> None:
     assert "as on this laptop" in router["text"]
 
 
-def test_a_killed_service_takes_its_token_along(stack: Chain) -> None:
+def test_a_killed_service_takes_its_token_along(stack: RunningStack) -> None:
     token = keys.live_key("001", "odom", "*")
     with probe(stack.config.bus) as opened:
         assert len(opened.alive(token)) == 1
@@ -87,7 +90,7 @@ def test_a_killed_service_takes_its_token_along(stack: Chain) -> None:
         wait_until(lambda: len(opened.alive(token)) == 1, "the next token")
 
 
-def test_who_comes_late_is_told_what_happened_before(stack: Chain) -> None:
+def test_who_comes_late_is_told_what_happened_before(stack: RunningStack) -> None:
     heard: list[Event] = []
     refusals: list[str] = []
 

@@ -8,8 +8,8 @@ from functools import partial
 from common.freshness import NS_PER_S
 from verification.containers.engine import docker
 from verification.containers.stack_fixture import Stage, held_run_s
-from verification.harness.stack import Witness
-from verification.harness.support import wait_until
+from verification.harness.host import StallRecorder
+from verification.harness.waiting import wait_until
 
 REST_S = 0.3  # beside the bridge's lease, as in tests/verification/harness/test_stack.py
 # Docker waits 0.1 s before it starts a container again, and the guard then brakes first of all.
@@ -66,7 +66,7 @@ def is_frozen(service: str, stage: Stage) -> str:
     """Pause a container: cut off from the bus, without an end that anybody could notice."""
     stage.wheel.push(stage.speed)
     container = stage[service]
-    witness, paused_ns = Witness(), time.monotonic_ns()
+    witness, paused_ns = StallRecorder(), time.monotonic_ns()
     docker("pause", container.id)
     docker_s = (time.monotonic_ns() - paused_ns) / NS_PER_S  # within which it took hold
     try:
@@ -83,7 +83,7 @@ def laptop_is_cut_off(stage: Stage) -> str:
     stage.wheel.push(stage.speed)
     router = stage["router"]
     network = next(iter(router.about["NetworkSettings"]["Networks"]))
-    witness, cut_ns = Witness(), time.monotonic_ns()
+    witness, cut_ns = StallRecorder(), time.monotonic_ns()
     docker("network", "disconnect", network, router.id)
     docker_s = (time.monotonic_ns() - cut_ns) / NS_PER_S
     try:
@@ -113,7 +113,7 @@ def survived(stage: Stage, service: str, hurt: Callable[[], int], restart_s: flo
     """Hurt a service while the vehicle drives; it stands, all comes back, and it drives again."""
     stage.wheel.push(stage.speed)
     before = stage[service].began
-    witness, hurt_ns = Witness(), hurt()
+    witness, hurt_ns = StallRecorder(), hurt()
     extra_s = restart_s if service == "bridge" and restart_s else REST_S
     took_s, allowed_s = stands(stage, hurt_ns, witness, extra_s)
     if restart_s is not None:
@@ -124,7 +124,9 @@ def survived(stage: Stage, service: str, hurt: Callable[[], int], restart_s: flo
     return f"{told(took_s, allowed_s)}; drives again"
 
 
-def stands(stage: Stage, since_ns: int, witness: Witness, extra_s: float) -> tuple[float, float]:
+def stands(
+    stage: Stage, since_ns: int, witness: StallRecorder, extra_s: float
+) -> tuple[float, float]:
     """Wait until the vehicle stands; return how long it was held to move, and what is allowed."""
     wait_until(lambda: stage.holds() in ("stop", "break"), "STOP at the board", RESTART_S)
     wait_until(lambda: abs(stage.speed()) < STILL, "the vehicle stands")

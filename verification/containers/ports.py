@@ -3,7 +3,7 @@
 import socket
 from dataclasses import dataclass
 
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from verification.containers.certificates import Keyring
 from verification.containers.engine import Container, Project, docker
 from verification.containers.ports import Ports
 from verification.containers.wheel import Wheel, wheel
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 OVER = ("deploy/compose/own-router.yaml", "deploy/compose/tls.yaml")

@@ -5,7 +5,7 @@ import json
 from verification.containers.crashes import stop
 from verification.containers.engine import Project, docker
 from verification.containers.stack_fixture import SERVICES, Stage
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ONE = "odom"
 

@@ -12,7 +12,8 @@ from common.bus.bus import Bus
 from common.loop import Loop
 from common.operator import reset_request
 from common.source import DriveSource
-from verification.harness.support import running, wait_until
+from verification.harness.bus import running
+from verification.harness.waiting import wait_until
 
 SPEED = 0.3  # m/s that is asked for
 MOVING = 0.1  # m/s, by what is really driven

@@ -28,7 +28,8 @@ from common.wire.reports import VelocityReport
 from services.bridge.guard_ipc import Handover
 from services.bridge.udp import Sockets
 from verification.cost.uncountable import Uncountable
-from verification.harness.support import bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
 
 FRAMES = 200
 ENOUGH = 10  # turns with a frame alone

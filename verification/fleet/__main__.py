@@ -23,13 +23,13 @@ from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.estop import stop
 from cli.inspect.robots import look
 from common.bus.probe import probe
-from verification.faults.machine import named
 from verification.fleet.figures import Window, markdown, shares, uplinks
 from verification.fleet.page import scale, units
 from verification.fleet.plot import save
 from verification.fleet.topology import REAL, Ground, crowd, site, stack, window
-from verification.harness.markdown import filled
-from verification.harness.support import at
+from verification.harness.bus import at
+from verification.harness.host import description
+from verification.harness.results import filled
 
 SIZES = "1,2,5,10,20,50"
 LOOKS = ("nobody", "overview", "everything")
@@ -140,7 +140,7 @@ def stopped(ground: Ground, robots: int) -> str:
 def machine(seconds: float) -> str:
     """Return where and how it was measured."""
     return (
-        f"Made by `make fleet` on {datetime.now(UTC):%Y-%m-%d}: {named()}, Python "
+        f"Made by `make fleet` on {datetime.now(UTC):%Y-%m-%d}: {description()}, Python "
         f"{platform.python_version()}, eclipse-zenoh {version('eclipse-zenoh')}; "
         f"{seconds:g} s a row."
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sim.trace import Command
-from verification.faults.table import rank
+from verification.harness.results import percentile
 
 S = 1_000_000_000
 PATIENCE_NS = S  # a frame that comes later answers nothing
@@ -47,7 +47,7 @@ def answers_s(asked: Sequence[Asked], commands: Sequence[Command]) -> list[float
 
 def ms(values: Sequence[float], share: float) -> str:
     """Return what this share of durations does not exceed, for a table."""
-    return f"{1000 * rank(values, share):.1f}" if values else "-"
+    return f"{1000 * percentile(values, share):.1f}" if values else "-"
 
 
 def kbit(bytes_per_s: float | None) -> str:

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from verification.faults.table import rank
 from verification.fleet.figures import Window, limits, name, on_the_wire
+from verification.harness.results import percentile
 
 Value = Callable[[Window], float | None]
 
@@ -51,4 +51,4 @@ def _lines(axes: Axes, windows: Sequence[Window], value: Value, marked: bool = F
 
 def _p99(answers: Sequence[float | None]) -> float | None:
     took = [each for each in answers if each is not None]
-    return 1000 * rank(took, 0.99) if took else None
+    return 1000 * percentile(took, 0.99) if took else None

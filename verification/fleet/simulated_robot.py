@@ -26,7 +26,7 @@ from common.messages import Message, SafetyState
 from services.recorder.reader import Reader
 from verification.fleet.child import obey
 from verification.fleet.streams import SERVICES, Stream, schedule, streams, thinning
-from verification.harness.support import at
+from verification.harness.bus import at
 
 LAP = Path(__file__).parents[2] / "tests/recorder/lap.mcap"
 AT_ONCE = 8  # sessions that are being opened: each takes half a second, and little work

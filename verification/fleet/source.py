@@ -13,7 +13,7 @@ from common.operator import reset_request
 from common.source import DriveSource
 from verification.fleet.child import obey
 from verification.fleet.figures import Asked
-from verification.harness.support import at
+from verification.harness.bus import at
 
 PERIOD_S = 0.05
 SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20

@@ -12,7 +12,7 @@ from common import keys
 from common.bus.session import client_config
 from common.messages import Message
 from verification.fleet.child import obey
-from verification.harness.support import at
+from verification.harness.bus import at
 
 # What somebody at the site looks at.
 WORDS = {

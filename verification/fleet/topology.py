@@ -6,13 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from verification.faults.frames import Frames
 from verification.faults.stack_fixture import QUICK
 from verification.fleet.child import Part
 from verification.fleet.figures import Asked, Window, answers_s
-from verification.fleet.gauges import Machine, Used, links, machine, since, used
-from verification.harness.stack import Chain, chain
-from verification.harness.support import free_port, router_process
+from verification.fleet.resource_usage import Usage, connections, since, usage
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
+from verification.harness.process_stats import Machine, machine
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.trace import TraceFollower
 
 SETTLE_S = 3.0  # until declarations are known and queues are empty
 ANSWER_S = 1.0  # until the last request is answered
@@ -25,7 +27,7 @@ class Ground:
 
     site: str
     site_pid: int
-    stacks: list[Chain] = field(default_factory=list)
+    stacks: list[RunningStack] = field(default_factory=list)
     light: Part | None = None
     light_count: int = 0
 
@@ -49,7 +51,7 @@ class Reading:
     """All gauges at one moment."""
 
     at_s: float
-    used: dict[str, Used]
+    used: dict[str, Usage]
     machine: Machine
     links: dict[int, dict[str, int]]
 
@@ -59,9 +61,9 @@ def read(ground: Ground, others: dict[str, list[int]]) -> Reading:
     pids = ground.pids() | others
     return Reading(
         time.monotonic(),
-        {who: used(each) for who, each in pids.items()},
+        {who: usage(each) for who, each in pids.items()},
         machine(),
-        links(ground.port),
+        connections(ground.port),
     )
 
 
@@ -74,13 +76,13 @@ def site() -> Iterator[Ground]:
 
 
 @contextlib.contextmanager
-def stack(ground: Ground, folder: Path) -> Iterator[Chain]:
+def stack(ground: Ground, folder: Path) -> Iterator[RunningStack]:
     """Run a real robot, whose own router dials the site's, while the context lasts."""
     number = len(ground.stacks)
     room = folder / f"robot{number}"
     room.mkdir(parents=True)
     sets = [f"robot.id={robot(number)}", f"bus.uplink={ground.site}", *QUICK]
-    with chain(room, sets=sets, shipped=True) as made:
+    with running_stack(room, sets=sets, shipped=True) as made:
         ground.stacks.append(made)
         try:
             yield made
@@ -119,7 +121,7 @@ def robot(number: int) -> str:
 
 def window(ground: Ground, what: str, seconds: float, endpoint: str) -> Window:
     """Measure for so long while somebody looks at this and one real robot is driven."""
-    frames = Frames(ground.stacks[0].trace_file)
+    frames = TraceFollower(ground.stacks[0].trace_file)
     hand_words = ("verification.fleet.source", endpoint, robot(0))
     with Part("verification.fleet.subscriber", ground.site, what) as ear, Part(*hand_words) as hand:
         time.sleep(SETTLE_S)

@@ -11,7 +11,7 @@ from cli.keys.access import access_control
 from common import members
 from common.bus.session import router
 from common.settings import BusSettings
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 ADDRESS = "127.0.0.1"
 

@@ -15,7 +15,8 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from verification.harness.support import PATIENCE_S, free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 @dataclass

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
 
 from verification.harness.dashboard import Site
-from verification.harness.stack import Chain
-from verification.harness.support import wait_until
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PHONE: ViewportSize = {"width": 390, "height": 844}
@@ -43,7 +43,7 @@ def takes(page: Page) -> None:
     page.wait_for_selector(".driving.mine")
 
 
-def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None]) -> None:
+def drives(stack: RunningStack, press: Callable[[], None], release: Callable[[], None]) -> None:
     """Hold until the vehicle moves; let go and press again when this machine held somebody up."""
     for _ in range(10):
         press()
@@ -56,7 +56,7 @@ def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None])
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-def stands(stack: Chain) -> None:
+def stands(stack: RunningStack) -> None:
     wait_until(lambda: abs(stack.speed()) < STILL_MPS, "the vehicle stands")
 
 

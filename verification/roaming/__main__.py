@@ -13,9 +13,9 @@ from pathlib import Path
 from services.safety.config import SafetyConfig
 from verification.faults.__main__ import today
 from verification.faults.catalogue import NOTICE_S
-from verification.faults.frames import SPEED
-from verification.faults.machine import HoldUps
-from verification.faults.namespaces import Need, enter, missing
+from verification.faults.namespaces import Requirement, enter, missing
+from verification.faults.stack_fixture import SPEED_MPS
+from verification.harness.host import StallRecorder
 from verification.roaming import page
 from verification.roaming.conditions import OUTAGES, STEADY, Outage, Steady
 from verification.roaming.hosts import Site, site
@@ -28,7 +28,7 @@ CANNOT = 3  # exit code where two hosts cannot be made here
 # What a source's request holds, as shipped, and what it takes to notice.
 SHIPPED = SafetyConfig().safety
 BUDGET_S = SHIPPED.sources["teleop"].lease + NOTICE_S
-NEEDS: tuple[Need, ...] = ("a far driver", "other clocks")
+NEEDS: tuple[Requirement, ...] = ("remote driver", "separate clocks")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if _wanted(one.name, options.only)
     ]
     began_s = time.monotonic()
-    with HoldUps() as holdups, tempfile.TemporaryDirectory() as folder:
+    with StallRecorder() as holdups, tempfile.TemporaryDirectory() as folder:
         wents, backs = campaign(Path(folder), weathers, losses, holdups, options.seconds)
     text = report(wents, backs, time.monotonic() - began_s)
     print(text)
@@ -68,7 +68,7 @@ def campaign(
     folder: Path,
     weathers: Sequence[Steady],
     losses: Sequence[Outage],
-    holdups: HoldUps,
+    holdups: StallRecorder,
     seconds: float,
 ) -> tuple[Wents, Backs]:
     """Try all; the robot's router is another one where nothing is thinned."""
@@ -84,7 +84,9 @@ def campaign(
             for weather in mine:
                 went = steady(it, weather, seconds)
                 wents[weather.name] = weather, went, _held(holdups, went)
-                print(page.driving([wents[weather.name]], SPEED).splitlines()[-1], file=sys.stderr)
+                print(
+                    page.driving([wents[weather.name]], SPEED_MPS).splitlines()[-1], file=sys.stderr
+                )
             for what in lost:
                 some = _lost(it, what)
                 backs.append((what, some, max(_held(holdups, back) for back in some)))
@@ -96,7 +98,7 @@ def _lost(it: Site, what: Outage) -> list[Back]:
     return [outage(it, what, 3 + n % 2) for n in range(what.times)]
 
 
-def _held(holdups: HoldUps, what: Went | Back) -> float:
+def _held(holdups: StallRecorder, what: Went | Back) -> float:
     return holdups.worst_s(what.since_ns, (what.until_ns - what.since_ns) / 1e9)
 
 
@@ -107,7 +109,7 @@ def report(wents: Wents, backs: Backs, took_s: float) -> str:
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}",
         "python": platform.python_version(),
         "minutes": f"{took_s / 60:.0f}",
-        "driving": page.driving(wents, SPEED),
+        "driving": page.driving(wents, SPEED_MPS),
         "seen": page.seen(wents),
         "returning": page.returning(backs),
         "own": page.own(wents, backs),

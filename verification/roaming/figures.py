@@ -6,8 +6,8 @@ from itertools import pairwise
 
 from common.freshness import NS_PER_S
 from sim.trace import Command
-from verification.faults.frames import moves
-from verification.faults.table import rank
+from verification.harness.results import percentile
+from verification.harness.trace import moves
 from verification.roaming.notes import Note
 
 STATE, ODOMETRY, BUMPER = "tel/safety/state", "tel/odom/odometry", "tel/bridge/bumper"
@@ -51,7 +51,7 @@ def stream(notes: Sequence[Note], key: str, since_ns: int, until_ns: int) -> Str
     gap_s = longest_s([note.at_ns for note in mine], since_ns, until_ns)
     rate_hz = len(mine) * NS_PER_S / (until_ns - since_ns)
     sent = mine[-1].seq - mine[0].seq + 1 if mine else 0
-    return Stream(rate_hz, gap_s, (rank(ages, 0.5), max(ages)), sent - len(mine))
+    return Stream(rate_hz, gap_s, (percentile(ages, 0.5), max(ages)), sent - len(mine))
 
 
 def chain(notes: Sequence[Note], since_ns: int, until_ns: int) -> Chain:
@@ -94,4 +94,8 @@ def longest_s(times_ns: Sequence[int], since_ns: int, until_ns: int) -> float:
 
 
 def _ranks(values: Sequence[float]) -> tuple[float, float]:
-    return (rank(values, 0.5), rank(values, 0.99)) if values else (float("inf"), float("inf"))
+    return (
+        (percentile(values, 0.5), percentile(values, 0.99))
+        if values
+        else (float("inf"), float("inf"))
+    )

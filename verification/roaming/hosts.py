@@ -13,10 +13,11 @@ from common.settings import BusSettings
 from sim.requests import Wire
 from verification.faults.namespaces import clock, step_clock
 from verification.faults.remote_host import net
-from verification.faults.stack_fixture import QUICK, Lane, driven
+from verification.faults.stack_fixture import QUICK, StackFixture, driven
 from verification.harness.certificates import Site as Keys
-from verification.harness.stack import chain
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.stack import SETTINGS_FILE, running_stack
+from verification.harness.waiting import wait_until
 from verification.roaming import notes
 from verification.roaming.notes import Note
 
@@ -30,14 +31,14 @@ DASHBOARD_S = 30.0  # until it is up and its viewer has a picture
 class Site:
     """Two hosts, the operator's finger, and what both have noted."""
 
-    lane: Lane
+    fixture: StackFixture
     robot_notes: Path
     laptop_notes: Path
 
     def air(self, *faults: Wire) -> None:
         """Let this happen to the packets between the hosts from now on; nothing else does."""
         for one in (Wire(), *faults):
-            self.lane.cable(one)
+            self.fixture.disturb_network(one)
 
     def carried(self) -> int:
         """Return how many bytes the robot has sent towards the laptop so far, headers and all."""
@@ -60,11 +61,11 @@ class Site:
 
     def press_again(self, speed: float) -> None:
         """Lift the finger and put it back, after a reset where one is due."""
-        self.lane.ask(0.0)
+        self.fixture.ask(0.0)
         time.sleep(LIFT_S)
-        if self.lane.latched():
-            self.lane.reset()
-        self.lane.ask(speed)
+        if self.fixture.latched():
+            self.fixture.reset()
+        self.fixture.ask(speed)
 
 
 @contextlib.contextmanager
@@ -73,7 +74,7 @@ def site(
 ) -> Iterator[Site]:
     """Run both hosts while the context lasts; the laptop's clocks are other ones."""
     folder.mkdir(exist_ok=True)
-    (folder / "lane.toml").write_text("")
+    (folder / SETTINGS_FILE).write_text("")
     robot, laptop = folder / "robot.jsonl", folder / "laptop.jsonl"
     port = free_port()
     with contextlib.redirect_stdout(io.StringIO()):  # what to do with the keys
@@ -84,7 +85,7 @@ def site(
     step_clock(folder / "laptop", AHEAD_S)
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
     sets = [*QUICK, *words_of(robots), *([] if thinned else [EVERYTHING])]
-    with chain(folder, sets=sets, shipped=shipped, listen=listen) as stack:
+    with running_stack(folder, sets=sets, shipped=shipped, listen=listen) as stack:
         command = [
             sys.executable,
             "-m",
@@ -100,8 +101,8 @@ def site(
             str(laptop),
         ]
         words += ["dashboard" if dashboard else "alone", *laptops]
-        with driven(stack, folder, words, env) as lane:
-            it = Site(lane, robot, laptop)
+        with driven(stack, folder, words, env) as fixture:
+            it = Site(fixture, robot, laptop)
             began_ns = time.monotonic_ns()
             wait_until(lambda: it.hears("tel/safety/state", began_ns), "the laptop", DASHBOARD_S)
             yield it

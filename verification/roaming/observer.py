@@ -6,7 +6,7 @@ from pathlib import Path
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from verification.harness.support import at
+from verification.harness.bus import at
 from verification.roaming.notes import Notebook
 
 

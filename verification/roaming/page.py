@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import inf, isfinite
 
-from verification.faults.table import rank
+from verification.harness.results import percentile
 from verification.roaming.conditions import Outage, Steady
 from verification.roaming.figures import Chain, Stream
 from verification.roaming.trial import Back, Went
@@ -146,7 +146,7 @@ def _stream(it: Stream) -> list[str]:
 
 
 def _spread(values: Sequence[float]) -> tuple[float, float]:
-    return rank(values, 0.5), max(values)
+    return percentile(values, 0.5), max(values)
 
 
 def _or_never(value: float | None) -> float:

@@ -7,9 +7,10 @@ import msgspec
 
 from common.freshness import NS_PER_S
 from sim.requests import Wire
-from verification.faults.frames import SPEED, first_stop_s, last_move_s, moves
 from verification.faults.remote_host import Address
-from verification.faults.stack_fixture import until
+from verification.faults.stack_fixture import SPEED_MPS
+from verification.harness.trace import first_stop_s, last_move_s, moves
+from verification.harness.waiting import becomes_true
 from verification.roaming import figures
 from verification.roaming.conditions import Outage, Steady
 from verification.roaming.figures import STATE, Chain, Drive, Stream
@@ -58,16 +59,16 @@ class Back:
 def steady(it: Site, weather: Steady, seconds: float) -> Went:
     """Drive in a weather for so long, then press the emergency stop in it."""
     calm(it)
-    it.lane.ready()
+    it.fixture.ready()
     it.air(*weather.faults)
     hold(it, SETTLE_S)
-    it.lane.frames.forget()
+    it.fixture.frames.forget()
     carried = it.carried()
-    began_m, since_ns = it.lane.stack.control.truth().distance, time.monotonic_ns()
+    began_m, since_ns = it.fixture.running.control.truth().distance, time.monotonic_ns()
     hands = hold(it, seconds)
-    until_ns, ended_m = time.monotonic_ns(), it.lane.stack.control.truth().distance
+    until_ns, ended_m = time.monotonic_ns(), it.fixture.running.control.truth().distance
     carried = it.carried() - carried
-    commands = list(it.lane.frames.follow().commands)
+    commands = list(it.fixture.frames.follow().commands)
     braked_s, told_s = estop(it)
     calm(it)
     robot, laptop = it.on_robot(since_ns, until_ns), it.on_laptop(since_ns, until_ns)
@@ -90,10 +91,10 @@ def hold(it: Site, seconds: float) -> int:
     """Hold the key; lift it and put it back when it stands; return how often that was."""
     end_s, hands, moved_s = time.monotonic() + seconds, 0, time.monotonic()
     while (now_s := time.monotonic()) < end_s:
-        if it.lane.moving():
+        if it.fixture.moving():
             moved_s = now_s
         elif now_s - moved_s > PATIENCE_S:
-            it.press_again(SPEED)
+            it.press_again(SPEED_MPS)
             hands, moved_s = hands + 1, time.monotonic()
         time.sleep(0.02)
     return hands
@@ -101,30 +102,30 @@ def hold(it: Site, seconds: float) -> int:
 
 def estop(it: Site) -> tuple[float | None, float | None]:
     """Press E; return how long it took to the board, and until the laptop was told."""
-    it.lane.frames.forget()
+    it.fixture.frames.forget()
     pressed_ns = time.monotonic_ns()
-    it.lane.tell(b"e")
+    it.fixture.send_line(b"e")
 
     def braked() -> list[int]:
-        commands = it.lane.frames.follow().commands
+        commands = it.fixture.frames.follow().commands
         return [c.mono_ns for c in commands if c.kind == "break" and c.mono_ns > pressed_ns]
 
     def told() -> list[int]:
         return [note.at_ns for note in it.hears(STATE, pressed_ns) if note.latched]
 
-    until(lambda: braked() and told(), ESTOP_S)
-    it.lane.ask(0.0)
+    becomes_true(lambda: braked() and told(), ESTOP_S)
+    it.fixture.ask(0.0)
     return _after_s(braked(), pressed_ns), _after_s(told(), pressed_ns)
 
 
 def calm(it: Site) -> None:
     """Let the air be good, and reset until none of the stops that were asked for is under way."""
     it.air()
-    it.lane.ask(0.0)
+    it.fixture.ask(0.0)
     quiet_s = time.monotonic()
     while time.monotonic() - quiet_s < CALM_S:
-        if it.lane.latched():
-            it.lane.reset()
+        if it.fixture.latched():
+            it.fixture.reset()
             quiet_s = time.monotonic()
         time.sleep(0.05)
 
@@ -132,21 +133,21 @@ def calm(it: Site) -> None:
 def outage(it: Site, what: Outage, address: int) -> Back:
     """Cut the link with the key held, mend it, and see what it takes to drive on."""
     calm(it)
-    it.lane.ready()
+    it.fixture.ready()
     time.sleep(0.3)
-    it.lane.frames.forget()
+    it.fixture.frames.forget()
     cut_ns = time.monotonic_ns()
     if what.seconds:
         it.air(Wire(drop=1.0))
         time.sleep(what.seconds)
     if what.moves:
-        it.lane.tell(msgspec.json.encode(Address(address)))
+        it.fixture.send_line(msgspec.json.encode(Address(address)))
     back_ns = time.monotonic_ns()
     it.air()
     drove_s, hands = _drives_again(it, back_ns)
     until_ns = time.monotonic_ns()
     time.sleep(LATE_S)
-    commands = it.lane.frames.commands
+    commands = it.fixture.frames.commands
     heard = [note.at_ns for note in it.hears(STATE, back_ns) if note.sent_ns > back_ns]
     return Back(
         told_s=first_stop_s(commands, cut_ns),
@@ -164,17 +165,17 @@ def _drives_again(it: Site, back_ns: int) -> tuple[float | None, int]:
     """Return how long after the return it drove for good, and how often that took the finger."""
     began_s, hands = time.monotonic(), 0
     since_s = began_s  # that it drives, or stands, without a change
-    moving = it.lane.moving()
+    moving = it.fixture.moving()
     while (now_s := time.monotonic()) - began_s < GIVE_UP_S:
-        if it.lane.moving() != moving:
+        if it.fixture.moving() != moving:
             moving, since_s = not moving, now_s
         elif moving and now_s - since_s > SURE_S and now_s - began_s > SURE_S:
-            commands = it.lane.frames.commands
+            commands = it.fixture.frames.commands
             stood = [c.mono_ns for c in commands if not moves(c)]
             drove = [c.mono_ns for c in commands if c.mono_ns > max(stood, default=0)]
             return max(0.0, (drove[0] - back_ns) / NS_PER_S) if stood else 0.0, hands
         elif not moving and now_s - since_s > PATIENCE_S:
-            it.press_again(SPEED)
+            it.press_again(SPEED_MPS)
             hands, since_s = hands + 1, time.monotonic()
         time.sleep(0.02)
     return None, hands

@@ -25,8 +25,8 @@ from common.config import load
 from common.errors import LinkError, RobotError
 from common.loop import Loop
 from sim.control import Control
+from verification.harness.process_stats import PROC
 from verification.soak.driver import STEP_S
-from verification.soak.process_stats import PROC
 from verification.soak.record import Record, encoded
 from verification.soak.runner import Yard
 from verification.soak.verdict import Limits, good, results

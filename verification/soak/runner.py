@@ -18,14 +18,27 @@ from common.messages import Health
 from sim import trace as t
 from sim.control import Control
 from sim.requests import Asked
+from verification.harness.process_stats import GONE, PROC, stat, tree
+from verification.harness.trace import Tail, moves
 from verification.soak.faults import Fault, Faults
-from verification.soak.process_stats import Tail, look, tree
-from verification.soak.record import Progress, Record, Window
-from verification.soak.verdict import moves, too_late
+from verification.soak.record import Life, Progress, Record, Sample, Window
+from verification.soak.verdict import too_late
 
 FIRST_S = 10.0  # all is well for so long, so that a lap begins
 HANG_S = 0.2  # without a heartbeat, and a guard acts
 TOLD = ("step", "lap finished", "begun anew")
+
+
+def sample_process(name: str, pid: int, at_s: float) -> tuple[Life, Sample] | None:
+    """Return a sample of a process; None when it does not run any more."""
+    try:
+        now = stat(pid)
+        descriptors = sum(1 for _ in (PROC / str(pid) / "fd").iterdir())
+    except GONE:
+        return None
+    if now.state in "ZX":
+        return None
+    return Life(name, pid, now.started), Sample(at_s, now.rss, now.threads, descriptors)
 
 
 class Yard:
@@ -97,7 +110,7 @@ class Yard:
             self._judge(fault)
             self._end_ns = 0  # judged once, whatever is tried again below
         if fault.end is not None and not self._do(fault.end):
-            return  # the next look tries again
+            return  # the next call tries again
         if self._held is not None:
             self._held.due_s = 0.0
             self._held = None
@@ -150,7 +163,7 @@ class Yard:
         self._see_lateness()
         pids = self._pids()
         for name, pid in pids:
-            found = look(name, pid, record.seconds)
+            found = sample_process(name, pid, record.seconds)
             if found is not None:
                 record.lives.setdefault(found[0], []).append(found[1])
         self._read_log()

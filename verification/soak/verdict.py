@@ -14,6 +14,7 @@ from statistics import median
 from cli.demo.score import Result
 from common.freshness import NS_PER_S
 from sim import trace as t
+from verification.harness.trace import moves
 from verification.soak.record import Life, Record, Sample, Window
 
 GROWTH_MAX = 2 * 2**20  # bytes of memory
@@ -60,11 +61,6 @@ def growth(samples: Sequence[Sample], warm_up_s: float) -> tuple[Sample, Sample]
         return None
     fifth = len(warm) // 5
     return _median(warm[:fifth]), _median(warm[-fifth:])
-
-
-def moves(command: t.Command) -> bool:
-    """Tell whether a command moves the vehicle."""
-    return command.kind == "run" and bool(command.linear or command.angular)
 
 
 def too_late(runs: Iterable[t.Command], window: Window) -> list[tuple[str, float]]:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 from verification.soak import driver
 from verification.systemd.machine import Machine
 

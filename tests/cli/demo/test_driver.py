@@ -12,7 +12,7 @@ from common import messages as m
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from tests.cli.demo.lap_fixture import odometry, safety
-from verification.harness.support import at
+from verification.harness.bus import at
 
 
 class Desk(Bus):

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from cli.__main__ import COMMANDS, main
-from verification.harness.support import PATIENCE_S
+from verification.harness.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,9 @@ from common.messages import Drive, ResetDone, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.teleop.support import safety_state
+from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site, dialling
-from verification.harness.support import at, joined, running, wait_until
+from verification.harness.waiting import wait_until
 
 
 class OnBoard:

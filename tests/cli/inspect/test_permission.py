@@ -10,7 +10,7 @@ from common import keys
 from common.messages import Drive, Link
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import Rig
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ROOT = "t2/v1/001"
 

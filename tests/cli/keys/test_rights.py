@@ -17,8 +17,9 @@ from cli.keys.access import Verb
 from common import keys
 from common.bus.session import client_config
 from tools.rights_table import CLASSES, MINE, ROLES, may
+from verification.harness.bus import at
 from verification.harness.certificates import Site, dialling
-from verification.harness.support import at, wait_until
+from verification.harness.waiting import wait_until
 
 KEYS = tuple(CLASSES.values())
 PLAIN = tuple(key for key in KEYS if "*" not in key)  # that can be served, or hold a token

@@ -19,7 +19,9 @@ from common.bus.session import client_config, router
 from common.settings import BusSettings, Log
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
-from verification.harness.support import at, free_port, listening, router_process, wait_until
+from verification.harness.bus import at, listening, router_process
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 # Matching these two takes Zenoh 1.10.2 a minute: long enough to be found, and it ends by itself.
 EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"

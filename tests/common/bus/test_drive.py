@@ -14,7 +14,8 @@ from common.freshness import NS_PER_S
 from common.messages import Bumper, Motion
 from common.settings import BusSettings as Settings
 from tests.common.bus_fixture import Rig, rising, until_heard
-from verification.harness.support import Lines, at, wait_until
+from verification.harness.bus import Lines, at
+from verification.harness.waiting import wait_until
 
 
 class Ends:

@@ -15,9 +15,9 @@ from verification.fleet.figures import (
     shares,
     uplinks,
 )
-from verification.fleet.gauges import parsed, since
 from verification.fleet.page import scale, units
 from verification.fleet.plot import save
+from verification.fleet.resource_usage import parsed, since
 
 MS = 1_000_000
 

@@ -15,7 +15,9 @@ from common import keys
 from common.bus.session import client_config, router_config
 from common.settings import BusSettings
 from tests.common.bus_fixture import until_heard
-from verification.harness.support import at, free_port, listening, wait_until
+from verification.harness.bus import at, listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 # What a site's router that dials a region's has besides its uplink.
 SITE: dict[str, object] = {

@@ -16,7 +16,7 @@ from sim.control import Control
 from sim.requests import Asked, Place
 from sim.trace import Truth
 from tests.cli.demo.lap_fixture import odometry, safety, truth
-from verification.harness.support import at
+from verification.harness.bus import at
 from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
 
 BEAT_NS = NS_PER_S // 20

@@ -18,9 +18,9 @@ from sim import trace as t
 from sim.control import Control
 from sim.requests import Asked, Driver
 from tests.cli.processes import alive, wait_gone
-from verification.harness.support import wait_until
+from verification.harness.process_stats import tree
+from verification.harness.waiting import wait_until
 from verification.soak.faults import Fault
-from verification.soak.process_stats import tree
 from verification.soak.record import Progress, Record
 from verification.soak.runner import FIRST_S, Yard
 

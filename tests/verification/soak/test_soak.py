@@ -10,7 +10,7 @@ import pytest
 
 from common.cli_args import EXIT_CONFIG
 from tests.cli.processes import children, running, wait_gone
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 from verification.soak.__main__ import main
 
 SOAK_S = 50

@@ -5,8 +5,9 @@ import pytest
 from cli.demo.score import Result
 from common.freshness import NS_PER_S
 from sim import trace as t
+from verification.harness.trace import moves
 from verification.soak.record import Life, Progress, Record, Sample, Window
-from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, moves, results, too_late
+from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, results, too_late
 
 MB = 2**20
 LIMITS = Limits(warm_up_s=60.0, lap_s=120.0, stuck_s=75.0)

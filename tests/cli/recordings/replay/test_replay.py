@@ -19,7 +19,7 @@ from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import Rig
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 FAST = ("--rate", "1000")
 

@@ -1,7 +1,6 @@
-"""The board's frames by hand, with ``struct`` and the same CRC: the floor.
+"""Frames of the board with plain ``struct``, as a user would write them in an afternoon.
 
-Every check of T2's, and no more: a bad frame is an error without a reason, and nothing is read
-behind it.
+Checks what T2 checks. A bad frame raises ``ValueError`` and ends the datagram.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,8 +8,6 @@ from struct import Struct
 from typing import Any
 
 import crcmod.predefined
-
-from bench.codec.candidate import Candidate, readers, writers
 
 Values = tuple[Any, ...]
 
@@ -40,12 +37,6 @@ def framed(command_id: int, payload: bytes) -> bytes:
     return HEADER.pack(b"GS", 8 + len(payload), command_id, crc(payload)) + payload
 
 
-def velocity(values: Values) -> bytes:
-    """Return a velocity report."""
-    linear, angular = values
-    return framed(0x7426, VELOCITY.pack(to_wire(linear), to_wire(angular)))
-
-
 def motion(values: Values) -> bytes:
     """Return a motion command; raise ``ValueError`` for one that there is not."""
     kind, linear, angular = values
@@ -54,27 +45,9 @@ def motion(values: Values) -> bytes:
     return framed(0x7426, MOTION.pack(kind, to_wire(linear), to_wire(angular)))
 
 
-def bumper(values: Values) -> bytes:
-    """Return a bumper report."""
-    (pressed,) = values
-    return framed(0x7602, BYTE.pack(pressed))
-
-
-def ultrasonic(values: Values) -> bytes:
-    """Return an ultrasonic report; ``struct`` itself checks number and range."""
-    return framed(0x7601, RANGES.pack(*values))
-
-
 def velocity_of(linear: int, angular: int) -> Values:
     """Return the values of a velocity report."""
     return from_wire(linear), from_wire(angular)
-
-
-def motion_of(kind: int, linear: int, angular: int) -> Values:
-    """Return the values of a motion command; raise ``ValueError`` for one that there is not."""
-    if kind > 2:
-        raise ValueError(kind)
-    return kind, from_wire(linear), from_wire(angular)
 
 
 def bumper_of(value: int) -> Values:
@@ -93,7 +66,6 @@ REPORTS: Kinds = {
     0x7602: (BYTE, bumper_of),
     0x7601: (RANGES, ultrasonic_of),
 }
-COMMANDS: Kinds = {0x7426: (MOTION, motion_of)}
 
 
 def read(datagram: bytes, kinds: Kinds) -> list[Values]:
@@ -118,25 +90,3 @@ def read(datagram: bytes, kinds: Kinds) -> list[Values]:
         frames.append(values_of(*layout.unpack(payload)))
         start += size
     return frames
-
-
-def _report(datagram: bytes) -> list[Values]:
-    return read(datagram, REPORTS)
-
-
-def _command(datagram: bytes) -> list[Values]:
-    return read(datagram, COMMANDS)
-
-
-def only(name: str, frames: list[Values]) -> Values:
-    """Return the values of the one frame that was read."""
-    (values,) = frames
-    return values
-
-
-BY_HAND = Candidate(
-    name="struct",
-    encode=writers(velocity, motion, bumper, ultrasonic),
-    decode=readers(_report, _command),
-    plain=only,
-)
