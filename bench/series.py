@@ -44,28 +44,28 @@ class Series(Struct, frozen=True, kw_only=True):
 
 
 class Measured(Struct, frozen=True, kw_only=True):
-    """The result of one part."""
+    """The result of one benchmark."""
 
     where: str  # date, machine, Python, versions
     noise: str  # other load on the machine
     series: Sequence[Series]
 
 
-def store(part: str, measured: Measured, folder: Path = RAW) -> Path:
-    """Write all samples of a part, compressed; return the file."""
+def store(benchmark: str, measured: Measured, folder: Path = RAW) -> Path:
+    """Write all samples of a benchmark, compressed; return the file."""
     folder.mkdir(parents=True, exist_ok=True)
-    file = _file(part, folder)
+    file = _file(benchmark, folder)
     file.write_bytes(gzip.compress(msgspec.json.encode(measured)))
     return file
 
 
-def load(part: str, folder: Path = RAW) -> Measured | None:
-    """Return the last stored result of a part, or None."""
-    file = _file(part, folder)
+def load(benchmark: str, folder: Path = RAW) -> Measured | None:
+    """Return the last stored result of a benchmark, or None."""
+    file = _file(benchmark, folder)
     if not file.exists():
         return None
     return msgspec.json.decode(gzip.decompress(file.read_bytes()), type=Measured)
 
 
-def _file(part: str, folder: Path) -> Path:
-    return folder / f"{part}.json.gz"
+def _file(benchmark: str, folder: Path) -> Path:
+    return folder / f"{benchmark}.json.gz"

@@ -1,4 +1,4 @@
-"""The part ``growth`` as a picture: CPU above and delay below, both axes logarithmic."""
+"""Plot of the benchmark ``growth``: CPU above, delay below, logarithmic axes."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,11 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from bench.growth.bend import bend
-from bench.growth.page import COSTS, CURVES, points
+from bench.growth.page import COSTS, CURVES, bend, points
 from bench.series import Series
 
-LEAST = 0.1  # % of a core; less is drawn as that
+LEAST = 0.1  # % of a core; smaller values are drawn as this
 
 
 def draw(file: Path, series: Sequence[Series]) -> None:

@@ -1,4 +1,4 @@
-"""Frames of the board with plain ``struct``, as a user would write them in an afternoon.
+"""Frames of the board with plain ``struct``, without a class for each frame.
 
 Checks what T2 checks. A bad frame raises ``ValueError`` and ends the datagram.
 """
@@ -28,7 +28,7 @@ def to_wire(value: int) -> int:
 
 
 def from_wire(raw: int) -> int:
-    """Return the velocity that sign and magnitude stand for."""
+    """Return the velocity of a sign and magnitude."""
     return -(raw & 0x7FFF) if raw & 0x8000 else raw
 
 
@@ -38,7 +38,7 @@ def framed(command_id: int, payload: bytes) -> bytes:
 
 
 def motion(values: Values) -> bytes:
-    """Return a motion command; raise ``ValueError`` for one that there is not."""
+    """Return a motion command; raise ``ValueError`` for an unknown kind."""
     kind, linear, angular = values
     if not 0 <= kind <= 2:
         raise ValueError(kind)

@@ -1,4 +1,4 @@
-"""The part ``load`` as a picture: the delay up to the rate that loses, and who takes the CPU."""
+"""Plot of the benchmark ``load``: the delay up to the first rate with a loss, and CPU shares."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ LABEL = 18  # characters in a line below a bar
 
 
 def draw(file: Path, series: Sequence[Series]) -> None:
-    """Draw the rates left and the CPU right."""
+    """Draw the rates on the left, the CPU on the right."""
     by_name = {each.name: each for each in series}
     figure = Figure(figsize=(13, 5), layout="constrained")
     FigureCanvasAgg(figure)
@@ -38,7 +38,7 @@ def _rates(axes: Axes, by_name: ByName) -> None:
     axes.axvline(FRAMES_HZ, color="gray", linestyle=":")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel("frames a second (hollow: not all arrived; dotted: to reach)")
+    axes.set_xlabel("frames a second (hollow: not all arrived; dotted: target)")
     axes.set_ylabel("bridge to consumer, p99, ms")
     axes.legend(title="consumers", fontsize=8)
     axes.grid(alpha=0.3)

@@ -1,4 +1,4 @@
-/* The floor of this machine: who answers without thinking. echo PORT HIT BREAK STOP */
+/* The floor of this host: answers by comparing bytes. echo PORT HIT BREAK STOP */
 #include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-"""What the bridge bears and the chain costs: small runs, and what is told of made-up ones."""
+"""Benchmark ``load``: small runs, and the tables of made-up samples."""
 
 import contextlib
 import os
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.load import bare, cost, loss, page, throughput
+from bench.load import cost, loss, page, throughput, two_processes
 from bench.load.board import ANSWERS, FRAMING, STANDS, board, compiled
 from bench.load.frames import read
 from bench.load.loss import Passage
@@ -36,7 +36,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def sock() -> Iterator[socket.socket]:
-    """Be whoever reads the board."""
+    """Socket of the board's reader."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
         made.bind(("127.0.0.1", 0))
         made.settimeout(20.0)
@@ -51,7 +51,7 @@ def bound(port: int) -> bool:
 
 
 @CC
-def test_the_board_sends_so_many_and_answers(program: Path, sock: socket.socket) -> None:
+def test_the_board_sends_a_number_of_frames_and_answers(program: Path, sock: socket.socket) -> None:
     port = free_port(socket.SOCK_DGRAM)
     with board(program, port, sock.getsockname()[1], {STANDS: 0.0}) as it:
         wait_until(lambda: bound(port), "the board")
@@ -66,28 +66,28 @@ def test_the_board_sends_so_many_and_answers(program: Path, sock: socket.socket)
             sock.recv(2048)
 
 
-def test_the_two_by_hand_ask_what_the_bridge_asks() -> None:
+def test_the_two_processes_send_the_queries_of_the_bridge() -> None:
     asked = {FRAMING.pack(frame): rate_hz for _, frame, rate_hz in queries(Bridge())}
-    assert asked == bare.QUERIES
+    assert asked == two_processes.QUERIES
     for query, answer in ANSWERS.items():
-        frames = read(FRAMING.pack(answer), bare.KINDS)
+        frames = read(FRAMING.pack(answer), two_processes.KINDS)
         assert len(frames) == 1, query
 
 
-def test_the_two_by_hand_ask_read_and_drive(sock: socket.socket) -> None:
+def test_the_two_processes_query_read_and_drive(sock: socket.socket) -> None:
     port = free_port(socket.SOCK_DGRAM)
-    words = "-m", "bench.load.bare", str(port), str(sock.getsockname()[1])
+    words = "-m", "bench.load.two_processes", str(port), str(sock.getsockname()[1])
     with subprocess.Popen([sys.executable, *words]) as process:
         heard: set[bytes] = set()
-        while len(heard) < len(bare.QUERIES) + 1:
+        while len(heard) < len(two_processes.QUERIES) + 1:
             heard.add(sock.recv(2048))
             sock.sendto(FRAMING.pack(STANDS), ("127.0.0.1", port))
         assert process.poll() is None
         process.kill()
-    (command,) = heard - set(bare.QUERIES)
+    (command,) = heard - set(two_processes.QUERIES)
     (part,) = FRAMING.read(command, commands.TO_BOARD)
     assert isinstance(part, Received)
-    assert part.frame == commands.MotionCommand(commands.MotionKind.RUN, bare.SPEED_MMPS)
+    assert part.frame == commands.MotionCommand(commands.MotionKind.RUN, two_processes.SPEED_MMPS)
 
 
 @CC
@@ -111,7 +111,7 @@ def test_both_are_measured_in_turns(program: Path) -> None:
     assert page.cost(by_name).count("\n") == 1 + len(chain) + 3 + 4
 
 
-def test_what_the_kernel_had_no_room_for_is_counted(sock: socket.socket) -> None:
+def test_datagrams_that_the_kernel_drops_are_counted(sock: socket.socket) -> None:
     port = sock.getsockname()[1]
     before = udp_drops(port)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
@@ -152,12 +152,12 @@ def test_time_and_memory_of_a_process() -> None:
         (Passage(100, 0, 100, [100], pace=0.9), "the board was at 90% of it"),
     ],
 )
-def test_where_frames_went(passage: Passage, words: str) -> None:
+def test_places_of_losses(passage: Passage, words: str) -> None:
     assert passage.words == words
 
 
 @CC
-def test_a_turn_in_which_a_process_ends_is_none(program: Path) -> None:
+def test_a_turn_in_which_a_process_ends_is_empty(program: Path) -> None:
     @contextlib.contextmanager
     def ended(_: Ports) -> Iterator[cost.Running]:
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
@@ -166,7 +166,7 @@ def test_a_turn_in_which_a_process_ends_is_none(program: Path) -> None:
     assert cost.turn(program, ended, 0.0) == {}
 
 
-def test_who_is_late_at_the_end_is_behind() -> None:
+def test_lateness_at_the_end_counts() -> None:
     ages_ns = [1_000_000] * 90 + [700_000_000] * 10
     assert throughput.late_s(ages_ns) == 0.7
     assert throughput.late_s([]) == 0.0
@@ -184,7 +184,7 @@ def test_the_highest_rate_is_found(most: int) -> None:
     assert len(tried) <= 3
 
 
-def test_a_rate_counts_when_none_below_it_lost_anything() -> None:
+def test_a_rate_counts_when_no_lower_rate_lost_anything() -> None:
     blocks = page.blocks(made_up())
     _, _, one, five, twenty = blocks["throughput"].splitlines()
     assert one == "| 1 | 6,000 | 400 | 400 | 25 | 25 | 25 | 8,000 | 9 in the socket |"
@@ -197,7 +197,7 @@ def test_a_rate_counts_when_none_below_it_lost_anything() -> None:
     ]
 
 
-def test_cost_is_told_beside_the_two_by_hand() -> None:
+def test_cost_is_compared_with_the_two_processes() -> None:
     blocks = page.blocks(made_up())
     assert blocks["turns"] == "3"
     assert blocks["cost"].splitlines()[4] == "| T2 | together | 6.0 | 60.0 | 180 | 60 |"

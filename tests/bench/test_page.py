@@ -1,4 +1,4 @@
-"""The document, from samples that are made up."""
+"""The document, from made-up samples."""
 
 from collections.abc import Callable
 from functools import partial
@@ -49,7 +49,7 @@ SERIES: dict[str, Callable[[], list[Series]]] = {
 }
 
 
-def keep(*names: str) -> None:
+def store_made_up(*names: str) -> None:
     for name in names:
         store(name, Measured(where="a day: a machine", noise="Quiet", series=SERIES[name]()))
 
@@ -61,54 +61,54 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_the_document_is_told_again_from_what_was_kept(
+def test_the_document_is_printed_again_from_stored_samples(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    keep(*bench.PARTS)
+    store_made_up(*bench.BENCHMARKS)
     assert bench.main(["--again", "--out", "performance.md"]) == 0
     text = (folder / "performance.md").read_text(encoding="utf-8")
     assert "Measured on a day: a machine. Quiet. 10 round trips a row" in text
     assert f"| {REFLEX} | 100 | 100 | 100 | × 1.0 | 100 | 100 | 100 | × 1.0 |" in text
-    for name in bench.PARTS:
+    for name in bench.BENCHMARKS:
         assert f"images/performance-{name}.png" in text
         assert (folder / f"images/performance-{name}.png").stat().st_size > 1000
     assert text in capsys.readouterr().out
 
 
-def test_a_part_is_measured_kept_and_told(
+def test_a_benchmark_is_measured_stored_and_printed(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    it = bench.PARTS["command"]
-    part = bench.Part(path, lambda: "pyzmq 1.0", it.blocks, it.draw)
-    monkeypatch.setitem(bench.PARTS, "command", part)
-    keep(*(name for name in bench.PARTS if name != "command"))
+    it = bench.BENCHMARKS["command"]
+    made = bench.Benchmark(path, lambda: "pyzmq 1.0", it.blocks, it.draw)
+    monkeypatch.setitem(bench.BENCHMARKS, "command", made)
+    store_made_up(*(name for name in bench.BENCHMARKS if name != "command"))
     assert bench.main(["--only", "command"]) == 0
-    told = capsys.readouterr().out
-    assert "; pyzmq 1.0; 0 minutes. A process that only sleeps was held up for " in told
+    printed = capsys.readouterr().out
+    assert "; pyzmq 1.0; 0 minutes. A sleeping process was stalled for at most " in printed
     assert bench.main(["--again"]) == 0
-    assert capsys.readouterr().out == told
-    files = {f"{name}.{kind}" for name in bench.PARTS for kind in ("json.gz", "png")}
+    assert capsys.readouterr().out == printed
+    files = {f"{name}.{kind}" for name in bench.BENCHMARKS for kind in ("json.gz", "png")}
     assert {file.name for file in (folder / kept.RAW).iterdir()} == files
 
 
-def test_without_samples_it_says_what_to_do(
+def test_without_samples_the_error_names_the_benchmarks(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert bench.main(["--again"]) == bench.UNMEASURED
     assert (
-        f"no samples in {kept.RAW} of {', '.join(bench.PARTS)}: measure them first"
+        f"no samples in {kept.RAW} of {', '.join(bench.BENCHMARKS)}: measure them first"
         in capsys.readouterr().err
     )
     assert not list(folder.iterdir())
 
 
-def test_a_package_that_is_missing_is_named(
+def test_a_missing_package_is_named(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lacking() -> str:
         raise ModuleNotFoundError(name="zmq")
 
-    part = bench.Part(lambda: [], lacking, lambda series: {}, lambda file, series: None)
-    monkeypatch.setitem(bench.PARTS, "command", part)
+    made = bench.Benchmark(lambda: [], lacking, lambda series: {}, lambda file, series: None)
+    monkeypatch.setitem(bench.BENCHMARKS, "command", made)
     assert bench.main(["--only", "command"]) == bench.UNMEASURED
-    assert capsys.readouterr().err == "zmq is not installed: say make bench\n"
+    assert capsys.readouterr().err == "zmq is not installed; run make bench\n"

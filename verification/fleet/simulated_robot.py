@@ -24,7 +24,7 @@ from common.bus.publisher import Publisher
 from common.bus.session import client_config
 from common.messages import Message, SafetyState
 from services.recorder.reader import Reader
-from verification.fleet.child import obey
+from verification.fleet.child_process import obey
 from verification.fleet.streams import SERVICES, Stream, schedule, streams, thinning
 from verification.harness.bus import at
 

@@ -11,7 +11,7 @@ from common.loop import Loop
 from common.messages import SafetyState
 from common.operator import reset_request
 from common.source import DriveSource
-from verification.fleet.child import obey
+from verification.fleet.child_process import obey
 from verification.fleet.figures import Asked
 from verification.harness.bus import at
 

@@ -11,7 +11,7 @@ import zenoh
 from common import keys
 from common.bus.session import client_config
 from common.messages import Message
-from verification.fleet.child import obey
+from verification.fleet.child_process import obey
 from verification.harness.bus import at
 
 # What somebody at the site looks at.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from verification.faults.stack_fixture import QUICK
-from verification.fleet.child import Part
+from verification.fleet.child_process import Part
 from verification.fleet.figures import Asked, Window, answers_s
 from verification.fleet.resource_usage import Usage, connections, since, usage
 from verification.harness.bus import router_process
