@@ -15,8 +15,8 @@ from bench.load.stack import Pids, Ports, guarded, stack
 from bench.load.throughput import consuming
 from bench.series import Series
 from common import keys
-from verification.fleet.child_process import Part
-from verification.fleet.topology import crowd, site
+from verification.fleet.topology import simulated_robots, site
+from verification.harness.child_process import ChildProcess
 from verification.harness.process_stats import CpuShares
 
 COUNTS = {
@@ -70,7 +70,7 @@ def consumers(it: Robot, counts: Sequence[int], seconds: float) -> list[Series]:
     """Measure with more and more consumers of everything that the bridge publishes."""
     made: list[Series] = []
     with contextlib.ExitStack() as held:
-        some: list[Part] = []
+        some: list[ChildProcess] = []
         for count in counts:
             some += held.enter_context(consuming(it.endpoint, EVERYTHING, count - len(some)))
             time.sleep(SETTLE_S)
@@ -89,7 +89,7 @@ def pairs(it: Robot, curve: str, counts: Sequence[int], seconds: float) -> list[
     made: list[Series] = []
     for count in counts:
         words = PAIRS[curve].format(count).split()
-        with Part("bench.growth.publisher_pair", it.endpoint, *words) as pair:
+        with ChildProcess("bench.growth.publisher_pair", it.endpoint, *words) as pair:
             time.sleep(SETTLE_S)
             shares = watched(it.pids, [pair], seconds)
             told = pair.end()
@@ -101,19 +101,22 @@ def pairs(it: Robot, curve: str, counts: Sequence[int], seconds: float) -> list[
 def robots(counts: Sequence[int], seconds: float) -> list[Series]:
     """Measure a site router with more and more simulated robots and one consumer of all streams."""
     made: list[Series] = []
-    with site() as ground, Part("verification.fleet.subscriber", ground.site, "everything") as ear:
+    with (
+        site() as fleet,
+        ChildProcess("verification.fleet.subscriber", fleet.site, "everything") as subscriber,
+    ):
         for count in counts:
-            with crowd(ground, count, "peer", 0.0):
-                assert ground.light is not None
+            with simulated_robots(fleet, count, "peer", 0.0):
+                assert fleet.simulated is not None
                 time.sleep(SETTLE_S)
-                shares = watched({"router": ground.site_pid}, [ear, ground.light], seconds)
-                heard, sent = ear.end(), ground.light.end()
+                shares = watched({"router": fleet.site_pid}, [subscriber, fleet.simulated], seconds)
+                heard, sent = subscriber.end(), fleet.simulated.end()
             ages_ns = [round(age_s * 1e9) for age_s in heard["ages_s"]]
             made += point((ROBOTS, str(count)), shares, ages_ns, heard["hz"] / sent["hz"])
     return made
 
 
-def watched(pids: Pids, parts: Sequence[Part], seconds: float) -> dict[str, int]:
+def watched(pids: Pids, parts: Sequence[ChildProcess], seconds: float) -> dict[str, int]:
     """Count for some time; return the CPU share of these processes, in ns/s."""
     for each in parts:
         each.begin()

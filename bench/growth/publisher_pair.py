@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import zenoh
 
 from bench.load.consumer import plain
-from verification.fleet.child_process import obey
+from verification.harness.child_process import serve
 
 HEAD = struct.Struct("<QQ")  # number and time of sending: the smallest message
 KEY = "t2/v1/001/tel/bench/{}"
@@ -70,7 +70,7 @@ def main() -> None:
                 for name in names[first : first + KEYS_PER_SESSION]
             ]
         receiver.declared_s = time.monotonic() - begin_s
-        obey(receiver.begin, receiver.end, left.set)
+        serve(receiver.begin, receiver.end, left.set)
         put(near, names, bytes(size - HEAD.size), hz, left)
 
 

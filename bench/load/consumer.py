@@ -12,7 +12,7 @@ from typing import Any
 import msgpack
 import zenoh
 
-from verification.fleet.child_process import obey
+from verification.harness.child_process import serve
 
 AGES_MAX = 1000  # reported, evenly spread
 
@@ -58,7 +58,7 @@ def main() -> None:
     consumer, left = Consumer(), threading.Event()
     with zenoh.open(plain(endpoint)) as session:
         declared = session.declare_subscriber(key, consumer.take)
-        obey(consumer.begin, consumer.end, left.set)
+        serve(consumer.begin, consumer.end, left.set)
         left.wait()
         declared.undeclare()
 

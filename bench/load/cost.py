@@ -17,8 +17,8 @@ from bench.load.page import BARE, BUS, CHAIN, TOGETHER
 from bench.load.stack import Pids, Ports, stack
 from bench.path.processes import robots_python
 from bench.series import Series
-from verification.fleet.child_process import Part
 from verification.harness.bus import router_process
+from verification.harness.child_process import ChildProcess
 from verification.harness.process_stats import CpuShares, memory, tree
 from verification.harness.waiting import wait_until
 
@@ -69,7 +69,10 @@ def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int
 @contextlib.contextmanager
 def on_board(ports: Ports) -> Iterator[Running]:
     """Run the stack with a source that requests motion like teleop."""
-    with stack(ports) as pids, Part("verification.fleet.source", ports.endpoint, "001") as source:
+    with (
+        stack(ports) as pids,
+        ChildProcess("verification.fleet.source", ports.endpoint, "001") as source,
+    ):
 
         def drives() -> bool:
             source.begin()

@@ -20,7 +20,7 @@ from bench.load.stack import Pids, Ports, guarded, stack
 from bench.series import Series
 from common import keys
 from common.wire.frame import Frame
-from verification.fleet.child_process import Part
+from verification.harness.child_process import ChildProcess
 from verification.harness.process_stats import CpuShares, udp_drops
 from verification.harness.waiting import wait_until
 
@@ -44,7 +44,7 @@ class Testbed:
     pids: Pids
     board: Board
     session: zenoh.Session
-    consumers: Sequence[Part]
+    consumers: Sequence[ChildProcess]
 
     def published(self) -> int:
         """Query how many velocities the bridge has published."""
@@ -117,7 +117,7 @@ def last_messages(session: zenoh.Session) -> Any:
     return None
 
 
-def settled(consumers: Sequence[Part]) -> list[Any]:
+def settled(consumers: Sequence[ChildProcess]) -> list[Any]:
     """Return the counts of the consumers once they do not change any more."""
     heard: list[Any] = []
 
@@ -137,8 +137,10 @@ def late_s(ages_ns: Sequence[int]) -> float:
 
 
 @contextlib.contextmanager
-def consuming(endpoint: str, key: str, count: int) -> Iterator[list[Part]]:
+def consuming(endpoint: str, key: str, count: int) -> Iterator[list[ChildProcess]]:
     """Run consumers of a key."""
     with contextlib.ExitStack() as held, ThreadPoolExecutor(AT_ONCE) as pool:
-        started = pool.map(lambda _: Part("bench.load.consumer", endpoint, key), range(count))
+        started = pool.map(
+            lambda _: ChildProcess("bench.load.consumer", endpoint, key), range(count)
+        )
         yield [held.enter_context(each) for each in started]

@@ -10,8 +10,8 @@ from bench.growth import measure, page
 from bench.growth.page import Point, bend
 from bench.load.board import compiled
 from tests.bench.growth_series import made_up
-from verification.fleet.child_process import Part
 from verification.harness.bus import router_process
+from verification.harness.child_process import ChildProcess
 from verification.harness.ports import free_port
 
 
@@ -47,7 +47,7 @@ def test_the_publisher_pair_measures_ages() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with (
         router_process(endpoint),
-        Part("bench.growth.publisher_pair", endpoint, "3", "100", "500") as pair,
+        ChildProcess("bench.growth.publisher_pair", endpoint, "3", "100", "500") as pair,
     ):
         told = pair.end()
         while len(told["ages_ns"]) < 10:

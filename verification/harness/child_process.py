@@ -1,4 +1,8 @@
-"""A process that takes part: it says when it is ready, and tells what was between two moments."""
+"""A child process that counts between ``begin`` and ``end``, controlled by its standard streams.
+
+The child prints ``"ready"`` as JSON. On ``begin`` it resets its counts; on any other line it prints
+its counts as JSON. It ends with its standard input.
+"""
 
 import json
 import subprocess
@@ -11,15 +15,15 @@ from typing import Any, Self
 PATIENCE_S = 60.0
 
 
-class Part:
-    """Its starter's end."""
+class ChildProcess:
+    """The parent's side; the module runs as long as the context."""
 
     def __init__(self, *words: str) -> None:
         command = [sys.executable, "-m", *words]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self.hear()
+        self._read_line()
 
     def __enter__(self) -> Self:
         return self
@@ -41,42 +45,40 @@ class Part:
         return self.process.pid
 
     def begin(self) -> None:
-        """Let it count from now on."""
-        self._say("begin")
+        """Reset the counts."""
+        self._send("begin")
 
     def end(self) -> Any:
-        """Return what it has counted."""
-        self._say("end")
-        return json.loads(self.hear())
+        """Return the counts since ``begin``."""
+        self._send("end")
+        return json.loads(self._read_line())
 
-    def hear(self) -> str:
-        """Return its next line."""
+    def _read_line(self) -> str:
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         assert line, f"{self.process.args!r} has ended"
         return line
 
-    def _say(self, word: str) -> None:
+    def _send(self, line: str) -> None:
         assert self.process.stdin is not None
-        self.process.stdin.write(f"{word}\n")
+        self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
 
-def obey(begin: Callable[[], None], end: Callable[[], object], leave: Callable[[], None]) -> None:
-    """Be such a process, in a thread beside what it does."""
+def serve(begin: Callable[[], None], end: Callable[[], object], leave: Callable[[], None]) -> None:
+    """Serve the parent in a thread; ``leave`` is called when standard input ends."""
 
-    def listen() -> None:
+    def read_commands() -> None:
         for line in sys.stdin:
             if line.strip() == "begin":
                 begin()
             else:
-                tell(end())
+                _write(end())
         leave()
 
-    threading.Thread(target=listen, daemon=True).start()
-    tell("ready")
+    threading.Thread(target=read_commands, daemon=True).start()
+    _write("ready")
 
 
-def tell(what: object) -> None:
-    """Write a line to whoever started this process."""
+def _write(what: object) -> None:
     print(json.dumps(what), flush=True)
