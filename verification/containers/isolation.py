@@ -1,11 +1,11 @@
-"""What the images hold, and what a container may do: looked at from inside and from the engine."""
+"""Images and isolation: size, tools, rights, limits and networks."""
 
 import json
 import urllib.error
 import urllib.request
 
 from verification.containers.engine import size_mb
-from verification.containers.stack_fixture import SERVICES, Stage
+from verification.containers.stack_fixture import SERVICES, StackFixture
 
 ROBOT_MB = 120.0
 NO_NETWORK = ("safety", "odom", "recorder")
@@ -29,16 +29,16 @@ pathlib.Path(tempfile.gettempdir(), "x").write_bytes(b"")
 LINKS = "import os; print(*sorted(os.listdir('/sys/class/net')))"
 
 
-def image_is_small(stage: Stage) -> str:
-    """The robot's own image."""
-    sizes = {name: size_mb(stage[name].about["Image"]) for name in ("safety", "dashboard")}
+def image_is_small(fixture: StackFixture) -> str:
+    """Check the size of the robot's image."""
+    sizes = {name: size_mb(fixture[name].about["Image"]) for name in ("safety", "dashboard")}
     assert sizes["safety"] < ROBOT_MB, sizes
     return f"robot {sizes['safety']:.1f} MB, with the dashboard {sizes['dashboard']:.1f} MB"
 
 
-def image_has_no_tools(stage: Stage) -> str:
-    """No shell and no installer."""
-    found = stage["safety"].python(
+def image_has_no_tools(fixture: StackFixture) -> str:
+    """Check that there is no shell and no installer."""
+    found = fixture["safety"].python(
         "import shutil; print([n for n in ('sh', 'bash', 'busybox', 'apt', 'dpkg', 'pip', 'pip3',"
         " 'perl') if shutil.which(n, path='/bin:/usr/bin:/usr/local/bin:/sbin:/opt/venv/bin')])"
     )
@@ -46,28 +46,28 @@ def image_has_no_tools(stage: Stage) -> str:
     return "no sh, apt, dpkg, pip, perl"
 
 
-def rights_are_few(stage: Stage) -> str:
-    """As the processes inside have them."""
+def rights_are_minimal(fixture: StackFixture) -> str:
+    """Check user, capabilities and privileges of the processes."""
     for name in SERVICES:
-        told = json.loads(stage[name].python(STATUS))
-        assert set(told["Uid"].split()) == {"10001"}, (name, told)
-        assert int(told["CapEff"], 16) == int(told["CapBnd"], 16) == 0, (name, told)
-        assert told["NoNewPrivs"] == "1", (name, told)
+        state = json.loads(fixture[name].python(STATUS))
+        assert set(state["Uid"].split()) == {"10001"}, (name, state)
+        assert int(state["CapEff"], 16) == int(state["CapBnd"], 16) == 0, (name, state)
+        assert state["NoNewPrivs"] == "1", (name, state)
     return f"uid 10001, no capability, no new privileges, in {len(SERVICES)} containers"
 
 
-def root_is_read_only(stage: Stage) -> str:
-    """Only /tmp, the socket's folder and the recordings can be written."""
+def root_is_read_only(fixture: StackFixture) -> str:
+    """Check that only /tmp, the socket's folder and the recordings are writable."""
     for name in SERVICES:
-        refused = stage[name].python(WRITES).split()
+        refused = fixture[name].python(WRITES).split()
         assert refused == ["30"] * 4, (name, refused)  # EROFS
     return "EROFS everywhere but in /tmp"
 
 
-def use_is_limited(stage: Stage) -> str:
-    """As the engine has it."""
+def resources_are_limited(fixture: StackFixture) -> str:
+    """Check limits, log rotation, init and restart policy."""
     for name in SERVICES:
-        host = stage[name].about["HostConfig"]
+        host = fixture[name].about["HostConfig"]
         limits = {key: host[key] for key in ("Memory", "MemorySwap", "NanoCpus", "PidsLimit")}
         assert all(limit and limit > 0 for limit in limits.values()), (name, limits)
         assert limits["Memory"] == limits["MemorySwap"], (name, limits)
@@ -77,21 +77,23 @@ def use_is_limited(stage: Stage) -> str:
     return "memory, CPUs, processes, log files; an init; restart unless stopped"
 
 
-def networks_are_few(stage: Stage) -> str:
-    """Who has which network."""
+def networks_are_minimal(fixture: StackFixture) -> str:
+    """Check the networks of each container."""
     for name in NO_NETWORK:
-        assert stage[name].python(LINKS) == "lo", name
-    hosts = [name for name in SERVICES if stage[name].about["HostConfig"]["NetworkMode"] == "host"]
+        assert fixture[name].python(LINKS) == "lo", name
+    hosts = [
+        name for name in SERVICES if fixture[name].about["HostConfig"]["NetworkMode"] == "host"
+    ]
     assert sorted(hosts) == sorted(HOST_NETWORK), hosts
     return f"none: {', '.join(NO_NETWORK)}; the host's: {', '.join(HOST_NETWORK)}"
 
 
-def page_asks_for_its_token(stage: Stage) -> str:
-    """On the loopback's port alone, and with the token from the log."""
-    bindings = stage["dashboard"].about["HostConfig"]["PortBindings"]["8080/tcp"]
+def dashboard_requires_its_token(fixture: StackFixture) -> str:
+    """Check that the dashboard is on loopback only, and requires the token from the log."""
+    bindings = fixture["dashboard"].about["HostConfig"]["PortBindings"]["8080/tcp"]
     assert [binding["HostIp"] for binding in bindings] == ["127.0.0.1"], bindings
-    page = f"http://127.0.0.1:{stage.ports.page}/"
-    token = stage["dashboard"].log().rsplit("?token=", 1)[1].split('"')[0]
+    page = f"http://127.0.0.1:{fixture.ports.page}/"
+    token = fixture["dashboard"].log().rsplit("?token=", 1)[1].split('"')[0]
     browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     seen = [status(browser, page), status(browser, f"{page}?token={token}")]
     assert seen == [401, 200], seen
@@ -99,7 +101,7 @@ def page_asks_for_its_token(stage: Stage) -> str:
 
 
 def status(browser: urllib.request.OpenerDirector, address: str) -> int:
-    """Return the status of an answer."""
+    """Return the HTTP status."""
     try:
         with browser.open(address, timeout=10) as answer:
             return int(answer.status)
