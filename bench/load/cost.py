@@ -78,7 +78,7 @@ def on_board(ports: Ports) -> Iterator[Running]:
             source.begin()
             time.sleep(1.0)
             told = source.end()
-            return bool(told["asked"]) and not told["refused"]
+            return bool(told["requests"]) and not told["refused"]
 
         yield pids, drives
 

@@ -116,7 +116,7 @@ def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> N
     record.lives = {Life("safety", 9, 0): life(20, rss_per_s=MB), SAFETY: life(200)}
     assert row(record, "safety: memory")[2] is True
     del record.lives[SAFETY]
-    assert row(record, "safety: memory")[1:] == ("never lived long enough to be judged", False)
+    assert row(record, "safety: memory")[1:] == ("no run was long enough", False)
 
 
 # --- log, health, laps --------------------------------------------------------------------------
