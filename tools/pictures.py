@@ -21,7 +21,7 @@ from verification.harness.bus import running
 from verification.harness.dashboard import dashboard
 from verification.harness.dashboard_page import CHROMIUM, opened, takes
 from verification.harness.stack import RunningStack, running_stack
-from verification.harness.teleop_app import NearApp
+from verification.harness.teleop_app import LocalTerminalApp
 from verification.harness.waiting import wait_until
 
 IMAGES = Path("docs/images")
@@ -51,7 +51,7 @@ async def terminal_screen(stack: RunningStack) -> str:
     desk = Desk(node, Logbook())
     node.present()
     desk.plug(find(node.config.teleop))
-    app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    app = LocalTerminalApp(desk, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):
         node.bus.open()
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:

@@ -10,7 +10,7 @@ from pathlib import Path
 from bench.path.processes import Command, module, running
 from common.settings import BusSettings
 from verification.harness.bus import at, set_options
-from verification.harness.certificates import ADDRESS, Site, dialling
+from verification.harness.certificates import ADDRESS, Site, connecting
 from verification.harness.ports import free_port, udp_ports
 
 ROBOT = "001"
@@ -51,7 +51,7 @@ def secured(board: int, port: int, *sets: str) -> Iterator[BusSettings]:
         onboard = f"unixsock-stream/{folder}/bus.sock"
         sets = (f"bus.listen=[{endpoint!r}, {onboard!r}]", NOT_THINNED, *files(robot), *sets)
         with running(*services(board, port, *sets)):
-            yield dialling(driver, endpoint)
+            yield connecting(driver, endpoint)
 
 
 def files(bus: BusSettings) -> list[str]:

@@ -16,7 +16,7 @@ from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.teleop.support import safety_state
 from verification.harness.bus import at, joined, running
-from verification.harness.certificates import Site, dialling
+from verification.harness.certificates import Site, connecting
 from verification.harness.waiting import wait_until
 
 
@@ -114,8 +114,8 @@ def test_a_driver_drives_and_a_viewer_is_told_that_it_may_not(
 ) -> None:
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         robot = on_board(join, onboard)
-        anna = member(join, dialling(site.settings("driver", "anna"), secured))
-        hall = member(join, dialling(site.settings("viewer", "hall"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured))
+        hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert drives(anna, robot)
         assert not drives(hall, robot)
         assert not anna.source.barred
@@ -132,10 +132,12 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
 ) -> None:
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         robot = on_board(join, onboard)
-        planner = member(join, dialling(site.settings("driver", "planner"), secured), source="nav")
+        planner = member(
+            join, connecting(site.settings("driver", "planner"), secured), source="nav"
+        )
         assert drives(planner, robot)
-        stolen = member(join, dialling(site.settings("driver", "planner"), secured))
-        anna = member(join, dialling(site.settings("driver", "anna"), secured), source="nav")
+        stolen = member(join, connecting(site.settings("driver", "planner"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured), source="nav")
         assert not drives(stolen, robot), "it took teleop's priority"
         assert not drives(anna, robot)
         assert stolen.source.barred
@@ -151,10 +153,10 @@ def test_through_the_sites_router_each_reaches_its_own(
         site.router(site.settings("robot", "002"), center) as (_, two),
     ):
         first, second = on_board(join, one), on_board(join, two, "002")
-        driver = dialling(site.settings("driver", "anna"), center)
+        driver = connecting(site.settings("driver", "anna"), center)
         assert drives(member(join, driver), first)
         assert not drives(member(join, driver, "002"), second)
-        everybody = member(join, dialling(site.settings("fleet", "room"), center), "*")
+        everybody = member(join, connecting(site.settings("fleet", "room"), center), "*")
 
         def stopped() -> bool:
             everybody.bus.estop()
@@ -206,8 +208,8 @@ def test_a_revoked_certificate_passes_and_may_do_nothing(
         site.router(site.settings("robot", "001")) as (secured, onboard),
     ):
         robot = on_board(join, onboard)
-        anna = member(join, dialling(site.settings("driver", "anna"), secured))
-        hall = member(join, dialling(site.settings("viewer", "hall"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured))
+        hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert not drives(hall, robot)  # and it has heard safety by then
         for _ in range(20):
             anna.source.ask(0.1, 0.0)
