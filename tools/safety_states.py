@@ -1,8 +1,8 @@
-"""The states of safety, found by walking the real policy: for the diagram in ``docs/safety.md``.
+"""State diagram of safety in ``docs/safety.md``, by exploration of the real policy.
 
-From its start the policy is put through every stimulus of a short list, from every situation that
-is found on the way, until nothing new is found. A state of the diagram is a verdict, told apart by
-whether a reset is due; what is drawn is what happened.
+The exploration applies every stimulus of a list in every situation that it reaches, until it finds
+no new one. A state of the diagram is a verdict, with or without a reset due; each arrow is an
+observed transition.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,20 +33,20 @@ from services.safety.policy import Policy
 from services.safety.state import State
 
 TICK_NS = NS_PER_S // 20
-QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease, than inputs take to settle
+QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease; longer than inputs settle
 FREE_M, NEAR_M, INSIDE_M = None, 0.3, 0.1
 FRONT = (1, 2, 3)  # of the sonars
 M = TypeVar("M", bound=Message)
 DRIVER_BOOT, BRIDGE_BOOT = 1, 2
 
 
-class Scene(Struct, frozen=True):
-    """What is so around the policy, and its memory."""
+class Situation(Struct, frozen=True):
+    """The policy's environment and its state."""
 
     state: State
     now_ns: int = 10 * NS_PER_S
     seq: int = 0
-    asks: float | None = None  # m/s; None for nobody
+    asks: float | None = None  # m/s; None: no requests
     holds: bool = False  # the release
     link: bool = True
     pressed: bool = False
@@ -54,15 +54,15 @@ class Scene(Struct, frozen=True):
     ahead_m: float | None = FREE_M
 
     @property
-    def troubles(self) -> int:
-        """Count what is not as it should be; the walk goes no farther than one at a time."""
+    def disturbances(self) -> int:
+        """Number of simultaneous disturbances; the exploration continues from at most one."""
         blocked = self.ahead_m is not FREE_M
-        aimless = 2 * (self.holds and not self.pressed)
-        return (not self.link) + self.pressed + self.faulty + blocked + aimless
+        without_cause = 2 * (self.holds and not self.pressed)
+        return (not self.link) + self.pressed + self.faulty + blocked + without_cause
 
     @property
     def name(self) -> str:
-        """Name the state of the diagram that this is in."""
+        """State in the diagram."""
         verdict = self.state.verdict
         if verdict.source == "release":
             return "creeping"
@@ -71,7 +71,7 @@ class Scene(Struct, frozen=True):
         return verdict.name
 
 
-Stimulus = Callable[[Scene], tuple[Scene, Event | None]]
+Stimulus = Callable[[Situation], tuple[Situation, Event | None]]
 
 STIMULI: dict[str, Stimulus] = {
     "inputs good": lambda it: (replace(it, link=True), None),
@@ -95,10 +95,10 @@ STIMULI: dict[str, Stimulus] = {
 
 @cache
 def transitions() -> list[tuple[str, str, str]]:
-    """Return from, stimulus and to of everything that changes the state; sorted."""
+    """Return all transitions as from, stimulus, to; sorted."""
     policy = Policy(Safety(), Vehicle())
-    first = _run(policy, Scene(policy.start(), link=False), None)
-    known, due = {_situation(first)}, [first]
+    first = _run(policy, Situation(policy.start(), link=False), None)
+    known, due = {_signature(first)}, [first]
     found = {("[*]", "", first.name)}
     while due:
         before = due.pop()
@@ -112,8 +112,8 @@ def transitions() -> list[tuple[str, str, str]]:
             after = _run(policy, changed, event)
             if after.name not in (before.name, idle):
                 found.add((before.name, name, after.name))
-            if after.troubles <= 1 and _situation(after) not in known:
-                known.add(_situation(after))
+            if after.disturbances <= 1 and _signature(after) not in known:
+                known.add(_signature(after))
                 due.append(after)
     return sorted(found)
 
@@ -131,7 +131,7 @@ def diagram() -> str:
 
 
 def causes() -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield each cause as a row: name, action, latched, how it clears, words; the worst first."""
+    """Yield a row for each cause: name, action, latched, clearing, text; most severe first."""
     how = {
         Clears.RESET: "reset",
         Clears.SETTLED: "by itself after 0.5 s, then a neutral request",
@@ -142,74 +142,81 @@ def causes() -> Iterator[tuple[str, str, str, str, str]]:
         yield f"`{rule.name}`", rule.action.upper(), yes, how[rule.clears], rule.text
 
 
-def _situation(scene: Scene) -> tuple[object, ...]:
-    """Return what tells situations apart; the rest is history."""
-    armed = any(one.neutral for one in scene.state.arbiter.channels.values())
-    around = scene.asks, scene.holds, scene.link, scene.pressed, scene.faulty, scene.ahead_m
-    return scene.name, armed, latched(scene.state.latches), around
+def _signature(situation: Situation) -> tuple[object, ...]:
+    """Return the part of a situation that distinguishes it from others."""
+    armed = any(one.neutral for one in situation.state.arbiter.channels.values())
+    around = (
+        situation.asks,
+        situation.holds,
+        situation.link,
+        situation.pressed,
+        situation.faulty,
+        situation.ahead_m,
+    )
+    return situation.name, armed, latched(situation.state.latches), around
 
 
-def _reset(scene: Scene) -> Reset:
+def _reset(situation: Situation) -> Reset:
     """Return an operator's call for everything that is latched."""
-    latches = scene.state.latches
+    latches = situation.state.latches
     ids = tuple(latches[name].id for name in latched(latches))
-    return Reset(scene.state.heartbeat.number, ids)
+    return Reset(situation.state.heartbeat.number, ids)
 
 
-def _run(policy: Policy, scene: Scene, event: Event | None) -> Scene:
-    """Let a stimulus act, with an event at its beginning, until it has settled."""
+def _run(policy: Policy, situation: Situation, event: Event | None) -> Situation:
+    """Simulate a stimulus, with an event at its beginning, until the policy has settled."""
     for tick in range(PATIENCE):
-        settling = any(clears(name) is Clears.SETTLED for name in scene.state.latches)
-        if tick >= QUICK and not (scene.link and settling):
+        settling = any(clears(name) is Clears.SETTLED for name in situation.state.latches)
+        if tick >= QUICK and not (situation.link and settling):
             break
-        scene = replace(scene, now_ns=scene.now_ns + TICK_NS, seq=scene.seq + 1)
-        beat = scene.state.heartbeat.beat(scene.now_ns)
-        scene = replace(scene, state=replace(scene.state, heartbeat=beat))
-        for one in _events(scene, event if tick == 0 else None):
-            inputs = replace(_inputs(scene), event=one)
-            state, _ = policy.decide(scene.state, inputs, scene.now_ns)
-            scene = replace(scene, state=state)
-    return scene
+        situation = replace(situation, now_ns=situation.now_ns + TICK_NS, seq=situation.seq + 1)
+        beat = situation.state.heartbeat.beat(situation.now_ns)
+        situation = replace(situation, state=replace(situation.state, heartbeat=beat))
+        for one in _events(situation, event if tick == 0 else None):
+            inputs = replace(_inputs(situation), event=one)
+            state, _ = policy.decide(situation.state, inputs, situation.now_ns)
+            situation = replace(situation, state=state)
+    return situation
 
 
-def _events(scene: Scene, event: Event | None) -> Iterator[Event | None]:
+def _events(situation: Situation, event: Event | None) -> Iterator[Event | None]:
     yield event
-    if scene.asks is not None:
+    if situation.asks is not None:
         drive = Drive(
-            linear=scene.asks,
+            linear=situation.asks,
             angular=0.0,
-            echo=scene.state.heartbeat.number,
-            seq=scene.seq,
+            echo=situation.state.heartbeat.number,
+            seq=situation.seq,
             boot=DRIVER_BOOT,
         )
-        yield Ask("teleop", drive, scene.now_ns)
-    if scene.holds:
-        yield Hold(True, "backward", scene.state.heartbeat.number)
+        yield Ask("teleop", drive, situation.now_ns)
+    if situation.holds:
+        yield Hold(True, "backward", situation.state.heartbeat.number)
 
 
-def _inputs(scene: Scene) -> Inputs:
+def _inputs(situation: Situation) -> Inputs:
     status: list[RangeStatus] = ["no_echo"] * 8
     ranges: list[float | None] = [None] * 8
-    for sonar in FRONT if scene.ahead_m is not None else ():
-        status[sonar], ranges[sonar] = "ok", scene.ahead_m
-    way = "" if scene.link else "link lost"
+    for sonar in FRONT if situation.ahead_m is not None else ():
+        status[sonar], ranges[sonar] = "ok", situation.ahead_m
+    way = "" if situation.link else "link lost"
     link = Link(
-        state="up" if scene.link else "lost", board="", epoch=0, armed=scene.link, waiting=way,
-        rates={}, rejected={}, round_trip=None,
+        state="up" if situation.link else "lost", board="", epoch=0, armed=situation.link,
+        waiting=way, rates={}, rejected={}, round_trip=None,
     )  # fmt: skip
-    twist = scene.state.verdict.twist
+    twist = situation.state.verdict.twist
     return Inputs(
-        velocity=_new(Velocity(linear=twist.linear, angular=twist.angular), scene),
-        ultrasonic=_new(Ultrasonic(ranges=tuple(ranges), status=tuple(status)), scene),
-        bumper=_new(Bumper(pressed=scene.pressed), scene),
-        left=_new(Driver(faults=(), bits=int(scene.faulty)), scene),
-        right=_new(Driver(faults=(), bits=0), scene),
-        switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), scene),
-        link=_new(link, scene),
+        velocity=_new(Velocity(linear=twist.linear, angular=twist.angular), situation),
+        ultrasonic=_new(Ultrasonic(ranges=tuple(ranges), status=tuple(status)), situation),
+        bumper=_new(Bumper(pressed=situation.pressed), situation),
+        left=_new(Driver(faults=(), bits=int(situation.faulty)), situation),
+        right=_new(Driver(faults=(), bits=0), situation),
+        switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), situation),
+        link=_new(link, situation),
         reader=True,
     )
 
 
-def _new(message: M, scene: Scene) -> Latest[M]:
-    """Return a sample that has just come."""
-    return Latest(replace(message, seq=scene.seq, boot=BRIDGE_BOOT), scene.now_ns)
+def _new(message: M, situation: Situation) -> Latest[M]:
+    """Return a sample that has just arrived."""
+    return Latest(replace(message, seq=situation.seq, boot=BRIDGE_BOOT), situation.now_ns)

@@ -24,7 +24,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
 
 @pytest.fixture
 def stick(stack: RunningStack) -> Iterator[Stick]:
-    """Be a source that asks without a pause."""
+    """A motion source with periodic requests."""
     with running(Loop()) as loop:
         it = Stick(loop)
         with bus_on(stack.endpoint, loop, it.declare):

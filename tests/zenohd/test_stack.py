@@ -1,4 +1,4 @@
-"""What the stack does on its own router it does on zenohd."""
+"""The stack on zenohd behaves as on its own router."""
 
 import json
 
@@ -19,20 +19,20 @@ pytestmark = pytest.mark.alone
 
 
 def t2(stack: RunningStack, *words: str) -> tuple[int, str]:
-    """Run the command on that stack; return its exit code and what it said."""
+    """Run a t2 command on the stack; return its exit code and output."""
     done = ran(*words, *sets(f"bus.connect={stack.endpoint}"))
     return done.returncode, done.stdout + done.stderr
 
 
 def reset(stack: RunningStack) -> None:
-    """Clear what is latched, as an operator does who keeps asking."""
+    """Retry the reset until it succeeds."""
     wait_until(lambda: t2(stack, "call", "safety/reset")[0] == 0, "a reset")
 
 
 def test_it_drives_and_an_emergency_stop_stops_it(stack: RunningStack, stick: Stick) -> None:
     push(stack, stick)
-    code, said = t2(stack, "estop")
-    assert code == 0, said
+    code, output = t2(stack, "estop")
+    assert code == 0, output
     wait_until(lambda: stack.last() == "break", "BREAK at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert not moves_since(stack, len(stack.trace().commands))
@@ -41,7 +41,7 @@ def test_it_drives_and_an_emergency_stop_stops_it(stack: RunningStack, stick: St
     push(stack, stick)
 
 
-def test_the_routers_death_stops_it_and_the_next_one_takes_over(
+def test_the_routers_death_stops_the_vehicle_and_a_new_one_takes_over(
     stack: RunningStack, stick: Stick
 ) -> None:
     push(stack, stick)
@@ -57,30 +57,30 @@ def test_the_routers_death_stops_it_and_the_next_one_takes_over(
     push(stack, stick)
 
 
-def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: RunningStack) -> None:
-    code, said = t2(stack, "services", "--json")
-    assert code == 0, said
-    who = {row["name"]: row for row in map(json.loads, said.splitlines()) if row["service"]}
+def test_services_are_listed_by_tokens_and_admin_space(stack: RunningStack) -> None:
+    code, output = t2(stack, "services", "--json")
+    assert code == 0, output
+    who = {row["name"]: row for row in map(json.loads, output.splitlines()) if row["service"]}
     assert {"bridge", "safety", "odom"} <= set(who)
     assert "tel/odom/odometry" in who["odom"]["publishes"]
     assert "tel/bridge/bumper" in who["safety"]["reads"]
     assert "srv/safety/reset" in who["safety"]["answers"]
 
 
-def test_the_doctor_gets_to_the_robot(stack: RunningStack) -> None:
-    """How the robot fares is another matter: it may be held up, or latched."""
-    _, said = t2(stack, "doctor", "--json")
-    found = [json.loads(line) for line in said.splitlines()]
+def test_the_doctor_reaches_the_robot(stack: RunningStack) -> None:
+    """The robot's own health is not checked: a stall or a latch is possible."""
+    _, output = t2(stack, "doctor", "--json")
+    found = [json.loads(line) for line in output.splitlines()]
     well = {"network": {"ok"}, "router": {"ok"}, "services": {"ok", "note"}, "rights": {"ok"}}
     for where, levels in well.items():
         seen = {one["level"] for one in found if one["where"] == where}
         assert seen, where
-        assert seen <= levels, said
+        assert seen <= levels, output
     router = next(one for one in found if one["where"] == "router")
     assert "as on this laptop" in router["text"]
 
 
-def test_a_killed_service_takes_its_token_along(stack: RunningStack) -> None:
+def test_a_killed_service_loses_its_token(stack: RunningStack) -> None:
     token = keys.live_key("001", "odom", "*")
     with probe(stack.config.bus) as opened:
         assert len(opened.alive(token)) == 1
@@ -90,15 +90,17 @@ def test_a_killed_service_takes_its_token_along(stack: RunningStack) -> None:
         wait_until(lambda: len(opened.alive(token)) == 1, "the next token")
 
 
-def test_who_comes_late_is_told_what_happened_before(stack: RunningStack) -> None:
-    heard: list[Event] = []
+def test_a_late_subscriber_receives_earlier_events(stack: RunningStack) -> None:
+    received: list[Event] = []
     refusals: list[str] = []
 
     def declare(bus: Bus) -> None:
-        bus.subscribe(keys.EVENTS, lambda a: heard.append(a.message), depth=99, service="*")
+        bus.subscribe(keys.EVENTS, lambda a: received.append(a.message), depth=99, service="*")
 
     with running(Loop()) as loop, bus_on(stack.endpoint, loop, declare) as bus:
-        wait_until(lambda: "link_up" in [each.name for each in heard], "the bridge's first event")
-        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names nothing
+        wait_until(
+            lambda: "link_up" in [each.name for each in received], "the bridge's first event"
+        )
+        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names no latch
         wait_until(lambda: refusals, "a reply")
-        wait_until(lambda: "reset_refused" in [each.name for each in heard], "a new event")
+        wait_until(lambda: "reset_refused" in [each.name for each in received], "a new event")
