@@ -75,11 +75,11 @@ def consumers(it: Robot, counts: Sequence[int], seconds: float) -> list[Series]:
             some += held.enter_context(consuming(it.endpoint, EVERYTHING, count - len(some)))
             time.sleep(SETTLE_S)
             shares = watched(it.pids, some, seconds)
-            heard = [each.end() for each in some]
-            ranges = [each for one in heard for each in one["keys"].values()]
+            results = [each.end() for each in some]
+            ranges = [each for one in results for each in one["keys"].values()]
             sent = sum(last - first + 1 for _, first, last in ranges)
             arrived = sum(came for came, *_ in ranges) / max(1, sent)
-            ages_ns = list(chain.from_iterable(each["ages_ns"] for each in heard))
+            ages_ns = list(chain.from_iterable(each["ages_ns"] for each in results))
             made += point((CONSUMERS, str(count)), shares, ages_ns, arrived)
     return made
 
@@ -92,9 +92,9 @@ def pairs(it: Robot, curve: str, counts: Sequence[int], seconds: float) -> list[
         with ChildProcess("bench.growth.publisher_pair", it.endpoint, *words) as pair:
             time.sleep(SETTLE_S)
             shares = watched(it.pids, [pair], seconds)
-            told = pair.end()
-        note = f"{told['declared_s']:.1f} s to declare them" if curve == KEYS else ""
-        made += point((curve, str(count)), shares, told["ages_ns"], told["arrived"], note)
+            result = pair.end()
+        note = f"{result['declared_s']:.1f} s to declare them" if curve == KEYS else ""
+        made += point((curve, str(count)), shares, result["ages_ns"], result["arrived"], note)
     return made
 
 
@@ -110,9 +110,9 @@ def robots(counts: Sequence[int], seconds: float) -> list[Series]:
                 assert fleet.simulated is not None
                 time.sleep(SETTLE_S)
                 shares = watched({"router": fleet.site_pid}, [subscriber, fleet.simulated], seconds)
-                heard, sent = subscriber.end(), fleet.simulated.end()
-            ages_ns = [round(age_s * 1e9) for age_s in heard["ages_s"]]
-            made += point((ROBOTS, str(count)), shares, ages_ns, heard["hz"] / sent["hz"])
+                result, sent = subscriber.end(), fleet.simulated.end()
+            ages_ns = [round(age_s * 1e9) for age_s in result["ages_s"]]
+            made += point((ROBOTS, str(count)), shares, ages_ns, result["hz"] / sent["hz"])
     return made
 
 
@@ -137,7 +137,7 @@ def point(
         note = f"{arrived:.0%} arrived"
     return [
         Series(name=(*name, "delay"), samples_ns=ages_ns, note=note),
-        *(Series(name=(*name, who), samples_ns=[ns]) for who, ns in shares.items()),
+        *(Series(name=(*name, process), samples_ns=[ns]) for process, ns in shares.items()),
     ]
 
 

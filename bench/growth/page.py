@@ -37,11 +37,11 @@ def blocks(series: Sequence[Series]) -> dict[str, str]:
 
 def cost_table(by_name: ByName, curve: str) -> str:
     """Return a row for each number: CPU in percent of a core, delay in us."""
-    costs = [who for who in COSTS if points(by_name, curve, who)]
-    head = [curve, *(f"{who} CPU %" for who in costs), "delay p50 us", "p99 us", ""]
+    costs = [process for process in COSTS if points(by_name, curve, process)]
+    head = [curve, *(f"{process} CPU %" for process in costs), "delay p50 us", "p99 us", ""]
     lines = []
     for number in numbers(by_name, curve):
-        shares = [by_name.get((curve, number, who)) for who in costs]
+        shares = [by_name.get((curve, number, process)) for process in costs]
         delay = by_name[curve, number, "delay"]
         times = [delay.p50_ns / 1000, delay.p99_ns / 1000] if delay.samples_ns else []
         lines.append([
@@ -54,7 +54,7 @@ def cost_table(by_name: ByName, curve: str) -> str:
 def bends(by_name: ByName, curve: str) -> str:
     """Return the sentence on which costs grow faster than the number, and from where."""
     found = []
-    kinds = [(who, f"CPU of the {who}", 0.5) for who in COSTS]
+    kinds = [(process, f"CPU of the {process}", 0.5) for process in COSTS]
     kinds += [("delay", "delay, p50", 0.5), ("delay", "delay, p99", 0.99)]
     for what, words, share in kinds:
         curved = points(by_name, curve, what, share)

@@ -20,9 +20,9 @@ def draw(file: Path, series: Sequence[Series]) -> None:
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, len(CURVES), sharex="col", sharey="row")
     for curve, cpu, delay in zip(CURVES, above, below, strict=True):
-        for number, who in enumerate(COSTS):
-            shares = [(n, max(ns / 1e7, LEAST)) for n, ns in points(by_name, curve, who)]
-            _line(cpu, shares, f"C{number}", who)
+        for number, process in enumerate(COSTS):
+            shares = [(n, max(ns / 1e7, LEAST)) for n, ns in points(by_name, curve, process)]
+            _line(cpu, shares, f"C{number}", process)
         for color, share in (("C2", 0.5), ("C3", 0.99)):
             times = [(n, ns / 1000) for n, ns in points(by_name, curve, "delay", share)]
             _line(delay, times, color, f"p{100 * share:.0f}")

@@ -40,8 +40,8 @@ def measure(program: Path, turns: int = TURNS, seconds: float = WATCHED_S) -> li
             whole = partial(turn, program, start, seconds)
             made = wait_until(whole, f"a turn of {name} in which no process ends", PATIENCE_S)
             for what, values in made.items():
-                for who, value in {**values, TOGETHER: sum(values.values())}.items():
-                    samples[name, what, who].append(value)
+                for candidate, value in {**values, TOGETHER: sum(values.values())}.items():
+                    samples[name, what, candidate].append(value)
     return [Series(name=name, samples_ns=some) for name, some in samples.items()]
 
 
@@ -59,10 +59,10 @@ def turn(program: Path, start: Start, seconds: float) -> dict[str, dict[str, int
                     time.sleep(seconds)
             if not pids.keys() <= shares.ns.keys():
                 return {}
-            made[rate] = {who: shares.ns[who] for who in pids}
-        used = {who: memory(pid) for who, pid in pids.items()}
+            made[rate] = {candidate: shares.ns[candidate] for candidate in pids}
+        used = {candidate: memory(pid) for candidate, pid in pids.items()}
     for kind in ("rss", "pss"):
-        made[kind] = {who: of[kind] for who, of in used.items()}
+        made[kind] = {candidate: of[kind] for candidate, of in used.items()}
     return made
 
 
@@ -77,8 +77,8 @@ def on_board(ports: Ports) -> Iterator[Running]:
         def drives() -> bool:
             source.begin()
             time.sleep(1.0)
-            told = source.end()
-            return bool(told["requests"]) and not told["refused"]
+            counts = source.end()
+            return bool(counts["requests"]) and not counts["refused"]
 
         yield pids, drives
 
@@ -119,9 +119,9 @@ def with_zenoh(ports: Ports) -> Iterator[Running]:
 
         def steady() -> bool:
             while silent:
-                heard = silent.pop().stdout
-                assert heard is not None
-                assert heard.readline() == b"heard\n"
+                output = silent.pop().stdout
+                assert output is not None
+                assert output.readline() == b"received\n"
             return settled()
 
         yield pids, steady

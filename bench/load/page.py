@@ -81,13 +81,15 @@ def cost(by_name: ByName) -> str:
     """Return a row for each process: CPU at both rates, and memory."""
     head = ["", "process", "CPU %", "CPU % tenfold", "RSS MB", "PSS MB"]
     lines = []
-    for who in (CHAIN, BARE, BUS):
-        names = [name[2] for name in by_name if name[:2] == (who, "shipped")]
+    for candidate in (CHAIN, BARE, BUS):
+        names = [name[2] for name in by_name if name[:2] == (candidate, "shipped")]
         for name in names:
-            shares = [middle(by_name, who, rate, name) / 1e7 for rate in ("shipped", "tenfold")]
-            sizes = [middle(by_name, who, kind, name) / 1e6 for kind in ("rss", "pss")]
+            shares = [
+                middle(by_name, candidate, rate, name) / 1e7 for rate in ("shipped", "tenfold")
+            ]
+            sizes = [middle(by_name, candidate, kind, name) / 1e6 for kind in ("rss", "pss")]
             cells = [f"{share:.1f}" for share in shares] + [f"{size:.0f}" for size in sizes]
-            lines.append([who, name, *cells])
+            lines.append([candidate, name, *cells])
     return table(head, lines)
 
 
@@ -117,7 +119,9 @@ def middle(by_name: ByName, *name: str) -> float:
 def _figures(by_name: ByName, count: str, hz: int) -> list[str]:
     name = "frames", count, str(hz)
     delay = by_name[*name, "delay"]
-    shares = [middle(by_name, *name, who) / 1e7 for who in ("bridge", "router", "machine")]
+    shares = [
+        middle(by_name, *name, candidate) / 1e7 for candidate in ("bridge", "router", "machine")
+    ]
     return [
         f"{delay.p50_ns / 1000:,.0f}", f"{delay.p99_ns / 1000:,.0f}", *(f"{s:.0f}" for s in shares)
     ]  # fmt: skip

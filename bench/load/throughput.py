@@ -91,21 +91,21 @@ def trial(testbed: Testbed, hz: int, seconds: float) -> list[Series]:
     with CpuShares(pids) as shares:
         sent = round(hz * seconds)
         pace = testbed.board.send(hz, sent) / hz
-    heard = settled(testbed.consumers)
+    counts = settled(testbed.consumers)
     if guarded(testbed.pids["guard"]) != pids["bridge"]:
         return [Series(name=(*name, "delay"), samples_ns=[], note=RESTARTED)]
     passage = Passage(
         sent=sent,
         dropped=udp_drops(testbed.ports.bridge) - dropped,
         published=testbed.published() - published,
-        received=[sum(came for came, *_ in each["keys"].values()) for each in heard],
-        late_s=max(late_s(each["ages_ns"]) for each in heard),
+        received=[sum(came for came, *_ in each["keys"].values()) for each in counts],
+        late_s=max(late_s(each["ages_ns"]) for each in counts),
         pace=pace,
     )
-    ages_ns = list(chain.from_iterable(each["ages_ns"] for each in heard))
+    ages_ns = list(chain.from_iterable(each["ages_ns"] for each in counts))
     return [
         Series(name=(*name, "delay"), samples_ns=ages_ns, note=passage.words),
-        *(Series(name=(*name, who), samples_ns=[ns]) for who, ns in shares.ns.items()),
+        *(Series(name=(*name, process), samples_ns=[ns]) for process, ns in shares.ns.items()),
     ]
 
 
@@ -119,15 +119,15 @@ def last_messages(session: zenoh.Session) -> Any:
 
 def settled(consumers: Sequence[ChildProcess]) -> list[Any]:
     """Return the counts of the consumers once they do not change any more."""
-    heard: list[Any] = []
+    counts: list[Any] = []
 
     def still() -> bool:
         time.sleep(0.2)
-        before, heard[:] = heard[:], [each.end() for each in consumers]
-        return heard == before
+        before, counts[:] = counts[:], [each.end() for each in consumers]
+        return counts == before
 
     wait_until(still, "the last message")
-    return heard
+    return counts
 
 
 def late_s(ages_ns: Sequence[int]) -> float:

@@ -21,33 +21,33 @@ REPORTS, MOTIONS = "reports", "motions"
 def run_board(port: int, board: int, session: zenoh.Session) -> None:
     """Run the process at the board until killed."""
     process = BoardProcess(port, board, publisher(session, REPORTS, FAST).put)
-    heard = Event()
+    received = Event()
 
     def take(sample: zenoh.Sample) -> None:
         process.send_frame(sample.payload.to_bytes())
-        report_once(heard)
+        report_once(received)
 
     declare(session, MOTIONS, take)
     process.run()
 
 
-def report_once(heard: Event) -> None:
+def report_once(received: Event) -> None:
     """Report the first message of the other process on standard output, once."""
-    if not heard.is_set():
-        heard.set()
-        sys.stdout.write("heard\n")
+    if not received.is_set():
+        received.set()
+        sys.stdout.write("received\n")
         sys.stdout.flush()
 
 
 def decide(session: zenoh.Session) -> None:
     """Store the newest of each kind and publish a motion periodically, until killed."""
     newest: dict[int, Any] = {}
-    heard = Event()
+    received = Event()
 
     def take(sample: zenoh.Sample) -> None:
         message = msgpack.unpackb(sample.payload.to_bytes())
         newest[message["kind"]] = message["values"]
-        report_once(heard)
+        report_once(received)
 
     motions = publisher(session, MOTIONS, COMMAND)
     declare(session, REPORTS, take)

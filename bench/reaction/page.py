@@ -33,10 +33,10 @@ def blocks(series: Sequence[Series]) -> dict[str, str]:
 
 
 def latency_table(
-    by_name: ByName, who: str = "who reacts", floor: str = LOOP, of: str = "of the loop's"
+    by_name: ByName, head: str = "responder", floor: str = LOOP, of: str = "of the loop's"
 ) -> str:
     """Return the table of percentiles in us; ``of`` is the head of the ratio to the floor."""
-    columns = [who, *(f"{load} {f}" for load in LOADS for f in (*FIGURES, of))]
+    columns = [head, *(f"{load} {f}" for load in LOADS for f in (*FIGURES, of))]
     lines = []
     for name in dict.fromkeys(name for name, _ in by_name):
         cells = [name]

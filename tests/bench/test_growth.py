@@ -49,12 +49,12 @@ def test_the_publisher_pair_measures_ages() -> None:
         router_process(endpoint),
         ChildProcess("bench.growth.publisher_pair", endpoint, "3", "100", "500") as pair,
     ):
-        told = pair.end()
-        while len(told["ages_ns"]) < 10:
-            told = pair.end()
-    assert all(0 < ns < 1e10 for ns in told["ages_ns"])
-    assert 0 < told["arrived"] <= 1
-    assert told["declared_s"] > 0
+        found = pair.end()
+        while len(found["ages_ns"]) < 10:
+            found = pair.end()
+    assert all(0 < ns < 1e10 for ns in found["ages_ns"])
+    assert 0 < found["arrived"] <= 1
+    assert found["declared_s"] > 0
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

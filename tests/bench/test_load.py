@@ -78,13 +78,13 @@ def test_the_two_processes_query_read_and_drive(sock: socket.socket) -> None:
     port = free_port(socket.SOCK_DGRAM)
     words = "-m", "bench.load.two_processes", str(port), str(sock.getsockname()[1])
     with subprocess.Popen([sys.executable, *words]) as process:
-        heard: set[bytes] = set()
-        while len(heard) < len(two_processes.QUERIES) + 1:
-            heard.add(sock.recv(2048))
+        received: set[bytes] = set()
+        while len(received) < len(two_processes.QUERIES) + 1:
+            received.add(sock.recv(2048))
             sock.sendto(FRAMING.pack(STANDS), ("127.0.0.1", port))
         assert process.poll() is None
         process.kill()
-    (command,) = heard - set(two_processes.QUERIES)
+    (command,) = received - set(two_processes.QUERIES)
     (part,) = FRAMING.read(command, commands.TO_BOARD)
     assert isinstance(part, Received)
     assert part.frame == commands.MotionCommand(commands.MotionKind.RUN, two_processes.SPEED_MMPS)
@@ -96,7 +96,9 @@ def test_frames_are_counted_through_the_bridge(program: Path) -> None:
     made = {one.name: one for one in throughput.measure(program, [2], [100], 0.3)}
     name = "frames", "2", "100"
     assert len(made[*name, "delay"].samples_ns) == 2 * 30
-    assert set(made) == {(*name, who) for who in ("delay", "router", "bridge", "machine")}
+    assert set(made) == {
+        (*name, candidate) for candidate in ("delay", "router", "bridge", "machine")
+    }
 
 
 @CC
@@ -105,9 +107,9 @@ def test_both_are_measured_in_turns(program: Path) -> None:
     by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.3)}
     chain = {name[2] for name in by_name if name[0] == page.CHAIN}
     assert chain == {"router", "guard", "bridge", "safety", "odom", page.TOGETHER}
-    for who in (page.CHAIN, page.BARE, page.BUS):
+    for candidate in (page.CHAIN, page.BARE, page.BUS):
         for what in ("tenfold", "rss", "pss"):
-            assert page.middle(by_name, who, what, page.TOGETHER) > 0
+            assert page.middle(by_name, candidate, what, page.TOGETHER) > 0
     assert page.cost(by_name).count("\n") == 1 + len(chain) + 3 + 4
 
 

@@ -32,8 +32,8 @@ wants_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler"
 def test_the_one_process_has_the_frames_of_the_bridge() -> None:
     sent = [loop.command(loop.RUN, mmps) for mmps in SPEEDS_MMPS]
     assert sent == [FRAMING.pack(motion) for motion in MOTIONS]
-    heard = [loop.velocity(FRAMING.pack(frame)) for frame in VELOCITIES]
-    assert heard == [(0.0, 0.0), (0.001, 0.0), (0.002, 0.0)]
+    received = [loop.velocity(FRAMING.pack(frame)) for frame in VELOCITIES]
+    assert received == [(0.0, 0.0), (0.001, 0.0), (0.002, 0.0)]
     assert loop.velocity(FRAMING.pack(VELOCITIES[0])[:-1]) is None
 
 
@@ -110,9 +110,9 @@ def path() -> list[Series]:
 
 
 def test_a_row_is_compared_with_the_floor() -> None:
-    told = page.blocks(path())
-    assert told["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |"
-    assert told["samples"] == "10"
+    found = page.blocks(path())
+    assert found["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |"
+    assert found["samples"] == "10"
 
 
 def test_lost_rounds_are_no_samples_and_are_named() -> None:
@@ -144,6 +144,6 @@ def test_ages_are_compared_with_the_limits() -> None:
 
 
 def test_ages_are_not_rows_of_the_path() -> None:
-    told = telemetry_blocks([*path(), *aged()])
-    assert told["decisions"] == "10"
-    assert len(told["table"].splitlines()) == 4
+    found = telemetry_blocks([*path(), *aged()])
+    assert found["decisions"] == "10"
+    assert len(found["table"].splitlines()) == 4

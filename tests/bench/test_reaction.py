@@ -24,8 +24,8 @@ from bench.series import Series
 
 def test_the_one_process_has_the_frames_of_the_bridge() -> None:
     assert (loop.command(loop.BREAK).hex(), loop.command(loop.STOP).hex()) == (BREAK, STOP)
-    heard = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
-    assert [loop.is_hit(each) for each in heard] == [True, False, False, False, False]
+    received = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
+    assert [loop.is_hit(each) for each in received] == [True, False, False, False, False]
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -54,10 +54,10 @@ def test_the_verdict_names_each_figure() -> None:
     assert latency_table(by_name).splitlines()[3] == (
         f"| {REFLEX} | 12 | 12 | 12 | × 1.2 | 12 | 99 | 99 | × 1.2 |"
     )
-    told = verdict(by_name).splitlines()
-    assert len(told) == 4  # no line without CycloneDDS
-    assert told[1].endswith("quiet, p99: × 1.20 of × 1.5: reached")
-    assert told[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
+    found = verdict(by_name).splitlines()
+    assert len(found) == 4  # no line without CycloneDDS
+    assert found[1].endswith("quiet, p99: × 1.20 of × 1.5: reached")
+    assert found[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
     both = [made_up(name, load, 10) for name in (JUDGED, DDS) for load in ("quiet", "busy")]
     assert len(verdict(by_name | {each.name: each for each in both}).splitlines()) == 8
 

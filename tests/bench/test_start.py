@@ -72,15 +72,15 @@ def test_the_memory_of_each_process() -> None:
 
 
 def test_the_table_is_in_the_order_of_the_starts() -> None:
-    told = blocks(list(reversed(made_up(200))))
-    assert told["samples"] == "10"
-    assert told["table"].splitlines()[2:] == [
+    found = blocks(list(reversed(made_up(200))))
+    assert found["samples"] == "10"
+    assert found["table"].splitlines()[2:] == [
         "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |",
         "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |",
         "| T2, guard and bridge | first BREAK | 100 | 100 |  | × 2.5 |",
         "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 |",
     ]
-    assert told["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
+    assert found["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
     assert "| 200 | 200 | 200 | × 5.0 |" in blocks(made_up(200, ENOUGH))["table"]
 
 

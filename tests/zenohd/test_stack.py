@@ -60,11 +60,11 @@ def test_the_routers_death_stops_the_vehicle_and_a_new_one_takes_over(
 def test_services_are_listed_by_tokens_and_admin_space(stack: RunningStack) -> None:
     code, output = t2(stack, "services", "--json")
     assert code == 0, output
-    who = {row["name"]: row for row in map(json.loads, output.splitlines()) if row["service"]}
-    assert {"bridge", "safety", "odom"} <= set(who)
-    assert "tel/odom/odometry" in who["odom"]["publishes"]
-    assert "tel/bridge/bumper" in who["safety"]["reads"]
-    assert "srv/safety/reset" in who["safety"]["answers"]
+    services = {row["name"]: row for row in map(json.loads, output.splitlines()) if row["service"]}
+    assert {"bridge", "safety", "odom"} <= set(services)
+    assert "tel/odom/odometry" in services["odom"]["publishes"]
+    assert "tel/bridge/bumper" in services["safety"]["reads"]
+    assert "srv/safety/reset" in services["safety"]["answers"]
 
 
 def test_the_doctor_reaches_the_robot(stack: RunningStack) -> None:

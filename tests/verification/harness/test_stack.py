@@ -78,7 +78,7 @@ def drives(stack: RunningStack, presser: KeyPresser) -> None:
             wait_until(moving, "the vehicle moves", patience_s=3)
         except AssertionError:
             presser.release()
-            wait_until(lambda: stack.last() != "run", "the board is told to stop")
+            wait_until(lambda: stack.last() != "run", "STOP or BREAK at the board")
         else:
             return
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")

@@ -1,4 +1,4 @@
-"""The operator of a soak: what he sets right before he drives, and when he begins anew."""
+"""The driver of a soak: recovery before driving, and restarted laps."""
 
 import math
 from collections.abc import Callable
@@ -81,7 +81,7 @@ class DriverFixture:
                 return
 
     def drives(self) -> bool:
-        """Beat once and tell whether a request went out."""
+        """Run one control step; return whether a request was sent."""
         (source,) = (p for p in self.desk.publishers if p.topic is keys.DRIVE)
         before = source.last
         self.beat()

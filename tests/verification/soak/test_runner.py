@@ -44,7 +44,7 @@ class Vehicle:
 
 
 class SoakFixture:
-    """A runner with one supervised process, and the faults that are wanted."""
+    """A soak with one supervised process and chosen faults."""
 
     def __init__(self, folder: Path, command: list[str], seed: int = 1) -> None:
         self.log, self.trace = folder / "log", folder / "trace"
@@ -151,7 +151,7 @@ def test_a_child_that_is_killed_is_no_crash_however_long_it_takes_to_end(tmp_pat
         soak.runner.sample()
         soak.runner._faults.one_of = lambda count: count - 1  # type: ignore[method-assign]
         (_, (_, child)) = tree("safety", soak.pid())
-        os.kill(soak.pid(), signal.SIGSTOP)  # who is stopped does not reap its child
+        os.kill(soak.pid(), signal.SIGSTOP)  # a stopped process does not reap its child
         soak.begin(KILL)
         soak.runner.sample()
         assert ("safety/1", child) in tree("safety", soak.pid())

@@ -128,7 +128,7 @@ def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> N
         ([(float(s), 500 * s) for s in range(300)], True),
         ([(float(s), 2100 * s) for s in range(300)], False),
         ([(float(s), 120_000 * (s > 100)) for s in range(300)], False),  # all at once
-        ([(float(s), 0) for s in range(300)], False),  # nobody said anything
+        ([(float(s), 0) for s in range(300)], False),  # no log lines
         ([(1.0, 300)], True),  # too short for a worst ten seconds
         ([], False),
     ],
