@@ -2,11 +2,12 @@
 
 from msgspec import Struct
 
+from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Direction, ReleaseRequest, ResetDone, ResetRequest, SafetyState
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
-MAX_CALL_AGE_NS = 1_000_000_000  # of a call to odometry or the bridge; safety has a setting
+MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 
 

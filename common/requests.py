@@ -17,18 +17,9 @@ three zeros, in any phase.
 from dataclasses import dataclass
 from enum import Enum
 
+from common.motion import STILL, Twist
+
 ZEROS = 3  # on release: one may be lost, two are a doubt
-
-
-@dataclass(frozen=True, slots=True)
-class Twist:
-    """A motion in the plane."""
-
-    linear: float = 0.0  # m/s
-    angular: float = 0.0  # rad/s
-
-
-STILL = Twist()
 
 
 class Phase(Enum):

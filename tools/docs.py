@@ -119,7 +119,7 @@ def causes() -> str:
 def metrics() -> str:
     """Return the table of Prometheus metrics."""
     rows = [
-        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.what)
+        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.help)
         for one in FAMILIES
     ]
     return table(("metric", "kind", "labels", ""), rows)

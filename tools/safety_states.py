@@ -27,7 +27,7 @@ from common.messages import (
 from common.settings import Vehicle
 from services.safety.causes import RULES, SEVERITY, Clears, clears
 from services.safety.config import Safety
-from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
 from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.state import State
@@ -189,7 +189,7 @@ def _events(situation: Situation, event: Event | None) -> Iterator[Event | None]
             seq=situation.seq,
             boot=DRIVER_BOOT,
         )
-        yield Ask("teleop", drive, situation.now_ns)
+        yield DriveRequest("teleop", drive, situation.now_ns)
     if situation.holds:
         yield Hold(True, "backward", situation.state.heartbeat.number)
 
@@ -213,7 +213,7 @@ def _inputs(situation: Situation) -> Inputs:
         right=_new(Driver(faults=(), bits=0), situation),
         switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), situation),
         link=_new(link, situation),
-        reader=True,
+        estop_session_up=True,
     )
 
 

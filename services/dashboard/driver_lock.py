@@ -26,6 +26,7 @@ from enum import Enum
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import Direction
+from common.motion import clamp
 
 PICTURES = 64  # whose times are kept, 3 s of them; an older one is too old for any setting
 
@@ -89,7 +90,7 @@ class Wheel:
         if self.grip is Grip.HELD and sent_ns < self._seen_ns:
             return False  # overtaken by a newer one
         self.grip, self._seen_ns, self.answered = Grip.HELD, sent_ns, picture
-        self.push = Push(clamp(push.linear), clamp(push.angular), push.release)
+        self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
         return True
 
     def let_go(self, viewer: str) -> None:
@@ -112,8 +113,3 @@ class Wheel:
         """Change the gear."""
         if viewer == self.driver:
             self.gear = gear
-
-
-def clamp(value: float) -> float:
-    """Return the value within -1..1."""
-    return max(-1.0, min(1.0, value))

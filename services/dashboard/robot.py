@@ -17,8 +17,9 @@ from common.codec import finite
 from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.log import Logger
+from common.motion import Twist
 from common.operator import CONFIRM_S, confirms, release_request, reset_request
-from common.requests import Phase, Requests, Twist
+from common.requests import Phase, Requests
 from common.source import DriveSource
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import Wheel

@@ -6,7 +6,8 @@ that nobody drives off fast by a key of ten minutes ago; CapsLock changes nothin
 """
 
 from common.messages import Direction
-from common.requests import Phase, Requests, Twist
+from common.motion import Twist
+from common.requests import Phase, Requests
 from services.teleop.config import Teleop
 from services.teleop.gamepad_watchdog import GamepadWatchdog
 from services.teleop.hold import Deadman, Keys

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.requests import STILL, ZEROS, Phase, Requests, Twist
+from common.motion import STILL, Twist
+from common.requests import ZEROS, Phase, Requests
 
 GO = Twist(0.2, 0.1)
 

@@ -72,7 +72,7 @@ def page(browser: Browser, site: Site) -> Iterator[Page]:
 
 def test_what_is_on_the_screen(page: Page, stack: RunningStack) -> None:
     shows(page, "#verdict", "STOP")
-    shows(page, "#sentence", "Nobody asks to move.")
+    shows(page, "#sentence", "No source requests motion.")
     shows(page, "#speed", "0.00")
     shows(page, "#driver", "Nobody drives")
     shows(page, "#bumper", "clear")

@@ -22,7 +22,7 @@ from common.messages import (
     SafetyState,
     Velocity,
 )
-from common.requests import Twist
+from common.motion import Twist
 from services.teleop.controller import ESTOP_TICKS, Desk
 from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick

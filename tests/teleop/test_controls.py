@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from common.requests import STILL, Twist
+from common.motion import STILL, Twist
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls
 from services.teleop.mapping import Deflection, Stick

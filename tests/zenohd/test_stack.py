@@ -33,7 +33,7 @@ def test_it_drives_and_an_emergency_stop_stops_it(stack: RunningStack, stick: St
     push(stack, stick)
     code, output = t2(stack, "estop")
     assert code == 0, output
-    wait_until(lambda: stack.last() == "break", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert not moves_since(stack, len(stack.trace().commands))
     stick.linear = 0.0
@@ -47,7 +47,7 @@ def test_the_routers_death_stops_the_vehicle_and_a_new_one_takes_over(
     push(stack, stick)
     stack.kill("router")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
-    assert stack.last() in ("stop", "break")
+    assert stack.last() in ("stop", "brake")
     count = len(stack.trace().commands)
     stack.start("router")
     wait_until(lambda: t2(stack, "services")[0] == 0, "the services on the next router")

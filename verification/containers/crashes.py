@@ -130,7 +130,7 @@ def stands(
     fixture: StackFixture, since_ns: int, stalls: StallRecorder, extra_s: float
 ) -> tuple[float, float]:
     """Wait until the vehicle stands; return how long it held a moving command, and the limit."""
-    wait_until(lambda: fixture.holds() in ("stop", "break"), "STOP at the board", RESTART_S)
+    wait_until(lambda: fixture.holds() in ("stop", "brake"), "STOP at the board", RESTART_S)
     wait_until(lambda: abs(fixture.speed()) < STILL, "the vehicle stands")
     allowed_s = fixture.config.bridge.lease + extra_s + stalls.stop()
     took_s = held_run_s(fixture.trace(), since_ns)

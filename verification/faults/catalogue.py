@@ -12,6 +12,7 @@ from typing import Literal, get_args
 from zenoh import CongestionControl
 
 from cli.settings import Everything
+from common.motion import Command
 from sim.requests import (
     Driver,
     Firmware,
@@ -58,7 +59,7 @@ class Fault:
     hold_s: float = 0.5  # how long requests go on after the fault
     harmless: bool = False  # no process may end because of it
     needs: Requirement = "none"
-    stops: tuple[str, ...] = ("stop", "break")  # commands that count as a reaction
+    stops: tuple[str, ...] = ("stop", "brake")  # commands that count as a reaction
 
 
 def by_limit(limit: Callable[[Everything], float]) -> Budget:
@@ -253,9 +254,10 @@ FIRMWARE = [
           within(0.12 + 0.1), hold_s=HOLD_S),
     # While safety is dead only the bridge detects that STOP has no effect.
     Fault("safety SIGKILL, the board ignores STOP",
-          injectors.in_sequence(do(Firmware(ignores=("stop",))), kill("safety", signal.SIGKILL)),
+          injectors.in_sequence(
+              do(Firmware(ignores=(Command.STOP,))), kill("safety", signal.SIGKILL)),
           (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
-          hold_s=2.0, stops=("break",)),
+          hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 
 # These also load the host.

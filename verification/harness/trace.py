@@ -61,7 +61,7 @@ def moves(command: Command) -> bool:
 
 
 def first_stop_s(
-    commands: Sequence[Command], since_ns: int, kinds: Collection[str] = ("stop", "break")
+    commands: Sequence[Command], since_ns: int, kinds: Collection[str] = ("stop", "brake")
 ) -> float | None:
     """Return the time until the first STOP or BREAK, in seconds; None if there is none."""
     stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= since_ns]

@@ -108,7 +108,7 @@ def estop(it: TwoHosts) -> tuple[float | None, float | None]:
 
     def braked() -> list[int]:
         commands = it.fixture.frames.follow().commands
-        return [c.mono_ns for c in commands if c.kind == "break" and c.mono_ns > pressed_ns]
+        return [c.mono_ns for c in commands if c.kind == "brake" and c.mono_ns > pressed_ns]
 
     def confirmed() -> list[int]:
         return [entry.at_ns for entry in it.received(STATE, pressed_ns) if entry.latched]

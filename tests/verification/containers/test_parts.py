@@ -6,11 +6,14 @@ from pathlib import Path
 import pytest
 
 from cli.demo.score import Trace
-from sim.trace import Command, Kind
+from common import motion
+from sim.trace import Command
 from verification.containers import __main__ as command
 from verification.containers import engine
 from verification.containers.__main__ import Row, markdown
 from verification.containers.stack_fixture import held_run_s, override
+
+RUN, STOP, BRAKE = motion.Command
 
 
 def test_without_an_engine_nothing_runs(
@@ -40,7 +43,7 @@ def test_settings_become_variables_of_each_container() -> None:
     assert services["sim"]["volumes"][0]["source"] == "/t"
 
 
-def commands(*kinds: tuple[int, Kind, float]) -> Trace:
+def commands(*kinds: tuple[int, motion.Command, float]) -> Trace:
     made = [Command(mono_ns=at, kind=kind, linear=v, angular=0.0) for at, kind, v in kinds]
     return Trace([], made, [])
 
@@ -48,9 +51,9 @@ def commands(*kinds: tuple[int, Kind, float]) -> Trace:
 @pytest.mark.parametrize(
     ("trace", "held_s"),
     [
-        (commands((1, "run", 0.3), (2_000_000_001, "stop", 0.0)), 1.0),  # held until the stop
-        (commands((1, "run", 0.3), (1_500_000_000, "run", 0.3), (3_000_000_001, "break", 0)), 2.0),
-        (commands((1, "stop", 0.0), (2_000_000_001, "run", 0.0)), 0.0),  # no moving command
+        (commands((1, RUN, 0.3), (2_000_000_001, STOP, 0.0)), 1.0),  # held until the stop
+        (commands((1, RUN, 0.3), (1_500_000_000, RUN, 0.3), (3_000_000_001, BRAKE, 0)), 2.0),
+        (commands((1, STOP, 0.0), (2_000_000_001, RUN, 0.0)), 0.0),  # no moving command
     ],
 )
 def test_duration_of_a_held_moving_command(trace: Trace, held_s: float) -> None:

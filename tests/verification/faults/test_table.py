@@ -5,13 +5,21 @@ from dataclasses import replace
 
 import pytest
 
-from sim.trace import Command, Kind
+from common import motion
+from sim.trace import Command
 from verification.faults.table import Row, markdown, renewed, times, verdict
 from verification.faults.trial import Sample, unrequested
 from verification.harness.results import percentile
 
+RUN, STOP, BRAKE = motion.Command
 
-def command(ms: float, kind: Kind = "run", linear: float = 0.8, angular: float = 0.0) -> Command:
+
+def command(
+    ms: float,
+    kind: motion.Command = RUN,
+    linear: float = 0.8,
+    angular: float = 0.0,
+) -> Command:
     return Command(mono_ns=round(ms * 1e6), kind=kind, linear=linear, angular=angular)
 
 
@@ -29,7 +37,7 @@ def row(*samples: Sample, budget_s: float | None = 0.02, stall_s: float = 0.0) -
     [
         (command(0), False),
         (command(0, linear=0.0), False),
-        (command(0, "stop", -1.0), False),
+        (command(0, STOP, -1.0), False),
         (command(0, linear=0.82), True),
         (command(0, linear=-0.1), True),
         (command(0, angular=0.1), True),

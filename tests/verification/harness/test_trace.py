@@ -4,18 +4,23 @@ from pathlib import Path
 
 import pytest
 
-from sim.trace import Command, Kind
+from common import motion
+from sim.trace import Command
 from verification.harness.trace import Tail, first_stop_s, last_move_s
 
+RUN, STOP, BRAKE = motion.Command
 
-def command(ms: float, kind: Kind = "run", linear: float = 0.8, angular: float = 0.0) -> Command:
+
+def command(
+    ms: float, kind: motion.Command = RUN, linear: float = 0.8, angular: float = 0.0
+) -> Command:
     return Command(mono_ns=round(ms * 1e6), kind=kind, linear=linear, angular=angular)
 
 
 def test_the_first_stop_and_the_last_move_after_a_fault() -> None:
     made = [
-        command(0, "stop", 0), command(90), command(100), command(110), command(120, "break", 0),
-        command(130), command(140, "stop", 0), command(150, linear=0.0),
+        command(0, STOP, 0), command(90), command(100), command(110), command(120, BRAKE, 0),
+        command(130), command(140, STOP, 0), command(150, linear=0.0),
     ]  # fmt: skip
     assert first_stop_s(made, round(100e6)) == pytest.approx(0.020)
     assert last_move_s(made, round(100e6)) == pytest.approx(0.030)
