@@ -12,7 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
-from verification.faults.catalogue import FAULTS, GROUPS, Fault
+from verification.faults.catalogue import FAULTS, GROUPS
+from verification.faults.fault import Fault
 from verification.faults.namespaces import Requirement, enter, missing
 from verification.faults.stack_fixture import StackFixture, stack_fixture
 from verification.faults.table import Row, markdown, renewed, verdict

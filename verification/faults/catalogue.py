@@ -1,17 +1,11 @@
-"""The catalogue of faults, with the reaction that ``docs/safety.md`` allows for each.
-
-A budget is the effective time limit plus the time to detect it: 50 ms where a timeout has to
-expire, less where the fault is signalled.
-"""
+"""The catalogue of faults, with the reaction that ``docs/safety.md`` allows for each."""
 
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from zenoh import CongestionControl
 
-from cli.settings import Everything
 from common.motion import Command
 from sim.requests import (
     Driver,
@@ -26,6 +20,21 @@ from sim.requests import (
     Wire,
 )
 from verification.faults import browser, forgery, injectors
+from verification.faults.fault import (
+    BUMPER_AGE,
+    HEARTBEAT,
+    MOTION_LEASE,
+    REQUEST_LEASE,
+    SILENCE,
+    ULTRASONIC_AGE,
+    VELOCITY_AGE,
+    ZEROS,
+    Budget,
+    Fault,
+    Outcome,
+    by_limit,
+    within,
+)
 from verification.faults.injectors import do, kill, second
 from verification.faults.namespaces import Requirement
 from verification.faults.stack_fixture import StackFixture
@@ -39,48 +48,6 @@ from verification.faults.surroundings import (
     starve,
     step_time_of_day,
 )
-
-# How the vehicle drives again, by rising effort.
-Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
-Budget = Callable[[Everything], float]  # s from the fault to the last command to move
-
-NOTICE_S = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One kind of fault."""
-
-    name: str
-    inject: Callable[[StackFixture], int]  # returns its time, in ns of the monotonic clock
-    outcome: tuple[Outcome, ...]  # allowed by docs/safety.md
-    budget: Budget | None = None  # None where the vehicle may drive on
-    restore: Callable[[StackFixture], None] = lambda fixture: fixture.restore()
-    hold_s: float = 0.5  # how long requests go on after the fault
-    harmless: bool = False  # no process may end because of it
-    needs: Requirement = "none"
-    stops: tuple[str, ...] = ("stop", "brake")  # commands that count as a reaction
-
-
-def by_limit(limit: Callable[[Everything], float]) -> Budget:
-    """Return a budget of a time limit plus the detection time."""
-    return lambda config: limit(config) + NOTICE_S
-
-
-def within(seconds: float) -> Budget:
-    """Return a fixed budget."""
-    return lambda _: seconds
-
-
-MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
-HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
-SILENCE = by_limit(lambda config: config.bridge.silence)
-BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
-VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
-ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
-REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
-# Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
-ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
 
 HOLD_S = 0.6
 FREEZE_S = 0.5
@@ -239,7 +206,7 @@ BOARD = [
     Fault("mileage silent for 4 s", injectors.silent("mileage", 4.0), ON, None, hold_s=4.8),
 ]  # fmt: skip
 
-# Firmware behaviour that differs from the simulated default.
+# Other firmware behaviour.
 FIRMWARE = [
     Fault("contact while every third answer is lost",
           injectors.in_sequence(do(Lose(reports=("bumper",))), injectors.hit(0.06)), RESET,
@@ -260,7 +227,6 @@ FIRMWARE = [
           hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 
-# These also load the host.
 GREEDY = [
     Fault("bridge out of memory", starve("bridge"), NEUTRAL, within(0.01), hold_s=1.0,
           needs="memory cgroup"),
@@ -289,7 +255,6 @@ HOSTILE = [
     for what, publish in injectors.HOSTILE.items()
 ]  # fmt: skip
 
-# The web server and its abusive clients also load the host.
 DASHBOARD = [
     Fault("browser's estop while a viewer sends 50 000 messages/s",
           browser.estop_while(browser.flood), RESET, within(0.3)),
@@ -303,8 +268,7 @@ OPERATORS = [
     Fault("contact, then 20 releases 1.3 s late", injectors.late_releases, RESET, within(0.02)),
 ]
 
-# Keys that a terminal delivers late move nothing: the hold of the last key in time ends. That key
-# may count as a first press, if the one before it was refused.
+# Late keys move nothing: the hold of the last key in time ends, also when it is a first press.
 TERMINAL = [
     Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
           injectors.stall_terminal(seconds), NEUTRAL,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sim.trace import Command
-from verification.faults.catalogue import Fault, Outcome
+from verification.faults.fault import Fault, Outcome
 from verification.faults.stack_fixture import SPEED_MPS, StackFixture
 from verification.harness.trace import first_stop_s, last_move_s, moves
 from verification.harness.waiting import becomes_true

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from services.safety.config import SafetyConfig
 from verification.faults.__main__ import today
-from verification.faults.catalogue import NOTICE_S
+from verification.faults.fault import NOTICE_S
 from verification.faults.namespaces import Requirement, enter, missing
 from verification.faults.stack_fixture import SPEED_MPS
 from verification.harness.host import StallRecorder, short_description

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from verification.faults.catalogue import FAULTS, Fault
+from verification.faults.catalogue import FAULTS
+from verification.faults.fault import Fault
 from verification.faults.stack_fixture import StackFixture, stack_fixture
 from verification.faults.table import Row
 from verification.faults.trial import run_trial
