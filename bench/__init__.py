@@ -1,1 +1,1 @@
-"""T2 beside what a user would pick instead, measured on one machine in one run."""
+"""Benchmarks of T2 and its alternatives on one host."""

@@ -1,6 +1,6 @@
-"""``python -m bench``: T2 beside what a user would pick instead, as a document.
+"""``python -m bench``: benchmarks of T2 and its alternatives, as a document.
 
-Raw samples are kept in ``out/bench``; parts that are not measured anew are told from there.
+Raw samples are stored in ``out/bench``. A benchmark that is not measured again is read from there.
 """
 
 import argparse
@@ -13,147 +13,135 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from bench.codec import page as codec_page
-from bench.codec import part as codec_part
-from bench.codec import plot as codec_plot
-from bench.command import part as command_part
+from bench.command import measure as command_measure
+from bench.growth import measure as growth_measure
 from bench.growth import page as growth_page
-from bench.growth import part as growth_part
 from bench.growth import plot as growth_plot
+from bench.load import measure as load_measure
 from bench.load import page as load_page
-from bench.load import part as load_part
 from bench.load import plot as load_plot
 from bench.path import page as path_page
+from bench.reaction import measure as reaction_measure
 from bench.reaction import page as reaction_page
-from bench.reaction import part as reaction_part
 from bench.reaction import plot as reaction_plot
 from bench.series import RAW, Measured, Series, load, store
+from bench.start import measure as start_measure
 from bench.start import page as start_page
-from bench.start import part as start_part
 from bench.start import plot as start_plot
+from bench.telemetry import measure as telemetry_measure
 from bench.telemetry import page as telemetry_page
-from bench.telemetry import part as telemetry_part
 from common.freshness import NS_PER_S
-from verification.faults.machine import HoldUps, named
+from verification.harness.host import StallRecorder, description
 
 PAGE = Path(__file__).with_name("page.md")
-UNMEASURED = 3  # exit code where something to measure, or to tell, is not there
-WHOLE = 0.95  # of a core; who got less has shared it
+UNMEASURED = 3  # exit code when packages or samples are missing
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """A part of the document: how it is measured, told and drawn."""
+class Benchmark:
+    """One section of the document: measurement, blocks and plot."""
 
     measure: Callable[[], list[Series]]
     versions: Callable[[], str]
     blocks: Callable[[Sequence[Series]], dict[str, str]]
     draw: Callable[[Path, Sequence[Series]], None]
-    waits: bool = False  # for other processes: how much of a core this one got says nothing
 
 
-PARTS = {
-    "reaction": Part(
-        reaction_part.measure,
-        reaction_part.versions,
+BENCHMARKS = {
+    "reaction": Benchmark(
+        reaction_measure.measure,
+        reaction_measure.versions,
         reaction_page.blocks,
         partial(reaction_plot.draw, what="contact to BREAK"),
-        waits=True,
     ),
-    "start": Part(
-        start_part.measure, start_part.versions, start_page.blocks, start_plot.draw, waits=True
+    "start": Benchmark(
+        start_measure.measure, start_measure.versions, start_page.blocks, start_plot.draw
     ),
-    "command": Part(
-        command_part.measure,
-        command_part.versions,
+    "command": Benchmark(
+        command_measure.measure,
+        command_measure.versions,
         path_page.blocks,
         partial(reaction_plot.draw, what="request to frame"),
-        waits=True,
     ),
-    "telemetry": Part(
-        telemetry_part.measure,
-        telemetry_part.versions,
+    "telemetry": Benchmark(
+        telemetry_measure.measure,
+        telemetry_measure.versions,
         telemetry_page.blocks,
         partial(reaction_plot.draw, what="frame to consumer"),
-        waits=True,
     ),
-    "codec": Part(codec_part.measure, codec_part.versions, codec_page.blocks, codec_plot.draw),
-    "load": Part(
-        load_part.measure, load_part.versions, load_page.blocks, load_plot.draw, waits=True
+    "load": Benchmark(
+        load_measure.measure, load_measure.versions, load_page.blocks, load_plot.draw
     ),
-    "growth": Part(
-        growth_part.measure, growth_part.versions, growth_page.blocks, growth_plot.draw, waits=True
+    "growth": Benchmark(
+        growth_measure.measure, growth_measure.versions, growth_page.blocks, growth_plot.draw
     ),
 }
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, keep, tell; return ``UNMEASURED`` where something for that is missing."""
+    """Measure, store, print; return ``UNMEASURED`` when something is missing."""
     options = _arguments().parse_args(argv)
-    for name in [] if options.again else options.only or PARTS:
+    for name in [] if options.again else options.only or BENCHMARKS:
         try:
-            print(f"{name}: {store(name, measured(PARTS[name]))}", file=sys.stderr)
+            print(f"{name}: {store(name, measured(BENCHMARKS[name]))}", file=sys.stderr)
         except ModuleNotFoundError as error:
-            print(f"{error.name} is not installed: say make bench", file=sys.stderr)
+            print(f"{error.name} is not installed; run make bench", file=sys.stderr)
             return UNMEASURED
-    kept = {name: load(name) for name in PARTS}
-    missing = [name for name, one in kept.items() if one is None]
+    stored = {name: load(name) for name in BENCHMARKS}
+    missing = [name for name, one in stored.items() if one is None]
     if missing:
         print(f"no samples in {RAW} of {', '.join(missing)}: measure them first", file=sys.stderr)
         return UNMEASURED
-    told = {name: one for name, one in kept.items() if one is not None}
-    text = page(told)
+    found = {name: one for name, one in stored.items() if one is not None}
+    text = page(found)
     print(text)
-    for name, one in told.items():
-        PARTS[name].draw(RAW / f"{name}.png", one.series)
+    for name, one in found.items():
+        BENCHMARKS[name].draw(RAW / f"{name}.png", one.series)
         if options.out:
-            PARTS[name].draw(picture(options.out, name), one.series)
+            BENCHMARKS[name].draw(plot_file(options.out, name), one.series)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
     return 0
 
 
-def measured(part: Part) -> Measured:
-    """Measure a part, with a witness of what else the machine does."""
-    versions = part.versions()
-    with HoldUps() as holdups:
-        begin_ns, ran_ns = time.monotonic_ns(), time.process_time_ns()
-        series = part.measure()
+def measured(benchmark: Benchmark) -> Measured:
+    """Measure, and record the stalls of the host meanwhile."""
+    versions = benchmark.versions()
+    with StallRecorder() as stalls:
+        begin_ns = time.monotonic_ns()
+        series = benchmark.measure()
         seconds = (time.monotonic_ns() - begin_ns) / NS_PER_S
-        core = (time.process_time_ns() - ran_ns) / NS_PER_S / seconds
-        held_ms = 1000 * holdups.worst_s(begin_ns, seconds)
-    shared = "The machine was shared" if core < WHOLE else "The machine had nothing else to do"
-    share = f"{shared}: this run got {core:.0%} of a core, and a" if not part.waits else "A"
+        stall_ms = 1000 * stalls.worst_s(begin_ns, seconds)
     return Measured(
-        where=f"{datetime.now(UTC):%Y-%m-%d}: {named()}, Python {platform.python_version()}; "
+        where=f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}; "
         f"{versions}; {seconds / 60:.0f} minutes",
-        noise=f"{share} process that only sleeps was held up for {held_ms:.0f} ms at worst",
+        noise=f"A sleeping process was stalled for at most {stall_ms:.0f} ms",
         series=series,
     )
 
 
-def page(told: dict[str, Measured]) -> str:
-    """Return the document; a part's blocks have its name in front."""
+def page(results: dict[str, Measured]) -> str:
+    """Return the document; the name of a benchmark prefixes its blocks."""
     blocks: dict[str, str] = {}
-    for name, one in told.items():
-        own = PARTS[name].blocks(one.series) | {"where": one.where, "noise": one.noise}
+    for name, one in results.items():
+        own = BENCHMARKS[name].blocks(one.series) | {"where": one.where, "noise": one.noise}
         blocks |= {f"{name}_{block}": text for block, text in own.items()}
     return PAGE.read_text(encoding="utf-8").format(**blocks)
 
 
-def picture(out: Path, name: str) -> Path:
-    """Return where the picture of a part goes, beside the document."""
+def plot_file(out: Path, name: str) -> Path:
+    """Return the file of a plot, beside the document."""
     return out.parent / "images" / f"performance-{name}.png"
 
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
     parser.add_argument(
-        "--only", action="append", choices=PARTS, metavar="PART",
-        help=f"measure this anew: {', '.join(PARTS)}; repeatable",
+        "--only", action="append", choices=BENCHMARKS, metavar="NAME",
+        help=f"measure only this: {', '.join(BENCHMARKS)}; repeatable",
     )  # fmt: skip
-    parser.add_argument("--again", action="store_true", help="tell what was measured last")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where the document goes")
+    parser.add_argument("--again", action="store_true", help="use the stored samples")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What was measured of one row, and what it comes to. Pure, but for ``store`` and ``load``."""
+"""Samples of a row with their percentiles, and the raw files in ``out/bench``."""
 
 import gzip
 from collections.abc import Sequence
@@ -7,66 +7,65 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from verification.faults.table import rank
+from verification.harness.results import percentile
 
 RAW = Path("out/bench")
 
 
 class Series(Struct, frozen=True, kw_only=True):
-    """The samples of one row; a sample is so many calls, one after the other."""
+    """The samples of one row."""
 
     name: tuple[str, ...]
-    calls: int
-    samples_ns: Sequence[int]  # each for all its calls
-    note: str = ""  # what is said of the row besides
+    samples_ns: Sequence[int]
+    note: str = ""  # remark on the row
 
-    def call_ns(self, share: float) -> float:
-        """Return how long a call took in the sample that this share does not exceed, in ns."""
-        return rank(self.samples_ns, share) / self.calls
+    def percentile_ns(self, share: float) -> float:
+        """Return the percentile of a share (nearest rank), in ns."""
+        return percentile(self.samples_ns, share)
 
     @property
     def p50_ns(self) -> float:
-        """Return the median, in ns a call."""
-        return self.call_ns(0.5)
+        """Median, in ns."""
+        return self.percentile_ns(0.5)
 
     @property
     def p99_ns(self) -> float:
-        """Return what 99 % do not exceed, in ns a call."""
-        return self.call_ns(0.99)
+        """99th percentile, in ns."""
+        return self.percentile_ns(0.99)
 
     @property
     def p999_ns(self) -> float:
-        """Return what 99.9 % do not exceed, in ns a call."""
-        return self.call_ns(0.999)
+        """99.9th percentile, in ns."""
+        return self.percentile_ns(0.999)
 
     def ratio(self, other: "Series") -> float:
-        """Return how many times as long as the other's its median is."""
+        """Return this median divided by the other median."""
         return self.p50_ns / other.p50_ns
 
 
 class Measured(Struct, frozen=True, kw_only=True):
-    """What a part measured, and where."""
+    """The result of one benchmark."""
 
     where: str  # date, machine, Python, versions
-    noise: str  # what else the machine did meanwhile
+    noise: str  # other load on the machine
     series: Sequence[Series]
 
 
-def store(part: str, measured: Measured, folder: Path = RAW) -> Path:
-    """Keep all samples of a part, compressed; return where."""
+def store(benchmark: str, measured: Measured, folder: Path = RAW) -> Path:
+    """Write all samples of a benchmark, compressed; return the file."""
     folder.mkdir(parents=True, exist_ok=True)
-    file = _file(part, folder)
+    file = _file(benchmark, folder)
     file.write_bytes(gzip.compress(msgspec.json.encode(measured)))
     return file
 
 
-def load(part: str, folder: Path = RAW) -> Measured | None:
-    """Return what was measured of a part the last time, or nothing."""
-    file = _file(part, folder)
+def load(benchmark: str, folder: Path = RAW) -> Measured | None:
+    """Return the last stored result of a benchmark, or None."""
+    file = _file(benchmark, folder)
     if not file.exists():
         return None
     return msgspec.json.decode(gzip.decompress(file.read_bytes()), type=Measured)
 
 
-def _file(part: str, folder: Path) -> Path:
-    return folder / f"{part}.json.gz"
+def _file(benchmark: str, folder: Path) -> Path:
+    return folder / f"{benchmark}.json.gz"

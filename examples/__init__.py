@@ -1,1 +1,1 @@
-"""Consumers to begin from."""
+"""Example consumers."""

@@ -1,4 +1,4 @@
-"""A consumer with T2's helpers: tells which obstacle is nearest.
+"""A consumer with T2's packages: print the nearest obstacle.
 
 python -m examples.nearest_obstacle
 """
@@ -12,16 +12,16 @@ from common.service import Node, run
 from common.settings import Shared
 
 
-def tell(arrival: Arrival[Ultrasonic]) -> None:
-    """Print the nearest range, in metres, and which sonar has it."""
+def print_nearest(arrival: Arrival[Ultrasonic]) -> None:
+    """Print the shortest range, in metres, and its sonar."""
     named = zip(arrival.message.ranges, SONAR_NAMES, strict=True)
-    seen = [(range_m, name) for range_m, name in named if range_m is not None]
-    print("{:.2f} m {}".format(*min(seen)) if seen else "nothing near", flush=True)
+    measured = [(range_m, name) for range_m, name in named if range_m is not None]
+    print("{:.2f} m {}".format(*min(measured)) if measured else "nothing near", flush=True)
 
 
 def build(node: Node[Shared]) -> None:
-    """Subscribe; the rest of a service's life comes with ``run``."""
-    node.bus.subscribe(keys.ULTRASONIC, tell)
+    """Subscribe; ``run`` does the rest."""
+    node.bus.subscribe(keys.ULTRASONIC, print_nearest)
 
 
 if __name__ == "__main__":

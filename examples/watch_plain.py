@@ -1,8 +1,8 @@
-"""Watch the vehicle with nothing but eclipse-zenoh and msgpack.
+"""Print the vehicle's pose with eclipse-zenoh and msgpack only.
 
 python examples/watch_plain.py [tcp/127.0.0.1:7447]
 
-The contract is docs/bus.md; any language that has both can do the same.
+The interface is docs/bus.md; any language with both libraries can do the same.
 """
 
 import json
@@ -12,7 +12,7 @@ import sys
 import msgpack
 import zenoh
 
-signal.signal(signal.SIGINT, signal.SIG_DFL)  # ctrl-c ends it at once, without a traceback
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
 endpoint = sys.argv[1] if len(sys.argv) > 1 else "tcp/127.0.0.1:7447"
 config = zenoh.Config.from_json5(
     json.dumps({"mode": "client", "connect": {"endpoints": [endpoint]}})

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import settings
 
 from common import log
-from verification.harness.support import free_port, router_process
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
 
 # Two noisy cores: how long an example takes says nothing.
 settings.register_profile("t2", deadline=None)

@@ -1,4 +1,4 @@
-"""A program that asks to move the whole chain, and what the board was told meanwhile."""
+"""A motion source for the whole stack, and the commands that the board received meanwhile."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,13 +9,14 @@ import pytest
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
-from verification.harness.stack import Chain, chain
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture
-def stack(tmp_path: Path) -> Iterator[Chain]:
-    with chain(tmp_path) as it:
+def stack(tmp_path: Path) -> Iterator[RunningStack]:
+    with running_stack(tmp_path) as it:
         yield it
 
 
@@ -36,14 +37,14 @@ class ConstantSource:
 
 
 @pytest.fixture
-def source(stack: Chain) -> Iterator[ConstantSource]:
+def source(stack: RunningStack) -> Iterator[ConstantSource]:
     with running(Loop()) as loop:
         source = ConstantSource(loop)
         with bus_on(stack.endpoint, loop, source.declare):
             yield source
 
 
-def drive_until_moving(stack: Chain, source: ConstantSource) -> None:
+def drive_until_moving(stack: RunningStack, source: ConstantSource) -> None:
     """Push the source until the vehicle moves; center it first when safety wants a neutral."""
     for _ in range(10):
         source.linear = 0.0
@@ -58,12 +59,12 @@ def drive_until_moving(stack: Chain, source: ConstantSource) -> None:
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-def kinds_since(stack: Chain, count: int) -> set[str]:
+def kinds_since(stack: RunningStack, count: int) -> set[str]:
     """Return what was commanded after that many commands."""
     return {command.kind for command in stack.trace().commands[count:]}
 
 
-def moves_since(stack: Chain, count: int) -> bool:
+def moves_since(stack: RunningStack, count: int) -> bool:
     """Return whether one of the hundred commands after the first ``count`` moves the vehicle."""
     wait_until(lambda: len(stack.trace().commands) > count + 100, "a hundred commands")
     return any(c.kind == "run" and (c.linear or c.angular) for c in stack.trace().commands[count:])

@@ -18,8 +18,9 @@ from common.loop import Loop
 from common.motion import Command
 from common.source import DriveSource
 from sim.requests import Bumper
-from verification.harness.stack import Chain, chain
-from verification.harness.support import at, bus_on, running, wait_until
+from verification.harness.bus import at, bus_on, running
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.alone
 
@@ -30,8 +31,8 @@ LASTS_S = 1.5
 
 
 @pytest.fixture
-def stack(tmp_path: Path) -> Iterator[Chain]:
-    with chain(tmp_path) as it:
+def stack(tmp_path: Path) -> Iterator[RunningStack]:
+    with running_stack(tmp_path) as it:
         yield it
 
 
@@ -82,7 +83,7 @@ def _seen(state: m.SafetyState | None) -> dict[str, Any]:
 
 
 @pytest.fixture
-def observer(stack: Chain) -> Iterator[Observer]:
+def observer(stack: RunningStack) -> Iterator[Observer]:
     with running(Loop()) as loop:
         observer = Observer(loop)
         with bus_on(stack.endpoint, loop, observer.declare):
@@ -91,7 +92,7 @@ def observer(stack: Chain) -> Iterator[Observer]:
 
 
 @contextmanager
-def rogue(stack: Chain) -> Iterator[Callable[[keys.Topic[Any], m.Message], None]]:
+def rogue(stack: RunningStack) -> Iterator[Callable[[keys.Topic[Any], m.Message], None]]:
     """Join as a plain client of the router, and yield what puts a message as it is."""
     with zenoh.open(client_config(at(stack.endpoint))) as session:
 
@@ -112,7 +113,7 @@ def copied(observer: Observer, seq: int) -> m.Motion:
     return replace(last, command=Command.RUN, linear=ROGUE_MPS, source="teleop", seq=seq)
 
 
-def attack(stack: Chain, observer: Observer) -> None:
+def attack(stack: RunningStack, observer: Observer) -> None:
     """Command motion at 50 Hz under safety's boot, always ahead of it."""
     with rogue(stack) as put:
         time.sleep(0.2)
@@ -123,12 +124,12 @@ def attack(stack: Chain, observer: Observer) -> None:
             time.sleep(0.02)
 
 
-def obeyed(stack: Chain) -> int:
+def obeyed(stack: RunningStack) -> int:
     """Return how many frames the board got that only the rogue asked for."""
     return sum(round(abs(c.linear), 2) == ROGUE_MPS for c in stack.trace().commands)
 
 
-def test_a_copied_authority_moves_nothing(stack: Chain, observer: Observer) -> None:
+def test_a_copied_authority_moves_nothing(stack: RunningStack, observer: Observer) -> None:
     armed(observer)
     attack(stack, observer)
     assert obeyed(stack) == 0
@@ -143,7 +144,9 @@ def test_a_copied_authority_moves_nothing(stack: Chain, observer: Observer) -> N
     assert stack.last() == "brake"
 
 
-def test_a_number_far_ahead_does_not_lock_safety_out(stack: Chain, observer: Observer) -> None:
+def test_a_number_far_ahead_does_not_lock_safety_out(
+    stack: RunningStack, observer: Observer
+) -> None:
     armed(observer)
     with rogue(stack) as put:
         time.sleep(0.2)
@@ -155,7 +158,9 @@ def test_a_number_far_ahead_does_not_lock_safety_out(stack: Chain, observer: Obs
     wait_until(lambda: stack.last() == "brake", "BREAK at the board")
 
 
-def test_copied_measurements_are_no_inputs_of_safety(stack: Chain, observer: Observer) -> None:
+def test_copied_measurements_are_no_inputs_of_safety(
+    stack: RunningStack, observer: Observer
+) -> None:
     armed(observer)
     with rogue(stack) as put:
         time.sleep(0.2)
@@ -169,7 +174,9 @@ def test_copied_measurements_are_no_inputs_of_safety(stack: Chain, observer: Obs
     armed(observer)
 
 
-def test_an_observer_at_the_router_sees_each_motion_once(stack: Chain, observer: Observer) -> None:
+def test_an_observer_at_the_router_sees_each_motion_once(
+    stack: RunningStack, observer: Observer
+) -> None:
     armed(observer)
     observer.motions.clear()
     time.sleep(LASTS_S)
@@ -179,7 +186,7 @@ def test_an_observer_at_the_router_sees_each_motion_once(stack: Chain, observer:
     assert len(seqs) > 0.95 * (seqs[-1] - seqs[0])  # a busy machine may drop one
 
 
-def test_without_a_router_it_brakes_until_a_reset(stack: Chain, observer: Observer) -> None:
+def test_without_a_router_it_brakes_until_a_reset(stack: RunningStack, observer: Observer) -> None:
     armed(observer)
     observer.linear = 0.3
     wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")

@@ -12,9 +12,9 @@ from common.freshness import NS_PER_S
 from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
 from tests.drive_source import ConstantSource, drive_until_moving, source, stack
-from verification.harness.stack import Chain
-from verification.harness.support import wait_until
+from verification.harness.stack import RunningStack
 from verification.harness.teleop_terminal import terminal
+from verification.harness.waiting import wait_until
 
 __all__ = ["source", "stack"]  # fixtures
 
@@ -29,7 +29,7 @@ WAYS = {
 }  # fmt: skip
 
 
-def told_once(stack: Chain) -> dict[str, Any]:
+def told_once(stack: RunningStack) -> dict[str, Any]:
     """Return what ``t2 latency --once`` prints as JSON."""
     result = ran("latency", "--once", "-o", "json", *sets(f"bus.connect={stack.endpoint}"))
     assert result.returncode == 0, result.stderr
@@ -39,7 +39,7 @@ def told_once(stack: Chain) -> dict[str, Any]:
 
 @pytest.mark.skipif(not host_id(), reason="this system does not name its boot: clocks are not one")
 def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
-    stack: Chain, source: ConstantSource, tmp_path: Path
+    stack: RunningStack, source: ConstantSource, tmp_path: Path
 ) -> None:
     before = told_once(stack)["durations"]
     assert before["contact_to_break"] == {"count": 0, "p50": None, "p99": None, "worst": None}
@@ -74,7 +74,7 @@ def judged(lines: Path) -> int:
     return int(json.loads(whole[-1])["durations"]["judged_stop"]["count"]) if whole else 0
 
 
-def assert_the_terminal_shows(stack: Chain, worst_s: float) -> None:
+def assert_the_terminal_shows(stack: RunningStack, worst_s: float) -> None:
     """Look at the table that ``t2 latency`` draws on a terminal."""
     words = ["Reactions in ms", "contact → BREAK, the reflex", f"{worst_s * 1000:.3f}", "p99 ≤",
              "driver → safety"]  # fmt: skip

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from cli.demo import host_stalls
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
 from verification.harness.teleop_terminal import PATIENT, Terminal, at_terminal
+from verification.harness.waiting import wait_until
 
 ROOT = Path(__file__).parents[1]
 TOUR = ROOT / "docs" / "tour.md"

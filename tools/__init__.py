@@ -1,1 +1,1 @@
-"""Commands for developers; nothing here ships."""
+"""Commands for developers, not part of the installation."""

@@ -1,14 +1,12 @@
-"""Writes what is made from the code: tables of the documents, and schemas.
+"""``make docs``: write the generated tables of the documents, and the JSON schemas.
 
-``make docs`` runs it; a test runs it against what is committed. The prose around the tables is
-written by hand, the tables stand between ``<!-- name -->`` and ``<!-- end -->``.
+A test compares the output with the committed files. The tables stand between ``<!-- name -->`` and
+``<!-- end -->``; the text around them is written by hand.
 """
 
 import json
 import sys
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from msgspec import Struct
@@ -18,13 +16,13 @@ from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
 from tools import rights_table, safety_states
-from verification.harness.markdown import filled
+from verification.harness.results import filled, table
 
 DOCS = Path(__file__).parent.parent / "docs"
 
 
 def main() -> int:
-    """Write every generated file anew."""
+    """Write every generated file."""
     for path, text in generated().items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -32,7 +30,7 @@ def main() -> int:
 
 
 def generated() -> dict[Path, str]:
-    """Return the text that each generated file should have."""
+    """Return the text of each generated file."""
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
     bus = {
         "topics": topics(),
@@ -54,7 +52,7 @@ def generated() -> dict[Path, str]:
 
 
 def kinds() -> list[type[Struct]]:
-    """Return every struct of the contract, messages first, requests and replies behind."""
+    """Return every struct of the interface: messages, then requests and replies."""
     of_topics = [topic.message for topic in keys.TOPICS]
     of_calls = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
     return list(
@@ -70,7 +68,7 @@ def schema(kind: type[Struct]) -> str:
 
 
 def topics() -> str:
-    """Return the table of what is published."""
+    """Return the table of topics."""
     rows = [
         (f"`{topic.path}`", f"[{topic.message.__name__}](#{topic.message.__name__.lower()})",
          f"{topic.rate_hz:g}" if topic.rate_hz else "on change",
@@ -83,7 +81,7 @@ def topics() -> str:
 
 
 def calls() -> str:
-    """Return the table of what answers."""
+    """Return the table of calls."""
     rows = [
         (f"`{call.path}`", _link(call.request), _link(call.reply), call.server, call.what)
         for call in keys.CALLS
@@ -102,7 +100,7 @@ def classes() -> str:
 
 
 def fields(kind: type[Struct]) -> str:
-    """Return a struct's own fields with their units, as its source tells them."""
+    """Return the table of a struct's fields with units, from its source."""
     cells = [
         (f"`{name}`", f"`{type_}`".replace("|", "\\|"), f"`{default}`" if default else "", why)
         for name, type_, default, why in fields_of(kind)
@@ -114,24 +112,17 @@ def fields(kind: type[Struct]) -> str:
 
 
 def causes() -> str:
-    """Return the table of what holds the vehicle back."""
+    """Return the table of safety's causes."""
     return table(("cause", "action", "latched", "clears", "in words"), safety_states.causes())
 
 
 def metrics() -> str:
-    """Return the table of what Prometheus is told."""
+    """Return the table of Prometheus metrics."""
     rows = [
         (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.help)
         for one in FAMILIES
     ]
     return table(("metric", "kind", "labels", ""), rows)
-
-
-def table(head: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """Return a Markdown table."""
-    titles = list(head)
-    lines = [titles, ["---"] * len(titles), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _link(kind: type[Struct]) -> str:

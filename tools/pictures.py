@@ -17,11 +17,12 @@ from services.teleop.controller import Desk
 from services.teleop.event_log import Logbook
 from services.teleop.gamepad import find
 from sim.requests import Place
+from verification.harness.bus import running
 from verification.harness.dashboard import dashboard
 from verification.harness.dashboard_page import CHROMIUM, opened, takes
-from verification.harness.stack import Chain, chain
-from verification.harness.support import running, wait_until
-from verification.harness.teleop_app import NearApp
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.teleop_app import LocalTerminalApp
+from verification.harness.waiting import wait_until
 
 IMAGES = Path("docs/images")
 COLUMNS, ROWS = 104, 34
@@ -30,7 +31,7 @@ GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # that many presses of W; m
 
 def main() -> None:
     """Make them anew."""
-    with tempfile.TemporaryDirectory() as folder, chain(Path(folder), "office") as stack:
+    with tempfile.TemporaryDirectory() as folder, running_stack(Path(folder), "office") as stack:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
             picture_dashboard(stack, browser, Path(folder))
@@ -43,14 +44,14 @@ def main() -> None:
             browser.close()
 
 
-async def terminal_screen(stack: Chain) -> str:
+async def terminal_screen(stack: RunningStack) -> str:
     """Drive from a terminal, and return what it shows then, as SVG."""
     sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
     desk = Desk(node, Logbook())
     node.announce()
     desk.plug(find(node.config.teleop))
-    app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    app = LocalTerminalApp(desk, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):
         node.bus.open()
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
@@ -73,7 +74,7 @@ def picture_terminal(screen: str, browser: Browser) -> None:
     page.close()
 
 
-def picture_dashboard(stack: Chain, browser: Browser, folder: Path) -> None:
+def picture_dashboard(stack: RunningStack, browser: Browser, folder: Path) -> None:
     """Drive by the page's keys, and keep what it shows then."""
     with dashboard(stack.endpoint, folder) as site:
         page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")

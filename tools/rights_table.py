@@ -1,4 +1,4 @@
-"""The table of rights in ``docs/security.md``: each role, each class of keys, each verb."""
+"""The table of permissions in ``docs/security.md``: roles, classes of keys, verbs."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from cli.keys.profile import OPERATORS_SOURCES
 from common import keys
 from common.bus.probe import includes
 
-MINE, OTHER = "001", "002"  # a driver's robot, and one that it was not given
+MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 
 ROLES: Mapping[str, Rights] = {
     "viewer": access.viewer(),
@@ -18,7 +18,7 @@ ROLES: Mapping[str, Rights] = {
     "router of 001": access.robot(MINE),
 }
 DASHBOARD = keys.EVENTS.on(MINE, service="dashboard")
-# One key of each class, with the words that the table has for it.
+# One key of each class, with its name in the table.
 CLASSES: Mapping[str, str] = {
     "measured, decided, health": keys.VELOCITY.on(MINE),
     "events": keys.EVENTS.on(MINE, service="safety"),
@@ -47,7 +47,7 @@ WORDS: Mapping[Verb, str] = {
 
 
 def may(given: Rights, verb: Verb, key: str) -> bool:
-    """Tell whether rights hold a verb on a key, or on every key of an expression."""
+    """Return whether permissions include a verb on a key, or on every key of an expression."""
     return any(includes(expression, key) for expression in given.get(verb, ()))
 
 

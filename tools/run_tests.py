@@ -4,7 +4,7 @@ Most tests start real processes with real time limits, and four run at once. A h
 processes fails a few of them. So the tests that failed run a second time, one by one, with the
 machine to themselves. A test that fails again fails the run; the others are listed at the end.
 
-Many failures are no stall: with more than ``RETRIED_MAX`` there is no second run.
+Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run.
 """
 
 import json
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def pytest(arguments: Sequence[str]) -> int:
-    """Run pytest in a process of its own; return its exit code."""
+    """Run pytest in its own process; return its exit code."""
     return subprocess.run([sys.executable, "-m", "pytest", *arguments], check=False).returncode
 
 

@@ -1,8 +1,8 @@
-"""The states of safety, found by walking the real policy: for the diagram in ``docs/safety.md``.
+"""State diagram of safety in ``docs/safety.md``, by exploration of the real policy.
 
-From its start the policy is put through every stimulus of a short list, from every situation that
-is found on the way, until nothing new is found. A state of the diagram is a verdict, told apart by
-whether a reset is due; what is drawn is what happened.
+The exploration applies every stimulus of a list in every situation that it reaches, until it finds
+no new one. A state of the diagram is a verdict, with or without a reset due; each arrow is an
+observed transition.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,7 +33,7 @@ from services.safety.policy import Policy
 from services.safety.state import State
 
 TICK_NS = NS_PER_S // 20
-QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease, than inputs take to settle
+QUICK, PATIENCE = 8, 14  # ticks: longer than a request's lease; longer than inputs settle
 FREE_M, NEAR_M, INSIDE_M = None, 0.3, 0.1
 FRONT = (1, 2, 3)  # of the sonars
 M = TypeVar("M", bound=Message)
@@ -41,12 +41,12 @@ DRIVER_BOOT, BRIDGE_BOOT = 1, 2
 
 
 class Situation(Struct, frozen=True):
-    """What is so around the policy, and its memory."""
+    """The policy's environment and its state."""
 
     state: State
     now_ns: int = 10 * NS_PER_S
     seq: int = 0
-    asks: float | None = None  # m/s; None for nobody
+    asks: float | None = None  # m/s; None: no requests
     holds: bool = False  # the release
     link: bool = True
     pressed: bool = False
@@ -54,15 +54,15 @@ class Situation(Struct, frozen=True):
     ahead_m: float | None = FREE_M
 
     @property
-    def troubles(self) -> int:
-        """Count what is not as it should be; the walk goes no farther than one at a time."""
+    def disturbances(self) -> int:
+        """Number of simultaneous disturbances; the exploration continues from at most one."""
         blocked = self.ahead_m is not FREE_M
-        aimless = 2 * (self.holds and not self.pressed)
-        return (not self.link) + self.pressed + self.faulty + blocked + aimless
+        without_cause = 2 * (self.holds and not self.pressed)
+        return (not self.link) + self.pressed + self.faulty + blocked + without_cause
 
     @property
     def name(self) -> str:
-        """Name the state of the diagram that this is in."""
+        """State in the diagram."""
         verdict = self.state.verdict
         if verdict.source == "release":
             return "creeping"
@@ -95,10 +95,10 @@ STIMULI: dict[str, Stimulus] = {
 
 @cache
 def transitions() -> list[tuple[str, str, str]]:
-    """Return from, stimulus and to of everything that changes the state; sorted."""
+    """Return all transitions as from, stimulus, to; sorted."""
     policy = Policy(Safety(), Vehicle())
     first = _run(policy, Situation(policy.start(), link=False), None)
-    known, due = {_situation(first)}, [first]
+    known, due = {_signature(first)}, [first]
     found = {("[*]", "", first.name)}
     while due:
         before = due.pop()
@@ -112,8 +112,8 @@ def transitions() -> list[tuple[str, str, str]]:
             after = _run(policy, changed, event)
             if after.name not in (before.name, idle):
                 found.add((before.name, name, after.name))
-            if after.troubles <= 1 and _situation(after) not in known:
-                known.add(_situation(after))
+            if after.disturbances <= 1 and _signature(after) not in known:
+                known.add(_signature(after))
                 due.append(after)
     return sorted(found)
 
@@ -131,7 +131,7 @@ def diagram() -> str:
 
 
 def causes() -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield each cause as a row: name, action, latched, how it clears, words; the worst first."""
+    """Yield a row for each cause: name, action, latched, clearing, text; most severe first."""
     how = {
         Clears.RESET: "reset",
         Clears.SETTLED: "by itself after 0.5 s, then a neutral request",
@@ -142,8 +142,8 @@ def causes() -> Iterator[tuple[str, str, str, str, str]]:
         yield f"`{rule.name}`", rule.action.upper(), yes, how[rule.clears], rule.text
 
 
-def _situation(situation: Situation) -> tuple[object, ...]:
-    """Return what tells situations apart; the rest is history."""
+def _signature(situation: Situation) -> tuple[object, ...]:
+    """Return the part of a situation that distinguishes it from others."""
     armed = any(one.neutral for one in situation.state.arbiter.channels.values())
     around = (
         situation.asks,
@@ -164,7 +164,7 @@ def _reset(situation: Situation) -> Reset:
 
 
 def _run(policy: Policy, situation: Situation, event: Event | None) -> Situation:
-    """Let a stimulus act, with an event at its beginning, until it has settled."""
+    """Simulate a stimulus, with an event at its beginning, until the policy has settled."""
     for tick in range(PATIENCE):
         settling = any(clears(name) is Clears.SETTLED for name in situation.state.latches)
         if tick >= QUICK and not (situation.link and settling):
@@ -218,5 +218,5 @@ def _inputs(situation: Situation) -> Inputs:
 
 
 def _new(message: M, situation: Situation) -> Latest[M]:
-    """Return a sample that has just come."""
+    """Return a sample that has just arrived."""
     return Latest(replace(message, seq=situation.seq, boot=BRIDGE_BOOT), situation.now_ns)

@@ -1,1 +1,1 @@
-"""Command path: how soon the board has the frame that a request to move comes to."""
+"""Command path: time from a motion request to its frame at the board."""

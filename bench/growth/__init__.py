@@ -1,1 +1,1 @@
-"""What consumers, robots, keys and bytes cost as there are more of them."""
+"""CPU and delay over the number of consumers, robots, keys and bytes."""

@@ -1,4 +1,4 @@
-"""The part ``growth`` as a picture: CPU above and delay below, both axes logarithmic."""
+"""Plot of the benchmark ``growth``: CPU above, delay below, logarithmic axes."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,11 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from bench.growth.bend import bend
-from bench.growth.page import COSTS, CURVES, points
+from bench.growth.page import COSTS, CURVES, bend, points
 from bench.series import Series
 
-LEAST = 0.1  # % of a core; less is drawn as that
+LEAST = 0.1  # % of a core; smaller values are drawn as this
 
 
 def draw(file: Path, series: Sequence[Series]) -> None:
@@ -21,9 +20,9 @@ def draw(file: Path, series: Sequence[Series]) -> None:
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, len(CURVES), sharex="col", sharey="row")
     for curve, cpu, delay in zip(CURVES, above, below, strict=True):
-        for number, who in enumerate(COSTS):
-            shares = [(n, max(ns / 1e7, LEAST)) for n, ns in points(by_name, curve, who)]
-            _line(cpu, shares, f"C{number}", who)
+        for number, process in enumerate(COSTS):
+            shares = [(n, max(ns / 1e7, LEAST)) for n, ns in points(by_name, curve, process)]
+            _line(cpu, shares, f"C{number}", process)
         for color, share in (("C2", 0.5), ("C3", 0.99)):
             times = [(n, ns / 1000) for n, ns in points(by_name, curve, "delay", share)]
             _line(delay, times, color, f"p{100 * share:.0f}")

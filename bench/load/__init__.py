@@ -1,1 +1,1 @@
-"""How much the bridge bears, and what the chain on board takes of the machine."""
+"""Throughput of the bridge, and CPU and memory of the stack on board."""

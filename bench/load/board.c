@@ -1,11 +1,11 @@
-/* A board that says what it is told to, as often as it is told to, and answers questions.
+/* Simulated board: sends frames at given rates and answers queries.
  *
- * board FROM TO SAY ...
+ * board FROM TO FRAMES ...
  *
- * FROM and TO are ports on loopback: its own, and of whoever reads. SAY is FRAME@HZ, what is sent
- * unasked, or QUERY=FRAME, what answers which datagram; frames are hexadecimal. A line "HZ COUNT"
- * on standard input sends the first FRAME so often, so many times; when that is done, a line on
- * standard output has the nanoseconds that it took. It ends with standard input.
+ * FROM and TO are its own port and the reader's on loopback. FRAMES is FRAME@HZ, a periodic frame, or
+ * QUERY=FRAME, the answer to a query; frames are hexadecimal. A line "HZ COUNT" on standard input
+ * sends the first FRAME COUNT times at that rate; afterwards a line on standard output has the
+ * nanoseconds that this took. Ends with standard input.
  */
 #include "../path/datagram.h"
 #include <unistd.h>
@@ -38,7 +38,7 @@ static void start(Stream *s, double hz, int64_t count) {
 static void add(const char *word) {
     size_t first = strcspn(word, "@=");
     if (streaming == MOST || answering == MOST || !word[first])
-        fail("FROM TO SAY ...");
+        fail("FROM TO FRAMES ...");
     Datagram left = parsed_of(word, first);
     const char *right = word + first + 1;
     if (word[first] == '@') {
@@ -49,18 +49,18 @@ static void add(const char *word) {
     }
 }
 
-static void say(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
+static void transmit(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
 
 static int64_t due_ns(const Stream *s) {
     return s->sent < s->count ? s->begin_ns + (int64_t)(s->sent * s->period_ns) : FOREVER;
 }
 
-/* Send what is due; return when the next one is. */
-static int64_t speak(void) {
+/* Send all due frames; return the time of the next one. */
+static int64_t send_due(void) {
     int64_t next_ns = FOREVER;
     for (Stream *s = streams; s < streams + streaming; s++) {
         while (due_ns(s) <= now()) {
-            say(&s->frame);
+            transmit(&s->frame);
             if (++s->sent == s->count)
                 printf("%lld\n", (long long)(now() - s->begin_ns));
         }
@@ -69,15 +69,15 @@ static int64_t speak(void) {
     return next_ns;
 }
 
-static void hear(void) {
+static void answer(void) {
     unsigned char got[LONGEST];
     for (ssize_t size; (size = recv(sock, got, LONGEST, MSG_DONTWAIT)) > 0;)
         for (Answer *a = answers; a < answers + answering; a++)
             if ((size_t)size == a->query.size && !memcmp(got, a->query.bytes, size))
-                say(&a->frame);
+                transmit(&a->frame);
 }
 
-static void obey(void) {
+static void execute(void) {
     char line[100];
     ssize_t size = read(STDIN_FILENO, line, sizeof line - 1);
     double hz;
@@ -92,21 +92,21 @@ static void obey(void) {
 
 int main(int count, char **given) {
     if (count < 4)
-        fail("FROM TO SAY ...");
+        fail("FROM TO FRAMES ...");
     for (int i = 3; i < count; i++)
         add(given[i]);
     sock = bound(given[1], given[2]);
     setvbuf(stdout, NULL, _IOLBF, 0);
-    go_ahead();
+    ask_realtime();
     struct pollfd ends[] = {{sock, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
     for (;;) {
-        int64_t next_ns = speak(), left_ns = next_ns - now();
+        int64_t next_ns = send_due(), left_ns = next_ns - now();
         left_ns = left_ns < 0 ? 0 : left_ns > S ? S : left_ns;
         struct timespec left = {left_ns / S, left_ns % S};
         ppoll(ends, 2, &left, NULL);
         if (ends[0].revents)
-            hear();
+            answer();
         if (ends[1].revents)
-            obey();
+            execute();
     }
 }

@@ -1,4 +1,4 @@
-"""The board's side: what it says unasked, how it answers, and frames at a rate."""
+"""The simulated board of the benchmark ``load``: periodic frames, answers, frames at a rate."""
 
 import contextlib
 import subprocess
@@ -25,7 +25,7 @@ ANSWERS: Mapping[Frame, Frame] = {
     commands.BumperBrakeSet(True): reports.BumperBrakeReport(True),
 }
 STANDS = reports.VelocityReport(0, 0)
-# What it says unasked, in Hz. Ten times as much: what the bridge asks for besides makes it full.
+# Periodic frames in Hz. TENFOLD: ten times the shipped rates together with the bridge's queries.
 SHIPPED: Mapping[Frame, float] = {STANDS: 50.0}
 TENFOLD: Mapping[Frame, float] = {
     STANDS: 500.0,
@@ -37,12 +37,12 @@ TENFOLD: Mapping[Frame, float] = {
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """One that runs."""
+    """A running board."""
 
     process: "subprocess.Popen[str]"
 
     def send(self, hz: float, count: int) -> float:
-        """Send so many velocity reports, so many a second; return the rate that it was."""
+        """Send velocity reports at a rate; return the reached rate."""
         out, back = self.process.stdin, self.process.stdout
         assert out is not None
         assert back is not None
@@ -53,16 +53,16 @@ class Board:
 
 
 def compiled(folder: Path) -> Path:
-    """Compile it into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
+    """Compile the program into a folder; raise ``FileNotFoundError`` without a C compiler."""
     return processes.compiled(SOURCE, folder)
 
 
 @contextlib.contextmanager
 def board(program: Path, port: int, to: int, says: Mapping[Frame, float]) -> Iterator[Board]:
-    """Run it while the context lasts, from a port of loopback to another."""
-    unasked = [f"{_hex(frame)}@{hz}" for frame, hz in says.items()]
-    asked = [f"{_hex(query)}={_hex(answer)}" for query, answer in ANSWERS.items()]
-    command = [str(program), str(port), str(to), *unasked, *asked]
+    """Run a board between two ports on loopback; ``says`` has the periodic frames in Hz."""
+    periodic = [f"{_hex(frame)}@{hz}" for frame, hz in says.items()]
+    answers = [f"{_hex(query)}={_hex(answer)}" for query, answer in ANSWERS.items()]
+    command = [str(program), str(port), str(to), *periodic, *answers]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:

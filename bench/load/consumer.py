@@ -1,7 +1,6 @@
-"""``python -m bench.load.consumer ENDPOINT KEY``: a consumer with nothing of T2's in it.
+"""``python -m bench.load.consumer ENDPOINT KEY``: a consumer without T2.
 
-Plain zenoh and msgpack, in Zenoh's own thread. It counts what comes, what was lost by the sequence
-numbers, and how old each message is.
+Plain zenoh and msgpack, in Zenoh's own thread. It records sequence numbers and ages.
 """
 
 import json
@@ -13,15 +12,15 @@ from typing import Any
 import msgpack
 import zenoh
 
-from verification.fleet.child import obey
+from verification.harness.child_process import serve
 
-TOLD = 1000  # ages at most, evenly spread
+AGES_MAX = 1000  # reported, evenly spread
 
 
 def plain(endpoint: str) -> zenoh.Config:
-    """Return how anybody dials a router."""
-    dials = {"mode": "client", "connect": {"endpoints": [endpoint]}}
-    return zenoh.Config.from_json5(json.dumps(dials))
+    """Return the configuration of a plain client."""
+    settings = {"mode": "client", "connect": {"endpoints": [endpoint]}}
+    return zenoh.Config.from_json5(json.dumps(settings))
 
 
 class Consumer:
@@ -31,20 +30,22 @@ class Consumer:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was."""
+        """Reset the counts."""
         self._seqs: dict[str, list[int]] = {}
         self._ages_ns: list[int] = []
 
     def take(self, sample: zenoh.Sample) -> None:
-        """Take one in."""
+        """Count one message."""
         message: dict[str, Any] = msgpack.unpackb(sample.payload.to_bytes())
         self._ages_ns.append(time.monotonic_ns() - message["mono_ns"])
         self._seqs.setdefault(str(sample.key_expr), []).append(message["seq"])
 
     def end(self) -> object:
-        """Tell of each key how many came, and the first and the last number; and ages."""
-        came = {key: list(seqs) for key, seqs in list(self._seqs.items())}  # more comes meanwhile
-        every = max(1, len(self._ages_ns) // TOLD)
+        """Return for each key the count, the first and the last number; and the ages."""
+        came = {
+            key: list(seqs) for key, seqs in list(self._seqs.items())
+        }  # copies: the other thread appends
+        every = max(1, len(self._ages_ns) // AGES_MAX)
         return {
             "keys": {key: (len(seqs), seqs[0], seqs[-1]) for key, seqs in came.items() if seqs},
             "ages_ns": self._ages_ns[::every],
@@ -52,12 +53,12 @@ class Consumer:
 
 
 def main() -> None:
-    """Listen until standard input ends."""
+    """Consume until standard input ends."""
     endpoint, key = sys.argv[1:]
     consumer, left = Consumer(), threading.Event()
     with zenoh.open(plain(endpoint)) as session:
         declared = session.declare_subscriber(key, consumer.take)
-        obey(consumer.begin, consumer.end, left.set)
+        serve(consumer.begin, consumer.end, left.set)
         left.wait()
         declared.undeclare()
 

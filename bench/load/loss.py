@@ -1,29 +1,29 @@
-"""Where frames went that did not arrive. Pure."""
+"""Where frames were lost. Pure."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 BEHIND_S = 0.2  # a consumer whose last messages are older does not keep up
-SLOW = 0.99  # of the rate that was asked for; a slower board has not asked for it
+SLOW = 0.99  # of the requested rate; below this the board was too slow
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """What became of the frames that were sent in a row."""
+    """Counts of the frames of one trial."""
 
     sent: int
     dropped: int  # by the kernel: the bridge's socket had no room
     published: int  # by the bridge
     received: Sequence[int]  # by each consumer
-    late_s: float = 0.0  # how old messages were, all or the last
-    pace: float = 1.0  # of the rate that was asked for
+    late_s: float = 0.0  # age of the messages, all or the last
+    pace: float = 1.0  # reached share of the requested rate
 
     @property
     def losses(self) -> dict[str, int]:
-        """Return how many are missing by place; what all consumers miss is lost before them."""
+        """Return the losses by place; frames that all consumers miss were lost before them."""
         missing = [self.published - each for each in self.received]
         shared, unread = min(missing), self.sent - self.published
-        dropped = min(self.dropped, unread)  # the kernel's count has answers in it, too
+        dropped = min(self.dropped, unread)  # the kernel's count includes answers
         lost = {
             "in the socket": dropped,
             "in the bridge": unread - dropped,
@@ -34,13 +34,13 @@ class Passage:
 
     @property
     def words(self) -> str:
-        """Say what was lost, late or not sent in time; empty when all is well."""
-        said = [f"{count:,} {place}" for place, count in self.losses.items()]
+        """Describe losses, delay and a slow board; empty without any."""
+        found = [f"{count:,} {place}" for place, count in self.losses.items()]
         if self.late_s > BEHIND_S:
-            said.append(f"{self.late_s:.1f} s behind")
+            found.append(f"{self.late_s:.1f} s behind")
         if self.pace < SLOW:
-            said.append(f"the board was at {self.pace:.0%} of it")
-        return ", ".join(said)
+            found.append(f"the board was at {self.pace:.0%} of it")
+        return ", ".join(found)
 
 
 def highest(rates: Sequence[int], holds: Callable[[int], bool]) -> int:

@@ -1,4 +1,4 @@
-"""The part ``load`` as a picture: the delay up to the rate that loses, and who takes the CPU."""
+"""Plot of the benchmark ``load``: the delay up to the first rate with a loss, and CPU shares."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ LABEL = 18  # characters in a line below a bar
 
 
 def draw(file: Path, series: Sequence[Series]) -> None:
-    """Draw the rates left and the CPU right."""
+    """Draw the rates on the left, the CPU on the right."""
     by_name = {each.name: each for each in series}
     figure = Figure(figsize=(13, 5), layout="constrained")
     FigureCanvasAgg(figure)
@@ -38,7 +38,7 @@ def _rates(axes: Axes, by_name: ByName) -> None:
     axes.axvline(FRAMES_HZ, color="gray", linestyle=":")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel("frames a second (hollow: not all arrived; dotted: to reach)")
+    axes.set_xlabel("frames a second (hollow: not all arrived; dotted: target)")
     axes.set_ylabel("bridge to consumer, p99, ms")
     axes.legend(title="consumers", fontsize=8)
     axes.grid(alpha=0.3)
@@ -46,17 +46,19 @@ def _rates(axes: Axes, by_name: ByName) -> None:
 
 def _cpu(axes: Axes, by_name: ByName) -> None:
     rates = ("shipped", "tenfold")
-    bars = [(who, rate) for rate in rates for who in (CHAIN, BARE, BUS)]
-    for at, (who, rate) in enumerate(bars):
+    bars = [(candidate, rate) for rate in rates for candidate in (CHAIN, BARE, BUS)]
+    for at, (candidate, rate) in enumerate(bars):
         bottom = 0.0
-        names = [name[2] for name in by_name if name[:2] == (who, rate) and name[2] != TOGETHER]
+        names = [
+            name[2] for name in by_name if name[:2] == (candidate, rate) and name[2] != TOGETHER
+        ]
         for name in names:
-            share = middle(by_name, who, rate, name) / 1e7
+            share = middle(by_name, candidate, rate, name) / 1e7
             axes.bar(at, share, bottom=bottom, edgecolor="white", color=f"C{names.index(name)}")
             if share > READABLE:
                 axes.annotate(name, (at, bottom + share / 2), ha="center", va="center", fontsize=7)
             bottom += share
-    labels = [fill(f"{who}, {rate}", LABEL) for who, rate in bars]
+    labels = [fill(f"{candidate}, {rate}", LABEL) for candidate, rate in bars]
     axes.set_xticks(range(len(bars)), labels, fontsize=8)
     axes.set_ylabel("CPU, % of a core")
     axes.grid(axis="y", alpha=0.3)

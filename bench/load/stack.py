@@ -1,14 +1,15 @@
-"""The chain on board as processes of its own, each known by its name."""
+"""The stack on board as processes with known pids."""
 
 import contextlib
-import socket
 import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from bench.path.processes import robots_python
-from verification.harness.support import free_port, router_process, wait_until
-from verification.soak.process_stats import tree
+from verification.harness.bus import router_process, set_options
+from verification.harness.ports import free_port, udp_ports
+from verification.harness.process_stats import children
+from verification.harness.waiting import wait_until
 
 CHAIN = ("bridge", "safety", "odom")
 
@@ -17,33 +18,32 @@ CHAIN = ("bridge", "safety", "odom")
 class Ports:
     """Where board, bridge and router listen on loopback."""
 
-    board: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
-    bridge: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
-    standby: int = field(default_factory=lambda: free_port(socket.SOCK_DGRAM))
+    board: int = field(default_factory=lambda: udp_ports(1)[0])
+    bridge: int = field(default_factory=lambda: udp_ports(1)[0])
+    standby: int = field(default_factory=lambda: udp_ports(1)[0])
     router: int = field(default_factory=free_port)
 
     @property
     def endpoint(self) -> str:
-        """Where the bus is."""
+        """Endpoint of the router."""
         return f"tcp/127.0.0.1:{self.router}"
 
     @property
     def sets(self) -> list[str]:
-        """The settings that say so, as options of a service."""
-        texts = (
+        """These ports as options of a service."""
+        return set_options(
             f"board.port={self.board}",
             f"board.listen_ports=[{self.bridge}, {self.standby}]",
             f"bus.listen={self.endpoint}",
         )
-        return [word for text in texts for word in ("--set", text)]
 
 
-Pids = dict[str, int]  # of each process, the guard's and its bridge's apart
+Pids = dict[str, int]  # by process; guard and bridge separately
 
 
 @contextlib.contextmanager
 def stack(ports: Ports, services: Sequence[str] = CHAIN) -> Iterator[Pids]:
-    """Run router and services while the context lasts, each as shipped."""
+    """Run router and services, each as shipped."""
     python = robots_python()
     with contextlib.ExitStack() as held:
         pids = {"router": held.enter_context(router_process(ports.endpoint, python)).pid}
@@ -57,6 +57,5 @@ def stack(ports: Ports, services: Sequence[str] = CHAIN) -> Iterator[Pids]:
 
 
 def guarded(guard: int) -> int:
-    """Return the bridge under a guard, as soon as there is one."""
-    found = wait_until(lambda: [pid for _, pid in tree("", guard)][1:], "a bridge under its guard")
-    return found[0]
+    """Wait for the bridge under a guard; return its pid."""
+    return wait_until(lambda: children(guard), "a bridge under its guard")[0]

@@ -1,1 +1,1 @@
-"""What the parts ``command`` and ``telemetry`` share: the vehicle, T2's stack, and other buses."""
+"""Shared by ``command`` and ``telemetry``: the simulated vehicle, T2's stack, processes."""

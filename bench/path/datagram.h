@@ -1,4 +1,4 @@
-/* What the programs that play the board have in common: time, datagrams, a socket on loopback. */
+/* Shared by the programs that simulate the board: time, datagrams, a socket on loopback. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <errno.h>
@@ -30,34 +30,33 @@ static inline void fail(const char *what) {
     exit(1);
 }
 
-/* So many hexadecimal digits, as bytes. */
+/* Parse hexadecimal digits. */
 static inline Datagram parsed_of(const char *hex, size_t digits) {
     Datagram d = {.size = digits / 2};
     if (d.size > LONGEST)
         fail("too long");
     for (size_t i = 0; i < d.size; i++)
         if (sscanf(hex + 2 * i, "%2hhx", &d.bytes[i]) != 1)
-            fail("no hexadecimal");
+            fail("not hexadecimal");
     return d;
 }
 
 static inline Datagram parsed(const char *hex) { return parsed_of(hex, strlen(hex)); }
 
-/* A socket at one port that talks to another; to nobody in particular for port 0. */
+/* A socket bound to one port and connected to another; not connected for port 0. */
 static inline int bound(const char *from, const char *to) {
     struct sockaddr_in here = {AF_INET, htons(atoi(from)), {htonl(INADDR_LOOPBACK)}, {0}};
     struct sockaddr_in there = here;
     there.sin_port = htons(atoi(to));
     int sock = socket(AF_INET, SOCK_DGRAM, 0);
     if (bind(sock, (void *)&here, sizeof here))
-        fail("cannot have its port");
+        fail("cannot bind its port");
     if (there.sin_port && connect(sock, (void *)&there, sizeof there))
-        fail("cannot reach a port");
+        fail("cannot connect to a port");
     return sock;
 }
 
-/* A board is another machine, and it measures: what keeps others waiting must not keep it. Where
- * that is not granted, it does. */
-static inline void go_ahead(void) {
+/* Ask for SCHED_FIFO: a real board is another computer, and load on this host must not delay it. */
+static inline void ask_realtime(void) {
     sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){.sched_priority = 80});
 }

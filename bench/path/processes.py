@@ -1,8 +1,7 @@
-"""Processes that run while a context lasts, and what they want installed."""
+"""Processes that last as long as their context, and the packages that they need."""
 
 import contextlib
 import shutil
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -28,32 +27,27 @@ def running(*commands: Command) -> Iterator[None]:
 
 @contextlib.contextmanager
 def loaded(processes: int) -> Iterator[None]:
-    """Keep so many processes counting while the context lasts."""
+    """Run processes with a busy loop."""
     with running(*[[sys.executable, "-S", "-c", "while True: pass"]] * processes):
         yield
 
 
 def module(name: str, *words: object) -> Command:
-    """Return how a module is run."""
+    """Return the command that runs a module."""
     return [sys.executable, "-m", *name.split(), *map(str, words)]
 
 
 def robots_python() -> str:
-    """Return a Python with a robot's packages alone, which `make bench` makes; without it, ours.
+    """Return a Python with only a robot's packages, made by `make bench`, else this Python.
 
-    What laptops want is found by libraries that can do without, and costs each process on board.
+    Libraries import optional packages of laptops when installed; that costs memory and time.
     """
     return str(ROBOTS) if ROBOTS.exists() else sys.executable
 
 
 def packages() -> str:
-    """Say whose packages that Python has."""
+    """Return which packages that Python has."""
     return "a robot's packages" if ROBOTS.exists() else "all packages of this checkout"
-
-
-def given(*sets: str) -> list[str]:
-    """Return settings as options."""
-    return [word for each in sets for word in ("--set", each)]
 
 
 def compiled(source: Path, folder: Path) -> Path:
@@ -66,7 +60,7 @@ def compiled(source: Path, folder: Path) -> Path:
 
 
 def lacking(package: str, program: str) -> str:
-    """Return what of these is not installed here; both may be empty."""
+    """Return the missing one of a package and a program; both may be empty."""
     try:
         if package:
             version(package)
@@ -75,31 +69,25 @@ def lacking(package: str, program: str) -> str:
     return program if program and shutil.which(program) is None else ""
 
 
-def answers(port: int) -> bool:
-    """Tell whether somebody listens on a port of loopback."""
-    with socket.socket() as sock:
-        return sock.connect_ex(("127.0.0.1", port)) == 0
-
-
-class Wanting(Protocol):
-    """A row of a table that may want a package."""
+class Optional(Protocol):
+    """A row of a table that may need a package."""
 
     @property
     def name(self) -> str:
-        """What the row is called."""
+        """Title of the row."""
 
     @property
     def package(self) -> str:
-        """What it wants, by its name in requirements-bench.lock; may be empty."""
+        """The required package, by its name in requirements-bench.lock; may be empty."""
 
     @property
     def lacks(self) -> str:
-        """What is not installed here; empty when it can run."""
+        """The missing package or program; empty when the row can run."""
 
 
-def versions(rows: Sequence[Wanting]) -> str:
-    """Return what is compared, with versions, and what is not here."""
+def versions(rows: Sequence[Optional]) -> str:
+    """Return the compared packages with versions, and the rows that are left out."""
     here = [row.package for row in rows if row.package and not row.lacks]
-    told = [f"{name} {version(name)}" for name in ("eclipse-zenoh", *here)]
+    versions_here = [f"{name} {version(name)}" for name in ("eclipse-zenoh", *here)]
     left_out = [f"{row.name} left out, {row.lacks} is not installed" for row in rows if row.lacks]
-    return ", ".join([*dict.fromkeys(told), *left_out])
+    return ", ".join([*dict.fromkeys(versions_here), *left_out])

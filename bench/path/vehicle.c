@@ -1,28 +1,28 @@
-/* The vehicle at the end of a path. It answers queries as a board does, and times round trips.
+/* The vehicle at the ends of a path. It answers queries like a board, and times round trips.
  *
- * vehicle BOARD TO WITNESS ASKER ROUNDS WARM STANDS ZERO ONE TWO [QUERY ANSWER ...]
+ * vehicle BOARD TO WITNESS SOURCE ROUNDS WARM STANDS ZERO ONE TWO [QUERY ANSWER ...]
  *
- * All ports are on loopback. BOARD is the board's own, TO whoever talks to it; at WITNESS it hears
- * from the program at the other end of the path, which says 0, 1 or 2 in a byte and then, in eight,
- * nanoseconds of the monotonic clock. From STANDS on all is datagrams as hexadecimal.
+ * All ports are on loopback. BOARD is the board's own port, TO its peer's. At WITNESS it receives
+ * stamps from the program at the other end of the path: a byte 0, 1 or 2, then eight bytes with
+ * nanoseconds of the monotonic clock. From STANDS on all arguments are datagrams in hexadecimal.
  *
- * With an ASKER a round begins with a byte to that port, which asks for ONE or TWO, in turns, and
- * lasts from the asker's stamp to the arrival of that frame. Without (ASKER 0) the vehicle sends ONE
- * or TWO, and the round lasts until the witness's stamp. STANDS is sent every 20 ms with an asker,
- * and when there are no ROUNDS, which means for ever.
+ * With a SOURCE a round begins with a byte to that port, which requests ONE or TWO alternately; it
+ * lasts from the source's stamp to the arrival of that frame. Without (SOURCE 0) the vehicle sends
+ * ONE or TWO, and the round lasts until the witness's stamp. STANDS is sent every 20 ms with a
+ * source, and without ROUNDS, which means for ever.
  *
- * ZERO is repeated until it goes through, at the beginning and after a round that was lost. One
- * line for each round after the first WARM ones: its nanoseconds, -1 when it took over a second.
+ * ZERO is repeated until it passes, at the beginning and after a lost round. Prints one line for
+ * each round after the first WARM ones: its nanoseconds, -1 when it took over a second.
  */
 #include "datagram.h"
 
 enum { MOST = 8, KINDS = 3, FIXED = 11 };
 
-static int board, witness, asks, keeps, pairs;
+static int board, witness, requests, repeats, pairs;
 static Datagram stands, frames[KINDS], queries[MOST], answers[MOST];
-static int64_t at_board[KINDS], at_witness[KINDS], keep_ns; /* 0: not yet */
+static int64_t at_board[KINDS], at_witness[KINDS], repeat_ns; /* 0: not yet */
 
-static void say(const Datagram *d) { send(board, d->bytes, d->size, 0); }
+static void transmit(const Datagram *d) { send(board, d->bytes, d->size, 0); }
 
 static int is(const Datagram *want, const Datagram *got) {
     return got->size == want->size && !memcmp(got->bytes, want->bytes, want->size);
@@ -37,8 +37,8 @@ static int came(int sock, Datagram *got) {
 static void on_frame(const Datagram *got) {
     for (int i = 0; i < pairs; i++)
         if (is(&queries[i], got))
-            say(&answers[i]);
-    for (int i = 0; i < KINDS && asks; i++)
+            transmit(&answers[i]);
+    for (int i = 0; i < KINDS && requests; i++)
         if (!at_board[i] && is(&frames[i], got))
             at_board[i] = now();
 }
@@ -48,7 +48,7 @@ static void on_witness(const Datagram *got) {
         memcpy(&at_witness[got->bytes[0]], got->bytes + 1, 8);
 }
 
-/* Be a board until a moment, or until one kind went through; tell whether it did. */
+/* Serve as a board until a time, or until one kind passed; return whether it did. */
 static int served(int64_t until_ns, int kind) {
     Datagram got;
     for (;;) {
@@ -61,49 +61,49 @@ static int served(int64_t until_ns, int kind) {
         int64_t now_ns = now();
         if (now_ns >= until_ns)
             return 0;
-        if (keeps && now_ns >= keep_ns) {
-            say(&stands);
-            keep_ns = now_ns + 20 * MS;
+        if (repeats && now_ns >= repeat_ns) {
+            transmit(&stands);
+            repeat_ns = now_ns + 20 * MS;
         }
-        int64_t left_ns = (keeps && keep_ns < until_ns ? keep_ns : until_ns) - now_ns;
+        int64_t left_ns = (repeats && repeat_ns < until_ns ? repeat_ns : until_ns) - now_ns;
         struct timespec left = {left_ns / S, left_ns % S};
         struct pollfd both[] = {{.fd = board, .events = POLLIN}, {.fd = witness, .events = POLLIN}};
         ppoll(both, 2, &left, NULL);
     }
 }
 
-/* Send one kind on its way, and wait for it as long; tell whether it went through. */
+/* Send one kind, and wait for it; return whether it passed. */
 static int passed(int kind, int64_t patience_ns) {
     unsigned char byte = kind;
     memset(at_board, 0, sizeof at_board);
     memset(at_witness, 0, sizeof at_witness);
     int64_t begin_ns = now();
-    if (asks) {
+    if (requests) {
         send(witness, &byte, 1, 0);
     } else {
         at_board[kind] = begin_ns;
-        say(&frames[kind]);
+        transmit(&frames[kind]);
     }
     return served(begin_ns + patience_ns, kind);
 }
 
-/* Wait until ZERO goes through, and then one of another kind, which may want time to get there. */
+/* Wait until ZERO passes, then another kind, which may take longer. */
 static void join(int kind) {
     int64_t lost_ns = now() + 30 * S;
     do {
         while (!passed(0, 20 * MS))
             if (now() > lost_ns)
-                fail("nothing goes through");
+                fail("nothing passes");
     } while (!passed(kind, S));
 }
 
 int main(int count, char **given) {
     pairs = (count - FIXED) / 2;
     if (count < FIXED || pairs > MOST)
-        fail("BOARD TO WITNESS ASKER ROUNDS WARM STANDS ZERO ONE TWO [QUERY ANSWER ...]");
+        fail("BOARD TO WITNESS SOURCE ROUNDS WARM STANDS ZERO ONE TWO [QUERY ANSWER ...]");
     int rounds = atoi(given[5]), warm = atoi(given[6]);
-    asks = atoi(given[4]);
-    keeps = asks || !rounds;
+    requests = atoi(given[4]);
+    repeats = requests || !rounds;
     stands = parsed(given[7]);
     for (int i = 0; i < KINDS; i++)
         frames[i] = parsed(given[8 + i]);
@@ -114,7 +114,7 @@ int main(int count, char **given) {
     board = bound(given[1], given[2]);
     witness = bound(given[3], given[4]);
 
-    go_ahead();
+    ask_realtime();
 
     srand(1);
     while (!rounds)
@@ -122,12 +122,12 @@ int main(int count, char **given) {
     int kind = 1;
     join(kind);
     for (int round = -warm; round < rounds; round++) {
-        kind = 3 - kind; /* ONE and TWO in turns */
-        served(now() + 2 * MS + rand() % (6 * MS), -1); /* in step with nobody's timer */
+        kind = 3 - kind; /* ONE and TWO alternate */
+        served(now() + 2 * MS + rand() % (6 * MS), -1); /* not synchronous with any timer */
         int through = passed(kind, S);
         int64_t took_ns = at_board[kind] - at_witness[kind];
         if (round >= 0)
-            printf("%lld\n", (long long)(!through ? -1 : asks ? took_ns : -took_ns));
+            printf("%lld\n", (long long)(!through ? -1 : requests ? took_ns : -took_ns));
         if (!through)
             join(kind);
     }

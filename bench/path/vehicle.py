@@ -1,6 +1,5 @@
-"""The vehicle's side: what it answers and says, and how long what it times took."""
+"""The simulated vehicle at the ends of a path: its frames, and its measured durations."""
 
-import socket
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,13 +8,13 @@ from bench.path import processes
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
-from verification.harness.support import free_port
+from verification.harness.ports import udp_ports
 
 SOURCE = Path(__file__).with_name("vehicle.c")
 FRAMING = Framing("crc-16", "payload")
-FREE_MM = 6000  # beyond what a sonar hears: no echo
+FREE_MM = 6000  # beyond the range of a sonar: no echo
 KINDS = (0, 1, 2)
-SPEEDS_MMPS = (0, 100, 101)  # asked for; apart by what a frame can tell
+SPEEDS_MMPS = (0, 100, 101)  # requested; distinguishable in a frame
 PATIENCE_S = 600.0
 
 ANSWERS: tuple[tuple[Frame, Frame], ...] = (
@@ -36,30 +35,30 @@ VELOCITIES = tuple(reports.VelocityReport(kind, 0) for kind in KINDS)  # mm/s: i
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """Where the vehicle is on loopback, and whom it talks to."""
+    """Ports of the vehicle and of its peers on loopback."""
 
     board: int
     to: int
     witness: int
-    asker: int = 0
+    source: int = 0  # 0: no source, the vehicle sends velocities
 
 
-def free_ports(*, asks: bool) -> Ports:
-    """Return ports that nobody has."""
-    board, to, witness, asker = (free_port(socket.SOCK_DGRAM) for _ in range(4))
-    return Ports(board, to, witness, asker if asks else 0)
+def free_ports(*, requests: bool) -> Ports:
+    """Return free ports."""
+    board, to, witness, source = udp_ports(4)
+    return Ports(board, to, witness, source if requests else 0)
 
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """The program, compiled."""
+    """The compiled program."""
 
     program: str
 
     def timed(self, ports: Ports, rounds: int, warm: int) -> list[int]:
-        """Return how long so many rounds took, in ns; -1 for what was lost.
+        """Return the durations of rounds, in ns; -1 for a lost round.
 
-        With an asker from requests to motion frames, else from velocity frames to the witness.
+        With a source from requests to motion frames, else from velocity frames to the witness.
         """
         command = self._command(ports, rounds, warm)
         done = subprocess.run(
@@ -70,16 +69,20 @@ class Vehicle:
         return [int(line) for line in done.stdout.split()]
 
     def standing(self, ports: Ports) -> list[str]:
-        """Return how a vehicle is run that only stands there, until killed."""
+        """Return the command of a vehicle that only stands."""
         return self._command(ports, 0, 0)
 
     def _command(self, it: Ports, rounds: int, warm: int) -> list[str]:
-        frames = MOTIONS if it.asker else VELOCITIES
-        numbers = (it.board, it.to, it.witness, it.asker, rounds, warm)
-        said = (STANDS, *frames, *(frame for pair in ANSWERS for frame in pair))
-        return [self.program, *map(str, numbers), *(FRAMING.pack(each).hex() for each in said)]
+        frames = MOTIONS if it.source else VELOCITIES
+        numbers = (it.board, it.to, it.witness, it.source, rounds, warm)
+        frames_given = (STANDS, *frames, *(frame for pair in ANSWERS for frame in pair))
+        return [
+            self.program,
+            *map(str, numbers),
+            *(FRAMING.pack(each).hex() for each in frames_given),
+        ]
 
 
 def compiled(folder: Path) -> Vehicle:
-    """Compile it into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
+    """Compile the program into a folder; raise ``FileNotFoundError`` without a C compiler."""
     return Vehicle(str(processes.compiled(SOURCE, folder)))

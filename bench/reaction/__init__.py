@@ -1,1 +1,1 @@
-"""Contact to BREAK: how soon the board is told to stop after it has reported a bumper hit."""
+"""Contact to BREAK: reaction time from a bumper hit at the board to BREAK."""

@@ -1,12 +1,12 @@
-/* The board of a reaction: it reports a bumper hit and waits for the BREAK that answers it.
+/* Simulated board: reports a bumper hit and waits for the BREAK that answers it.
  *
- * board FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [KEEP ...]
+ * board FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [REPEAT ...]
  *
- * FROM and TO are ports on loopback: its own, and of whoever reacts. What follows are datagrams as
- * hexadecimal: the hit, the all-clear, the two answers, and what is sent every 20 ms besides. Before
- * each hit the other side has said STOP and no BREAK since, so that an old BREAK is not taken for an
- * answer; until then the all-clear is sent each millisecond. One line for each round after the first WARM ones, in which not everybody need be
- * there yet: nanoseconds from the hit's send to the BREAK's arrival.
+ * FROM and TO are its own port and the peer's on loopback. Then follow datagrams in hexadecimal: the
+ * hit, the all-clear, the two answers, and datagrams that are repeated every 20 ms. Before each hit
+ * the peer must have sent STOP and no BREAK since, so that an old BREAK does not count as an answer;
+ * until then the all-clear is sent each millisecond. Prints one line for each round after the first
+ * WARM ones, in which the peer may still start: nanoseconds from sending the hit to the BREAK.
  */
 #include "../path/datagram.h"
 
@@ -14,14 +14,14 @@ enum { MOST = 8 };
 
 static int sock;
 
-static void say(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
+static void transmit(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
 
 static int is(const Datagram *want, const unsigned char *got, ssize_t size) {
     return (size_t)size == want->size && !memcmp(got, want->bytes, want->size);
 }
 
-/* Wait for a datagram until a moment; 0 when none comes. */
-static ssize_t heard(unsigned char *got, int64_t until_ns) {
+/* Wait for a datagram until a time; 0 when none arrives. */
+static ssize_t receive(unsigned char *got, int64_t until_ns) {
     for (;;) {
         ssize_t size = recv(sock, got, LONGEST, MSG_DONTWAIT);
         int64_t left_ns = until_ns - now();
@@ -36,52 +36,52 @@ static ssize_t heard(unsigned char *got, int64_t until_ns) {
 
 int main(int count, char **given) {
     if (count < 9 || count > 9 + MOST)
-        fail("FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [KEEP ...]");
-    int rounds = atoi(given[3]), warm = atoi(given[4]), keeps = count - 9;
+        fail("FROM TO ROUNDS WARM HIT CLEAR BREAK STOP [REPEAT ...]");
+    int rounds = atoi(given[3]), warm = atoi(given[4]), repeats = count - 9;
     Datagram hit = parsed(given[5]), clear = parsed(given[6]), brake = parsed(given[7]),
-             stop = parsed(given[8]), keep[MOST];
-    for (int i = 0; i < keeps; i++)
-        keep[i] = parsed(given[9 + i]);
+             stop = parsed(given[8]), repeat[MOST];
+    for (int i = 0; i < repeats; i++)
+        repeat[i] = parsed(given[9 + i]);
     sock = bound(given[1], given[2]);
 
-    go_ahead();
+    ask_realtime();
 
     unsigned char got[LONGEST];
     srand(1);
     for (int round = -warm; round < rounds; round++) {
-        int64_t lost_ns = now() + 30 * S, clear_ns = 0, keep_ns = 0;
+        int64_t lost_ns = now() + 30 * S, clear_ns = 0, repeat_ns = 0;
         for (int stopped = 0, clears = 0; !stopped || clears < 4;) {
             if (now() > lost_ns)
-                fail("nobody says STOP");
-            if (now() >= keep_ns) {
-                for (int i = 0; i < keeps; i++)
-                    say(&keep[i]);
-                keep_ns = now() + 20 * MS;
+                fail("no STOP received");
+            if (now() >= repeat_ns) {
+                for (int i = 0; i < repeats; i++)
+                    transmit(&repeat[i]);
+                repeat_ns = now() + 20 * MS;
             }
             if (now() >= clear_ns) {
-                say(&clear);
+                transmit(&clear);
                 clears++;
                 clear_ns = now() + (clears < 4 ? MS / 2 : MS);
             }
-            ssize_t size = heard(got, clear_ns);
+            ssize_t size = receive(got, clear_ns);
             if (is(&brake, got, size))
                 stopped = 0;
             else if (is(&stop, got, size))
                 stopped = 1;
         }
-        /* At no fixed distance from anything. */
+        /* At a random time. */
         int64_t due_ns = now() + MS / 2 + rand() % (2 * MS);
         int again = 0;
-        for (ssize_t size; (size = heard(got, due_ns));)
+        for (ssize_t size; (size = receive(got, due_ns));)
             again |= is(&brake, got, size);
         if (again) {
             round--;
             continue;
         }
         int64_t hit_ns = now();
-        say(&hit);
+        transmit(&hit);
         ssize_t size;
-        while ((size = heard(got, hit_ns + S)) && !is(&brake, got, size))
+        while ((size = receive(got, hit_ns + S)) && !is(&brake, got, size))
             ;
         if (!size && round >= 0)
             fail("no BREAK within a second");

@@ -1,4 +1,4 @@
-"""The board's side: what it says, and how long until it is told to BREAK."""
+"""The simulated board of the benchmark ``reaction``: its frames and reaction times."""
 
 import subprocess
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ BREAK, STOP = (
     FRAMING.pack(commands.MotionCommand(kind)).hex()
     for kind in (commands.MotionKind.BREAK, commands.MotionKind.STOP)
 )
-# A reset wants to see the vehicle stand.
+# Safety accepts a reset only while the vehicle stands.
 STANDS = FRAMING.pack(reports.VelocityReport(0, 0)).hex()
 PATIENCE_S = 600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Programs:
-    """The programs in C, compiled."""
+    """The compiled C programs."""
 
     folder: Path
 
     @property
     def echo(self) -> str:
-        """Who answers without thinking."""
+        """The program that answers by comparing bytes."""
         return str(self.folder / "echo")
 
     def hits(self, board: int, to: int, rounds: int, warm: int) -> list[int]:
-        """Report so many hits from a port to another; return the ns until each BREAK.
+        """Report hits from one port to another; return the ns until each BREAK.
 
-        Raise ``RuntimeError`` when one is not answered.
+        Raise ``RuntimeError`` when a hit is not answered.
         """
         words = [str(self.folder / "board"), *map(str, (board, to, rounds, warm))]
         done = subprocess.run(
@@ -47,7 +47,7 @@ class Programs:
 
 
 def compiled(folder: Path) -> Programs:
-    """Compile them into a folder; raise ``FileNotFoundError`` where there is no C compiler."""
+    """Compile the programs into a folder; raise ``FileNotFoundError`` without a C compiler."""
     for name in ("board", "echo"):
         processes.compiled(HERE / f"{name}.c", folder)
     return Programs(folder)

@@ -1,4 +1,4 @@
-/* The floor of this machine: who answers without thinking. echo PORT HIT BREAK STOP */
+/* The floor of this host: answers by comparing bytes. echo PORT HIT BREAK STOP */
 #include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,14 +18,14 @@ int main(int count, char **given) {
         return 2;
     size_t hits = parsed(given[2], hit), brakes = parsed(given[3], brake),
            stops = parsed(given[4], stop);
-    struct sockaddr_in here = {AF_INET, htons(atoi(given[1])), {htonl(INADDR_LOOPBACK)}, {0}}, who;
+    struct sockaddr_in here = {AF_INET, htons(atoi(given[1])), {htonl(INADDR_LOOPBACK)}, {0}}, peer;
     int sock = socket(AF_INET, SOCK_DGRAM, 0);
     if (bind(sock, (void *)&here, sizeof here))
         return 1;
     for (;;) {
-        socklen_t length = sizeof who;
-        ssize_t size = recvfrom(sock, got, sizeof got, 0, (void *)&who, &length);
+        socklen_t length = sizeof peer;
+        ssize_t size = recvfrom(sock, got, sizeof got, 0, (void *)&peer, &length);
         int is_hit = (size_t)size == hits && !memcmp(got, hit, hits);
-        sendto(sock, is_hit ? brake : stop, is_hit ? brakes : stops, 0, (void *)&who, length);
+        sendto(sock, is_hit ? brake : stop, is_hit ? brakes : stops, 0, (void *)&peer, length);
     }
 }

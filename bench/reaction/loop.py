@@ -1,7 +1,6 @@
-"""``python -m bench.reaction.loop PORT``: one process, one loop over a socket, nothing else.
+"""``python -m bench.reaction.loop PORT``: one process with a loop over a socket.
 
-What somebody writes in an hour: it knows frames and CRC, answers a bumper hit with BREAK and
-everything else with STOP.
+It knows frames and CRC, answers a bumper hit with BREAK and everything else with STOP.
 """
 
 import math
@@ -23,23 +22,23 @@ def command(kind: int, linear_mmps: int = 0) -> bytes:
     return HEADER.pack(b"GS", HEADER.size + len(payload), MOTION, CRC(payload)) + payload
 
 
-def payload_of(datagram: bytes, name: int) -> bytes | None:
-    """Return what a sound frame of this name holds; None when it is none."""
+def payload_of(datagram: bytes, command_id: int) -> bytes | None:
+    """Return the payload of a valid frame with this id, else None."""
     if len(datagram) < HEADER.size:
         return None
     magic, size, named, crc = HEADER.unpack_from(datagram)
     payload = datagram[HEADER.size : size]
-    sound = magic == b"GS" and size == len(datagram) and crc == CRC(payload) and named == name
-    return payload if sound else None
+    valid = magic == b"GS" and size == len(datagram) and crc == CRC(payload) and named == command_id
+    return payload if valid else None
 
 
 def is_hit(datagram: bytes) -> bool:
-    """Tell whether a datagram is a sound bumper report that says pressed."""
+    """Return whether a datagram is a valid bumper report of a pressed bumper."""
     return payload_of(datagram, BUMPER) == b"\1"
 
 
 def velocity(datagram: bytes) -> tuple[float, float] | None:
-    """Return what a velocity report says, m/s and rad/s, forward or standing; None for others."""
+    """Decode a velocity report, m/s and rad/s, forward or standing; None for other frames."""
     payload = payload_of(datagram, MOTION)
     if payload is None:
         return None

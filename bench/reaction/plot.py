@@ -1,4 +1,4 @@
-"""Rows under both loads as a picture: how large a share took longer, against the time."""
+"""Plot of rows under both loads: the share of samples that took longer, over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from bench.reaction.page import LOADS
 from bench.series import Series
 
-COLOURS = 10  # then they begin anew, in the next style
+COLOURS = 10  # then repeated in the next style
 STYLES = "-", "--", ":"
 
 
 def draw(file: Path, series: Sequence[Series], what: str) -> None:
-    """Draw the quiet machine left and the busy one right."""
+    """Draw the quiet host on the left, the busy one on the right."""
     figure = Figure(figsize=(15, 5), layout="constrained")
     FigureCanvasAgg(figure)
     for axes, load in zip(figure.subplots(1, 2, sharex=True, sharey=True), LOADS, strict=True):

@@ -1,1 +1,1 @@
-"""From nothing to the first STOP: how long each process takes to start, and its memory."""
+"""Start: time until the first STOP, and memory of each process."""

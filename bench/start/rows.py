@@ -1,20 +1,26 @@
-"""What is timed: each process from its start until it has done what it is for."""
+"""Rows of the benchmark ``start``: each process from its start to its first useful output."""
 
 import contextlib
+import os
 import queue
+import signal
 import socket
+import subprocess
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from bench.path.processes import robots_python
 from bench.reaction.loop import BREAK, STOP, command
-from bench.start.processes import settings, started
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from verification.harness.support import PATIENCE_S, bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running, set_options
+from verification.harness.ports import accepts_connections, free_port, udp_ports
+from verification.harness.process_stats import children
+from verification.harness.waiting import PATIENCE_S
 
-Name = tuple[str, str]  # who, and until what
+Name = tuple[str, str]  # process, event
 Times = dict[Name, int]  # ns
 
 FIRST_STOP, FIRST_BREAK, ON_BUS = "first STOP", "first BREAK", "on the bus"
@@ -24,41 +30,42 @@ BRIDGE = "T2, guard and bridge"
 ROUTER: Name = ("T2, router", "it listens")
 SAFETY: Name = ("T2, safety", ON_BUS)
 ODOM: Name = ("T2, odometry", ON_BUS)
-WORDS = {command(STOP): FIRST_STOP, command(BREAK): FIRST_BREAK}
+COMMANDS = {command(STOP): FIRST_STOP, command(BREAK): FIRST_BREAK}
 POLL_S = 0.001
+NO_BYTE_CODE = "PYTHONDONTWRITEBYTECODE"
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A router that runs, and who has come to its bus."""
+    """A running router, and the services that appear on its bus."""
 
     endpoint: str
-    came: "queue.SimpleQueue[tuple[str, int]]" = field(default_factory=queue.SimpleQueue)
+    appeared: "queue.SimpleQueue[tuple[str, int]]" = field(default_factory=queue.SimpleQueue)
 
     def declare(self, bus: Bus) -> None:
-        """Hear who comes."""
-        bus.watch_live(keys.live_key(bus.robot, "*", "*"), self._hear)
+        """Watch the liveliness tokens."""
+        bus.watch_live(keys.live_key(bus.robot, "*", "*"), self._on_token)
 
     def until(self, service: str) -> int:
-        """Return when the service came; raise ``queue.Empty`` when it does not."""
+        """Return when the service appeared; raise ``queue.Empty`` after a timeout."""
         while True:
-            name, now_ns = self.came.get(timeout=PATIENCE_S)
+            name, now_ns = self.appeared.get(timeout=PATIENCE_S)
             if name == service:
                 return now_ns
 
     def forget(self) -> None:
-        """Drop those who came before."""
-        while not self.came.empty():
-            self.came.get()
+        """Forget earlier services."""
+        while not self.appeared.empty():
+            self.appeared.get()
 
-    def _hear(self, key: str, alive: bool) -> None:
+    def _on_token(self, key: str, alive: bool) -> None:
         if alive:
-            self.came.put((key.split("/")[-2], time.monotonic_ns()))
+            self.appeared.put((key.split("/")[-2], time.monotonic_ns()))
 
 
 @contextlib.contextmanager
 def site() -> Iterator[Site]:
-    """Run a router, and hear who comes to it, while the context lasts."""
+    """Run a router and watch the services on its bus."""
     made = Site(f"tcp/127.0.0.1:{free_port()}")
     with (
         router_process(made.endpoint),
@@ -68,8 +75,24 @@ def site() -> Iterator[Site]:
         yield made
 
 
+@contextlib.contextmanager
+def started(*words: str) -> Iterator[tuple["subprocess.Popen[bytes]", int]]:
+    """Start a Python; yield it and its start time; kill it and its children at the end."""
+    # Byte code is written, as in every installation, whatever this process is set to.
+    environ = {name: text for name, text in os.environ.items() if name != NO_BYTE_CODE}
+    begin_ns = time.monotonic_ns()
+    process = subprocess.Popen([robots_python(), *words], env=environ, stderr=subprocess.DEVNULL)
+    try:
+        yield process, begin_ns
+    finally:
+        for pid in (process.pid, *children(process.pid)):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        process.wait()
+
+
 def nothing(_: Site) -> Times:
-    """Time a Python that does nothing."""
+    """Time an empty Python program."""
     with started("-c", "pass") as (process, begin_ns):
         process.wait()
         return {NOTHING: time.monotonic_ns() - begin_ns}
@@ -78,31 +101,34 @@ def nothing(_: Site) -> Times:
 def bare(_: Site) -> Times:
     """Time the script until its STOP."""
     with board() as sock:
-        port = str(free_port(socket.SOCK_DGRAM))
-        with started("-m", "bench.start.bare", port, str(sock.getsockname()[1])) as (__, begin_ns):
-            return {BARE: words(sock)[FIRST_STOP] - begin_ns}
+        port = str(udp_ports(1)[0])
+        with started("-m", "bench.start.script", port, str(sock.getsockname()[1])) as (
+            __,
+            begin_ns,
+        ):
+            return {BARE: first_commands(sock)[FIRST_STOP] - begin_ns}
 
 
 def bridge(site: Site) -> Times:
     """Time guard and bridge until BREAK, STOP and presence on the bus."""
     site.forget()
     with board() as sock:
-        given = settings(
+        given = set_options(
             f"board.port={sock.getsockname()[1]}",
-            f"board.listen_ports={[free_port(socket.SOCK_DGRAM) for _ in range(2)]}",
+            f"board.listen_ports={udp_ports(2)}",
             f"bus.connect={site.endpoint}",
         )
         with started("-m", "services.bridge", *given) as (_, begin_ns):
-            times = words(sock) | {ON_BUS: site.until("bridge")}
+            times = first_commands(sock) | {ON_BUS: site.until("bridge")}
     return {(BRIDGE, word): ns - begin_ns for word, ns in times.items()}
 
 
 def router(_: Site) -> Times:
-    """Time a router until it takes a connection."""
+    """Time a router until it accepts a connection."""
     port = free_port()
-    given = settings(f"bus.listen=tcp/127.0.0.1:{port}")
+    given = set_options(f"bus.listen=tcp/127.0.0.1:{port}")
     with started("-m", "cli", "router", *given) as (process, begin_ns):
-        while not listens(port) and process.poll() is None:
+        while not accepts_connections(port) and process.poll() is None:
             time.sleep(POLL_S)
         return {ROUTER: time.monotonic_ns() - begin_ns}
 
@@ -120,34 +146,28 @@ def odom(site: Site) -> Times:
 def service(site: Site, name: str) -> int:
     """Return how long a service takes until its presence on the bus, in ns."""
     site.forget()
-    given = settings(f"bus.connect={site.endpoint}")
+    given = set_options(f"bus.connect={site.endpoint}")
     with started("-m", f"services.{name}", *given) as (_, begin_ns):
         return site.until(name) - begin_ns
 
 
-def listens(port: int) -> bool:
-    """Tell whether somebody listens on a port of loopback."""
-    with socket.socket() as sock:
-        return sock.connect_ex(("127.0.0.1", port)) == 0
-
-
 @contextlib.contextmanager
 def board() -> Iterator[socket.socket]:
-    """Yield the socket of a board that only listens."""
+    """Yield the socket of a board that only receives."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
         sock.settimeout(PATIENCE_S)
         yield sock
 
 
-def words(sock: socket.socket) -> dict[str, int]:
-    """Return when the board heard each word first, until STOP came."""
-    heard: dict[str, int] = {}
-    while FIRST_STOP not in heard:
-        word = WORDS.get(sock.recv(2048))
-        if word is not None:
-            heard.setdefault(word, time.monotonic_ns())
-    return heard
+def first_commands(sock: socket.socket) -> dict[str, int]:
+    """Return when the board first received each command, until the first STOP."""
+    received: dict[str, int] = {}
+    while FIRST_STOP not in received:
+        name = COMMANDS.get(sock.recv(2048))
+        if name is not None:
+            received.setdefault(name, time.monotonic_ns())
+    return received
 
 
 ROWS = (nothing, bare, bridge, router, safety, odom)

@@ -1,1 +1,1 @@
-"""Telemetry path: how soon a consumer has what the board measured, and how old safety's is."""
+"""Telemetry path: time from the board to a consumer, and the age of safety's samples."""

@@ -1,7 +1,7 @@
-"""``python -m bench.telemetry.consumer WITNESS ...``: who waits for velocities, decoded.
+"""``python -m bench.telemetry.consumer WITNESS ...``: consume decoded velocities.
 
-``frames PORT`` has them from the board, ``by NAME WHERE`` by somebody else's bus, ``t2 CONFIG``
-with Zenoh and MessagePack alone. It tells the witness's port of each, and when it was there.
+``frames PORT`` reads the board's frames, ``by NAME WHERE`` uses another bus, ``t2 CONFIG`` uses
+Zenoh and MessagePack alone. It sends a stamp of each velocity to the witness's port.
 """
 
 import socket
@@ -12,15 +12,13 @@ import time
 import msgpack
 import zenoh
 
-from bench.path.bus import carrier
-from bench.path.stamp import stamped
-from bench.path.twist import Say
+from bench.adapters.protocols import Twist, path_adapter, stamped
 from bench.reaction.loop import velocity
 from common import keys
 
 
-def by_frames(port: str, take: Say) -> None:
-    """Take what the board sends to a port."""
+def by_frames(port: str, take: Twist) -> None:
+    """Read the frames that the board sends to a port."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.bind(("127.0.0.1", int(port)))
     while True:
@@ -29,8 +27,8 @@ def by_frames(port: str, take: Say) -> None:
             take(*measured)
 
 
-def by_t2(config: str, take: Say) -> None:
-    """Take what the bridge publishes."""
+def by_t2(config: str, take: Twist) -> None:
+    """Subscribe to the bridge's velocity."""
 
     def decode(sample: zenoh.Sample) -> None:
         message = msgpack.unpackb(sample.payload.to_bytes())
@@ -57,7 +55,7 @@ def main(witness: str, *words: str) -> None:
         case ["t2", config]:
             by_t2(config, take)
         case ["by", name, where]:
-            carrier(name).listen(where, take)
+            path_adapter(name).subscribe(where, take)
 
 
 if __name__ == "__main__":

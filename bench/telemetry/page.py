@@ -1,14 +1,15 @@
-"""What the part ``telemetry`` says in the document. Pure."""
+"""Blocks of the document for the benchmark ``telemetry``. Pure."""
 
 from collections.abc import Sequence
 
 from bench.path import page
-from bench.reaction.page import LOADS, rows
+from bench.reaction.page import LOADS
 from bench.series import Series
 from common import keys
 from services.safety.config import Safety
+from verification.harness.results import table
 
-AGE = "age"  # in the name of a series: stream, this, load
+AGE = "age"  # in the name of a series: stream, AGE, load
 MS = 1_000_000
 SAFETY = Safety()
 STREAMS = (
@@ -19,7 +20,7 @@ STREAMS = (
 
 
 def blocks(series: Sequence[Series]) -> dict[str, str]:
-    """Return the blocks of the document by their names."""
+    """Return the blocks by name."""
     aged = {one.name: one for one in series if AGE in one.name}
     return {
         **page.blocks([one for one in series if AGE not in one.name]),
@@ -31,12 +32,12 @@ def blocks(series: Sequence[Series]) -> dict[str, str]:
 def ages(by_name: dict[tuple[str, ...], Series]) -> str:
     """Return a row for each stream, times in ms."""
     figures = [f"{load} {figure}" for load in LOADS for figure in ("p50", "p99", "max")]
-    lines = [["sample", "Hz", *figures, "allowed"]]
-    lines.append(["---"] * len(lines[0]))
+    head = ["sample", "Hz", *figures, "allowed"]
+    lines = []
     for name, topic, allowed_s in STREAMS:
         cells = [name, f"{topic.rate_hz:g}"]
         for load in LOADS:
             one = by_name[name, AGE, load]
             cells += [f"{ns / MS:.1f}" for ns in (one.p50_ns, one.p99_ns, max(one.samples_ns))]
         lines.append([*cells, f"{1000 * allowed_s:.0f}"])
-    return rows(lines)
+    return table(head, lines)

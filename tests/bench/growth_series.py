@@ -1,6 +1,6 @@
 """Made-up curves of growth."""
 
-from bench.growth import curves, page
+from bench.growth import measure, page
 from bench.series import Series
 
 
@@ -10,8 +10,8 @@ def made_up() -> list[Series]:
     for name in page.CURVES:
         for number, ns in ((1, 1000), (10, 2000), (100, 90_000)):
             note = "7% arrived" if number == 100 else ""
-            point = curves.point((name, str(number)), {"router": ns}, [ns] * 5, 1.0, note)
+            point = measure.point((name, str(number)), {"router": ns}, [ns] * 5, 1.0, note)
             made += [one for one in point if name != page.ROBOTS or one.name[2] == "router"]
             if name == page.ROBOTS:
-                made.append(Series(name=(name, str(number), "delay"), calls=1, samples_ns=[]))
+                made.append(Series(name=(name, str(number), "delay"), samples_ns=[]))
     return made

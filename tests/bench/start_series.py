@@ -14,10 +14,7 @@ from bench.start.rows import (
 def made_up(stop_ms: int, samples: int = 10) -> list[Series]:
     times = {NOTHING: 10, BARE: 40, (BRIDGE, FIRST_BREAK): 100, (BRIDGE, FIRST_STOP): stop_ms}
     return [
-        *(
-            Series(name=name, calls=1, samples_ns=[ms * 1_000_000] * samples)
-            for name, ms in times.items()
-        ),
-        Series(name=(MEMORY, "guard"), calls=1, samples_ns=(), note="20000000 10000000"),
-        Series(name=(MEMORY, "bridge"), calls=1, samples_ns=(), note="160000000 90000000"),
+        *(Series(name=name, samples_ns=[ms * 1_000_000] * samples) for name, ms in times.items()),
+        Series(name=(MEMORY, "guard"), samples_ns=(), note="20000000 10000000"),
+        Series(name=(MEMORY, "bridge"), samples_ns=(), note="160000000 90000000"),
     ]

@@ -1,4 +1,4 @@
-"""What the bridge bears and the chain costs: small runs, and what is told of made-up ones."""
+"""Benchmark ``load``: small runs, and the tables of made-up samples."""
 
 import contextlib
 import os
@@ -12,17 +12,18 @@ from pathlib import Path
 
 import pytest
 
-from bench.codec.frame_struct import read
-from bench.load import bare, cost, loss, page, throughput
+from bench.load import cost, loss, page, throughput, two_processes
 from bench.load.board import ANSWERS, FRAMING, STANDS, board, compiled
-from bench.load.gauges import Shares, drops, memory
+from bench.load.frames import read
 from bench.load.loss import Passage
 from bench.load.stack import Ports
 from common.wire import commands
 from common.wire.framing import Received
 from services.bridge.config import Bridge, queries
 from tests.bench.load_series import made_up
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.process_stats import CpuShares, memory, udp_drops
+from verification.harness.waiting import wait_until
 
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
@@ -34,7 +35,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def sock() -> Iterator[socket.socket]:
-    """Be whoever reads the board."""
+    """Socket of the board's reader."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
         made.bind(("127.0.0.1", 0))
         made.settimeout(20.0)
@@ -43,13 +44,13 @@ def sock() -> Iterator[socket.socket]:
 
 def bound(port: int) -> bool:
     try:
-        return drops(port) == 0
+        return udp_drops(port) == 0
     except LookupError:
         return False
 
 
 @CC
-def test_the_board_sends_so_many_and_answers(program: Path, sock: socket.socket) -> None:
+def test_the_board_sends_a_number_of_frames_and_answers(program: Path, sock: socket.socket) -> None:
     port = free_port(socket.SOCK_DGRAM)
     with board(program, port, sock.getsockname()[1], {STANDS: 0.0}) as it:
         wait_until(lambda: bound(port), "the board")
@@ -64,28 +65,28 @@ def test_the_board_sends_so_many_and_answers(program: Path, sock: socket.socket)
             sock.recv(2048)
 
 
-def test_the_two_by_hand_ask_what_the_bridge_asks() -> None:
+def test_the_two_processes_send_the_queries_of_the_bridge() -> None:
     asked = {FRAMING.pack(frame): rate_hz for _, frame, rate_hz in queries(Bridge())}
-    assert asked == bare.QUERIES
+    assert asked == two_processes.QUERIES
     for query, answer in ANSWERS.items():
-        frames = read(FRAMING.pack(answer), bare.KINDS)
+        frames = read(FRAMING.pack(answer), two_processes.KINDS)
         assert len(frames) == 1, query
 
 
-def test_the_two_by_hand_ask_read_and_drive(sock: socket.socket) -> None:
+def test_the_two_processes_query_read_and_drive(sock: socket.socket) -> None:
     port = free_port(socket.SOCK_DGRAM)
-    words = "-m", "bench.load.bare", str(port), str(sock.getsockname()[1])
+    words = "-m", "bench.load.two_processes", str(port), str(sock.getsockname()[1])
     with subprocess.Popen([sys.executable, *words]) as process:
-        heard: set[bytes] = set()
-        while len(heard) < len(bare.QUERIES) + 1:
-            heard.add(sock.recv(2048))
+        received: set[bytes] = set()
+        while len(received) < len(two_processes.QUERIES) + 1:
+            received.add(sock.recv(2048))
             sock.sendto(FRAMING.pack(STANDS), ("127.0.0.1", port))
         assert process.poll() is None
         process.kill()
-    (command,) = heard - set(bare.QUERIES)
+    (command,) = received - set(two_processes.QUERIES)
     (part,) = FRAMING.read(command, commands.TO_BOARD)
     assert isinstance(part, Received)
-    assert part.frame == commands.MotionCommand(commands.MotionKind.RUN, bare.SPEED_MMPS)
+    assert part.frame == commands.MotionCommand(commands.MotionKind.RUN, two_processes.SPEED_MMPS)
 
 
 @CC
@@ -94,7 +95,9 @@ def test_frames_are_counted_through_the_bridge(program: Path) -> None:
     made = {one.name: one for one in throughput.measure(program, [2], [100], 0.3)}
     name = "frames", "2", "100"
     assert len(made[*name, "delay"].samples_ns) == 2 * 30
-    assert set(made) == {(*name, who) for who in ("delay", "router", "bridge", "machine")}
+    assert set(made) == {
+        (*name, candidate) for candidate in ("delay", "router", "bridge", "machine")
+    }
 
 
 @CC
@@ -103,29 +106,29 @@ def test_both_are_measured_in_turns(program: Path) -> None:
     by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.3)}
     chain = {name[2] for name in by_name if name[0] == page.CHAIN}
     assert chain == {"router", "guard", "bridge", "safety", "odom", page.TOGETHER}
-    for who in (page.CHAIN, page.BARE, page.BUS):
+    for candidate in (page.CHAIN, page.BARE, page.BUS):
         for what in ("tenfold", "rss", "pss"):
-            assert page.middle(by_name, who, what, page.TOGETHER) > 0
+            assert page.middle(by_name, candidate, what, page.TOGETHER) > 0
     assert page.cost(by_name).count("\n") == 1 + len(chain) + 3 + 4
 
 
-def test_what_the_kernel_had_no_room_for_is_counted(sock: socket.socket) -> None:
+def test_datagrams_that_the_kernel_drops_are_counted(sock: socket.socket) -> None:
     port = sock.getsockname()[1]
-    before = drops(port)
+    before = udp_drops(port)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for _ in range(100):
             other.sendto(b"x" * 1000, ("127.0.0.1", port))
-    assert 0 < drops(port) - before < 100
+    assert 0 < udp_drops(port) - before < 100
     with pytest.raises(LookupError):
-        drops(0)
+        udp_drops(0)
 
 
 def test_time_and_memory_of_a_process() -> None:
     waits = [sys.executable, "-c", "input()"]
     with (
         subprocess.Popen(waits, stdin=subprocess.PIPE) as other,
-        Shares({"me": os.getpid(), "other": other.pid}) as shares,
+        CpuShares({"me": os.getpid(), "other": other.pid}) as shares,
     ):
         begin_s = time.process_time()
         while time.process_time() - begin_s < 0.1:
@@ -150,12 +153,12 @@ def test_time_and_memory_of_a_process() -> None:
         (Passage(100, 0, 100, [100], pace=0.9), "the board was at 90% of it"),
     ],
 )
-def test_where_frames_went(passage: Passage, words: str) -> None:
+def test_places_of_losses(passage: Passage, words: str) -> None:
     assert passage.words == words
 
 
 @CC
-def test_a_turn_in_which_a_process_ends_is_none(program: Path) -> None:
+def test_a_turn_in_which_a_process_ends_is_empty(program: Path) -> None:
     @contextlib.contextmanager
     def ended(_: Ports) -> Iterator[cost.Running]:
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
@@ -164,7 +167,7 @@ def test_a_turn_in_which_a_process_ends_is_none(program: Path) -> None:
     assert cost.turn(program, ended, 0.0) == {}
 
 
-def test_who_is_late_at_the_end_is_behind() -> None:
+def test_lateness_at_the_end_counts() -> None:
     ages_ns = [1_000_000] * 90 + [700_000_000] * 10
     assert throughput.late_s(ages_ns) == 0.7
     assert throughput.late_s([]) == 0.0
@@ -182,7 +185,7 @@ def test_the_highest_rate_is_found(most: int) -> None:
     assert len(tried) <= 3
 
 
-def test_a_rate_counts_when_none_below_it_lost_anything() -> None:
+def test_a_rate_counts_when_no_lower_rate_lost_anything() -> None:
     blocks = page.blocks(made_up())
     _, _, one, five, twenty = blocks["throughput"].splitlines()
     assert one == "| 1 | 6,000 | 400 | 400 | 25 | 25 | 25 | 8,000 | 9 in the socket |"
@@ -195,7 +198,7 @@ def test_a_rate_counts_when_none_below_it_lost_anything() -> None:
     ]
 
 
-def test_cost_is_told_beside_the_two_by_hand() -> None:
+def test_cost_is_compared_with_the_two_processes() -> None:
     blocks = page.blocks(made_up())
     assert blocks["turns"] == "3"
     assert blocks["cost"].splitlines()[4] == "| T2 | together | 6.0 | 60.0 | 180 | 60 |"

@@ -1,4 +1,4 @@
-"""Both paths: every row carries what it is given, and what is told of that."""
+"""Benchmarks ``command`` and ``telemetry``: every row works, and the tables of made-up samples."""
 
 import itertools
 import shutil
@@ -9,34 +9,35 @@ from pathlib import Path
 
 import pytest
 
-from bench.command import part as command
-from bench.path import page, turns
-from bench.path.stamp import STAMP, stamped
-from bench.path.twist import packed, unpacked
+from bench.adapters.protocols import STAMP, packed, stamped, unpacked
+from bench.command import measure as command
+from bench.path import page, rows
 from bench.path.vehicle import FRAMING, MOTIONS, SPEEDS_MMPS, VELOCITIES, compiled, free_ports
 from bench.reaction import loop
 from bench.series import Series
-from bench.telemetry import part as telemetry
+from bench.telemetry import measure as telemetry
 from bench.telemetry.page import AGE, STREAMS, ages
 from bench.telemetry.page import blocks as telemetry_blocks
 
-PARTS = {"command": command.ROWS, "telemetry": telemetry.ROWS}
+BENCHMARKS = {"command": command.ROWS, "telemetry": telemetry.ROWS}
 LOST = -1
-CROWDED = "T2, 20 consumers"  # as with 5, and too much for a machine that tests
-EACH = [(part, row) for part, rows in PARTS.items() for row in rows if row.name != CROWDED]
+CROWDED = "T2, 20 consumers"  # like 5 consumers, too much load for a test
+EACH = [
+    (part, row) for part, all_rows in BENCHMARKS.items() for row in all_rows if row.name != CROWDED
+]
 
 wants_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
 
-def test_the_one_process_speaks_as_the_bridge_does() -> None:
+def test_the_one_process_has_the_frames_of_the_bridge() -> None:
     sent = [loop.command(loop.RUN, mmps) for mmps in SPEEDS_MMPS]
     assert sent == [FRAMING.pack(motion) for motion in MOTIONS]
-    heard = [loop.velocity(FRAMING.pack(frame)) for frame in VELOCITIES]
-    assert heard == [(0.0, 0.0), (0.001, 0.0), (0.002, 0.0)]
+    received = [loop.velocity(FRAMING.pack(frame)) for frame in VELOCITIES]
+    assert received == [(0.0, 0.0), (0.001, 0.0), (0.002, 0.0)]
     assert loop.velocity(FRAMING.pack(VELOCITIES[0])[:-1]) is None
 
 
-def test_what_goes_over_a_bus_comes_back() -> None:
+def test_a_twist_survives_encoding() -> None:
     assert unpacked(packed(0.1, -0.5)) == (0.1, -0.5)
 
 
@@ -48,33 +49,35 @@ def test_a_stamp_is_nine_bytes_as_the_vehicle_reads_them() -> None:
 @wants_cc
 @pytest.mark.campaign
 @pytest.mark.parametrize(("part", "row"), EACH, ids=[f"{part}: {row.name}" for part, row in EACH])
-def test_each_carries_what_it_is_given(part: str, row: turns.Row, tmp_path: Path) -> None:
+def test_each_row_passes_rounds(part: str, row: rows.Row, tmp_path: Path) -> None:
     if row.lacks:
         pytest.skip(f"{row.lacks} is not installed; `make bench` wants it")
-    taken_ns = turns.block(compiled(tmp_path), row, 3, asks=part == "command")
+    taken_ns = rows.block(compiled(tmp_path), row, 3, requests=part == "command")
     assert len(taken_ns) == 3
-    assert max(taken_ns) > 0  # a machine that tests may lose one
+    assert max(taken_ns) > 0  # a loaded host may lose one
     assert all(ns == LOST or 0 < ns < 1e9 for ns in taken_ns)
 
 
 @wants_cc
 @pytest.mark.campaign
-def test_a_round_that_is_lost_is_told_and_another_follows(tmp_path: Path) -> None:
-    ports = free_ports(asks=False)
+def test_a_lost_round_is_reported_and_another_follows(tmp_path: Path) -> None:
+    ports = free_ports(requests=False)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", ports.to))
-        consumer = threading.Thread(target=overhear, args=(sock, ports.witness))
+        consumer = threading.Thread(target=consume, args=(sock, ports.witness))
         consumer.start()
         try:
-            _, lost, _ = compiled(tmp_path).timed(ports, 3, 0)  # raises when none goes on
+            _, lost, _ = compiled(tmp_path).timed(
+                ports, 3, 0
+            )  # raises when no further round passes
         finally:
             sock.sendto(b"", sock.getsockname())
             consumer.join()
     assert lost == LOST
 
 
-def overhear(sock: socket.socket, witness: int) -> None:
-    """Be a consumer that misses the first ONE after a TWO; an empty datagram ends it."""
+def consume(sock: socket.socket, witness: int) -> None:
+    """Consume, but miss the first ONE after a TWO; an empty datagram ends it."""
     frames = [FRAMING.pack(frame) for frame in VELOCITIES]
     early, missed = True, False
     while datagram := sock.recv(2048):
@@ -88,7 +91,7 @@ def overhear(sock: socket.socket, witness: int) -> None:
 
 @wants_cc
 @pytest.mark.campaign
-def test_the_ages_are_those_of_a_stack_that_runs() -> None:
+def test_sample_ages_of_a_running_stack() -> None:
     made = telemetry.ages("quiet", 20)
     assert [one.name for one in made] == [(name, AGE, "quiet") for name, _, __ in STREAMS]
     for one in made:
@@ -97,7 +100,7 @@ def test_the_ages_are_those_of_a_stack_that_runs() -> None:
 
 
 def made_up(*name: str, times_us: int = 10) -> Series:
-    return Series(name=name, calls=1, samples_ns=[1000 * times_us] * 9 + [2000 * times_us])
+    return Series(name=name, samples_ns=[1000 * times_us] * 9 + [2000 * times_us])
 
 
 def path() -> list[Series]:
@@ -106,24 +109,24 @@ def path() -> list[Series]:
     ]
 
 
-def test_a_row_stands_beside_the_floor() -> None:
-    told = page.blocks(path())
-    assert told["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |"
-    assert told["samples"] == "10"
+def test_a_row_is_compared_with_the_floor() -> None:
+    found = page.blocks(path())
+    assert found["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |"
+    assert found["samples"] == "10"
 
 
-def test_rounds_that_were_lost_are_no_samples_and_are_told() -> None:
-    row = turns.series(("T2", "busy"), [1, -1, 3])
+def test_lost_rounds_are_no_samples_and_are_named() -> None:
+    row = rows.series(("T2", "busy"), [1, -1, 3])
     assert row.samples_ns == [1, 3]
     assert page.lost([row, made_up("T2", "quiet")]).endswith(": T2, busy: 1 of 3.")
-    assert page.lost([made_up("T2", "quiet")]).endswith(": nothing.")
+    assert page.lost([made_up("T2", "quiet")]).endswith(": none.")
 
 
-def test_each_row_has_its_turns_under_both_loads() -> None:
-    order = turns.turns(command.ROWS, 2)
+def test_each_row_runs_under_both_loads() -> None:
+    order = rows.order(command.ROWS, 2)
     assert len(order) == 4 * len(command.ROWS)
     assert set(order[: len(order) // 2]) == set(itertools.product(command.ROWS, ("quiet", "busy")))
-    assert order == turns.turns(command.ROWS, 2)
+    assert order == rows.order(command.ROWS, 2)
 
 
 def aged() -> list[Series]:
@@ -134,13 +137,13 @@ def aged() -> list[Series]:
     ]
 
 
-def test_ages_stand_beside_what_safety_allows() -> None:
+def test_ages_are_compared_with_the_limits() -> None:
     lines = ages({one.name: one for one in aged()}).splitlines()
     assert lines[2] == "| velocity | 50 | 1.5 | 3.0 | 3.0 | 1.5 | 3.0 | 3.0 | 200 |"
     assert [line.split(" | ")[-1] for line in lines[3:]] == ["300 |", "150 |"]
 
 
-def test_ages_are_no_rows_of_the_path() -> None:
-    told = telemetry_blocks([*path(), *aged()])
-    assert told["decisions"] == "10"
-    assert len(told["table"].splitlines()) == 4
+def test_ages_are_not_rows_of_the_path() -> None:
+    found = telemetry_blocks([*path(), *aged()])
+    assert found["decisions"] == "10"
+    assert len(found["table"].splitlines()) == 4

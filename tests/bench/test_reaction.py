@@ -1,4 +1,4 @@
-"""Contact to BREAK: everybody answers hits alone, and what is told of it."""
+"""Benchmark ``reaction``: every responder answers, and the tables of made-up samples."""
 
 import shutil
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 from bench.reaction import loop
 from bench.reaction.board import BREAK, CLEAR, HIT, STANDS, STOP, compiled
-from bench.reaction.page import share, table, verdict
-from bench.reaction.part import block
+from bench.reaction.measure import block
+from bench.reaction.page import latency_table, share, verdict
 from bench.reaction.responders import (
     DDS,
     FIFO,
@@ -22,10 +22,10 @@ from bench.reaction.responders import (
 from bench.series import Series
 
 
-def test_the_one_process_speaks_as_the_bridge_does() -> None:
+def test_the_one_process_has_the_frames_of_the_bridge() -> None:
     assert (loop.command(loop.BREAK).hex(), loop.command(loop.STOP).hex()) == (BREAK, STOP)
-    heard = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
-    assert [loop.is_hit(each) for each in heard] == [True, False, False, False, False]
+    received = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
+    assert [loop.is_hit(each) for each in received] == [True, False, False, False, False]
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -40,7 +40,7 @@ def test_each_answers_every_hit(responder: Responder, tmp_path: Path) -> None:
 
 
 def made_up(name: str, load: str, *times_us: int) -> Series:
-    return Series(name=(name, load), calls=1, samples_ns=[1000 * us for us in times_us])
+    return Series(name=(name, load), samples_ns=[1000 * us for us in times_us])
 
 
 def test_the_verdict_names_each_figure() -> None:
@@ -51,18 +51,18 @@ def test_the_verdict_names_each_figure() -> None:
         made_up(REFLEX, "busy", *[12] * 90, *[99] * 10),
     ]
     by_name = {each.name: each for each in series}
-    assert table(by_name).splitlines()[3] == (
+    assert latency_table(by_name).splitlines()[3] == (
         f"| {REFLEX} | 12 | 12 | 12 | × 1.2 | 12 | 99 | 99 | × 1.2 |"
     )
-    told = verdict(by_name).splitlines()
-    assert len(told) == 4  # without CycloneDDS nothing is said of it
-    assert told[1].endswith("quiet, p99: × 1.20 of × 1.5: reached")
-    assert told[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
+    found = verdict(by_name).splitlines()
+    assert len(found) == 4  # no line without CycloneDDS
+    assert found[1].endswith("quiet, p99: × 1.20 of × 1.5: reached")
+    assert found[3].endswith("busy, p99: × 9.90 of × 1.5: not reached")
     both = [made_up(name, load, 10) for name in (JUDGED, DDS) for load in ("quiet", "busy")]
     assert len(verdict(by_name | {each.name: each for each in both}).splitlines()) == 8
 
 
-def test_what_is_the_buss_share() -> None:
+def test_the_share_of_the_bus() -> None:
     rows = [(JUDGED, 20, 60), (ZENOH + FIFO, 10, 20), (DDS + FIFO, 5, 20)]
     series = [
         made_up(name, load, us)

@@ -1,4 +1,4 @@
-"""From nothing to the first STOP: each is started and seen, and what is told of it."""
+"""Benchmark ``start``: real starts, and the tables of made-up samples."""
 
 import sys
 from pathlib import Path
@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from bench.reaction.board import STOP
-from bench.start.memory import held
+from bench.start.measure import held
 from bench.start.page import ENOUGH, blocks
-from bench.start.processes import children, started
 from bench.start.rows import (
     BARE,
     BRIDGE,
+    COMMANDS,
     FIRST_BREAK,
     FIRST_STOP,
     NOTHING,
@@ -20,18 +20,19 @@ from bench.start.rows import (
     ROUTER,
     ROWS,
     SAFETY,
-    WORDS,
     site,
+    started,
 )  # fmt: skip
 from tests.bench.start_series import made_up
-from verification.harness.support import wait_until
+from verification.harness.process_stats import children
+from verification.harness.waiting import wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
 
 @LINUX
 @pytest.mark.campaign
-def test_each_is_started_and_seen() -> None:
+def test_each_row_is_timed() -> None:
     with site() as here:
         times = {name: ns for row in ROWS for name, ns in row(here).items()}
     whats = {(BRIDGE, what) for what in (FIRST_BREAK, FIRST_STOP, ON_BUS)}
@@ -40,12 +41,12 @@ def test_each_is_started_and_seen() -> None:
     assert times[BRIDGE, FIRST_BREAK] < times[BRIDGE, FIRST_STOP]
 
 
-def test_the_script_says_what_the_bridge_says() -> None:
-    assert WORDS[bytes.fromhex(STOP)] == FIRST_STOP
+def test_the_script_sends_the_frame_of_the_bridge() -> None:
+    assert COMMANDS[bytes.fromhex(STOP)] == FIRST_STOP
 
 
 @LINUX
-def test_nobody_is_left_behind() -> None:
+def test_children_are_killed_too() -> None:
     sleep = "import time; time.sleep(1000)"
     code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {sleep!r}])"
     with started("-c", code) as (process, _):
@@ -55,7 +56,7 @@ def test_nobody_is_left_behind() -> None:
 
 
 def lives(pid: int) -> bool:
-    """Tell whether a process runs; one that nobody has buried does not."""
+    """Return whether a process runs and is not a zombie."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
     except FileNotFoundError:
@@ -64,27 +65,27 @@ def lives(pid: int) -> bool:
 
 
 @LINUX
-def test_the_memory_of_each_is_told() -> None:
+def test_the_memory_of_each_process() -> None:
     sizes = held(settled_s=0.0)
     assert len(sizes) == 5
     assert all(0 < pss <= rss for rss, pss in sizes.values())
 
 
 def test_the_table_is_in_the_order_of_the_starts() -> None:
-    told = blocks(list(reversed(made_up(200))))
-    assert told["samples"] == "10"
-    assert told["table"].splitlines()[2:] == [
+    found = blocks(list(reversed(made_up(200))))
+    assert found["samples"] == "10"
+    assert found["table"].splitlines()[2:] == [
         "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |",
         "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |",
         "| T2, guard and bridge | first BREAK | 100 | 100 |  | × 2.5 |",
         "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 |",
     ]
-    assert told["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
+    assert found["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
     assert "| 200 | 200 | 200 | × 5.0 |" in blocks(made_up(200, ENOUGH))["table"]
 
 
 @pytest.mark.parametrize(("stop_ms", "word"), [(250, "reached"), (251, "not reached")])
-def test_the_verdict_names_each_aim(stop_ms: int, word: str) -> None:
+def test_the_verdict_names_each_target(stop_ms: int, word: str) -> None:
     assert blocks(made_up(stop_ms))["verdict"].splitlines() == [
         f"- T2's first STOP, p50: {stop_ms} of 250 ms: {word}",
         "- memory of all on board, PSS: 100 of 150 MB: reached",

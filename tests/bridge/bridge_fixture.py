@@ -18,7 +18,7 @@ from common.motion import Command
 from common.wire.commands import MotionKind
 from tests.factories import safety_state
 from verification.harness.fake_board import Board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 PROC = Path("/proc")
 

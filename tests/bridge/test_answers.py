@@ -10,7 +10,7 @@ from common.wire.commands import MotionKind
 from common.wire.frame import HEADER
 from common.wire.framing import crc_function
 from tests.bridge.bridge_fixture import BridgeFixture
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def test_a_hit_on_the_other_port_is_braked_for_while_it_drives(bridge: BridgeFixture) -> None:

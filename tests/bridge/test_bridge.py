@@ -18,8 +18,9 @@ from common.wire.commands import MotionKind
 from common.wire.frame import Side
 from common.wire.framing import Framing
 from tests.bridge.bridge_fixture import BridgeFixture, bridge_process
+from verification.harness.bus import bus_on, running
 from verification.harness.fake_board import board
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.waiting import wait_until
 
 STOPS = [MotionKind.STOP] * 10
 

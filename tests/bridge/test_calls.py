@@ -9,7 +9,7 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from common.motion import Command
 from tests.bridge.bridge_fixture import BridgeFixture
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def switches(bridge: BridgeFixture, **brakes: bool) -> m.SwitchesRequest:

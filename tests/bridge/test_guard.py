@@ -33,7 +33,7 @@ from tests.bridge.bridge_fixture import (
     bridge_process,
 )
 from verification.harness.fake_board import Board, board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def test_break_goes_first_then_the_bridges_stop() -> None:

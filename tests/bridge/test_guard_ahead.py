@@ -8,7 +8,7 @@ import pytest
 from common.wire.commands import MotionKind
 from tests.common.rights import needs_right
 from verification.harness.fake_board import board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 SPIN = """
 import os

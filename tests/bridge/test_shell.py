@@ -19,7 +19,7 @@ from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.udp import Sockets
 from verification.harness.fake_board import Board, board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 HIT, STOP, BREAK = (
     Framing().pack(frame)

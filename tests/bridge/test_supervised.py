@@ -21,7 +21,7 @@ from tests.bridge.bridge_fixture import (
 )
 from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 Watched = tuple[Board, "subprocess.Popen[bytes]", Manager]
 

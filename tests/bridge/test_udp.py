@@ -12,7 +12,8 @@ from common.freshness import NS_PER_S
 from common.settings import Board
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.udp import BURST, BURST_PAUSE_S, Sockets, enable_timestamps
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux stamps datagrams by itself")
 

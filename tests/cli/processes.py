@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 PATIENCE_S = 60.0
 

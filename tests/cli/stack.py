@@ -4,7 +4,7 @@ import json
 import socket
 from pathlib import Path
 
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 STACK = {"router", "sim", "bridge", "safety", "odom", "recorder"}
 

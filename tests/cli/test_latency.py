@@ -20,7 +20,8 @@ from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Durations, Health, Timing
 from tests.cli.processes import PATIENCE_S, sets, t2
-from verification.harness.support import bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
 
 TIMING = Timing(
     bounds=(0.001, 0.01),

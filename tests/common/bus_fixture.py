@@ -11,7 +11,8 @@ import zenoh
 from common.bus.bus import Bus
 from common.bus.session import client_config
 from common.loop import Loop
-from verification.harness.support import at, running, wait_until
+from verification.harness.bus import at, running
+from verification.harness.waiting import wait_until
 
 _robots = count(1)
 

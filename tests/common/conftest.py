@@ -8,7 +8,8 @@ import pytest
 from common import log
 from tests.common.bus_fixture import BusFixture
 from tests.common.settings_fixture import SettingsFixture
-from verification.harness.support import Lines, free_port, router_process
+from verification.harness.bus import Lines, router_process
+from verification.harness.ports import free_port
 
 
 @pytest.fixture(scope="package")

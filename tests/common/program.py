@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from typing import IO, Any
 
-from verification.harness.support import PATIENCE_S, wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 SPECIMEN = "tests.common.example_service"
 

@@ -18,7 +18,8 @@ import pytest
 
 from common import log
 from common.settings import Log
-from verification.harness.support import PATIENCE_S, Lines, wait_until
+from verification.harness.bus import Lines
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 class Screen(io.StringIO):

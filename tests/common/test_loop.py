@@ -11,7 +11,8 @@ import pytest
 from common import loop as loop_module
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from verification.harness.support import running, wait_until
+from verification.harness.bus import running
+from verification.harness.waiting import wait_until
 
 
 class Clock:

@@ -17,7 +17,9 @@ from common.service import Node, resident_bytes, run
 from common.settings import Shared
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
-from verification.harness.support import free_port, listening, wait_until
+from verification.harness.bus import listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 # --- settings -----------------------------------------------------------------------------------
 

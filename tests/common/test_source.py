@@ -12,7 +12,8 @@ from common.messages import Drive
 from common.source import BARRED_AFTER, DriveSource
 from tests.factories import safety_state
 from tests.teleop.support import FakeBus
-from verification.harness.support import at, bus_on, running, wait_until
+from verification.harness.bus import at, bus_on, running
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

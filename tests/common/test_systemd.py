@@ -12,7 +12,8 @@ from common.freshness import NS_PER_S
 from common.systemd import BEATS_PER_TIMEOUT, Systemd
 from tests.common.program import SPECIMEN, on, program
 from tests.common.systemd_manager import PATIENCE_US, Manager
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 PERIOD_NS = PATIENCE_US * 1000 // BEATS_PER_TIMEOUT
 

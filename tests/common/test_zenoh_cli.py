@@ -15,7 +15,7 @@ from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
 from common.messages import Bumper, Done, Drive, ReleaseRequest
 from tests.common.bus_fixture import BusFixture, until_heard
-from verification.harness.support import PATIENCE_S, wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 ZENOH = Path(sys.executable).parent / "zenoh"
 

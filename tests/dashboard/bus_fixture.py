@@ -8,8 +8,8 @@ from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, Release
 from tests.factories import safety_state
-from verification.harness.dashboard import Eye
-from verification.harness.support import PATIENCE_S, wait_until
+from verification.harness.dashboard import Viewer
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 HOLD = {"x": 1.0, "y": 0.0}
 
@@ -80,7 +80,7 @@ class World:
         return count
 
 
-def drive(it: Eye, world: World) -> None:
+def drive(it: Viewer, world: World) -> None:
     """Answer every picture with a push, until requests to move go out."""
     deadline = time.monotonic() + PATIENCE_S
     while not world.moving():

@@ -6,8 +6,9 @@ import pytest
 
 from common.loop import Loop
 from tests.dashboard.bus_fixture import World
+from verification.harness.bus import bus_on, router_process, running
 from verification.harness.dashboard import Site, dashboard
-from verification.harness.support import bus_on, free_port, router_process, running
+from verification.harness.ports import free_port
 
 
 @pytest.fixture(scope="module")

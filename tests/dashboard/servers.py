@@ -20,7 +20,7 @@ from common.messages import (
     SwitchesRequest,
 )
 from tests.dashboard.bus_fixture import World
-from verification.harness.support import bus_on, running
+from verification.harness.bus import bus_on, running
 
 CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
 NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)

@@ -23,9 +23,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from services.dashboard.listener import RESERVE
 from tests.dashboard.bus_fixture import World
-from verification.harness.dashboard import Eye, Site, dashboard, eye
+from verification.harness.dashboard import Site, Viewer, dashboard, viewer
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open, is_closed
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst
 TRIES = 4
@@ -63,7 +63,7 @@ def worst_s(world: World, ask: Callable[[], None]) -> float:
 
 
 def said(site: Site) -> None:
-    with eye(site) as it:
+    with viewer(site) as it:
         it.say("estop")
 
 
@@ -110,10 +110,10 @@ def test_beyond_the_limit_only_an_emergency_stop_is_served(
         contextlib.ExitStack() as viewers,
     ):
         for _ in range(limit):
-            viewers.enter_context(eye(site))
+            viewers.enter_context(viewer(site))
         assert status_of(site) == 503
         with pytest.raises(InvalidStatus):
-            viewers.enter_context(eye(site))
+            viewers.enter_context(viewer(site))
         with half_open(site, 2 * RESERVE) as opened:
             assert worst_s(world, lambda: posted(site)) < ESTOP_S
             assert sum(map(is_closed, opened)) >= RESERVE  # the oldest made room
@@ -125,7 +125,7 @@ def test_an_emergency_stop_among_messages_that_are_dropped(site: Site, world: Wo
     world.latched = ("estop",)
     world.quiet()
     world.estops.clear()
-    with eye(site) as it:
+    with viewer(site) as it:
         for _ in range(300):  # more than a burst, less than abuse
             it.say("free")
         it.say("estop", robot="001")
@@ -141,12 +141,12 @@ def dropped(rest: dict[str, Any]) -> int:
 
 
 def test_who_goes_on_sending_is_closed(site: Site) -> None:
-    def go_on(it: Eye) -> None:
+    def go_on(it: Viewer) -> None:
         for _ in range(600):
             it.say("free")
         it.waits("never")
 
-    with eye(site) as it, pytest.raises(ConnectionClosed):
+    with viewer(site) as it, pytest.raises(ConnectionClosed):
         go_on(it)
 
 

@@ -19,7 +19,7 @@ from verification.harness.dashboard_page import (
     takes,
     text,
 )
-from verification.harness.stack import Chain, chain
+from verification.harness.stack import RunningStack, running_stack
 
 # Alone: a browser that shares the machine answers so late that the hand lapses.
 pytestmark = [
@@ -29,13 +29,13 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
-    with chain(tmp_path_factory.mktemp("stack")) as it:
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("stack")) as it:
         yield it
 
 
 @pytest.fixture(scope="module")
-def site(stack: Chain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+def site(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     # A browser on a shared machine answers late; what is late is tried in test_server.py.
     with dashboard(
         stack.endpoint, tmp_path_factory.mktemp("site"), "dashboard.round_trip=1.0"
@@ -70,7 +70,7 @@ def page(browser: Browser, site: Site) -> Iterator[Page]:
     assert problems == []
 
 
-def test_what_is_on_the_screen(page: Page, stack: Chain) -> None:
+def test_what_is_on_the_screen(page: Page, stack: RunningStack) -> None:
     shows(page, "#verdict", "STOP")
     shows(page, "#sentence", "No source requests motion.")
     shows(page, "#speed", "0.00")
@@ -95,7 +95,7 @@ def test_what_is_on_the_screen(page: Page, stack: Chain) -> None:
     resets(page)
 
 
-def test_by_mouse(page: Page, stack: Chain) -> None:
+def test_by_mouse(page: Page, stack: RunningStack) -> None:
     takes(page)
     x, y, way = middle(page, "#stick")
 
@@ -112,7 +112,7 @@ def test_by_mouse(page: Page, stack: Chain) -> None:
     shows(page, "#hold", "Released")
 
 
-def test_by_keyboard_and_a_lost_focus(page: Page, stack: Chain) -> None:
+def test_by_keyboard_and_a_lost_focus(page: Page, stack: RunningStack) -> None:
     takes(page)
     page.keyboard.press("3")
     shows(page, "#top", "0.50")
@@ -127,7 +127,7 @@ def test_by_keyboard_and_a_lost_focus(page: Page, stack: Chain) -> None:
     page.keyboard.up("s")
 
 
-def test_a_key_whose_way_up_is_lost(page: Page, stack: Chain) -> None:
+def test_a_key_whose_way_up_is_lost(page: Page, stack: RunningStack) -> None:
     takes(page)
     ways: tuple[Callable[[], None], ...] = (
         lambda: page.keyboard.press("Meta"),
@@ -154,7 +154,7 @@ PAD = """() => {
 }"""
 
 
-def test_by_gamepad(page: Page, stack: Chain) -> None:
+def test_by_gamepad(page: Page, stack: RunningStack) -> None:
     def deadman(down: bool) -> None:
         page.evaluate("down => { window.pad.buttons[4].pressed = down; }", down)
         page.wait_for_timeout(200)  # the page looks at it with each picture
@@ -171,7 +171,7 @@ def test_by_gamepad(page: Page, stack: Chain) -> None:
     shows(page, "#gamepad", "cannot drive: the browser does not know its buttons: An odd one")
 
 
-def test_in_the_background(page: Page, stack: Chain) -> None:
+def test_in_the_background(page: Page, stack: RunningStack) -> None:
     takes(page)
     drives(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
     page.evaluate(
@@ -185,7 +185,7 @@ def test_in_the_background(page: Page, stack: Chain) -> None:
 
 
 def test_by_touch_and_a_stop_from_somebody_who_watches(
-    browser: Browser, page: Page, site: Site, stack: Chain
+    browser: Browser, page: Page, site: Site, stack: RunningStack
 ) -> None:
     context, phone, finger = phone_of(browser, site, "zh-CN")
     shows(phone, "#link", "主板：在线")
@@ -225,7 +225,7 @@ def test_a_second_finger_stops(browser: Browser, site: Site) -> None:
     context.close()
 
 
-def test_one_tap_stops(page: Page, stack: Chain) -> None:
+def test_one_tap_stops(page: Page, stack: RunningStack) -> None:
     page.click("#estop")
     shows(page, "#causes", "Emergency stop.")
     shows(page, "#sentence", "Emergency stop.")
@@ -233,7 +233,7 @@ def test_one_tap_stops(page: Page, stack: Chain) -> None:
     resets(page)
 
 
-def test_the_server_is_lost_and_comes_back(page: Page, site: Site, stack: Chain) -> None:
+def test_the_server_is_lost_and_comes_back(page: Page, site: Site, stack: RunningStack) -> None:
     takes(page)
     drives(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
     site.kill()

@@ -12,7 +12,7 @@ from services.dashboard import client_messages as w
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
 from services.dashboard.fleet import REST_TICKS, ROBOTS_MAX, UNWANTED_S, Fleet
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

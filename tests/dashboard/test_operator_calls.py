@@ -8,8 +8,8 @@ import pytest
 from common.messages import Cause
 from tests.dashboard.bus_fixture import World
 from tests.dashboard.servers import CONTACT, NEWER, Servers, serving
-from verification.harness.dashboard import Eye, Site, eye
-from verification.harness.support import wait_until
+from verification.harness.dashboard import Site, Viewer, viewer
+from verification.harness.waiting import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
 
@@ -21,15 +21,15 @@ def servers(endpoint: str, world: World) -> Iterator[Servers]:
 
 
 @pytest.fixture
-def ada(site: Site, servers: Servers) -> Iterator[Eye]:
+def ada(site: Site, servers: Servers) -> Iterator[Viewer]:
     """The driver's connection, at a contact."""
-    with eye(site) as it:
+    with viewer(site) as it:
         it.takes()
         seen(it, CONTACT)
         yield it
 
 
-def seen(it: Eye, cause: Cause) -> int:
+def seen(it: Viewer, cause: Cause) -> int:
     """Wait for a picture with a cause, and return its number."""
     while True:
         picture = it.look()
@@ -37,12 +37,12 @@ def seen(it: Eye, cause: Cause) -> int:
             return int(picture["n"])
 
 
-def told(it: Eye) -> tuple[str, str]:
+def told(it: Viewer) -> tuple[str, str]:
     word = it.waits("told")
     return word["level"], word["text"]
 
 
-def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Eye, servers: Servers) -> None:
+def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Viewer, servers: Servers) -> None:
     ada.say("reset", n=seen(ada, CONTACT))
     assert told(ada) == ("info", "Reset.")
     (request,) = servers.resets
@@ -51,7 +51,7 @@ def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Eye, servers: Servers
     assert 0 <= time.monotonic_ns() - request.echo < 20e9  # a heartbeat of this world
 
 
-def test_a_reset_does_not_name_a_newer_contact(ada: Eye, servers: Servers) -> None:
+def test_a_reset_does_not_name_a_newer_contact(ada: Viewer, servers: Servers) -> None:
     servers.is_effective = False
     number = seen(ada, CONTACT)
     servers.world.causes = (NEWER,)
@@ -61,7 +61,7 @@ def test_a_reset_does_not_name_a_newer_contact(ada: Eye, servers: Servers) -> No
     assert servers.resets[0].causes == (CONTACT.id,)
 
 
-def test_a_reset_that_a_proxy_held_clears_nothing(ada: Eye, servers: Servers) -> None:
+def test_a_reset_that_a_proxy_held_clears_nothing(ada: Viewer, servers: Servers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
     servers.world.causes = (NEWER,)
     while time.monotonic() - began < PROXY_S:
@@ -77,14 +77,14 @@ def test_a_reset_that_a_proxy_held_clears_nothing(ada: Eye, servers: Servers) ->
     assert servers.world.causes == (NEWER,)
 
 
-def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Eye, servers: Servers) -> None:
+def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Viewer, servers: Servers) -> None:
     servers.boot += 1
     servers.is_effective = False
     ada.say("reset", n=seen(ada, CONTACT))
     assert told(ada) == ("error", "reset_unconfirmed")
 
 
-def test_a_reset_without_effect_is_not_confirmed(ada: Eye, servers: Servers) -> None:
+def test_a_reset_without_effect_is_not_confirmed(ada: Viewer, servers: Servers) -> None:
     servers.is_effective = False
     began = time.monotonic()
     ada.say("reset", n=seen(ada, CONTACT))
@@ -92,7 +92,7 @@ def test_a_reset_without_effect_is_not_confirmed(ada: Eye, servers: Servers) -> 
     assert time.monotonic() - began > 0.9
 
 
-def test_a_switch_carries_the_echo_of_what_was_seen(ada: Eye, servers: Servers) -> None:
+def test_a_switch_carries_the_echo_of_what_was_seen(ada: Viewer, servers: Servers) -> None:
     ada.say("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
     assert told(ada) == ("info", "done")
     (request,) = servers.switches
@@ -100,7 +100,7 @@ def test_a_switch_carries_the_echo_of_what_was_seen(ada: Eye, servers: Servers) 
     assert (request.echo or 0) > 1
 
 
-def test_a_release_names_the_direction_and_what_was_seen(ada: Eye, servers: Servers) -> None:
+def test_a_release_names_the_direction_and_what_was_seen(ada: Viewer, servers: Servers) -> None:
     for _ in range(20):
         ada.say("hold", n=ada.look()["n"], release="backward")
     assert ada.seen["now"]["safety"]["release"]["believed_free"] == "backward"
@@ -114,7 +114,7 @@ def test_a_release_names_the_direction_and_what_was_seen(ada: Eye, servers: Serv
     assert end.direction is None
 
 
-def test_a_release_that_comes_late_is_not_asked(ada: Eye, servers: Servers) -> None:
+def test_a_release_that_comes_late_is_not_asked(ada: Viewer, servers: Servers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
     while time.monotonic() - began < 1.0:
         ada.look()

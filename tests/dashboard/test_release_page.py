@@ -11,7 +11,7 @@ from tests.dashboard.bus_fixture import World
 from tests.dashboard.servers import FREE, NEWER, Servers, serving
 from verification.harness.dashboard import Site, dashboard
 from verification.harness.dashboard_page import CHROMIUM, middle, shows, takes
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 pytestmark = [
     pytest.mark.alone,

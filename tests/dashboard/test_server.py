@@ -14,21 +14,21 @@ from websockets.exceptions import ConnectionClosed
 from common.freshness import NS_PER_S
 from services.dashboard.fleet import ROBOTS_MAX
 from tests.dashboard.bus_fixture import HOLD, World, drive
-from verification.harness.dashboard import Eye, Site, dashboard, eye
-from verification.harness.support import wait_until
+from verification.harness.dashboard import Site, Viewer, dashboard, viewer
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture
-def ada(site: Site, world: World) -> Iterator[Eye]:
+def ada(site: Site, world: World) -> Iterator[Viewer]:
     """A viewer who sees that safety runs."""
     world.safe = True
-    with eye(site) as it:
+    with viewer(site) as it:
         while not it.look()["safety"]:
             pass
         yield it
 
 
-def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Eye, world: World) -> None:
+def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Viewer, world: World) -> None:
     ada.takes()
     world.requests.clear()
     drive(ada, world)
@@ -42,7 +42,7 @@ def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Eye, world: Worl
     assert world.zeros() == 3
 
 
-def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Eye, world: World) -> None:
+def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Viewer, world: World) -> None:
     ada.takes()
     world.requests.clear()
     drive(ada, world)
@@ -61,7 +61,7 @@ def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Eye, world: Wor
     drive(ada, world)
 
 
-def test_an_old_picture_is_no_reason_to_drive(ada: Eye, world: World) -> None:
+def test_an_old_picture_is_no_reason_to_drive(ada: Viewer, world: World) -> None:
     ada.takes()
     ada.say("free")
     first = ada.look()["n"]
@@ -75,16 +75,16 @@ def test_an_old_picture_is_no_reason_to_drive(ada: Eye, world: World) -> None:
 
 
 def test_a_viewer_who_is_gone_has_let_go(site: Site, world: World) -> None:
-    with eye(site) as it:
+    with viewer(site) as it:
         it.takes()
         world.requests.clear()
         drive(it, world)
     wait_until(lambda: world.zeros() >= 3, "zeros")
-    with eye(site) as it:
+    with viewer(site) as it:
         assert it.look()["hands"]["id"] is None
 
 
-def test_a_silent_safety_lets_go(ada: Eye, world: World) -> None:
+def test_a_silent_safety_lets_go(ada: Viewer, world: World) -> None:
     ada.takes()
     world.requests.clear()
     drive(ada, world)
@@ -95,10 +95,10 @@ def test_a_silent_safety_lets_go(ada: Eye, world: World) -> None:
     wait_until(lambda: world.zeros() >= 3, "zeros")
 
 
-def test_one_drives_and_taking_over_asks(site: Site, ada: Eye, world: World) -> None:
+def test_one_drives_and_taking_over_asks(site: Site, ada: Viewer, world: World) -> None:
     ada.takes()
     ada.say("look", robot="001", name="Ada")
-    with eye(site) as bob:
+    with viewer(site) as bob:
         bob.say("take")
         assert bob.waits("ask")["who"] == "Ada"
         picture = bob.look()
@@ -112,7 +112,7 @@ def test_one_drives_and_taking_over_asks(site: Site, ada: Eye, world: World) -> 
         assert ada.waits("told")["text"] == "taken_over"
 
 
-def test_anybody_may_stop_and_it_is_asked_until_it_is_confirmed(ada: Eye, world: World) -> None:
+def test_anybody_may_stop_and_it_is_asked_until_it_is_confirmed(ada: Viewer, world: World) -> None:
     world.estops.clear()
     ada.say("estop")
     wait_until(lambda: len(world.estops) > 5, "stops, again and again")
@@ -133,16 +133,16 @@ def taps(site: Site, robot: str) -> None:
         assert answer.status == 200
 
 
-def test_a_refusal_is_told(ada: Eye) -> None:
+def test_a_refusal_is_told(ada: Viewer) -> None:
     ada.takes()
     ada.say("reset", n=ada.look()["n"])
     assert "safety does not answer" in ada.waits("told")["text"]
 
 
-def test_several_robots(site: Site, ada: Eye) -> None:
+def test_several_robots(site: Site, ada: Viewer) -> None:
     wait_until(lambda: "002" in ada.waits("rest")["robots"], "the other robot")
     assert "two words" not in ada.seen["rest"]["robots"]
-    with eye(site, "002") as it:
+    with viewer(site, "002") as it:
         assert it.look()["safety"] is None
         assert [one["name"] for one in it.waits("rest")["services"]] == ["bridge"]
     ada.say("look", robot="003")
@@ -150,7 +150,7 @@ def test_several_robots(site: Site, ada: Eye) -> None:
 
 
 def test_not_any_number_of_robots_but_for_a_stop(site: Site, world: World) -> None:
-    with eye(site) as it:
+    with viewer(site) as it:
         for number in range(ROBOTS_MAX + 1):
             it.say("look", robot=f"many-{number}")
         assert it.waits("told")["text"] == "too_many_robots"
@@ -167,7 +167,7 @@ def test_no_robot_is_called_so(site: Site) -> None:
         urllib.request.urlopen(request)
 
 
-def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Eye) -> None:
+def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Viewer) -> None:
     request = urllib.request.Request(
         f"{site.url}estop/made-up", method="POST", headers={"Origin": site.url.rstrip("/")}
     )
@@ -181,7 +181,7 @@ def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Eye) ->
 
 @pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])
 def test_who_says_something_else_is_hung_up_on(site: Site, text: str) -> None:
-    with eye(site) as it:
+    with viewer(site) as it:
         it.socket.send(text)
         with pytest.raises(ConnectionClosed):
             it.waits("never")
@@ -194,7 +194,7 @@ def test_it_is_alive_on_the_bus(world: World) -> None:
 def test_a_signal_is_zeros_and_the_end(endpoint: str, world: World, tmp_path: Path) -> None:
     world.safe = True
     with dashboard(endpoint, tmp_path, "dashboard.round_trip=1.0") as site:
-        with eye(site) as it:
+        with viewer(site) as it:
             it.takes()
             world.requests.clear()
             drive(it, world)

@@ -12,7 +12,7 @@ from common.systemd import Systemd
 from services.dashboard.host import Host
 from tests.common.systemd_manager import Manager
 from verification.harness.dashboard import dashboard
-from verification.harness.support import PATIENCE_S, wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 @pytest.fixture

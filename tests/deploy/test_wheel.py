@@ -11,7 +11,7 @@ import pytest
 from common import child_process
 from tests.cli.processes import PATIENCE_S, running, sets
 from tests.cli.stack import STACK, ports, starts
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = {"common", "services", "sim", "cli", "config", "deploy"}

@@ -1,4 +1,4 @@
-"""Both consumers, run as a newcomer runs them, against a real router with a robot made up."""
+"""Both examples as documented, with a real router and a fake robot."""
 
 import signal
 import subprocess
@@ -11,20 +11,22 @@ from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.messages import Odometry, Ultrasonic
-from verification.harness.support import PATIENCE_S, bus_on, free_port, router_process, running
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S
 
 RANGES = (2.0, 1.5, 0.62, None, 3.0, None, None, 4.0)
 
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[str]:
-    """Run a router with a robot on it that measures and drives; name the endpoint."""
+    """Run a router with a fake robot; yield the endpoint."""
     where = f"tcp/127.0.0.1:{free_port()}"
 
     def declare(bus: Bus) -> None:
         ultrasonic, odometry = bus.publisher(keys.ULTRASONIC), bus.publisher(keys.ODOMETRY)
 
-        def play(_: int) -> None:
+        def publish(_: int) -> None:
             status = tuple("no_echo" if one is None else "ok" for one in RANGES)
             ultrasonic.put(Ultrasonic(ranges=RANGES, status=status))  # type: ignore[arg-type]
             odometry.put(
@@ -35,14 +37,14 @@ def robot() -> Iterator[str]:
                 )
             )  # fmt: skip
 
-        loop.every(0.05, play)
+        loop.every(0.05, publish)
 
     with router_process(where), running(Loop()) as loop, bus_on(where, loop, declare):
         yield where
 
 
 def first_line(*words: str) -> tuple[str, int]:
-    """Run a program until its first line of output, then stop it as ctrl-c does."""
+    """Run a program until its first line of output, then stop it like Ctrl-C."""
     with subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
@@ -54,12 +56,12 @@ def first_line(*words: str) -> tuple[str, int]:
     return line, process.returncode
 
 
-def test_the_consumer_with_our_helpers_tells_the_nearest_obstacle(robot: str) -> None:
+def test_the_consumer_with_t2_prints_the_nearest_obstacle(robot: str) -> None:
     line, code = first_line("-m", "examples.nearest_obstacle", "--set", f"bus.connect={robot}")
     assert line == "0.62 m front\n"
     assert code == 0
 
 
-def test_the_plain_consumer_watches_the_vehicle(robot: str) -> None:
+def test_the_plain_consumer_prints_the_pose(robot: str) -> None:
     line, _ = first_line("examples/watch_plain.py", robot)
     assert line == "x   1.25 m  y  -0.50 m   0.30 m/s\n"

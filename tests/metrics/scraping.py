@@ -10,7 +10,8 @@ from pathlib import Path
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.metrics.values import Values, flat
-from verification.harness.support import PATIENCE_S, free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 def scraped(port: int) -> Values:

@@ -22,7 +22,9 @@ from tests.common.bus_fixture import BusFixture, until_heard
 from tests.metrics.robots import event, health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
-from verification.harness.support import free_port, router_process, wait_until
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 def test_scrape_of_a_running_robot(rig: BusFixture, tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from tests.metrics.robots import health, link, odometry, safety
 from tests.metrics.scraping import running as exporting
 from tests.metrics.scraping import scraped, value
 from tests.metrics.values import names
+from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
-from verification.harness.support import at, joined, running, wait_until
+from verification.harness.waiting import wait_until
 
 ROBOT = "001"
 

@@ -18,7 +18,8 @@ from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
 from tests.factories import safety_state
-from verification.harness.support import PATIENCE_S, at, bus_on, running, wait_until
+from verification.harness.bus import at, bus_on, running
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 SPEED, TURNING = 0.5, 0.25
 PERIOD_S = 0.02

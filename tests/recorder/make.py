@@ -21,8 +21,9 @@ from services.recorder.mcap_codec import Encoder
 from services.recorder.reader import Reader
 from services.recorder.writer import RecordingWriter
 from sim.requests import Bumper
-from verification.harness.stack import Chain, chain
-from verification.harness.support import PATIENCE_S, at, running, wait_until
+from verification.harness.bus import at, running
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 KEPT = Path(__file__).with_name("lap.mcap")
 PATHS = ("tel/bridge/", "tel/odom/odometry", "tel/safety/state", "evt/", "@cmd/")
@@ -33,7 +34,7 @@ def main() -> int:
     """Drive, record, and keep the relevant keys."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        with chain(folder) as stack, recorder(stack, folder) as process:
+        with running_stack(folder) as stack, recorder(stack, folder) as process:
             drive(stack)
             process.terminate()
             process.wait(PATIENCE_S)
@@ -44,7 +45,7 @@ def main() -> int:
 
 
 @contextmanager
-def recorder(stack: Chain, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
+def recorder(stack: RunningStack, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
     """Record a running stack while the context lasts."""
     where = f"bus.connect={stack.endpoint}", f"recorder.folder={folder}"
     words = [word for each in (*where, "recorder.everything=true") for word in ("--set", each)]
@@ -55,7 +56,7 @@ def recorder(stack: Chain, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
             process.terminate()
 
 
-def drive(stack: Chain) -> None:
+def drive(stack: RunningStack) -> None:
     """Drive straight ahead and around a bend, then press the bumper."""
     twist = [0.0, 0.0]
     with ExitStack() as closing_all:

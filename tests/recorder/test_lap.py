@@ -24,8 +24,9 @@ from services.bridge.translate import BumperFilter
 from services.recorder.reader import Reader
 from tests.bridge.bridge_fixture import bridge_process
 from tests.recorder.make import KEPT
+from verification.harness.bus import bus_on, running
 from verification.harness.fake_board import Board
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.waiting import wait_until
 
 STREAMS = ("velocity", "mileage", "ultrasonic", "bumper", "driver/left", "driver/right")
 HEADER = Message.__struct_fields__

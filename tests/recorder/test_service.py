@@ -27,8 +27,9 @@ from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_heard
 from tests.recorder import samples
-from verification.harness.stack import Witness
-from verification.harness.support import PATIENCE_S, running, wait_until
+from verification.harness.bus import running
+from verification.harness.host import StallRecorder
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 def sets(rig: BusFixture, folder: Path, *more: str) -> list[str]:
@@ -199,13 +200,13 @@ def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None
     with subprocess.Popen(
         [sys.executable, "-m", "services.recorder", *words], stderr=subprocess.DEVNULL
     ) as process:
-        witness = Witness()
+        stalls = StallRecorder()
         try:
             wait_until(lambda: len(read(tmp_path)) > 200, "some seconds of recording")
         finally:
             killed_ns = time.time_ns()
             process.kill()
-            held_up_s = witness.stop()
+            stall_s = stalls.stop()
     (path,) = tmp_path.glob("*.mcap")
     with Reader(path) as reader:
         found = list(reader)
@@ -213,7 +214,7 @@ def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None
     assert len(found) > 200
     numbers_read = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
     assert numbers_read == list(range(int(numbers_read[0]), int(numbers_read[-1]) + 1))
-    assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * held_up_s
+    assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * stall_s
 
 
 def test_an_invalid_safety_state_is_recorded_and_ignored(rig: BusFixture, tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from common.messages import (
 )
 from common.operator import release_request, reset_request
 from tests.safety.policy_fixture import FREE, NO_ECHO, link
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 Q = TypeVar("Q", bound=Struct)
 

@@ -7,7 +7,8 @@ from common.bus.bus import Arrival
 from common.loop import Loop
 from common.messages import Motion, ReleaseRequest
 from tests.safety.peers import PATIENT, Peers, safety_process
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.waiting import wait_until
 
 # Only how old inputs may be is patient; how old a call may be is as shipped.
 SETS = {name: age for name, age in PATIENT.items() if name != "max_echo_age"}

@@ -8,7 +8,8 @@ import sys
 from common import keys
 from common.loop import Loop
 from tests.safety.peers import Peers, StarvedError, safety_process
-from verification.harness.support import PATIENCE_S, bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 def test_from_inhibited_to_run_to_contact_to_reset(endpoint: str) -> None:

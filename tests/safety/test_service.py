@@ -27,7 +27,8 @@ from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService, source_of
-from verification.harness.support import at, bus_on, running, wait_until
+from verification.harness.bus import at, bus_on, running
+from verification.harness.waiting import wait_until
 
 
 def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:

@@ -11,7 +11,8 @@ from sim.control import HOST, Control, ControlSocket
 from sim.injection import Reply
 from sim.requests import Bumper, RemoveBox
 from tests.sim.sim_fixture import SimFixture
-from verification.harness.support import PATIENCE_S, free_port
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S
 
 
 @contextmanager

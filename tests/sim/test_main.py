@@ -26,7 +26,8 @@ from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
 from sim.trace import read
 from sim.world import Box
 from tests.common.rights import needs_right
-from verification.harness.support import PATIENCE_S, free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 FRAMING = Framing()
 

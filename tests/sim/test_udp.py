@@ -8,7 +8,8 @@ from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
 from sim.udp import BURST, BoardSocket, bound, drain
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from services.teleop.config import TeleopConfig
 from services.teleop.controller import Desk
 from services.teleop.event_log import Logbook
 from services.teleop.view import View
-from verification.harness.support import at
+from verification.harness.bus import at
 
 
 class FakeBus(Bus):

@@ -19,8 +19,8 @@ from services.teleop.config import Teleop
 from services.teleop.controller import Desk
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.support import FakeNode, answer
-from verification.harness.support import PATIENCE_S
-from verification.harness.teleop_app import NearApp
+from verification.harness.teleop_app import LocalTerminalApp
+from verification.harness.waiting import PATIENCE_S
 
 
 class Bench:
@@ -32,7 +32,9 @@ class Bench:
         self.ended = False
         self.now_ns = 100 * NS_PER_S
         post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
-        self.app = NearApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
+        self.app = LocalTerminalApp(
+            self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns
+        )
         # However long this machine takes to hand a key over.
         self.app._came_ns = lambda event: self.now_ns  # type: ignore[method-assign]
 
@@ -146,7 +148,7 @@ def test_a_reset_clears_what_the_screen_showed(bench: Bench) -> None:
 def test_a_key_carries_the_time_when_it_came(bench: Bench) -> None:
     key = Key("w", "w")
     key.time = time.monotonic() - 3.0
-    came_ns = NearApp._came_ns(bench.app, key)
+    came_ns = LocalTerminalApp._came_ns(bench.app, key)
     assert (bench.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
 
 
@@ -176,7 +178,9 @@ def test_a_terminal_that_does_not_answer_is_asked_less_often(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []
-    monkeypatch.setattr(NearApp, "query_terminal", lambda _, question: asked.append(question))
+    monkeypatch.setattr(
+        LocalTerminalApp, "query_terminal", lambda _, question: asked.append(question)
+    )
 
     async def act(pilot: Pilot[None]) -> None:
         before = len(asked)

@@ -13,8 +13,10 @@ from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Drive, Health
 from services.teleop import life
-from verification.harness.support import bus_on, free_port, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.ports import free_port
 from verification.harness.teleop_terminal import Terminal, terminal
+from verification.harness.waiting import wait_until
 
 
 @pytest.fixture

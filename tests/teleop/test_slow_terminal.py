@@ -10,8 +10,9 @@ from common.bus.bus import Arrival, Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Drive, Event
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
 from verification.harness.teleop_terminal import STRICT, TELEOP, Terminal, terminal
+from verification.harness.waiting import wait_until
 
 REPEAT_S = 0.033
 FAR_S = 0.21  # each way: 0.42 s there and back

@@ -5,7 +5,7 @@ from common.freshness import NS_PER_S
 from common.messages import Bumper
 from services.teleop.view import Ear
 from tests.teleop.support import FakeBus
-from verification.harness.support import at
+from verification.harness.bus import at
 
 
 def test_a_value_is_shown_while_it_is_worth_it() -> None:

@@ -1,4 +1,4 @@
-"""What the documents name is there."""
+"""The documents name only files, tests, keys and settings that exist."""
 
 import ast
 import re
@@ -14,12 +14,12 @@ NAMED = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+))?`")
 HAZARD = re.compile(r"^\|(?P<cells>.*`tests/.*)\|$", re.MULTILINE)
 
 
-def test_no_schema_is_left_over() -> None:
+def test_every_schema_has_a_struct() -> None:
     names = {path.stem for path in (DOCS / "schemas").glob("*.json")}
     assert names == {kind.__name__ for kind in kinds()}
 
 
-def test_every_key_and_every_field_is_there() -> None:
+def test_every_field_is_documented() -> None:
     page = (DOCS / "bus.md").read_text(encoding="utf-8")
     for kind in kinds():
         assert f"### {kind.__name__}\n" in page
@@ -37,7 +37,7 @@ def functions_in(path: Path) -> set[str]:
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
-def test_every_test_that_the_safety_case_names_is_there() -> None:
+def test_every_test_in_the_safety_case_exists() -> None:
     named = set(NAMED.findall(case()))
     assert len(named) > 30
     for file, name in sorted(named):
@@ -62,7 +62,7 @@ def test_every_cause_is_in_the_safety_case() -> None:
         assert f"| `{rule.name}` | {rule.action.upper()} |" in case(), rule.name
 
 
-def test_the_settings_of_a_fleets_robot_are_good(tmp_path: Path) -> None:
+def test_the_settings_of_a_fleet_robot_are_valid(tmp_path: Path) -> None:
     page = (DOCS / "fleet.md").read_text(encoding="utf-8")
     file = tmp_path / "robot.toml"
     file.write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")

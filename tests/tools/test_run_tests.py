@@ -1,4 +1,4 @@
-"""The second run of failed tests, on a small suite of its own."""
+"""The second run of failed tests, with a small suite."""
 
 import subprocess
 import sys
@@ -61,7 +61,7 @@ def test_a_suite_that_passes_runs_once(tmp_path: Path) -> None:
     ],
     ids=["many failures", "no collection"],
 )
-def test_what_is_no_stall_has_no_second_run(tmp_path: Path, tests: str) -> None:
+def test_other_failures_have_no_second_run(tmp_path: Path, tests: str) -> None:
     done = run(tmp_path, tests)
     assert done.returncode in (1, 2)
     assert "once more" not in done.stdout

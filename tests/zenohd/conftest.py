@@ -9,21 +9,21 @@ import pytest
 from common.loop import Loop
 from tests.drive_source import ConstantSource
 from tests.zenohd.router import command, found
-from verification.harness.stack import Chain, chain
-from verification.harness.support import bus_on, running
+from verification.harness.bus import bus_on, running
+from verification.harness.stack import RunningStack, running_stack
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
     """Run the stack on zenohd."""
     zenohd = found()
     folder: Path = tmp_path_factory.mktemp("stack")
-    with chain(folder, route=partial(command, zenohd, folder)) as it:
+    with running_stack(folder, route=partial(command, zenohd, folder)) as it:
         yield it
 
 
 @pytest.fixture
-def source(stack: Chain) -> Iterator[ConstantSource]:
+def source(stack: RunningStack) -> Iterator[ConstantSource]:
     """Be a source that asks without a pause."""
     with running(Loop()) as loop:
         it = ConstantSource(loop)

@@ -1,4 +1,4 @@
-"""A real ``zenohd`` as the stack's router, and a second one that speaks HTTP."""
+"""A real ``zenohd`` as the stack's router, and a second one with the REST plugin."""
 
 import contextlib
 import json
@@ -14,14 +14,15 @@ from typing import Any
 import pytest
 
 from tests.cli.processes import ran, sets
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 REST = Path(__file__).parent.parent.parent / "deploy" / "zenohd" / "rest.json5"
-ABSENT = "no zenohd: ZENOHD names none and there is none on PATH; see deploy/zenohd/README.md"
+ABSENT = "zenohd not found, neither by ZENOHD nor on PATH; see deploy/zenohd/README.md"
 
 
 def found() -> str:
-    """Return where zenohd is; skip the test that asks where there is none."""
+    """Return the path of zenohd; skip the test when it is not installed."""
     path = os.environ.get("ZENOHD") or shutil.which("zenohd")
     if not path:
         pytest.skip(ABSENT)
@@ -29,7 +30,7 @@ def found() -> str:
 
 
 def command(zenohd: str, folder: Path, given: Sequence[str]) -> list[str]:
-    """Return how zenohd is started with the configuration that ``t2 router`` prints for it."""
+    """Return the command of zenohd with the configuration from ``t2 router --print``."""
     printed = ran("router", "--print", *sets(*given))
     assert printed.returncode == 0, printed.stderr
     file = folder / "zenohd.json5"
@@ -39,16 +40,16 @@ def command(zenohd: str, folder: Path, given: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Rest:
-    """What speaks HTTP for the bus."""
+    """The REST interface."""
 
     port: int
 
     def get(self, path: str, accept: str = "application/json") -> bytes:
-        """Ask for a key; 200 is wanted."""
-        return self._ask(path, "GET", accept=accept)
+        """GET a key; raise unless the status is 200."""
+        return self._request(path, "GET", accept=accept)
 
     def rows(self, path: str) -> list[dict[str, Any]]:
-        """Ask for a key, and return what each one answers."""
+        """GET a key, and return all replies."""
         rows: list[dict[str, Any]] = json.loads(self.get(path))
         return rows
 
@@ -62,17 +63,19 @@ class Rest:
                     yield line.removeprefix(b"data:")
 
     def put(self, path: str, body: bytes) -> None:
-        """Publish, as `curl -X PUT` does."""
-        self._ask(path, "PUT", body)
+        """Publish like `curl -X PUT`."""
+        self._request(path, "PUT", body)
 
-    def _ask(self, path: str, method: str, body: bytes | None = None, accept: str = "") -> bytes:
+    def _request(
+        self, path: str, method: str, body: bytes | None = None, accept: str = ""
+    ) -> bytes:
         url = f"http://127.0.0.1:{self.port}/{path}"
         request = urllib.request.Request(url, body, {"Accept": accept}, method=method)
         with urllib.request.urlopen(request, timeout=15) as answer:
             return bytes(answer.read())
 
     def answers(self) -> bool:
-        """Tell whether it listens."""
+        """Return whether it listens."""
         with contextlib.suppress(OSError):
             self.get("t2/nothing")
             return True
@@ -83,7 +86,7 @@ class Rest:
 def rest(
     zenohd: str, log: Path, endpoint: str, tls: dict[str, object] | None = None
 ) -> Iterator[Rest]:
-    """Run the second one while the context lasts; skip where its plugins are not installed."""
+    """Run zenohd with REST; skip when its plugins are not installed."""
     port = free_port()
     changes = {"plugins/rest/http_port": f"127.0.0.1:{port}", "connect/endpoints": [endpoint]}
     if tls is not None:
@@ -97,10 +100,10 @@ def rest(
         try:
             it = Rest(port)
             wait_until(lambda: process.poll() is not None or it.answers(), f"REST; {log}")
-            said = log.read_text(encoding="utf-8", errors="replace")
-            if process.poll() is not None and "library not found" in said.lower():
-                pytest.skip("this zenohd has no plugins for REST and storages beside it")
-            assert process.poll() is None, said
+            text = log.read_text(encoding="utf-8", errors="replace")
+            if process.poll() is not None and "library not found" in text.lower():
+                pytest.skip("this zenohd has no plugins for REST and storages")
+            assert process.poll() is None, text
             yield it
         finally:
             process.kill()

@@ -1,4 +1,4 @@
-"""The bus over HTTP: what a shell or a browser reads, and what it may do."""
+"""The bus over HTTP: reading, and permissions."""
 
 import base64
 import contextlib
@@ -18,9 +18,11 @@ from common.loop import Loop
 from common.messages import Odometry
 from tests.common.bus_fixture import rising
 from tests.zenohd.router import Rest, command, found, rest
+from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
-from verification.harness.stack import Chain
-from verification.harness.support import at, free_port, joined, running, wait_until
+from verification.harness.ports import free_port
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.alone
 
@@ -28,15 +30,15 @@ ODOMETRY = keys.ODOMETRY.on("001")
 
 
 @pytest.fixture(scope="module")
-def http(stack: Chain, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rest]:
+def http(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rest]:
     log = tmp_path_factory.mktemp("rest") / "rest.log"
     with rest(found(), log, stack.endpoint) as it:
         yield it
 
 
 def odometry(http: Rest) -> Odometry:
-    """Return what the storage keeps, as it came."""
-    (row,) = wait_until(lambda: http.rows(ODOMETRY), "the storage to have heard it")
+    """Return the odometry in the storage."""
+    (row,) = wait_until(lambda: http.rows(ODOMETRY), "odometry in the storage")
     assert row["key"] == ODOMETRY
     assert row["encoding"] == codec.encoding(Odometry)
     return codec.decode(base64.b64decode(row["value"]), Odometry)
@@ -44,17 +46,17 @@ def odometry(http: Rest) -> Odometry:
 
 def test_the_newest_odometry_is_read_over_http(http: Rest) -> None:
     first = odometry(http)
-    wait_until(lambda: odometry(http).seq > first.seq, "a newer one")
+    wait_until(lambda: odometry(http).seq > first.seq, "newer odometry")
     raw = codec.decode(http.get(f"{ODOMETRY}?_raw"), Odometry)
     assert raw.boot == first.boot
 
 
-def test_what_a_service_said_last_is_json_without_a_storage(http: Rest) -> None:
+def test_the_last_message_of_a_service_is_json_without_a_storage(http: Rest) -> None:
     (row,) = wait_until(lambda: http.rows(keys.info_key("001", "odom", "last")), "an answer")
     assert row["value"][ODOMETRY]["frame_id"] == "odom"
 
 
-def test_a_wild_card_asks_for_all_streams(http: Rest) -> None:
+def test_a_wildcard_reads_all_streams(http: Rest) -> None:
     wanted = {f"t2/v1/001/{path}" for path in ("tel/bridge/velocity", "tel/safety/state")}
     wait_until(
         lambda: wanted <= {row["key"] for row in http.rows("t2/v1/001/tel/**")}, "all streams"
@@ -69,9 +71,9 @@ def test_a_stream_is_followed(http: Rest) -> None:
 
 @contextlib.contextmanager
 def secured(site: Site, folder: Path, *words: str) -> Iterator[tuple[str, str]]:
-    """Run zenohd with this site's rules; yield its TLS endpoint, and the one for those on board.
+    """Run zenohd with this site's access control; yield its TLS and its local endpoint.
 
-    ``words`` are options of zenohd's besides.
+    ``words`` are additional options of zenohd.
     """
     outside, onboard = f"tls/127.0.0.1:{free_port()}", f"unixsock-stream/{folder}/bus.sock"
     own = site.settings("robot", "001")
@@ -93,7 +95,7 @@ FILES = ("ca", "certificate", "private_key", "members")
 
 
 def files(site: Site, role: str, name: str) -> dict[str, object]:
-    """Return a member's files in Zenoh's own words."""
+    """Return a member's files as Zenoh settings."""
     own = site.settings(role, name)
     return {
         "root_ca_certificate": own.ca,
@@ -105,7 +107,7 @@ def files(site: Site, role: str, name: str) -> dict[str, object]:
 
 @dataclass
 class OnBoard:
-    """What arrives on the robot, and an answer of its own."""
+    """Messages that arrive on the robot, and one answer."""
 
     estops: list[int] = field(default_factory=list)
     motions: list[int] = field(default_factory=list)
@@ -113,7 +115,7 @@ class OnBoard:
     def declare(self, bus: Bus) -> None:
         bus.on_any(keys.estop_key("001"), self.estops.append)
         bus.on_any(keys.MOTION.on("001"), self.motions.append)
-        bus.answer(INFO, lambda: b'{"said": 1}', "application/json")
+        bus.answer(INFO, lambda: b'{"value": 1}', "application/json")
 
 
 INFO = keys.info_key("001", "safety", "last")
@@ -127,7 +129,7 @@ def site(tmp_path: Path) -> Site:
     return made
 
 
-def test_over_http_one_may_do_what_the_certificate_may(site: Site, tmp_path: Path) -> None:
+def test_permissions_over_http_are_those_of_the_certificate(site: Site, tmp_path: Path) -> None:
     site.member("viewer", "rest")
     site.member("driver", "rest", "--robot", "001")
     robot = OnBoard()
@@ -139,7 +141,7 @@ def test_over_http_one_may_do_what_the_certificate_may(site: Site, tmp_path: Pat
         with rest(found(), tmp_path / "viewer.log", outside, files(site, "viewer", "rest")) as http:
             wait_until(lambda: http.rows(INFO), "an answer")
             http.put(keys.estop_key("001"), b"")
-            assert http.rows(INFO)[0]["value"] == {"said": 1}  # which came after it
+            assert http.rows(INFO)[0]["value"] == {"value": 1}  # processed after it
             assert robot.estops == []
         with rest(found(), tmp_path / "driver.log", outside, files(site, "driver", "rest")) as http:
             wait_until(lambda: http.rows(INFO), "an answer")
@@ -149,8 +151,8 @@ def test_over_http_one_may_do_what_the_certificate_may(site: Site, tmp_path: Pat
             assert robot.motions == []
 
 
-def test_a_plugin_of_the_router_is_past_its_rules(site: Site, tmp_path: Path) -> None:
-    """Why REST has a zenohd of its own; when this fails, it needs none any more."""
+def test_a_plugin_of_the_router_bypasses_its_access_control(site: Site, tmp_path: Path) -> None:
+    """The reason for a separate zenohd for REST; when this fails, it is not needed any more."""
     http, robot = Rest(free_port()), OnBoard()
     plugin = f'{{__required__: true, http_port: "127.0.0.1:{http.port}"}}'
     with (
@@ -160,4 +162,4 @@ def test_a_plugin_of_the_router_is_past_its_rules(site: Site, tmp_path: Path) ->
     ):
         wait_until(lambda: http.answers() and http.rows(INFO), "an answer")
         http.put(keys.MOTION.on("001"), b"")
-        wait_until(lambda: robot.motions, "what safety alone may say")
+        wait_until(lambda: robot.motions, "a motion, which only safety may publish")

@@ -1,4 +1,4 @@
-"""What the stack does on its own router it does on zenohd."""
+"""The stack on zenohd behaves as on its own router."""
 
 import json
 
@@ -11,24 +11,27 @@ from common.loop import Loop
 from common.messages import Event, ResetRequest
 from tests.cli.processes import ran, sets
 from tests.drive_source import ConstantSource, drive_until_moving, moves_since
-from verification.harness.stack import Chain
-from verification.harness.support import bus_on, running, wait_until
+from verification.harness.bus import bus_on, running
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.alone
 
 
-def t2(stack: Chain, *words: str) -> tuple[int, str]:
-    """Run the command on that stack; return its exit code and what it said."""
+def t2(stack: RunningStack, *words: str) -> tuple[int, str]:
+    """Run a t2 command on the stack; return its exit code and output."""
     done = ran(*words, *sets(f"bus.connect={stack.endpoint}"))
     return done.returncode, done.stdout + done.stderr
 
 
-def reset(stack: Chain) -> None:
-    """Clear what is latched, as an operator does who keeps asking."""
+def reset(stack: RunningStack) -> None:
+    """Retry the reset until it succeeds."""
     wait_until(lambda: t2(stack, "call", "safety/reset")[0] == 0, "a reset")
 
 
-def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, source: ConstantSource) -> None:
+def test_it_drives_and_an_emergency_stop_stops_it(
+    stack: RunningStack, source: ConstantSource
+) -> None:
     drive_until_moving(stack, source)
     code, said = t2(stack, "estop")
     assert code == 0, said
@@ -41,7 +44,7 @@ def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, source: Constant
 
 
 def test_the_routers_death_stops_it_and_the_next_one_takes_over(
-    stack: Chain, source: ConstantSource
+    stack: RunningStack, source: ConstantSource
 ) -> None:
     drive_until_moving(stack, source)
     stack.kill("router")
@@ -56,30 +59,30 @@ def test_the_routers_death_stops_it_and_the_next_one_takes_over(
     drive_until_moving(stack, source)
 
 
-def test_who_is_there_is_told_by_tokens_and_by_the_admin_space(stack: Chain) -> None:
-    code, said = t2(stack, "services", "--json")
-    assert code == 0, said
-    who = {row["name"]: row for row in map(json.loads, said.splitlines()) if row["service"]}
-    assert {"bridge", "safety", "odom"} <= set(who)
-    assert "tel/odom/odometry" in who["odom"]["publishes"]
-    assert "tel/bridge/bumper" in who["safety"]["reads"]
-    assert "srv/safety/reset" in who["safety"]["answers"]
+def test_services_are_listed_by_tokens_and_admin_space(stack: RunningStack) -> None:
+    code, output = t2(stack, "services", "--json")
+    assert code == 0, output
+    services = {row["name"]: row for row in map(json.loads, output.splitlines()) if row["service"]}
+    assert {"bridge", "safety", "odom"} <= set(services)
+    assert "tel/odom/odometry" in services["odom"]["publishes"]
+    assert "tel/bridge/bumper" in services["safety"]["reads"]
+    assert "srv/safety/reset" in services["safety"]["answers"]
 
 
-def test_the_doctor_gets_to_the_robot(stack: Chain) -> None:
-    """How the robot fares is another matter: it may be held up, or latched."""
-    _, said = t2(stack, "doctor", "--json")
-    found = [json.loads(line) for line in said.splitlines()]
+def test_the_doctor_reaches_the_robot(stack: RunningStack) -> None:
+    """The robot's own health is not checked: a stall or a latch is possible."""
+    _, output = t2(stack, "doctor", "--json")
+    found = [json.loads(line) for line in output.splitlines()]
     well = {"network": {"ok"}, "router": {"ok"}, "services": {"ok", "note"}, "rights": {"ok"}}
     for where, levels in well.items():
         seen = {one["level"] for one in found if one["where"] == where}
         assert seen, where
-        assert seen <= levels, said
+        assert seen <= levels, output
     router = next(one for one in found if one["where"] == "router")
     assert "as on this laptop" in router["text"]
 
 
-def test_a_killed_service_takes_its_token_along(stack: Chain) -> None:
+def test_a_killed_service_loses_its_token(stack: RunningStack) -> None:
     token = keys.live_key("001", "odom", "*")
     with probe(stack.config.bus) as opened:
         assert len(opened.alive(token)) == 1
@@ -89,15 +92,17 @@ def test_a_killed_service_takes_its_token_along(stack: Chain) -> None:
         wait_until(lambda: len(opened.alive(token)) == 1, "the next token")
 
 
-def test_who_comes_late_is_told_what_happened_before(stack: Chain) -> None:
-    heard: list[Event] = []
+def test_a_late_subscriber_receives_earlier_events(stack: RunningStack) -> None:
+    received: list[Event] = []
     refusals: list[str] = []
 
     def declare(bus: Bus) -> None:
-        bus.subscribe(keys.EVENTS, lambda a: heard.append(a.message), depth=99, service="*")
+        bus.subscribe(keys.EVENTS, lambda a: received.append(a.message), depth=99, service="*")
 
     with running(Loop()) as loop, bus_on(stack.endpoint, loop, declare) as bus:
-        wait_until(lambda: "link_up" in [each.name for each in heard], "the bridge's first event")
-        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names nothing
+        wait_until(
+            lambda: "link_up" in [each.name for each in received], "the bridge's first event"
+        )
+        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names no latch
         wait_until(lambda: refusals, "a reply")
-        wait_until(lambda: "reset_refused" in [each.name for each in heard], "a new event")
+        wait_until(lambda: "reset_refused" in [each.name for each in received], "a new event")

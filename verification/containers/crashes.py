@@ -1,4 +1,4 @@
-"""What ends, hangs or is cut off while it drives: the board is told to stop, and all comes back."""
+"""Killed, hanging and disconnected services while driving: STOP in time, and recovery."""
 
 import signal
 import time
@@ -7,18 +7,18 @@ from functools import partial
 
 from common.freshness import NS_PER_S
 from verification.containers.engine import docker
-from verification.containers.stack_fixture import Stage, held_run_s
-from verification.harness.stack import Witness
-from verification.harness.support import wait_until
+from verification.containers.stack_fixture import StackFixture, held_run_s
+from verification.harness.host import StallRecorder
+from verification.harness.waiting import wait_until
 
-REST_S = 0.3  # beside the bridge's lease, as in tests/verification/harness/test_stack.py
-# Docker waits 0.1 s before it starts a container again, and the guard then brakes first of all.
+REST_S = 0.3  # in addition to the bridge's lease, as in tests/verification/harness/test_stack.py
+# Docker waits 0.1 s before it restarts a container; the guard then brakes at first.
 RESTART_S = 15.0
 STILL = 0.001  # m/s
 
-# From inside, signals reach all but the init; no right of the host's is needed for it. Each says
-# when it was, by the clock that all on this host share: to get in takes Docker a while.
-EVERYTHING = """
+# Inside a container a signal reaches all processes except init, without rights on the host. Each
+# script prints its time by the host's monotonic clock, because `docker exec` takes some time.
+KILL_ALL = """
 import os, time
 print(time.monotonic_ns(), flush=True)
 os.kill(-1, 9)
@@ -34,125 +34,129 @@ for entry in pathlib.Path("/proc").iterdir():
 """
 
 
-def is_killed(service: str, stage: Stage) -> str:
-    """Kill all that a container runs; it is started again, and the vehicle stands meanwhile."""
-    return survived(stage, service, partial(killed, stage, service), RESTART_S)
+def container_is_killed(service: str, fixture: StackFixture) -> str:
+    """Kill all processes of a container; Docker restarts it, the vehicle stops meanwhile."""
+    return recovers(fixture, service, partial(kill_all, fixture, service), RESTART_S)
 
 
-def is_killed_alone(module: str, stage: Stage) -> str:
-    """Kill one process of the bridge's container: the container stays."""
-    before = stage["bridge"].began
-    seen = survived(
-        stage, "bridge", partial(signalled, stage, "bridge", module, signal.SIGKILL), None
+def process_is_killed(module: str, fixture: StackFixture) -> str:
+    """Kill one process of the bridge's container; the container keeps running."""
+    before = fixture["bridge"].began
+    seen = recovers(
+        fixture, "bridge", partial(send_signal, fixture, "bridge", module, signal.SIGKILL), None
     )
-    assert stage["bridge"].began == before, "the container did not outlive it"
-    return f"{seen}; the container stays"
+    assert fixture["bridge"].began == before, "the container ended with it"
+    return f"{seen}; the container keeps running"
 
 
-def is_not_needed(service: str, stage: Stage) -> str:
-    """Kill what nobody waits for: the vehicle drives on."""
-    stage.wheel.push(stage.speed)
-    before = stage[service].began
-    killed_ns = killed(stage, service)
+def optional_container_is_killed(service: str, fixture: StackFixture) -> str:
+    """Kill a service that driving does not need; the vehicle drives on."""
+    fixture.driver.push(fixture.speed)
+    before = fixture[service].began
+    killed_ns = kill_all(fixture, service)
     wait_until(lambda: time.monotonic_ns() - killed_ns > NS_PER_S, "a second")
-    assert stage.holds() == "run", stage.holds()
-    stop(stage)
-    wait_until(lambda: stage[service].began != before, f"{service} is started again", RESTART_S)
-    stage.wait_well(service)
-    return "drives on; started again, healthy"
+    assert fixture.holds() == "run", fixture.holds()
+    stop(fixture)
+    wait_until(lambda: fixture[service].began != before, f"{service} is restarted", RESTART_S)
+    fixture.wait_healthy(service)
+    return "drives on; restarted, healthy"
 
 
-def is_frozen(service: str, stage: Stage) -> str:
-    """Pause a container: cut off from the bus, without an end that anybody could notice."""
-    stage.wheel.push(stage.speed)
-    container = stage[service]
-    witness, paused_ns = Witness(), time.monotonic_ns()
+def container_is_paused(service: str, fixture: StackFixture) -> str:
+    """Pause a container: it disappears from the bus without closing a connection."""
+    fixture.driver.push(fixture.speed)
+    container = fixture[service]
+    stalls, paused_ns = StallRecorder(), time.monotonic_ns()
     docker("pause", container.id)
-    docker_s = (time.monotonic_ns() - paused_ns) / NS_PER_S  # within which it took hold
+    docker_s = (time.monotonic_ns() - paused_ns) / NS_PER_S  # the pause began within this time
     try:
-        took_s, allowed_s = stands(stage, paused_ns, witness, REST_S + docker_s)
+        took_s, allowed_s = stands(fixture, paused_ns, stalls, REST_S + docker_s)
     finally:
         docker("unpause", container.id)
-    stage.wheel.push(stage.speed)
-    stop(stage)
-    return f"{told(took_s, allowed_s)}; drives again"
+    fixture.driver.push(fixture.speed)
+    stop(fixture)
+    return f"{held(took_s, allowed_s)}; drives again"
 
 
-def laptop_is_cut_off(stage: Stage) -> str:
-    """Take the router from the laptops' network: the robot's own chain does not notice."""
-    stage.wheel.push(stage.speed)
-    router = stage["router"]
+def laptop_network_is_cut(fixture: StackFixture) -> str:
+    """Disconnect the router from the laptops' network; services on board are not affected."""
+    fixture.driver.push(fixture.speed)
+    router = fixture["router"]
     network = next(iter(router.about["NetworkSettings"]["Networks"]))
-    witness, cut_ns = Witness(), time.monotonic_ns()
+    stalls, cut_ns = StallRecorder(), time.monotonic_ns()
     docker("network", "disconnect", network, router.id)
     docker_s = (time.monotonic_ns() - cut_ns) / NS_PER_S
     try:
-        extra_s = stage.config.safety.sources["teleop"].lease + REST_S + docker_s
-        took_s, allowed_s = stands(stage, cut_ns, witness, extra_s)
+        extra_s = fixture.config.safety.sources["teleop"].lease + REST_S + docker_s
+        took_s, allowed_s = stands(fixture, cut_ns, stalls, extra_s)
         for name in ("bridge", "safety", "odom"):
-            stage["safety"].run("t2", "health", name)
+            fixture["safety"].run("t2", "health", name)
     finally:
         docker("network", "connect", network, router.id)
-    stage.wheel.push(stage.speed)
-    stop(stage)
-    return f"{told(took_s, allowed_s)}; bridge, safety, odom answer meanwhile"
+    fixture.driver.push(fixture.speed)
+    stop(fixture)
+    return f"{held(took_s, allowed_s)}; bridge, safety, odom answer meanwhile"
 
 
-def hang_is_seen(stage: Stage) -> str:
-    """Stop a process without ending it: its health check finds out."""
-    signalled(stage, "odom", "services.odom", signal.SIGSTOP)
+def hang_is_detected(fixture: StackFixture) -> str:
+    """Send SIGSTOP to a process; its health check detects it."""
+    send_signal(fixture, "odom", "services.odom", signal.SIGSTOP)
     try:
-        wait_until(lambda: stage["odom"].health == "unhealthy", "odom is unhealthy", 120.0)
+        wait_until(lambda: fixture["odom"].health == "unhealthy", "odom is unhealthy", 120.0)
     finally:
-        signalled(stage, "odom", "services.odom", signal.SIGCONT)
-    stage.wait_well("odom")
+        send_signal(fixture, "odom", "services.odom", signal.SIGCONT)
+    fixture.wait_healthy("odom")
     return "unhealthy while it hangs, healthy after"
 
 
-def survived(stage: Stage, service: str, hurt: Callable[[], int], restart_s: float | None) -> str:
-    """Hurt a service while the vehicle drives; it stands, all comes back, and it drives again."""
-    stage.wheel.push(stage.speed)
-    before = stage[service].began
-    witness, hurt_ns = Witness(), hurt()
+def recovers(
+    fixture: StackFixture, service: str, inject: Callable[[], int], restart_s: float | None
+) -> str:
+    """Inject a fault while driving; the vehicle stops, the service recovers, driving resumes."""
+    fixture.driver.push(fixture.speed)
+    before = fixture[service].began
+    stalls, fault_ns = StallRecorder(), inject()
     extra_s = restart_s if service == "bridge" and restart_s else REST_S
-    took_s, allowed_s = stands(stage, hurt_ns, witness, extra_s)
+    took_s, allowed_s = stands(fixture, fault_ns, stalls, extra_s)
     if restart_s is not None:
-        wait_until(lambda: stage[service].began != before, f"{service} is started again", restart_s)
-    stage.wait_well(service)
-    stage.wheel.push(stage.speed)
-    stop(stage)
-    return f"{told(took_s, allowed_s)}; drives again"
+        wait_until(lambda: fixture[service].began != before, f"{service} is restarted", restart_s)
+    fixture.wait_healthy(service)
+    fixture.driver.push(fixture.speed)
+    stop(fixture)
+    return f"{held(took_s, allowed_s)}; drives again"
 
 
-def stands(stage: Stage, since_ns: int, witness: Witness, extra_s: float) -> tuple[float, float]:
-    """Wait until the vehicle stands; return how long it was held to move, and what is allowed."""
-    wait_until(lambda: stage.holds() in ("stop", "brake"), "STOP at the board", RESTART_S)
-    wait_until(lambda: abs(stage.speed()) < STILL, "the vehicle stands")
-    allowed_s = stage.config.bridge.lease + extra_s + witness.stop()
-    took_s = held_run_s(stage.trace(), since_ns)
-    assert took_s < allowed_s, told(took_s, allowed_s)
+def stands(
+    fixture: StackFixture, since_ns: int, stalls: StallRecorder, extra_s: float
+) -> tuple[float, float]:
+    """Wait until the vehicle stands; return how long it held a moving command, and the limit."""
+    wait_until(lambda: fixture.holds() in ("stop", "brake"), "STOP at the board", RESTART_S)
+    wait_until(lambda: abs(fixture.speed()) < STILL, "the vehicle stands")
+    allowed_s = fixture.config.bridge.lease + extra_s + stalls.stop()
+    took_s = held_run_s(fixture.trace(), since_ns)
+    assert took_s < allowed_s, held(took_s, allowed_s)
     return took_s, allowed_s
 
 
-def told(took_s: float, allowed_s: float) -> str:
-    """Say how long a command to move was held."""
-    return f"the board held a command to move for {took_s:.2f} s, {allowed_s:.2f} s are allowed"
+def held(took_s: float, allowed_s: float) -> str:
+    """Describe how long the board held a moving command."""
+    return f"the board held a moving command for {took_s:.2f} s, limit {allowed_s:.2f} s"
 
 
-def stop(stage: Stage) -> None:
-    """Let go, wait until it stands, and put it back to where it began."""
-    stage.wheel.linear = 0.0
-    wait_until(lambda: abs(stage.speed()) < STILL, "the vehicle stands")
-    stage.put_back()
+def stop(fixture: StackFixture) -> None:
+    """Request zero, wait until the vehicle stands, and put it back to its start."""
+    fixture.driver.linear = 0.0
+    wait_until(lambda: abs(fixture.speed()) < STILL, "the vehicle stands")
+    fixture.put_back()
 
 
-def killed(stage: Stage, service: str) -> int:
-    """Kill all that a container runs, but its init, which ends then; return when, in ns."""
-    return int(stage[service].python(EVERYTHING, check=False).split()[0])
+def kill_all(fixture: StackFixture, service: str) -> int:
+    """Kill all processes of a container except init, which then ends; return the time in ns."""
+    return int(fixture[service].python(KILL_ALL, check=False).split()[0])
 
 
-def signalled(stage: Stage, service: str, module: str, number: int) -> int:
-    """Send a signal to the process of a container that runs a module; return when, in ns."""
-    when = stage[service].python(SIGNAL.format(module=module, number=int(number)), check=False)
+def send_signal(fixture: StackFixture, service: str, module: str, number: int) -> int:
+    """Send a signal to the process of a container that runs a module; return the time in ns."""
+    when = fixture[service].python(SIGNAL.format(module=module, number=int(number)), check=False)
     assert when, f"{service} runs no {module}"
     return int(when.split()[0])

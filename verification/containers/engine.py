@@ -1,4 +1,4 @@
-"""Docker and docker-compose, by their command lines."""
+"""Command lines of Docker and Docker Compose."""
 
 import json
 import os
@@ -10,58 +10,58 @@ from pathlib import Path
 from typing import Any
 
 PATIENCE_S = 300.0
-# A registry that cannot be reached may also be one that does not answer.
+# An unreachable registry may not answer at all.
 PULL_S = 60.0
 
 
 class EngineError(AssertionError):
-    """A command of Docker's ended with an error."""
+    """A Docker command failed."""
 
 
 def docker(*words: str, patience_s: float = PATIENCE_S, check: bool = True) -> str:
-    """Run ``docker`` and return what it says; raise ``EngineError`` when it ends with an error."""
+    """Run ``docker`` and return its output; raise ``EngineError`` when it fails."""
     return ran(["docker", *words], None, patience_s, check)
 
 
 def ran(
     command: Sequence[str], env: Mapping[str, str] | None, patience_s: float, check: bool = True
 ) -> str:
-    """Run a command; with ``env`` over this process's own environment."""
+    """Run a command with additional environment variables."""
     try:
         done = subprocess.run(
             command, env=os.environ | (env or {}), capture_output=True, text=True,
             timeout=patience_s, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise EngineError(f"{' '.join(command)}: no end after {patience_s:.0f} s") from None
+        raise EngineError(f"{' '.join(command)}: timeout after {patience_s:.0f} s") from None
     if check and done.returncode:
-        said = (done.stdout + done.stderr)[-2000:]
-        raise EngineError(f"{' '.join(command)} ended with {done.returncode}: {said}")
+        output = (done.stdout + done.stderr)[-2000:]
+        raise EngineError(f"{' '.join(command)} ended with {done.returncode}: {output}")
     return done.stdout.strip()
 
 
 def missing() -> str:
-    """Say what this machine lacks to run containers; nothing when it has all."""
+    """Return what this machine lacks to run containers; empty when nothing is missing."""
     if shutil.which("docker") is None:
-        return "there is no docker"
+        return "docker is not installed"
     try:
         docker("info", patience_s=30.0)
     except EngineError as failed:
-        return f"no Docker engine answers: {str(failed).strip().splitlines()[-1]}"
+        return f"the Docker engine does not answer: {str(failed).strip().splitlines()[-1]}"
     if not compose():
-        return "there is neither `docker compose` nor docker-compose"
+        return "neither `docker compose` nor docker-compose is installed"
     return ""
 
 
 def compose() -> list[str]:
-    """Return how compose is called here: the plugin of Docker, or the program before it."""
+    """Return the command of Compose: the plugin of Docker, or the older program."""
     if docker("compose", "version", check=False):
         return ["docker", "compose"]
     return ["docker-compose"] if shutil.which("docker-compose") else []
 
 
 def pulled(image: str) -> bool:
-    """Tell whether a registry gives an image, or this machine has it."""
+    """Return whether an image is present or can be pulled."""
     if docker("image", "ls", "--quiet", image):
         return True
     try:
@@ -78,7 +78,7 @@ def size_mb(image: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """One compose project: its files, what its variables are, and a name of its own."""
+    """One Compose project: name, files and variables."""
 
     name: str
     files: Sequence[Path]
@@ -86,7 +86,7 @@ class Project:
     profiles: Sequence[str] = ()
 
     def __call__(self, *words: str, patience_s: float = PATIENCE_S, check: bool = True) -> str:
-        """Run compose on it."""
+        """Run a Compose command."""
         files = [word for file in self.files for word in ("-f", str(file))]
         profiles = [word for profile in self.profiles for word in ("--profile", profile)]
         command = [*compose(), "-p", self.name, *files, *profiles, *words]
@@ -112,19 +112,19 @@ class Container:
 
     @property
     def about(self) -> dict[str, Any]:
-        """All that the engine knows of it."""
+        """Output of ``docker inspect``."""
         about: dict[str, Any] = json.loads(docker("inspect", self.id))[0]
         return about
 
     @property
     def health(self) -> str:
-        """``healthy``, ``unhealthy``, ``starting``; ``none`` where nobody asks."""
+        """``healthy``, ``unhealthy``, ``starting``; ``none`` without a health check."""
         state = self.about["State"]
         return str(state.get("Health", {}).get("Status", "none")) if state["Running"] else "down"
 
     @property
     def began(self) -> str:
-        """When its processes were started."""
+        """Start time of its processes."""
         return str(self.about["State"]["StartedAt"])
 
     def run(self, *words: str, check: bool = True) -> str:
@@ -132,9 +132,9 @@ class Container:
         return docker("exec", self.id, *words, check=check)
 
     def python(self, text: str, check: bool = True) -> str:
-        """Run a piece of Python in it: there is no shell."""
+        """Run Python code in it: there is no shell."""
         return self.run("python", "-c", text, check=check)
 
     def log(self) -> str:
-        """Return all that its processes have said."""
+        """Return its log."""
         return ran(["sh", "-c", f"docker logs {self.id} 2>&1"], None, PATIENCE_S)

@@ -1,1 +1,1 @@
-"""What the hot paths cost, in counts that a noisy machine does not change."""
+"""Cost of the hot paths in counts that do not depend on the load of the host."""

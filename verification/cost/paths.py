@@ -1,4 +1,4 @@
-"""The hot paths, as shipped: what comes in, until what goes out is encoded."""
+"""The hot paths as shipped: from the input until the output is encoded."""
 
 import os
 from collections import Counter
@@ -30,10 +30,10 @@ from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService
-from verification.cost.stand_ins import BOOT, Cable, Clock, DroppedLines, Session
+from verification.cost.stand_ins import BOOT, BoardSocket, Clock, DroppedLines, Session
 
 MS = NS_PER_S // 1000
-MOMENT_NS = 10_000  # between two frames, when the replay must not grow old
+STEP_NS = 10_000  # between two frames, so short that no data becomes stale
 ROBOT = "001"
 C = TypeVar("C", bound=Shared)
 
@@ -49,7 +49,7 @@ ANSWERS: list[tuple[Frame, Frame]] = [
 
 
 def node(name: str, root: type[C]) -> Node[C]:
-    """Return a service's node with the shipped settings, on nobody's bus and the same each time."""
+    """Return a service's node with the shipped settings, without a bus and deterministic."""
     loaded = load(root, Sources(environ={}))
     with (
         patch.object(log, "LossyQueue", DroppedLines),
@@ -70,9 +70,9 @@ class BridgePaths:
         framing = self._framing = Framing()
         answers = {framing.pack(asked): framing.pack(answer) for asked, answer in ANSWERS}
         board = self._node.config.board
-        self._cables = [Cable(clock, (board.address, board.port), answers) for _ in range(2)]
+        self._sockets = [BoardSocket(clock, (board.address, board.port), answers) for _ in range(2)]
         self._guard, heartbeat = os.pipe()
-        with patch.object(udp, "_bind", Mock(side_effect=self._cables)):
+        with patch.object(udp, "_bind", Mock(side_effect=self._sockets)):
             self._bridge = Bridge(self._node, Inherited((), heartbeat))
         Session(self._node.bus, self._node.loop)
         self._session = Session(self._node.drive, self._node.loop)
@@ -90,11 +90,11 @@ class BridgePaths:
         self._expect(MotionKind.RUN, 300)
 
     def second(self, command: Command = Command.RUN) -> None:
-        """All that a second brings: ticks, queries and answers, velocities, motions, the link."""
+        """One second: ticks, queries and answers, velocities, motions, the link."""
         for tick in range(100):
             self.clock.now_ns += 10 * MS
             if tick % 2:
-                self._come("velocity")
+                self._receive("velocity")
                 self._move(command)
             self._node.loop._call_due()
         os.read(self._guard, 4096)
@@ -112,8 +112,8 @@ class BridgePaths:
         self._bridge._core._bumper = BumperFilter()
         self._take("hit")
 
-    def judge(self) -> None:
-        """Safety has judged the hit."""
+    def acknowledge(self) -> None:
+        """A motion of safety that acknowledges the hit."""
         self._expect(MotionKind.BREAK)
         self._bridge._core._bumper = BumperFilter()
         self._move(Command.RUN, judged=self._bridge._publishers["bumper"].next_seq)
@@ -121,16 +121,16 @@ class BridgePaths:
 
     def motion(self) -> None:
         """A motion message to a RUN frame."""
-        self.clock.now_ns += MOMENT_NS
+        self.clock.now_ns += STEP_NS
         self._move(Command.RUN)
 
-    def _come(self, name: str) -> None:
-        for cable in self._cables:  # the board sends to both ports
-            cable.inbox.append(self._frames[name])
+    def _receive(self, name: str) -> None:
+        for sock in self._sockets:  # the board sends to both ports
+            sock.inbox.append(self._frames[name])
 
     def _take(self, name: str) -> None:
-        self.clock.now_ns += MOMENT_NS
-        self._come(name)
+        self.clock.now_ns += STEP_NS
+        self._receive(name)
         self._bridge._read(self.clock.now_ns)
 
     def _move(self, command: Command, judged: int = 0) -> None:
@@ -146,11 +146,11 @@ class BridgePaths:
 
     def _expect(self, kind: MotionKind, linear_mmps: int = 0) -> None:
         expected = self._framing.pack(commands.MotionCommand(kind, linear_mmps))
-        assert self._cables[0].sent == expected, "the replay does not drive any more: mend it"
+        assert self._sockets[0].sent == expected, "the replay does not drive any more"
 
 
 class SafetyPaths:
-    """Safety between a bridge with a clear way and somebody who drives."""
+    """Safety between a bridge without obstacles and a motion source."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -164,48 +164,48 @@ class SafetyPaths:
         self._seq: Counter[str] = Counter()
         for linear in (0.0, 0.3):
             self.second(linear)
-        assert self._motion().command is Command.RUN, "the replay does not drive any more: mend it"
+        assert self._motion().command is Command.RUN, "the replay does not drive any more"
 
     def second(self, linear: float = 0.3) -> None:
-        """All that a second brings: samples and requests in, verdicts and states out."""
+        """One second: samples and requests in, verdicts and states out."""
         for tick in range(100):
             self.clock.now_ns += 10 * MS
             if tick % 20 == 0:
                 self._slow()
             if tick % 2:
-                self._hear(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0))
+                self._deliver(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0))
                 self.bumper()
             if tick % 5 == 0:
                 self.ultrasonic()
-                self._ask(linear)
+                self._request(linear)
             self._node.loop._call_due()
 
     def bumper(self) -> None:
         """A bumper sample to a motion."""
-        self.clock.now_ns += MOMENT_NS
-        self._hear(keys.BUMPER, m.Bumper(pressed=False))
+        self.clock.now_ns += STEP_NS
+        self._deliver(keys.BUMPER, m.Bumper(pressed=False))
 
     def ultrasonic(self) -> None:
         """Eight ranges to a motion."""
-        self.clock.now_ns += MOMENT_NS
-        self._hear(keys.ULTRASONIC, m.Ultrasonic(ranges=(2.0,) * 8, status=("ok",) * 8))
+        self.clock.now_ns += STEP_NS
+        self._deliver(keys.ULTRASONIC, m.Ultrasonic(ranges=(2.0,) * 8, status=("ok",) * 8))
 
     def _slow(self) -> None:
         link = m.Link(state="up", board="", epoch=0, armed=True, waiting="", rates={},
                       rejected={}, round_trip=None)  # fmt: skip
-        self._hear(keys.LINK, link)
-        self._hear(keys.SWITCHES, m.Switches(ultrasonic_brake=True, bumper_brake=True))
+        self._deliver(keys.LINK, link)
+        self._deliver(keys.SWITCHES, m.Switches(ultrasonic_brake=True, bumper_brake=True))
         for side in ("left", "right"):
-            self._hear(keys.DRIVER, m.Driver(faults=(), bits=0), side=side)
+            self._deliver(keys.DRIVER, m.Driver(faults=(), bits=0), side=side)
 
-    def _ask(self, linear: float) -> None:
-        told = self._session.sent.get(keys.SAFETY.on(ROBOT))
-        if told is not None:
-            echo = msgspec.msgpack.decode(told, type=m.SafetyState).heartbeat
+    def _request(self, linear: float) -> None:
+        state = self._session.sent.get(keys.SAFETY.on(ROBOT))
+        if state is not None:
+            echo = msgspec.msgpack.decode(state, type=m.SafetyState).heartbeat
             drive = m.Drive(linear=linear, angular=0.0, echo=echo)
-            self._hear(keys.DRIVE, drive, source="teleop")
+            self._deliver(keys.DRIVE, drive, source="teleop")
 
-    def _hear(self, topic: keys.Topic[Any], message: m.Message, **names: str) -> None:
+    def _deliver(self, topic: keys.Topic[Any], message: m.Message, **names: str) -> None:
         key = topic.on(ROBOT, **names)
         self._seq[key] += 1
         one = stamped(message, self._seq[key], self.clock.now_ns)
@@ -218,7 +218,7 @@ class SafetyPaths:
 
 
 class OdomPaths:
-    """Odometry behind a bridge that drives an arc."""
+    """Odometry of a vehicle that drives an arc."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -229,16 +229,16 @@ class OdomPaths:
         self._steps = 0
         for _ in range(100):
             self.step()
-        assert keys.ODOMETRY.on(ROBOT) in self._session.sent, "odometry is silent: mend the replay"
+        assert keys.ODOMETRY.on(ROBOT) in self._session.sent, "odometry is silent"
 
     def step(self) -> None:
-        """A velocity and the counters to pose and twist: all of 20 ms."""
+        """A velocity and the counters to pose and twist: 20 ms."""
         self.clock.now_ns += 20 * MS
         self._steps += 1
-        way_m = 0.006 * self._steps
+        distance_m = 0.006 * self._steps
         for topic, message in (
             (keys.VELOCITY, m.Velocity(linear=0.3, angular=0.1)),
-            (keys.MILEAGE, m.Mileage(distance=way_m, heading=way_m / 3, epoch=0)),
+            (keys.MILEAGE, m.Mileage(distance=distance_m, heading=distance_m / 3, epoch=0)),
         ):
             one = stamped(message, self._steps, self.clock.now_ns)
             self._session.deliver(topic.on(ROBOT), one, topic.on(ROBOT))
@@ -246,7 +246,7 @@ class OdomPaths:
 
 
 def stamped(message: m.Message, seq: int, now_ns: int) -> m.Message:
-    """Return it with a header, as a publisher on this host makes it."""
+    """Return the message with a header of a publisher on this host."""
     return msgspec.structs.replace(
         message, seq=seq, boot=BOOT, t_ns=now_ns, mono_ns=now_ns, host=BOOT
     )
@@ -256,27 +256,27 @@ Step = Callable[[], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Walk:
-    """One hot path, to be walked so many times by a clock of its service's own."""
+class HotPath:
+    """One hot path: a step and its number of repetitions, with its service's clock."""
 
     name: str
     clock: Clock
     step: Step
     times: int = 20
-    mend: Step = lambda: None  # puts right what a step leaves behind
+    restore: Step = lambda: None  # restores the state after a step
 
 
-def walks() -> list[Walk]:
-    """Return all hot paths, ready to be walked; install the clock of each before."""
+def hot_paths() -> list[HotPath]:
+    """Return all hot paths; install the clock of each before running it."""
     bridge, safety, odom = BridgePaths(Clock()), SafetyPaths(Clock()), OdomPaths(Clock())
     return [
-        Walk("bridge_velocity", bridge.clock, bridge.velocity),
-        Walk("bridge_ultrasonic", bridge.clock, bridge.ultrasonic),
-        Walk("bridge_hit", bridge.clock, bridge.hit, mend=bridge.judge),
-        Walk("bridge_motion", bridge.clock, bridge.motion),
-        Walk("bridge_second", bridge.clock, bridge.second, times=1),
-        Walk("safety_bumper", safety.clock, safety.bumper),
-        Walk("safety_ultrasonic", safety.clock, safety.ultrasonic),
-        Walk("safety_second", safety.clock, safety.second, times=1),
-        Walk("odom_step", odom.clock, odom.step, times=50),
+        HotPath("bridge_velocity", bridge.clock, bridge.velocity),
+        HotPath("bridge_ultrasonic", bridge.clock, bridge.ultrasonic),
+        HotPath("bridge_hit", bridge.clock, bridge.hit, restore=bridge.acknowledge),
+        HotPath("bridge_motion", bridge.clock, bridge.motion),
+        HotPath("bridge_second", bridge.clock, bridge.second, times=1),
+        HotPath("safety_bumper", safety.clock, safety.bumper),
+        HotPath("safety_ultrasonic", safety.clock, safety.ultrasonic),
+        HotPath("safety_second", safety.clock, safety.second, times=1),
+        HotPath("odom_step", odom.clock, odom.step, times=50),
     ]

@@ -1,9 +1,9 @@
-"""``python -m verification.cost.replay WHAT``: walk each hot path, and count in this process.
+"""``python -m verification.cost.replay WHAT``: run each hot path and count.
 
-``opcodes``       Python instructions of everything but the replay itself, per step
-``instructions``  counts nothing: callgrind does, from one ``getpgrp`` to the next
+``opcodes``       Python opcodes per step, without the replay itself
+``instructions``  nothing itself: callgrind counts between two calls of ``getpgrp``
 
-The first are printed as JSON; the last prints the names and numbers of its steps.
+The result is JSON: the counts, or the number of steps of each path for ``instructions``.
 """
 
 import gc
@@ -16,33 +16,33 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from verification.cost.paths import Walk, walks
+from verification.cost.paths import HotPath, hot_paths
 
 HERE = str(Path(__file__).parent)
-WARM = 1  # steps before the first that counts: caches, free lists
+WARM = 1  # uncounted steps to warm up caches and free lists
 
 
 def main() -> int:
-    """Count what is asked for."""
+    """Run the chosen counter."""
     count = COUNTERS[sys.argv[1]]
-    gc.disable()  # when it runs depends on what was made before
-    all_walks = walks()
-    for walk in all_walks:
-        walk.clock.install()
+    gc.disable()  # its runs depend on earlier allocations
+    paths = hot_paths()
+    for path in paths:
+        path.clock.install()
         for _ in range(WARM):
-            walk.step()
-            walk.mend()
+            path.step()
+            path.restore()
     if sys.argv[1] == "instructions":
         begin_instructions()
-    told = {}
-    for walk in all_walks:
-        walk.clock.install()
-        told[walk.name] = count(walk)
-    print(json.dumps(told))
+    counts = {}
+    for path in paths:
+        path.clock.install()
+        counts[path.name] = count(path)
+    print(json.dumps(counts))
     return 0
 
 
-def opcodes(walk: Walk) -> float:
+def opcodes(path: HotPath) -> float:
     """Return the opcodes of a step."""
     count = 0
 
@@ -57,34 +57,34 @@ def opcodes(walk: Walk) -> float:
         frame.f_trace_opcodes, frame.f_trace_lines = True, False
         return on_event
 
-    for _ in range(walk.times):
+    for _ in range(path.times):
         sys.settrace(on_call)
-        walk.step()
+        path.step()
         sys.settrace(None)
-        walk.mend()
-    return count / walk.times
+        path.restore()
+    return count / path.times
 
 
 def begin_instructions() -> None:
-    """Have callgrind, which has only run this process so far, take note from here on."""
-    # Without the ptrace that a container may forbid: a busy process listens by itself.
+    """Switch callgrind's instrumentation on."""
+    # Containers may forbid ptrace; a busy process polls for the command.
     me = [f"--pid={os.getpid()}", "--max-invoke-ms=0"]
     with subprocess.Popen(["vgdb", *me, "instrumentation", "on"], stdout=sys.stderr) as vgdb:
         while vgdb.poll() is None:
             pass
 
 
-def instructions(walk: Walk) -> int:
-    """Walk between two marks for callgrind; return how many steps."""
+def instructions(path: HotPath) -> int:
+    """Run the steps between two marks for callgrind; return their number."""
     os.getpgrp()
-    for _ in range(walk.times):
-        walk.step()
-        walk.mend()
+    for _ in range(path.times):
+        path.step()
+        path.restore()
     os.getpgrp()
-    return walk.times
+    return path.times
 
 
-COUNTERS: dict[str, Callable[[Walk], float]] = {
+COUNTERS: dict[str, Callable[[HotPath], float]] = {
     "opcodes": opcodes,
     "instructions": instructions,
 }

@@ -1,7 +1,7 @@
-"""What stands in for the world around a service: clock, Zenoh session, the board's cable, log.
+"""Test doubles around a service: clock, Zenoh session, the board's socket, log.
 
-Everything of ours runs as shipped, down to the call that would enter Zenoh, the kernel or the log's
-thread. What is encoded is dropped there.
+All code of T2 runs as shipped, up to the call into Zenoh, the kernel or the log's thread. The
+doubles drop encoded data.
 """
 
 import logging
@@ -24,25 +24,25 @@ from services.bridge.rx_timestamp import SO_TIMESTAMPNS, TIMESPEC
 
 START_NS = 1_000 * NS_PER_S
 WALL_NS = 1_700_000_000 * NS_PER_S  # ahead of the monotonic clock
-CABLE_NS = 50_000  # from the kernel's stamp to our read
+LATENCY_NS = 50_000  # from the kernel's time stamp to the read
 BOOT = 2**62 + 1  # always as long in MessagePack and in memory
 
 
 class Clock:
-    """The time, which passes when the replay says so."""
+    """A clock that the replay advances."""
 
     def __init__(self) -> None:
         self.now_ns = START_NS
 
     def install(self) -> None:
-        """Let this process see no other."""
+        """Replace the clocks of this process."""
         time.monotonic_ns = lambda: self.now_ns
         time.time_ns = lambda: WALL_NS + self.now_ns
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A sample as Zenoh hands it over."""
+    """A sample as Zenoh passes it to a callback."""
 
     key_expr: zenoh.KeyExpr
     payload: zenoh.ZBytes
@@ -50,7 +50,7 @@ class Sample:
 
 
 class Session:
-    """A Zenoh session with a router and nothing behind it."""
+    """A Zenoh session without a network."""
 
     def __init__(self, bus: Bus, loop: Loop) -> None:
         self.info = self
@@ -61,26 +61,26 @@ class Session:
             bus._adopt(cast("zenoh.Session", self))
 
     def routers_zid(self) -> list[str]:
-        """Name the router."""
+        """Return the router's id."""
         return ["router"]
 
     def peers_zid(self) -> list[str]:
-        """Name the other end of the drive link."""
+        """Return the id of the drive link's other end."""
         return ["peer"]
 
     def declare_publisher(self, key: str, **_: object) -> "Sink":
-        """Return where a publisher puts."""
+        """Return a publisher."""
         return Sink(self, key)
 
     def declare_subscriber(self, key: str, queue: Callable[[Any], None]) -> None:
-        """Keep whom a sample is handed to."""
+        """Store the callback."""
         self._queues[key] = queue
 
     def declare_queryable(self, key: str, queue: Callable[[Any], None]) -> None:
-        """Nobody asks."""
+        """Ignore it: there are no queries."""
 
     def deliver(self, key: str, message: Message, subscription: str) -> None:
-        """Hand a message over as Zenoh's thread does, and let the loop take it."""
+        """Deliver a message as Zenoh's thread does, and run the loop once."""
         payload = zenoh.ZBytes(codec.encode(message))
         self._queues[subscription](Sample(zenoh.KeyExpr(key), payload, None))
         self._loop._drain(0)
@@ -94,12 +94,12 @@ class Sink:
         self._key = key
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
-        """Keep the newest."""
+        """Store the newest message."""
         self._session.sent[self._key] = payload
 
 
-class Cable(socket.socket):
-    """A socket to the board, which answers what it is told to."""
+class BoardSocket(socket.socket):
+    """A socket to a board that answers queries."""
 
     def __init__(self, clock: Clock, board: tuple[str, int], answers: dict[bytes, bytes]) -> None:
         super().__init__(socket.AF_INET, socket.SOCK_DGRAM)  # a descriptor that the loop can watch
@@ -107,17 +107,17 @@ class Cable(socket.socket):
         self.sent = b""
         self._clock = clock
         self._board = board
-        self._answers = answers  # by the frame that asks
+        self._answers = answers  # by query
 
     def recvmsg(self, *_: object) -> tuple[bytes, list[tuple[int, int, bytes]], int, object]:
-        """Return what waits, stamped by the kernel."""
+        """Return the next datagram with a kernel time stamp."""
         if not self.inbox:
             raise BlockingIOError
-        stamp = TIMESPEC.pack(*divmod(WALL_NS + self._clock.now_ns - CABLE_NS, NS_PER_S))
+        stamp = TIMESPEC.pack(*divmod(WALL_NS + self._clock.now_ns - LATENCY_NS, NS_PER_S))
         return self.inbox.popleft(), [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], 0, self._board
 
     def sendto(self, datagram: bytes, *_: object) -> None:  # type: ignore[override]
-        """Take a command, and answer it."""
+        """Record a command, and queue its answer."""
         self.sent = datagram
         if datagram in self._answers:
             self.inbox.append(self._answers[datagram])

@@ -1,8 +1,8 @@
-"""System calls of a real bridge process, between waking for a frame and waiting for the next.
+"""System calls of a real bridge process for one velocity frame.
 
-``strace -c`` would mix in the ticks and Zenoh's threads, which go by time. So only the bridge's own
-thread is traced, and cut at its ``epoll_wait``; what most of the turns with one velocity frame took
-is the count. How Zenoh wakes its threads is left out: that depends on how deep they sleep.
+``strace -c`` would include periodic ticks and Zenoh's threads. So only the bridge's own thread is
+traced, and split at its ``epoll_wait``; the count is the mode of the turns with one velocity frame.
+Calls that wake Zenoh's threads are left out: their number depends on how deep the threads sleep.
 """
 
 import os
@@ -27,24 +27,25 @@ from common.wire.framing import Framing
 from common.wire.reports import VelocityReport
 from services.bridge.guard_ipc import Inherited
 from services.bridge.udp import Sockets
-from verification.cost.uncountable import Uncountable
-from verification.harness.support import bus_on, free_port, router_process, running
+from verification.cost.ledger import UncountableError
+from verification.harness.bus import bus_on, router_process, running
+from verification.harness.ports import free_port
 
 FRAMES = 200
-ENOUGH = 10  # turns with a frame alone
-LOST_S = 0.2  # after which the next one is sent: there was no bus yet
-PAUSE_S = 0.002  # for threads to fall asleep
+ENOUGH = 10  # turns with one frame only
+LOST_S = 0.2  # then the next frame is sent: the bus was not connected
+PAUSE_S = 0.002  # until the threads sleep
 PATIENCE_S = 60.0
 TURN = re.compile(r"^epoll_wait\(.*$", re.MULTILINE)
 READ = re.compile(r"^recvmsg\(.* = (\d+)$", re.MULTILINE)
 WAKING = re.compile(r"^(futex\(|write\(\d+, \"\\1(\\0){7}\", 8\)).*\n", re.MULTILINE)
-VELOCITY_BYTES = "12"  # of the board's frames no other has as many
+VELOCITY_BYTES = "12"  # unique among the board's frames
 
 
 def system_calls() -> dict[str, float]:
-    """Return the system calls of a velocity frame; raise ``Uncountable`` without strace."""
+    """Return the system calls of a velocity frame; raise ``UncountableError`` without strace."""
     if shutil.which("strace") is None:
-        raise Uncountable("strace is not installed")
+        raise UncountableError("strace is not installed")
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "strace"
         watch(log)
@@ -52,24 +53,24 @@ def system_calls() -> dict[str, float]:
 
 
 def per_frame(log: str) -> float:
-    """Return what most of the turns took in which nothing came but one velocity frame."""
+    """Return the mode of the system calls of turns with one velocity frame only."""
     turns = [turn.strip() for turn in TURN.split(WAKING.sub("", log))]
     took = [
-        turn.count("\n") + 2  # the wait, and a line for each call after it
-        for turn in turns[len(turns) // 2 :]  # there has been a bus for long
+        turn.count("\n") + 2  # the wait, and one line for each call
+        for turn in turns[len(turns) // 2 :]  # the bus was connected by then
         if READ.findall(turn) == [VELOCITY_BYTES]
     ]
     if len(took) < ENOUGH:
-        raise Uncountable(f"strace saw {len(took)} turns with a frame alone, too few to judge")
+        raise UncountableError(f"strace saw only {len(took)} turns with one frame")
     return statistics.mode(took)
 
 
 def watch(log: Path) -> None:
-    """Let a bridge under strace take in frame after frame, each once the one before is through."""
-    heard = threading.Semaphore(0)
+    """Send frames to a bridge under strace, one at a time."""
+    published = threading.Semaphore(0)
 
     def declare(bus: Bus) -> None:
-        bus.subscribe(keys.VELOCITY, lambda _: heard.release(), depth=64)
+        bus.subscribe(keys.VELOCITY, lambda _: published.release(), depth=64)
 
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     frame = Framing().pack(VelocityReport(300, 0))
@@ -85,13 +86,13 @@ def watch(log: Path) -> None:
         with traced(made.getsockname(), ours, endpoint, log):
             while through < FRAMES and time.monotonic() < deadline_s:
                 made.sendto(frame, ("127.0.0.1", ours))
-                through += heard.acquire(timeout=LOST_S)
+                through += published.acquire(timeout=LOST_S)
                 time.sleep(PAUSE_S)
 
 
 @contextmanager
 def traced(made: tuple[str, int], ours: int, endpoint: str, log: Path) -> Iterator[None]:
-    """Run the bridge itself, as its guard would start it, with its own thread under strace."""
+    """Run the bridge as its guard starts it, with its own thread under strace."""
     sockets = Sockets(Board(port=made[1], listen_ports=(ours,)))
     guard, heartbeat = os.pipe()
     handover = Inherited(tuple(s.fileno() for s in sockets.sockets), heartbeat)
@@ -108,6 +109,6 @@ def traced(made: tuple[str, int], ours: int, endpoint: str, log: Path) -> Iterat
     try:
         yield
     finally:
-        os.close(guard)  # a bridge that nobody guards stops and ends
+        os.close(guard)  # without a guard the bridge stops and ends
         process.wait(20)
         sockets.close()

@@ -1,4 +1,4 @@
-"""``python -m verification.faults``: every fault of the catalogue, again and again, as a table."""
+"""``python -m verification.faults``: inject every fault repeatedly and print a table."""
 
 import argparse
 import os
@@ -12,34 +12,36 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
-from verification.faults.catalogue import FAULTS, PARTS, Fault
-from verification.faults.machine import HoldUps
-from verification.faults.namespaces import Need, enter, missing
-from verification.faults.stack_fixture import Lane, lane
+from verification.faults.catalogue import FAULTS, GROUPS
+from verification.faults.fault import Fault
+from verification.faults.namespaces import Requirement, enter, missing
+from verification.faults.stack_fixture import StackFixture, stack_fixture
 from verification.faults.table import Row, markdown, renewed, verdict
-from verification.faults.trial import tried
+from verification.faults.trial import run_trial
+from verification.harness.host import StallRecorder, short_description
+from verification.harness.stack import SETTINGS_FILE
 
-Queues = dict[Need, deque[Fault]]
+Queues = dict[Requirement, deque[Fault]]
 
-# What each lane of a part stands on, one after the other. A trial waits most of the time: a core
-# bears two of them. With four, stacks hold each other up for longer than they may.
+# Requirements of the parallel stacks of each group, in sequence. A trial waits most of the time: a
+# core can run two stacks. Four stacks per core would stall each other beyond the limits.
 CORES = max(2, os.cpu_count() or 2)
-PLAIN: Sequence[Need] = ["nothing"]
-LANES: Sequence[Sequence[Sequence[Need]]] = [
-    [["nothing", "other clocks"]],
-    [PLAIN] * CORES,
+NONE: Sequence[Requirement] = ["none"]
+STACKS: Sequence[Sequence[Sequence[Requirement]]] = [
+    [["none", "separate clocks"]],
+    [NONE] * CORES,
     [
-        ["a far driver", "nothing"],
-        ["a far driver", "nothing"],
-        ["a small disk", "nothing"],
-        ["a teleop", "nothing"],
-        *[PLAIN] * 2 * (CORES - 2),
+        ["remote driver", "none"],
+        ["remote driver", "none"],
+        ["small disk", "none"],
+        ["teleop", "none"],
+        *[NONE] * 2 * (CORES - 2),
     ],
 ]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the campaign; return 1 when a row is not as it should be."""
+    """Run the campaign; return 1 when a row is outside its limits."""
     parser = _arguments()
     options = parser.parse_args(argv)
     faults = [f for f in FAULTS if not options.only or any(o in f.name for o in options.only)]
@@ -52,8 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     ]
     faults = [fault for fault in faults if fault.needs not in lacking]
     started_s = time.monotonic()
-    with HoldUps() as holdups, tempfile.TemporaryDirectory() as folder:
-        rows = campaign(faults, options.repeat, Path(folder), holdups)
+    with StallRecorder() as stalls, tempfile.TemporaryDirectory() as folder:
+        rows = campaign(faults, options.repeat, Path(folder), stalls)
     took_s = time.monotonic() - started_s
     text = report(rows, left_out, took_s)
     print(text)
@@ -67,29 +69,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     return int(any(row.faults for row in rows))
 
 
-def campaign(faults: Sequence[Fault], repeat: int, folder: Path, holdups: HoldUps) -> list[Row]:
-    """Try one part after the other, each on lanes of its own."""
+def campaign(
+    faults: Sequence[Fault], repeat: int, folder: Path, stalls: StallRecorder
+) -> list[Row]:
+    """Run one group after the other, each on its own parallel stacks."""
     rows: dict[str, Row] = {}
 
-    def work(queues: Queues, needs: Sequence[Need], name: str) -> None:
+    def run_stack(queues: Queues, needs: Sequence[Requirement], name: str) -> None:
         for need in needs:
             if queues[need]:
-                _drive(folder / f"{name} {need}".replace(" ", "-"), queues[need], need)
+                run_queue(folder / f"{name} {need}".replace(" ", "-"), queues[need], need)
 
-    def _drive(room: Path, queue: deque[Fault], need: Need) -> None:
+    def run_queue(room: Path, queue: deque[Fault], need: Requirement) -> None:
         room.mkdir()
-        (room / "lane.toml").write_text("")
-        with lane(room, need=need) as it:
+        (room / SETTINGS_FILE).write_text("")
+        with stack_fixture(room, need=need) as it:
             while (fault := _next(queue)) is not None:
-                row = _row(it, fault, repeat, holdups)
+                row = _row(it, fault, repeat, stalls)
                 rows[row.name] = row
                 print(markdown([row]).splitlines()[-1], file=sys.stderr, flush=True)
 
-    for number, (part, lanes) in enumerate(zip(PARTS, LANES, strict=True)):
-        queues = _queues(fault for fault in faults if fault in part)
-        with ThreadPoolExecutor(len(lanes)) as pool:
+    for number, (group, stacks) in enumerate(zip(GROUPS, STACKS, strict=True)):
+        queues = _queues(fault for fault in faults if fault in group)
+        with ThreadPoolExecutor(len(stacks)) as pool:
             jobs = [
-                pool.submit(work, queues, needs, f"{number}-{n}") for n, needs in enumerate(lanes)
+                pool.submit(run_stack, queues, needs, f"{number}-{n}")
+                for n, needs in enumerate(stacks)
             ]
             for job in jobs:
                 job.result()
@@ -99,29 +104,29 @@ def campaign(faults: Sequence[Fault], repeat: int, folder: Path, holdups: HoldUp
 def _queues(faults: Iterable[Fault]) -> Queues:
     queues: Queues = defaultdict(deque)
     for fault in faults:
-        queues["nothing" if fault.needs == "a memory group" else fault.needs].append(fault)
+        queues["none" if fault.needs == "memory cgroup" else fault.needs].append(fault)
     return queues
 
 
 def _next(queue: deque[Fault]) -> Fault | None:
     try:
         return queue.popleft()
-    except IndexError:  # another lane was faster
+    except IndexError:  # another stack took it
         return None
 
 
-def _row(it: Lane, fault: Fault, repeat: int, holdups: HoldUps) -> Row:
-    samples = [tried(it, fault) for _ in range(repeat)]
-    budget_s = fault.budget(it.stack.config) if fault.budget else None
-    held = [holdups.worst_s(s.fault_ns, fault.hold_s) for s in samples]
-    return Row(fault.name, budget_s, fault.outcome, samples, held)
+def _row(it: StackFixture, fault: Fault, repeat: int, stalls: StallRecorder) -> Row:
+    samples = [run_trial(it, fault) for _ in range(repeat)]
+    budget_s = fault.budget(it.running.config) if fault.budget else None
+    stalls_s = [stalls.worst_s(s.fault_ns, fault.hold_s) for s in samples]
+    return Row(fault.name, budget_s, fault.outcome, samples, stalls_s)
 
 
 def report(rows: Sequence[Row], left_out: Sequence[str], took_s: float) -> str:
-    """Return the campaign as a document."""
+    """Return the document of the campaign."""
     return TEXT.format(
         date=today(),
-        machine=f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}",
+        machine=short_description(),
         python=platform.python_version(),
         minutes=round(took_s / 60),
         table=markdown(rows),
@@ -131,7 +136,7 @@ def report(rows: Sequence[Row], left_out: Sequence[str], took_s: float) -> str:
 
 
 def today() -> str:
-    """Return the date, UTC."""
+    """Return the date in UTC."""
     return f"{datetime.now(UTC):%Y-%m-%d}"
 
 
@@ -139,17 +144,17 @@ TEXT = """# Faults
 
 Made by `make faults` on {date}: {machine}, Python {python}, {minutes} minutes.
 
-Real processes, real UDP, the simulated board, 0.8 m/s on an empty plain with the stick held on.
+Real processes, real UDP, the simulated board, 0.8 m/s on an empty plane while motion is requested.
 
-- *p50, p99, worst*: from the fault to the last command to move that the board received, or to the
-  first STOP or BREAK if that came later.
-- *held up*: how long the machine kept a process that only sleeps from running, at worst, while a
-  sample lasted, and with SIGKILL how long the kernel took to end the process: others notice its
-  end by its pipes, which are closed last. A sample may take so much longer than its budget.
-- Network, disk and mounts are the campaign's own. It wants root for that; what it cannot have here
-  is said below the table.
-- *then*: what it took to drive again once the fault was gone. Faults that come again and again trip
-  safety's `flapping`, which wants a reset; those resets are the campaign's own and do not count.
+- *p50, p99, worst*: time from the fault to the last command at the board that moves the vehicle, or
+  to the first STOP or BREAK if that is later.
+- *stall*: the longest time that the host kept a sleeping process from running during a sample.
+  After SIGKILL it includes the time that the kernel took to end the process: other processes detect
+  the end by its pipes, which the kernel closes last. A sample may exceed its budget by this time.
+- The campaign uses its own network namespace, disk and mounts, which need root. Faults that need
+  something that is not available here are listed below the table.
+- *then*: what it takes to drive again after the fault. Repeated faults trip safety's `flapping`,
+  which needs a reset; these resets belong to the campaign and do not count.
 
 {table}{left_out}
 {verdict}
@@ -158,13 +163,16 @@ Real processes, real UDP, the simulated board, 0.8 m/s on an empty plain with th
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="faults", description=__doc__)
-    parser.add_argument("--repeat", type=int, default=20, help="how often each fault is tried")
+    parser.add_argument("--repeat", type=int, default=20, help="trials per fault, 20")
     parser.add_argument(
-        "--only", action="append", metavar="TEXT", help="faults named so; repeatable"
+        "--only",
+        action="append",
+        metavar="TEXT",
+        help="only faults whose name contains TEXT; repeatable",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE",
-        help="where the document goes; with --only, just these rows of it are made anew",
+        help="write the document here; with --only replace only these rows",
     )  # fmt: skip
     return parser
 

@@ -1,4 +1,4 @@
-"""A dashboard beside the stack, and an operator's browser that stops the vehicle by it."""
+"""E-STOP from a browser while other clients abuse the dashboard's web server."""
 
 import contextlib
 import time
@@ -7,32 +7,32 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any
 
-from verification.faults.stack_fixture import Lane
+from verification.faults.stack_fixture import StackFixture
 from verification.harness.dashboard import Site, dashboard
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open
 
 HALF_OPEN = 500
-SETTLE_S = 1.0  # until the abuse has had its effect
+SETTLE_S = 1.0  # until the abuse takes effect
 
 Abuse = Callable[[Site], AbstractContextManager[Any]]
 
 
 def flood(site: Site) -> AbstractContextManager[None]:
-    """Send 50 000 messages a second, as a viewer."""
+    """Send 50 000 messages a second as a viewer."""
     return flooded(site, FLOODS["look"])
 
 
 def unfinished(site: Site) -> AbstractContextManager[Any]:
-    """Begin requests and never end them."""
+    """Open requests that never end."""
     return half_open(site, HALF_OPEN)
 
 
-def estop_while(abuse: Abuse) -> Callable[[Lane], int]:
+def estop_while(abuse: Abuse) -> Callable[[StackFixture], int]:
     """Press the browser's E-STOP while a client abuses the web server."""
 
-    def inject(lane: Lane) -> int:
+    def inject(fixture: StackFixture) -> int:
         with contextlib.ExitStack() as stack:
-            site = stack.enter_context(dashboard(lane.stack.endpoint, lane.folder))
+            site = stack.enter_context(dashboard(fixture.running.endpoint, fixture.folder))
             stack.enter_context(abuse(site))
             time.sleep(SETTLE_S)
             request = urllib.request.Request(

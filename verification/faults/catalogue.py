@@ -1,17 +1,11 @@
-"""The faults that are tried, with what ``safety.md`` allows for each.
-
-A budget is what the limit in force allows, plus what a process needs to notice: 50 ms where a
-limit of time is waited for, less where the news is pushed.
-"""
+"""The catalogue of faults, with the reaction that ``docs/safety.md`` allows for each."""
 
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from zenoh import CongestionControl
 
-from cli.settings import Everything
 from common.motion import Command
 from sim.requests import (
     Driver,
@@ -26,61 +20,34 @@ from sim.requests import (
     Wire,
 )
 from verification.faults import browser, forgery, injectors
+from verification.faults.fault import (
+    BUMPER_AGE,
+    HEARTBEAT,
+    MOTION_LEASE,
+    REQUEST_LEASE,
+    SILENCE,
+    ULTRASONIC_AGE,
+    VELOCITY_AGE,
+    ZEROS,
+    Budget,
+    Fault,
+    Outcome,
+    by_limit,
+    within,
+)
 from verification.faults.injectors import do, kill, second
-from verification.faults.namespaces import Need
-from verification.faults.stack_fixture import Lane
+from verification.faults.namespaces import Requirement
+from verification.faults.stack_fixture import StackFixture
 from verification.faults.surroundings import (
-    cable,
     cut_and_let_go,
     empty_disk,
     fill_disk,
-    mend_cable,
-    set_clocks_right,
+    network,
+    restore_clocks,
+    restore_network,
     starve,
-    step,
+    step_time_of_day,
 )
-
-# How the vehicle came to drive again, by rising effort.
-Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
-Budget = Callable[[Everything], float]  # s from the fault to the last command to move
-
-NOTICE_S = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One kind of fault."""
-
-    name: str
-    inject: Callable[[Lane], int]  # do it; return when, in ns of the monotonic clock
-    outcome: tuple[Outcome, ...]  # what ``safety.md`` allows
-    budget: Budget | None = None  # None where the vehicle may drive on
-    mend: Callable[[Lane], None] = lambda lane: lane.mend()
-    hold_s: float = 0.5  # how long the stick is held on after the fault
-    harmless: bool = False  # no process may end by it
-    needs: Need = "nothing"
-    stops: tuple[str, ...] = ("stop", "brake")  # commands that end the fault's danger
-
-
-def by_limit(limit: Callable[[Everything], float]) -> Budget:
-    """Allow a limit of time and what it takes to notice."""
-    return lambda config: limit(config) + NOTICE_S
-
-
-def within(seconds: float) -> Budget:
-    """Allow so much, whatever the limits in force."""
-    return lambda _: seconds
-
-
-MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
-HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
-SILENCE = by_limit(lambda config: config.bridge.silence)
-BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
-VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
-ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
-REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
-# Who lets go says three zeros, 50 ms apart; the last of them holds for its lease.
-ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
 
 HOLD_S = 0.6
 FREEZE_S = 0.5
@@ -97,23 +64,22 @@ def signals(
     then: tuple[Outcome, ...],
     budget: Budget | None,
     *,
-    asked: Budget | None = None,
-    needs: Need = "nothing",
+    terminated: Budget | None = None,
+    needs: Requirement = "none",
 ) -> list[Fault]:
-    """Return what comes of a part that is killed, stopped, or ``asked`` to end."""
-    told = asked or budget
+    """Return SIGKILL, SIGSTOP and SIGTERM of a process; ``terminated`` is the budget of SIGTERM."""
     return [
         Fault(f"{name} SIGKILL", kill(name, signal.SIGKILL), then, budget, hold_s=HOLD_S,
               needs=needs),
         Fault(f"{name} SIGSTOP", kill(name, signal.SIGSTOP), then, budget, injectors.go_on(name),
               hold_s=HOLD_S, needs=needs),
-        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, told, hold_s=HOLD_S,
-              needs=needs),
+        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, terminated or budget,
+              hold_s=HOLD_S, needs=needs),
     ]  # fmt: skip
 
 
-def wire(**what: float) -> Callable[[Lane], int]:
-    """Disturb what the board sends."""
+def wire(**what: float) -> Callable[[StackFixture], int]:
+    """Disturb the datagrams from the board."""
     return do(Wire(direction="to_pc", **what))
 
 
@@ -140,46 +106,46 @@ PROCESSES = [
     Fault("guard SIGKILL", kill("guard", signal.SIGKILL), NEUTRAL, within(0.05), hold_s=HOLD_S),
     Fault("guard SIGSTOP", kill("guard", signal.SIGSTOP), ON, None, injectors.go_on("guard")),
     Fault("guard SIGTERM", kill("guard", signal.SIGTERM), NEUTRAL, within(0.05), hold_s=HOLD_S),
-    # A safety that stood still for long could hear no emergency stop, and its latches outlive it.
+    # A safety that was stopped could not receive an emergency stop; its latches outlive it.
     *signals("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
-    # Safety that loses its bus can hear no emergency stop: that is latched.
+    # Without the bus safety cannot receive an emergency stop: it latches that.
     *signals("router", (*NEUTRAL, *RESET), MOTION_LEASE),
     Fault("router gone for 5 s", kill("router", signal.SIGKILL), RESET, MOTION_LEASE, hold_s=5.0),
-    # A put that may be dropped, Zenoh's default, is dropped at its sender when it is so large.
+    # With Zenoh's default congestion control (drop) the sender drops a message of this size.
     Fault("estop with 1 MB in it", injectors.estop_by(
         lambda session, key: session.put(
             key, b"x" * 1_000_000, congestion_control=CongestionControl.BLOCK)),
           RESET, within(0.1)),
-    # A driver that goes on has a stick that is still held: its next request counts.
+    # A continued driver still requests motion: its next request counts.
     *signals("driver", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
-    # The real one in a terminal, a finger on W; whoever only asks, as it does, is the driver.
-    *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, asked=ZEROS, needs="a teleop"),
+    # The real teleop in a terminal with W held; ``driver`` above only sends its requests.
+    *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, terminated=ZEROS, needs="teleop"),
     *signals("odom", ON, None),
     Fault("a second bridge", second("bridge"), ON, None, injectors.end_others, hold_s=HOLD_S),
-    # Its heartbeats mix with the first one's in what drivers echo; it never reaches the wheels.
+    # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect.
     Fault("a second safety", second("safety"), (*ON, *ITSELF), None,
           injectors.end_others, hold_s=1.5),
     Fault("a second driver of one name", injectors.second_driver, (*ON, *ITSELF), None,
           injectors.end_others, hold_s=1.5),
-    # What cannot be written is lost; nobody waits for it.
+    # Log lines that cannot be written are lost; no service waits for the disk.
     Fault("disk full, then contact", fill_disk, RESET, within(0.05), empty_disk, harmless=True,
-          needs="a small disk"),
+          needs="small disk"),
 ]  # fmt: skip
 
 NETWORK = [
-    Fault("driver's network cut for 3 s", cable(Wire(drop=1.0)), (*ITSELF, *NEUTRAL),
-          REQUEST_LEASE, mend_cable, hold_s=3.0, needs="a far driver"),
-    # The stick was let go meanwhile: of all that was asked before, nothing may move it any more.
+    Fault("driver's network cut for 3 s", network(Wire(drop=1.0)), (*ITSELF, *NEUTRAL),
+          REQUEST_LEASE, restore_network, hold_s=3.0, needs="remote driver"),
+    # The stick was released meanwhile: no earlier request may move the vehicle any more.
     *(
         Fault(f"driver's network cut for {seconds:g} s, then the burst", cut_and_let_go(seconds),
-              NEUTRAL, REQUEST_LEASE, mend_cable, hold_s=seconds + 1.0, needs="a far driver")
+              NEUTRAL, REQUEST_LEASE, restore_network, hold_s=seconds + 1.0, needs="remote driver")
         for seconds in (0.8, 3.0)
     ),
-    Fault("all from the driver 1 s late", cable(Wire(direction="to_pc", delay=1.0)),
-          (*ITSELF, *NEUTRAL), REQUEST_LEASE, mend_cable, hold_s=2.0, needs="a far driver"),
+    Fault("all from the driver 1 s late", network(Wire(direction="to_pc", delay=1.0)),
+          (*ITSELF, *NEUTRAL), REQUEST_LEASE, restore_network, hold_s=2.0, needs="remote driver"),
     *(
-        Fault(f"driver's network: {what}", cable(faults), (*ON, *ITSELF, *NEUTRAL), None,
-              mend_cable, hold_s=1.5, needs="a far driver")
+        Fault(f"driver's network: {what}", network(faults), (*ON, *ITSELF, *NEUTRAL), None,
+              restore_network, hold_s=1.5, needs="remote driver")
         for what, faults in {
             "1 % lost": Wire(drop=0.01),
             "10 % lost": Wire(drop=0.1),
@@ -190,16 +156,16 @@ NETWORK = [
     ),
 ]  # fmt: skip
 
-# A step of nothing is the control: that a clock of its own does nothing to a process.
+# A step of 0 h is the control: a separate clock alone changes nothing.
 CLOCKS = [
-    Fault(f"{whose}'s clock stepped by {hours:+d} h", step(whose, 3600 * hours), ON, None,
-          set_clocks_right, hold_s=1.5, needs="other clocks")
+    Fault(f"{whose}'s clock stepped by {hours:+d} h", step_time_of_day(whose, 3600 * hours), ON,
+          None, restore_clocks, hold_s=1.5, needs="separate clocks")
     for whose in ("robot", "driver")
     for hours in (0, 1, -1)
 ]  # fmt: skip
 
 BOARD = [
-    # What waits in a frozen board is read when it thaws, the last of it first of all STOP.
+    # A frozen board reads its queue when it continues; the newest command in it is STOP.
     Fault("board freeze of 0.5 s", do(Freeze(seconds=FREEZE_S)), NEUTRAL, within(FREEZE_S + 0.05),
           hold_s=HOLD_S),
     Fault("board restart in 0.3 s", do(PowerCycle(seconds=OFF_S)), (*NEUTRAL, *RESET),
@@ -207,7 +173,7 @@ BOARD = [
     Fault("board not heard", wire(drop=1.0), NEUTRAL, SILENCE),
     Fault("board answers 0.5 s late", wire(delay=0.5), NEUTRAL, SILENCE, hold_s=1.0),
     Fault("board's datagrams from elsewhere", wire(foreign=1.0), NEUTRAL, SILENCE),
-    # The header has no CRC: an echo whose id is damaged can read as a bumper that is hit.
+    # The header has no CRC: an echo with a damaged id can read as a pressed bumper.
     Fault("board's datagrams all damaged", wire(corrupt=1.0), (*NEUTRAL, *RESET), SILENCE),
     Fault("board's datagrams twice, out of order", wire(duplicate=0.5, reorder=0.3),
           (*ON, *ITSELF, *NEUTRAL), None),
@@ -215,55 +181,58 @@ BOARD = [
     Fault("right driver fault", do(Driver(side="right", bits=1 << 3)), RESET, within(0.1)),
     *(
         Fault(f"{name} sonar faulty", do(Sonar(name=name, fault=True)), ITSELF, within(0.15),
-              injectors.sonar_well(name))
+              injectors.restore_sonar(name))
         for name in FORWARD
     ),
-    # Suspect after 0.5 m without a change: slower from then on.
+    # Suspect after 0.5 m without a change: the speed limit drops.
     *(
         Fault(f"{name} sonar stuck", do(Sonar(name=name, range=3.0)), ON, None,
-              injectors.sonar_well(name), hold_s=1.3)
+              injectors.restore_sonar(name), hold_s=1.3)
         for name in FORWARD
     ),
     *(
-        Fault(f"{name} sonar {what}", do(sonar), ON, None, injectors.sonar_well(name), hold_s=0.8)
+        Fault(f"{name} sonar {what}", do(sonar), ON, None, injectors.restore_sonar(name),
+              hold_s=0.8)
         for name in ELSEWHERE
         for what, sonar in {
             "faulty": Sonar(name=name, fault=True), "stuck": Sonar(name=name, range=3.0),
         }.items()
     ),
-    # One frame tells of all eight.
+    # One frame reports all eight.
     Fault("sonars silent", do(Mute(reports=("ultrasonic",))), ITSELF, ULTRASONIC_AGE),
     Fault("bumper silent", do(Mute(reports=("bumper",))), NEUTRAL, BUMPER_AGE),
     Fault("velocity silent", do(Mute(reports=("velocity",))), NEUTRAL, VELOCITY_AGE),
-    # Long enough to drive further than a step of the counters may be.
+    # The vehicle drives further than the largest accepted step of the counters.
     Fault("mileage silent for 4 s", injectors.silent("mileage", 4.0), ON, None, hold_s=4.8),
 ]  # fmt: skip
 
-# What a board may do otherwise than the simulated one does.
+# Other firmware behaviour.
 FIRMWARE = [
     Fault("contact while every third answer is lost",
-          injectors.then(do(Lose(reports=("bumper",))), injectors.hit(0.06)), RESET, within(0.02)),
+          injectors.in_sequence(do(Lose(reports=("bumper",))), injectors.hit(0.06)), RESET,
+          within(0.02)),
     Fault("contact reported on the other port",
-          injectors.then(do(Firmware(hits="second")), injectors.hit(0.3)), RESET, within(0.02)),
-    # The other port is taken after a tenth of a second without an answer.
+          injectors.in_sequence(do(Firmware(hits="second")), injectors.hit(0.3)), RESET,
+          within(0.02)),
+    # The bridge changes to the other port after 0.1 s without an answer.
     Fault("board answers on the other port", do(Firmware(answers="second")),
           (*ON, *ITSELF, *NEUTRAL), None),
     Fault("board restart in 0.12 s", do(PowerCycle(seconds=0.12)), (*NEUTRAL, *RESET),
           within(0.12 + 0.1), hold_s=HOLD_S),
-    # While safety is dead nobody but the bridge sees that STOP does not stop it.
+    # While safety is dead only the bridge detects that STOP has no effect.
     Fault("safety SIGKILL, the board ignores STOP",
-          injectors.then(do(Firmware(ignores=(Command.STOP,))), kill("safety", signal.SIGKILL)),
+          injectors.in_sequence(
+              do(Firmware(ignores=(Command.STOP,))), kill("safety", signal.SIGKILL)),
           (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
           hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 
-# These take the machine's time as well.
 GREEDY = [
     Fault("bridge out of memory", starve("bridge"), NEUTRAL, within(0.01), hold_s=1.0,
-          needs="a memory group"),
+          needs="memory cgroup"),
     *(
         Fault(f"{name} out of memory", starve(name), then, budget, hold_s=HOLD_S,
-              needs="a memory group")
+              needs="memory cgroup")
         for name, then, budget in (
             ("guard", NEUTRAL, within(0.05)),
             ("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
@@ -276,17 +245,16 @@ GREEDY = [
           injectors.end_others, hold_s=1.0),
     Fault("board's 20 000 datagrams/s of garbage", do(Flood(seconds=0.9, garbage=True)),
           (*ON, *NEUTRAL), None, hold_s=1.0, harmless=True),
-    # More than the bridge can publish: what it asks for is lost among them, the bumper first.
+    # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), None, hold_s=1.0, harmless=True),
 ]  # fmt: skip
 
 HOSTILE = [
-    Fault(f"{what} on every key", saying, (*ON, *ITSELF, *NEUTRAL, *RESET), None, harmless=True)
-    for what, saying in injectors.HOSTILE.items()
+    Fault(f"{what} on every key", publish, (*ON, *ITSELF, *NEUTRAL, *RESET), None, harmless=True)
+    for what, publish in injectors.HOSTILE.items()
 ]  # fmt: skip
 
-# The web server and what abuses it take the machine's time as well.
 DASHBOARD = [
     Fault("browser's estop while a viewer sends 50 000 messages/s",
           browser.estop_while(browser.flood), RESET, within(0.3)),
@@ -294,20 +262,19 @@ DASHBOARD = [
           browser.estop_while(browser.unfinished), RESET, within(0.3)),
 ]  # fmt: skip
 
-# What a network held back has no effect: no frame moves the vehicle, and the latch stays.
+# Delayed calls have no effect: no frame moves the vehicle, and the latch stays.
 OPERATORS = [
     Fault("contact, then 20 resets 1.3 s late", injectors.late_resets, RESET, within(0.02)),
     Fault("contact, then 20 releases 1.3 s late", injectors.late_releases, RESET, within(0.02)),
 ]
 
-# Keys that a terminal delivers late move nothing: the hold of the last one in time ends, and that
-# one may be a first press, if the one before it was refused.
+# Late keys move nothing: the hold of the last key in time ends, also when it is a first press.
 TERMINAL = [
     Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
           injectors.stall_terminal(seconds), NEUTRAL,
           by_limit(lambda config: config.teleop.hold_first + 0.15
                    + config.safety.sources["teleop"].lease),
-          hold_s=seconds + 1.0, needs="a teleop")
+          hold_s=seconds + 1.0, needs="teleop")
     for seconds in (0.8, 3.0)
 ]  # fmt: skip
 
@@ -324,10 +291,10 @@ DRIVE_LINK = [
     ),
 ]  # fmt: skip
 
-# What is tried beside each other, the most delicate first.
-PARTS = [
+# Groups that run in parallel, the most sensitive to host load first.
+GROUPS = [
     [*MILLISECONDS, *CLOCKS],
     [*GREEDY, *DASHBOARD],
     [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *TERMINAL, *DRIVE_LINK, *OPERATORS],
 ]
-FAULTS = [fault for part in PARTS for fault in part]
+FAULTS = [fault for group in GROUPS for fault in group]

@@ -1,9 +1,9 @@
-/* A time of day of its own for a process: LD_PRELOAD, and what T2_CLOCK names holds the step.
+/* A separate time of day for a process: preload this library, T2_CLOCK names the file with the step.
  *
- * Nothing but the time of day changes: waits, timers and the monotonic clock are the machine's. Nothing of
- * ours waits until a time of day.
- * The file holds one int64 in nanoseconds, in the machine's byte order, and is mapped: who writes
- * it steps the clock of all that run with it, at once and at no cost.
+ * Only the time of day changes. Waits, timers and the monotonic clock stay the machine's; no T2
+ * process waits until a time of day.
+ * The file holds one int64 in nanoseconds, in the machine's byte order. It is mapped: a write steps
+ * the clock of all processes that use it, at once.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -24,12 +24,12 @@ __attribute__((constructor)) static void begin(void) {
     int file = name ? open(name, O_RDONLY | O_CLOEXEC) : -1;
     void *page = mmap(NULL, sizeof none, PROT_READ, MAP_SHARED, file, 0);
     if (page == MAP_FAILED)
-        abort(); /* a trial that steps nothing must not pass */
+        abort(); /* a trial without a step must not pass */
     step_ns = page;
 }
 
 int clock_gettime(clockid_t clock, struct timespec *now) {
-    if (!machine) /* another library's constructor came first */
+    if (!machine) /* called by another library's constructor */
         machine = dlsym(RTLD_NEXT, "clock_gettime");
     int error = machine(clock, now);
     if (!error && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) {
@@ -40,7 +40,7 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
 }
 
 int gettimeofday(struct timeval *restrict now, void *restrict zone) {
-    (void)zone; /* obsolete, and asked for by nobody */
+    (void)zone; /* obsolete */
     struct timespec it;
     int error = clock_gettime(CLOCK_REALTIME, &it);
     *now = (struct timeval){it.tv_sec, it.tv_nsec / 1000};

@@ -1,4 +1,4 @@
-"""``python -m verification.faults.flood PORT``: 20 000 datagrams/s to a port, until killed."""
+"""``python -m verification.faults.flood PORT``: send 20 000 datagrams/s to a port."""
 
 import contextlib
 import socket

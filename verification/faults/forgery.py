@@ -1,4 +1,4 @@
-"""Messages in the name of bridge and safety, from a plain client of the router."""
+"""Forged messages of bridge and safety, from a plain client of the router."""
 
 import os
 import signal
@@ -13,28 +13,29 @@ from common.bus.session import client_config
 from common.messages import Bumper, Motion, Velocity
 from common.motion import Command
 from verification.faults import injectors
-from verification.faults.stack_fixture import Lane, until
-from verification.harness.support import at
+from verification.faults.stack_fixture import StackFixture
+from verification.harness.bus import at
+from verification.harness.waiting import becomes_true
 
 LASTS_S = 0.6
 AHEAD = 1000
-BACKWARD_MPS = -0.5  # no driver of the campaign asks for that
+BACKWARD_MPS = -0.5  # no driver of the campaign requests it
 HUNG_S = 0.05  # the vehicle still moves: the lease is 0.2 s
 
 
-def forged(make: Callable[[Motion, Bumper], dict[str, bytes]]) -> Callable[[Lane], int]:
-    """Put what is made of the newest motion and bumper sample, at 50 Hz for a while."""
+def forged(make: Callable[[Motion, Bumper], dict[str, bytes]]) -> Callable[[StackFixture], int]:
+    """Publish forgeries of the newest motion and bumper sample, at 50 Hz for ``LASTS_S``."""
 
-    def inject(lane: Lane) -> int:
+    def inject(fixture: StackFixture) -> int:
         newest: dict[str, bytes] = {}
         motion, bumper = keys.MOTION.on("001"), keys.BUMPER.on("001")
 
         def take(sample: zenoh.Sample) -> None:
             newest[str(sample.key_expr)] = sample.payload.to_bytes()
 
-        with zenoh.open(client_config(at(lane.stack.endpoint))) as session:
+        with zenoh.open(client_config(at(fixture.running.endpoint))) as session:
             subscribers = [session.declare_subscriber(key, take) for key in (motion, bumper)]
-            until(lambda: len(newest) == len(subscribers), 2.0)
+            becomes_true(lambda: len(newest) == len(subscribers), 2.0)
             command = codec.decode(newest[motion], Motion)
             sample = codec.decode(newest[bumper], Bumper)
             at_ns = time.monotonic_ns()
@@ -52,18 +53,18 @@ def forged(make: Callable[[Motion, Bumper], dict[str, bytes]]) -> Callable[[Lane
 
 
 def authority(motion: Motion, _: Bumper) -> dict[str, bytes]:
-    """Command a motion in safety's name."""
+    """Forge a motion command of safety."""
     run = replace(motion, command=Command.RUN, linear=BACKWARD_MPS)
     return {keys.MOTION.on("001"): codec.encode(run)}
 
 
 def lock_out(motion: Motion, _: Bumper) -> dict[str, bytes]:
-    """Go far ahead of all numbers that safety will ever use."""
+    """Forge a motion with a sequence number above all that safety will use."""
     return {keys.MOTION.on("001"): codec.encode(replace(motion, seq=2**62))}
 
 
 def measurements(_: Motion, bumper: Bumper) -> dict[str, bytes]:
-    """Report a contact and a runaway in the bridge's name."""
+    """Forge a contact and a runaway velocity of the bridge."""
     velocity = Velocity(linear=3.0, angular=0.0, seq=bumper.seq, boot=bumper.boot)
     return {
         keys.BUMPER.on("001"): codec.encode(replace(bumper, pressed=True)),
@@ -71,8 +72,8 @@ def measurements(_: Motion, bumper: Bumper) -> dict[str, bytes]:
     }
 
 
-def hit_while_safety_hangs(lane: Lane) -> int:
-    """Stop safety, and press the bumper while the vehicle still moves."""
-    os.kill(injectors.pid_of(lane, "safety"), signal.SIGSTOP)
+def hit_while_safety_hangs(fixture: StackFixture) -> int:
+    """Send SIGSTOP to safety, and press the bumper while the vehicle still moves."""
+    os.kill(injectors.pid_of(fixture, "safety"), signal.SIGSTOP)
     time.sleep(HUNG_S)
-    return injectors.hit(0.3)(lane)
+    return injectors.hit(0.3)(fixture)

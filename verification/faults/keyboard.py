@@ -1,8 +1,7 @@
-"""``python -m verification.faults.keyboard ENDPOINT``: teleop in a terminal, a finger on its keys.
+"""``python -m verification.faults.keyboard ENDPOINT``: teleop in a pseudo terminal.
 
-Reads lines from standard input: a speed, and while the last one is over zero, W is held in the
-fifth gear; ``stall SECONDS`` holds up all that the terminal sends and gets. Ends with teleop, or
-with its input.
+Reads lines from standard input. A speed above zero holds W in the fifth gear until a speed of zero.
+``stall SECONDS`` stalls the terminal in both directions. Ends with teleop or with its input.
 """
 
 import os
@@ -29,13 +28,13 @@ def main() -> None:
                     return
                 *lines, said = (said + new).split(b"\n")
                 for line in lines:
-                    held = take(line, teleop, held)
+                    held = execute(line, teleop, held)
             if held:
                 teleop.type("w")
 
 
-def take(line: bytes, teleop: Terminal, held: bool) -> bool:
-    """Execute a line; return whether the key is held after it."""
+def execute(line: bytes, teleop: Terminal, held: bool) -> bool:
+    """Execute a line; return whether the key is held afterwards."""
     if line.startswith(b"stall "):
         teleop.stall(float(line.removeprefix(b"stall ")))
         return held

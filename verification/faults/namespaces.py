@@ -1,8 +1,8 @@
-"""What a fault needs of the machine: a network, a disk, a clock or memory to take away.
+"""Namespaces for faults of network, disk, clock and memory.
 
-The campaign moves into a network and mounts of its own, so that it can cut the one and fill the
-other without touching the machine's. What cannot be had here is told with its reason, and the
-faults that need it are left out.
+The campaign moves into its own network and mount namespaces, so that it can cut the network and
+fill a disk without affecting the machine. Faults whose requirement is not available are left out,
+with the reason.
 """
 
 import contextlib
@@ -18,8 +18,8 @@ from typing import Literal
 
 from common.freshness import NS_PER_S
 
-Need = Literal[
-    "nothing", "a teleop", "a far driver", "a small disk", "other clocks", "a memory group"
+Requirement = Literal[
+    "none", "teleop", "remote driver", "small disk", "separate clocks", "memory cgroup"
 ]
 
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
@@ -30,50 +30,54 @@ SMALL = "256k"
 
 
 def enter() -> str:
-    """Leave the machine's network and mounts; return why not, or nothing.
+    """Enter new network and mount namespaces; return the reason when that is impossible.
 
-    To be called before there are threads: those that come later go along.
+    Call it before any thread starts: only later threads share the namespaces.
     """
     if not (shutil.which("ip") and shutil.which("mount")):
-        return "the commands ip and mount are not here (Debian: apt-get install iproute2 mount)"
+        return (
+            "the commands ip and mount are not installed (Debian: apt-get install iproute2 mount)"
+        )
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNS | CLONE_NEWNET):
-        return f"no network of its own: {os.strerror(ctypes.get_errno())}"
+        return f"cannot create a network namespace: {os.strerror(ctypes.get_errno())}"
     subprocess.run(["mount", "--make-rprivate", "/"], check=True)
     subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
     return ""
 
 
-def missing(outside: str) -> Mapping[Need, str]:
-    """Return what cannot be had, and why; ``outside`` says why ``enter`` did not work, if so."""
+def missing(outside: str) -> Mapping[Requirement, str]:
+    """Return the missing requirements with reasons; ``outside`` is the reason of ``enter``."""
     writable = os.access(MEMORY, os.W_OK) and (MEMORY / "memory.limit_in_bytes").exists()
-    reasons: dict[Need, str] = {
-        "a far driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
-        "a small disk": outside,
-        "other clocks": ""
+    reasons: dict[Requirement, str] = {
+        "remote driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
+        "small disk": outside,
+        "separate clocks": ""
         if shutil.which("cc")
         else "no C compiler (Debian: apt-get install gcc libc6-dev)",
-        "a memory group": "" if writable else "no memory control group can be made",
+        "memory cgroup": "" if writable else "cannot create a memory cgroup (version 1)",
     }
     return {need: reason for need, reason in reasons.items() if reason}
 
 
 @contextlib.contextmanager
 def small_disk(folder: Path) -> Iterator[None]:
-    """Make a folder that is a small disk of its own while the context lasts."""
+    """Mount a small disk on a new folder while the context lasts."""
     folder.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={SMALL}", "t2", str(folder)], check=True)
     try:
         yield
     finally:
-        subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a bridge may still end
+        subprocess.run(
+            ["umount", "--lazy", str(folder)], check=True
+        )  # a bridge may still be ending
 
 
 def clock(file: Path) -> dict[str, str]:
-    """Return an environment in which a process's time of day is off by what a file says."""
+    """Return an environment whose processes have a time of day shifted by the content of a file."""
     library = file.with_suffix(".so")
     subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, CLOCK, "-ldl"], check=True)
     env = {**os.environ, "LD_PRELOAD": str(library), "T2_CLOCK": str(file)}
-    step_clock(file, 3600)  # a library that cannot be loaded is passed over: then nothing is tried
+    step_clock(file, 3600)  # to detect a library that the loader ignores
     seen = subprocess.run(["date", "+%s"], env=env, capture_output=True, text=True, check=True)
     assert int(seen.stdout) - time.time() > 3000, f"the clock does not step: {seen.stderr}"
     step_clock(file, 0)
@@ -81,6 +85,6 @@ def clock(file: Path) -> dict[str, str]:
 
 
 def step_clock(file: Path, seconds: int) -> None:
-    """Step the time of day of all that run by this file: to so much beside the machine's."""
+    """Set the shift of the time of day of all processes that use this file."""
     with file.open("r+b" if file.exists() else "wb") as it:  # in place: it is mapped
         it.write((seconds * NS_PER_S).to_bytes(8, sys.byteorder, signed=True))

@@ -1,12 +1,12 @@
-"""A program on a host behind a bad cable.
+"""A program on a simulated remote host behind a disturbed network link.
 
 ``python -m verification.faults.remote_host ENDPOINT MODULE [WORD]...``
 
-The host has a network, a monotonic clock and a boot of its own; ``MODULE`` runs there, with the
-router's endpoint as seen from there and the words. This process holds both ends of the cable, a TUN
-device in each network, and does to the packets what it is told. Reads lines from standard input:
-``sim.requests.Wire`` as JSON, where ``to_pc`` is the way to the robot, and ``Address``; all else it
-hands on to the program.
+The host has its own network namespace, monotonic clock and boot id. ``MODULE`` runs there, with the
+router's endpoint as seen from there and the words. This process forwards packets between two TUN
+devices, one in each network, and disturbs them. It reads lines from standard input:
+``sim.requests.Wire`` as JSON, where ``to_pc`` is the direction to the robot, and ``Address``. It
+passes all other lines on to the program.
 """
 
 import ctypes
@@ -36,19 +36,19 @@ CLONE_NEWNS, CLONE_NEWTIME, CLONE_NEWNET = 0x00020000, 0x00000080, 0x40000000  #
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PACKET_MAX = 2048
 IDLE_S = 0.1
-AHEAD_S = 86_400  # of the far host's monotonic clock: it was started a day before
+AHEAD_S = 86_400  # of the remote host's monotonic clock: it booted a day earlier
 OFFSETS = Path("/proc/self/timens_offsets")
 
 
 class Address(msgspec.Struct, frozen=True, tag_field="do", tag="address"):
-    """The far host's address from now on: the last of its four numbers."""
+    """Change the remote host's address; the last of its four numbers."""
 
     last: int
 
 
 @dataclass
-class Line:
-    """The cable between two hosts, its end at each, and who is told what is no matter of it."""
+class Link:
+    """The link between two hosts, and the program's input."""
 
     near: int
     far: int
@@ -58,29 +58,29 @@ class Line:
     to_near: Cable = field(default_factory=lambda: Cable(2))
 
     def forward(self) -> None:
-        """Carry packets until standard input ends."""
+        """Forward packets until standard input ends."""
         said = b""
         while True:
             stdin = sys.stdin.fileno()
             ready, _, _ = select.select([self.near, self.far, stdin], [], [], self._wait_s())
-            self._carry(self.near, self.to_far, self.far)
-            self._carry(self.far, self.to_near, self.near)
+            self._forward(self.near, self.to_far, self.far)
+            self._forward(self.far, self.to_near, self.near)
             if stdin in ready:
                 new = os.read(stdin, PACKET_MAX)
                 if not new:
                     return
                 *lines, said = (said + new).split(b"\n")
                 for line in lines:
-                    self._obey(line)
+                    self._execute(line)
 
-    def _carry(self, source: int, cable: Cable, sink: int) -> None:
+    def _forward(self, source: int, cable: Cable, sink: int) -> None:
         now_ns = time.monotonic_ns()
         for packet in _waiting(source):
             cable.put(Datagram(packet, 0), now_ns)
         for datagram in cable.take(now_ns):
             os.write(sink, datagram.payload)
 
-    def _obey(self, line: bytes) -> None:
+    def _execute(self, line: bytes) -> None:
         if not line.startswith(b"{"):
             os.write(self.program, line + b"\n")
             return
@@ -100,43 +100,43 @@ class Line:
 
 
 def net(port: int) -> str:
-    """Return the network between a router of that port and its far host: one for each."""
+    """Return the network between a router and its remote host, one for each port."""
     return f"10.{port >> 8}.{port & 255}"
 
 
 def main() -> None:
-    """Be the far host until standard input ends."""
+    """Run the remote host until standard input ends."""
     endpoint, module, *words = sys.argv[1:]
     protocol, port = endpoint.partition("/")[0], int(endpoint.rpartition(":")[2])
     set_congestion_control()
     near = _end(f"near{port}", f"{net(port)}.1")
-    _move_out()
+    _enter_namespaces()
     far = _end("far", f"{net(port)}.2")
     _ip("link", "set", "lo", "up")
     command = [sys.executable, "-m", module, f"{protocol}/{net(port)}.1:{port}", *words]
     with subprocess.Popen(command, stdin=subprocess.PIPE, preexec_fn=die_with_parent) as process:
         assert process.stdin is not None
         try:
-            Line(near, far, net(port), process.stdin.fileno()).forward()
+            Link(near, far, net(port), process.stdin.fileno()).forward()
         finally:
             process.kill()
 
 
 def set_congestion_control() -> None:
-    """Let TCP in this network go by loss, as on most hosts; cubic is the machine's own alone."""
+    """Set loss-based TCP congestion control: a new network namespace has no cubic."""
     Path("/proc/sys/net/ipv4/tcp_congestion_control").write_text("reno\n")
 
 
 def die_with_parent() -> None:
-    """Let the kernel kill this process when the one that started it is no more."""
+    """Make the kernel kill this process when its parent ends."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _move_out() -> None:
-    """Leave for a host of its own; the clock is that of children, not of this process."""
-    timed = CLONE_NEWTIME if OFFSETS.exists() else 0  # a kernel without has one clock for all
+def _enter_namespaces() -> None:
+    """Enter the namespaces of the remote host; its clock applies to children only."""
+    timed = CLONE_NEWTIME if OFFSETS.exists() else 0  # older kernels have one clock for all
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET | CLONE_NEWNS | timed):
-        raise OSError(ctypes.get_errno(), "no host of its own")
+        raise OSError(ctypes.get_errno(), "cannot create the remote host's namespaces")
     set_congestion_control()
     if timed:
         OFFSETS.write_text(f"monotonic {AHEAD_S} 0\n")
@@ -147,7 +147,7 @@ def _move_out() -> None:
 
 
 def _end(name: str, address: str) -> int:
-    """Make one end of the cable in the network that this process is in."""
+    """Create one end of the link in the current network namespace."""
     device = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(device, TUNSETIFF, struct.pack("16sH", name.encode(), IFF_TUN | IFF_NO_PI))
     _ip("addr", "add", f"{address}/24", "dev", name)

@@ -1,4 +1,4 @@
-"""How faults are made to what the stack stands on: the driver's network, clocks, disk, memory."""
+"""Fault injectors for the environment: the driver's network, clocks, disk, memory."""
 
 import os
 import select
@@ -11,114 +11,114 @@ from pathlib import Path
 from sim.requests import Wire
 from verification.faults.injectors import hit, pid_of
 from verification.faults.namespaces import MEMORY, step_clock
-from verification.faults.stack_fixture import Lane, until
+from verification.faults.stack_fixture import StackFixture
+from verification.harness.waiting import becomes_true
 
 LET_GO_S = 0.4
-BURST_S = 1.0
 FULL = b"x" * 4096
 MEMORY_MAX = 64 << 20
 
 
-def cable(faults: Wire) -> Callable[[Lane], int]:
-    """Let this happen to the packets between the driver and the robot."""
+def network(faults: Wire) -> Callable[[StackFixture], int]:
+    """Disturb the packets between the driver and the robot."""
 
-    def inject(lane: Lane) -> int:
+    def inject(fixture: StackFixture) -> int:
         at_ns = time.monotonic_ns()
-        lane.cable(faults)
+        fixture.disturb_network(faults)
         return at_ns
 
     return inject
 
 
-def cut_and_let_go(seconds: float) -> Callable[[Lane], int]:
-    """Cut the driver's network; the stick is let go meanwhile. Then comes what has waited."""
+def cut_and_let_go(seconds: float) -> Callable[[StackFixture], int]:
+    """Cut the driver's network and release the stick meanwhile; then deliver what was queued."""
 
-    def inject(lane: Lane) -> int:
+    def inject(fixture: StackFixture) -> int:
         at_ns = time.monotonic_ns()
-        lane.cable(Wire(drop=1.0))
-        time.sleep(LET_GO_S)  # asked for meanwhile: to drive on
-        lane.ask(0.0)
+        fixture.disturb_network(Wire(drop=1.0))
+        time.sleep(LET_GO_S)  # the driver still requests motion
+        fixture.ask(0.0)
         time.sleep(seconds - LET_GO_S)
-        lane.cable(Wire())
+        fixture.disturb_network(Wire())
         return at_ns
 
     return inject
 
 
-def mend_cable(lane: Lane) -> None:
-    """Let the driver's network be well again."""
-    lane.cable(Wire())
-    lane.mend()
+def restore_network(fixture: StackFixture) -> None:
+    """Restore the driver's network."""
+    fixture.disturb_network(Wire())
+    fixture.restore()
 
 
-def step(whose: str, seconds: int) -> Callable[[Lane], int]:
+def step_time_of_day(whose: str, seconds: int) -> Callable[[StackFixture], int]:
     """Step the time of day of the ``robot`` or of the ``driver``."""
 
-    def inject(lane: Lane) -> int:
+    def inject(fixture: StackFixture) -> int:
         at_ns = time.monotonic_ns()
-        step_clock(lane.folder / whose, seconds)
+        step_clock(fixture.folder / whose, seconds)
         return at_ns
 
     return inject
 
 
-def set_clocks_right(lane: Lane) -> None:
-    """Step all clocks back."""
+def restore_clocks(fixture: StackFixture) -> None:
+    """Reset the time of day of both."""
     for whose in ("robot", "driver"):
-        step_clock(lane.folder / whose, 0)
-    lane.mend()
+        step_clock(fixture.folder / whose, 0)
+    fixture.restore()
 
 
-def fill_disk(lane: Lane) -> int:
-    """Fill the disk that the log is on, and hit something: that wants to be logged."""
-    with _ballast(lane).open("wb", buffering=0) as file:
+def fill_disk(fixture: StackFixture) -> int:
+    """Fill the disk of the log, then press the bumper, which has to be logged."""
+    with _ballast(fixture).open("wb", buffering=0) as file:
         try:
             while True:
                 file.write(FULL)
-        except OSError:  # it is full now, but for less than a block
+        except OSError:  # full, except for less than a block
             pass
-    return hit(0.3)(lane)
+    return hit(0.3)(fixture)
 
 
-def empty_disk(lane: Lane) -> None:
-    """Make room on the disk again."""
-    _ballast(lane).unlink()
-    lane.mend()
+def empty_disk(fixture: StackFixture) -> None:
+    """Free the disk."""
+    _ballast(fixture).unlink()
+    fixture.restore()
 
 
-def _ballast(lane: Lane) -> Path:
-    return lane.stack.log.with_name("ballast")
+def _ballast(fixture: StackFixture) -> Path:
+    return fixture.running.log.with_name("ballast")
 
 
-def starve(name: str) -> Callable[[Lane], int]:
-    """Let the kernel kill a part for want of memory, in a group of its own."""
+def starve(name: str) -> Callable[[StackFixture], int]:
+    """Make the kernel kill a process out of memory, in its own memory cgroup."""
 
-    def inject(lane: Lane) -> int:
-        pid = pid_of(lane, name)
+    def inject(fixture: StackFixture) -> int:
+        pid = pid_of(fixture, name)
         group = MEMORY / f"t2-faults-{pid}"
         group.mkdir()
         (group / "memory.limit_in_bytes").write_text(str(MEMORY_MAX))
         Path(f"/proc/{pid}/oom_score_adj").write_text("1000")
         (group / "cgroup.procs").write_text(str(pid))
-        at_ns = _eat_beside(group, pid)
-        until(lambda: not (group / "cgroup.procs").read_text(), 1.0)
+        at_ns = _exhaust_memory(group, pid)
+        becomes_true(lambda: not (group / "cgroup.procs").read_text(), 1.0)
         group.rmdir()
         return at_ns
 
     return inject
 
 
-def _eat_beside(group: Path, pid: int) -> int:
-    """Take all memory of a group until a process of it is dead; return when that was."""
+def _exhaust_memory(group: Path, pid: int) -> int:
+    """Take all memory of a cgroup until its process is dead; return the time of death."""
     hungry = "import os; x = []\nwhile True: x.append(os.urandom(1 << 20))"
-    waiting = os.pidfd_open(pid)
+    victim = os.pidfd_open(pid)
     with subprocess.Popen(
         [sys.executable, "-c", hungry],
         preexec_fn=lambda: (group / "cgroup.procs").write_text(str(os.getpid())),
     ) as eater:
         at_ns = time.monotonic_ns()
-        while not select.select([waiting], [], [], 0.0005)[0]:
-            at_ns = time.monotonic_ns()  # it was alive then
+        while not select.select([victim], [], [], 0.0005)[0]:
+            at_ns = time.monotonic_ns()  # still alive
         eater.kill()
-    os.close(waiting)
+    os.close(victim)
     return at_ns

@@ -1,1 +1,1 @@
-"""A fleet on one machine: real stacks, light robots, one site router, and what they cost it."""
+"""Cost of a fleet on a site router: real stacks and simulated robots on one host."""

@@ -1,4 +1,4 @@
-"""A fleet on paper: what the site's router takes, and what a robot's request takes, against N."""
+"""Plot of a fleet: cost of the site's router and latency of requests over the number of robots."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from verification.faults.table import rank
 from verification.fleet.figures import Window, limits, name, on_the_wire
+from verification.harness.results import percentile
 
 Value = Callable[[Window], float | None]
 
 
 def save(file: Path, windows: Sequence[Window]) -> None:
-    """Draw the windows into a file."""
+    """Write the plot to a file."""
     figure = Figure(figsize=(11, 8), layout="constrained")
     FigureCanvasAgg(figure)
     (cpu, memory), (latency, uplink) = figure.subplots(2, 2)
@@ -24,10 +24,10 @@ def save(file: Path, windows: Sequence[Window]) -> None:
     _lines(uplink, windows, lambda w: on_the_wire(w["real_link"], "up") * 8 / 1000)
     cpu.set_ylabel("site router, % of a core")
     memory.set_ylabel("site router, MB")
-    latency.set_ylabel("request to frame, p99, ms\n(hollow: generator or machine at its end)")
+    latency.set_ylabel("request to frame, p99, ms\n(hollow: generator or machine saturated)")
     latency.set_yscale("log")
     uplink.set_ylabel("uplink of a real robot, kbit/s")
-    cpu.legend(title="looked at", fontsize=8)
+    cpu.legend(title="subscribed", fontsize=8)
     for axes in (cpu, memory, latency, uplink):
         axes.set_xlabel("robots")
         axes.grid(alpha=0.3)
@@ -51,4 +51,4 @@ def _lines(axes: Axes, windows: Sequence[Window], value: Value, marked: bool = F
 
 def _p99(answers: Sequence[float | None]) -> float | None:
     took = [each for each in answers if each is not None]
-    return 1000 * rank(took, 0.99) if took else None
+    return 1000 * percentile(took, 0.99) if took else None

@@ -1,7 +1,7 @@
-"""``python -m verification.fleet.simulated_robot``: many light robots in one process.
+"""``python -m verification.fleet.simulated_robot``: many simulated robots in one process.
 
-Each has a session of its own that dials the site's router as a robot's router does, declares what
-a robot declares, and publishes what a robot publishes. An emergency stop latches it.
+Each has its own session to the site's router with the declarations and the messages of a real
+robot. An emergency stop latches it.
 """
 
 import argparse
@@ -24,26 +24,26 @@ from common.bus.publisher import Publisher
 from common.bus.session import client_config
 from common.messages import Message, SafetyState
 from services.recorder.reader import Reader
-from verification.fleet.child import obey
-from verification.fleet.streams import SERVICES, Stream, schedule, streams, thinning
-from verification.harness.support import at
+from verification.fleet.streams import SERVICES, Stream, downsampling, schedule, streams
+from verification.harness.bus import at
+from verification.harness.child_process import serve
 
 LAP = Path(__file__).parents[2] / "tests/recorder/lap.mcap"
-AT_ONCE = 8  # sessions that are being opened: each takes half a second, and little work
-ASLEEP_S = 0.0005  # a shorter wait is none
-INNER = ("tel/**", "@cmd/motion", "@cmd/drive/*")  # what a robot's services read
+AT_ONCE = 8  # sessions that open in parallel: each takes half a second, mostly waiting
+SLEEP_MIN_S = 0.0005
+INNER = ("tel/**", "@cmd/motion", "@cmd/drive/*")  # what a robot's services subscribe to
 
 
 class Robot:
-    """One of them."""
+    """One simulated robot."""
 
-    def __init__(self, session: zenoh.Session, name: str, all_of_them: Sequence[Stream]) -> None:
+    def __init__(self, session: zenoh.Session, name: str, all_streams: Sequence[Stream]) -> None:
         self.stopped = False
         self._boot = time.monotonic_ns()
-        self._streams = all_of_them
+        self._streams = all_streams
         self._sent: Counter[str] = Counter()
         self._publishers: list[Publisher[Message]] = []
-        for stream in all_of_them:
+        for stream in all_streams:
             key = stream.topic.on(name, **stream.names)
             self._publishers.append(Publisher(stream.topic, key, self._boot, self._sent, 1))
         for service in SERVICES:
@@ -55,7 +55,7 @@ class Robot:
         self._declared = self._declare(session, name)
 
     def put(self, number: int) -> None:
-        """Publish on one of its streams."""
+        """Publish one stream."""
         stream = self._streams[number]
         message = stream.message
         if isinstance(message, SafetyState):
@@ -67,13 +67,13 @@ class Robot:
         def stop(_: zenoh.Sample) -> None:
             self.stopped = True
 
-        far = zenoh.Locality.REMOTE  # its own words stay out of it
+        remote = zenoh.Locality.REMOTE  # ignore its own messages
         tokens = [
             session.liveliness().declare_token(keys.live_key(name, service, f"{self._boot:x}"))
             for service in SERVICES
         ]
         read = [
-            session.declare_subscriber(f"{keys.ROOT}/{name}/{path}", print, allowed_origin=far)
+            session.declare_subscriber(f"{keys.ROOT}/{name}/{path}", print, allowed_origin=remote)
             for path in INNER
         ]
         answered = [call.on(name) for call in keys.CALLS]
@@ -89,7 +89,7 @@ class Robot:
 
 
 def config(site: str, shape: str, thin: list[dict[str, object]]) -> zenoh.Config:
-    """Return how one dials the site's: as a peer, which robots do, as a router, or a client."""
+    """Return the configuration of a session to the site: peer (as robots), router or client."""
     made = client_config(at(site))
     made.insert_json5("mode", json.dumps(shape))
     made.insert_json5("listen/endpoints", "[]")
@@ -101,40 +101,40 @@ def config(site: str, shape: str, thin: list[dict[str, object]]) -> zenoh.Config
 
 
 def recorded() -> list[Stream]:
-    """Return a robot's streams, from the recording that the tests keep."""
+    """Return a robot's streams from the recording in the tests."""
     with Reader(LAP) as reader:
         return streams(itertools.takewhile(lambda row: not latched(row[1]), rows(reader)))
 
 
 def rows(reader: Reader) -> Iterator[tuple[str, Message, bytes | None]]:
-    """Yield path, message and frame of what was recorded."""
+    """Yield path, message and frame of each recorded message."""
     for entry in reader:
         if (message := entry.message) is not None:
             yield entry.key.split("/", 3)[3], message, entry.sample.raw
 
 
 def latched(message: Message) -> bool:
-    """Tell whether the lap ends here."""
+    """Return whether safety latched, which ends the usable part of the lap."""
     return isinstance(message, SafetyState) and bool(message.latched)
 
 
-class Crowd:
-    """Publishes for all of them, and counts."""
+class Generator:
+    """Publishes for all simulated robots, and counts."""
 
-    def __init__(self, robots: Sequence[Robot], all_of_them: Sequence[Stream]) -> None:
+    def __init__(self, robots: Sequence[Robot], all_streams: Sequence[Stream]) -> None:
         self.left = threading.Event()
         self._robots = robots
-        self._slots = schedule(all_of_them, len(robots))
+        self._slots = schedule(all_streams, len(robots))
         self._sent = 0
         self._late_s: list[float] = []
 
     def run(self) -> None:
-        """Publish what is due until told to leave; what is late is sent all the same."""
+        """Publish all due messages, also late ones, until ``left`` is set."""
         begin_s, second = time.monotonic(), 0
         while not self.left.is_set():
             for at_s, robot, number in self._slots:
                 wait_s = begin_s + second + at_s - time.monotonic()
-                if wait_s > ASLEEP_S:
+                if wait_s > SLEEP_MIN_S:
                     time.sleep(wait_s)
                 self._robots[robot].put(number)
                 self._sent += 1
@@ -146,7 +146,7 @@ class Crowd:
         self._since_s = time.monotonic()
 
     def end(self) -> object:
-        """Tell the rate, what it should be, and how late it was."""
+        """Return the rate, the intended rate and the lateness."""
         past_s = time.monotonic() - self._since_s
         return {
             "hz": self._sent / past_s,
@@ -157,26 +157,26 @@ class Crowd:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Be these robots until standard input ends."""
+    """Run the robots until standard input ends."""
     options = arguments().parse_args(argv)
-    all_of_them = recorded()
+    all_streams = recorded()
     with contextlib.ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(AT_ONCE))
 
         def opened(name: str) -> Robot:
-            thin = thinning(name, all_of_them, options.thin) if options.thin else []
+            thin = downsampling(name, all_streams, options.thin) if options.thin else []
             session = stack.enter_context(zenoh.open(config(options.site, options.shape, thin)))
-            return Robot(session, name, all_of_them)
+            return Robot(session, name, all_streams)
 
         robots = list(pool.map(opened, options.names))
-        crowd = Crowd(robots, all_of_them)
-        crowd.begin()
-        obey(crowd.begin, crowd.end, crowd.left.set)
-        crowd.run()
+        generator = Generator(robots, all_streams)
+        generator.begin()
+        serve(generator.begin, generator.end, generator.left.set)
+        generator.run()
 
 
 def arguments() -> argparse.ArgumentParser:
-    """Return what the command line may say."""
+    """Return the argument parser."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("site", help="the site's router")
     parser.add_argument("names", nargs="+")

@@ -1,6 +1,6 @@
-"""``python -m verification.fleet.source ENDPOINT ROBOT``: requests, each with another speed.
+"""``python -m verification.fleet.source ENDPOINT ROBOT``: motion requests with varying speed.
 
-So the frame at the board that answers a request is known by its speed.
+The speed identifies the frame at the board that answers a request.
 """
 
 import sys
@@ -11,36 +11,39 @@ from common.loop import Loop
 from common.messages import SafetyState
 from common.operator import reset_request
 from common.source import DriveSource
-from verification.fleet.child import obey
-from verification.fleet.figures import Asked
-from verification.harness.support import at
+from verification.fleet.figures import Request
+from verification.harness.bus import at
+from verification.harness.child_process import serve
 
 PERIOD_S = 0.05
 SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20
 
 
-class Hand:
-    """Asks 20 times a second; with zeros, and for a reset, while safety will not have it."""
+class RequestSource:
+    """Requests motion 20 times a second; zero and a reset while safety refuses motion."""
 
     def __init__(self, loop: Loop, bus: Bus) -> None:
-        self.asked: list[Asked] = []
+        self.requests: list[Request] = []
         self._bus = bus
         self._source = DriveSource(bus, "teleop")
         self._state: SafetyState | None = None
         self._number = 0
         self._refused = 0
-        bus.subscribe(keys.SAFETY, self._hear)
-        loop.every(PERIOD_S, self._ask)
+        bus.subscribe(keys.SAFETY, self._on_safety)
+        loop.every(PERIOD_S, self._request)
 
     def begin(self) -> None:
-        self.asked.clear()
+        self.requests.clear()
         self._refused = 0
 
     def end(self) -> object:
-        """Tell what was asked, and how often it could not be."""
-        return {"asked": [(a.mono_ns, a.linear) for a in self.asked], "refused": self._refused}
+        """Return the requests, and how often motion was refused."""
+        return {
+            "requests": [(a.mono_ns, a.linear) for a in self.requests],
+            "refused": self._refused,
+        }
 
-    def _ask(self, _: int) -> None:
+    def _request(self, _: int) -> None:
         if self._state is None or self._state.verdict not in ("run", "slow"):
             self._refused += 1
             if self._state is not None and self._state.latched and self._refused % 10 == 0:
@@ -51,10 +54,10 @@ class Hand:
         self._number += 1
         linear = round(SLOW_MPS + STEP_MPS * (self._number % STEPS), 3)
         drive = self._source.ask(linear, 0.0)
-        if self._number % STEPS:  # the step down takes its time
-            self.asked.append(Asked(drive.mono_ns, linear))
+        if self._number % STEPS:  # the large step down is ramped
+            self.requests.append(Request(drive.mono_ns, linear))
 
-    def _hear(self, arrival: Arrival[SafetyState]) -> None:
+    def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
         self._state = arrival.message
 
 
@@ -63,9 +66,9 @@ def main() -> None:
     endpoint, robot = sys.argv[1:]
     loop = Loop()
     bus = Bus(at(endpoint), robot, loop.post)
-    hand = Hand(loop, bus)
+    source = RequestSource(loop, bus)
     bus.open()
-    obey(lambda: loop.post(hand.begin), hand.end, loop.stop)
+    serve(lambda: loop.post(source.begin), source.end, loop.stop)
     loop.run()
     bus.close()
 

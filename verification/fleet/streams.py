@@ -1,6 +1,6 @@
-"""What a robot publishes, as it was recorded on a lap: real sizes, at the shipped rates. Pure.
+"""Streams of a robot, recorded on a lap: real sizes, shipped rates. Pure.
 
-Health is not in that recording and is made up, with the histograms of a bridge that has driven.
+The recording has no health messages: they are made up, with full histograms of a bridge.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,7 +12,7 @@ from common.messages import Durations, Health, Message, Timing
 from services.bridge.timing import BOUNDS_NS, REACTIONS
 
 SERVICES = ("bridge", "safety", "odom", "recorder")
-UPWARD = "tel/"  # what a site may look at; commands stay on the robot
+UPWARD = "tel/"  # what a site receives; commands stay on the robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Stream:
 
     topic: Topic[Message]
     message: Message
-    raw: bytes | None = None  # the board's frame that goes with it
+    raw: bytes | None = None  # the attached frame of the board
     names: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -31,7 +31,7 @@ class Stream:
 
 
 def streams(recorded: Iterable[tuple[str, Message, bytes | None]]) -> list[Stream]:
-    """Return a robot's streams: of each path recorded the last message, and each one's health."""
+    """Return a robot's streams: the last recorded message of each path, and health messages."""
     last = {path: (message, raw) for path, message, raw in recorded}
     made = [
         Stream(topic, *last[topic.path.format(**names)], names)
@@ -45,19 +45,19 @@ def streams(recorded: Iterable[tuple[str, Message, bytes | None]]) -> list[Strea
     ]
 
 
-def schedule(all_of_them: Sequence[Stream], robots: int) -> list[tuple[float, int, int]]:
-    """Return a second of all robots: when, which robot, which stream; evenly spread."""
+def schedule(all_streams: Sequence[Stream], robots: int) -> list[tuple[float, int, int]]:
+    """Return one second of all robots: time, robot, stream; evenly spread."""
     slots = []
     for robot in range(robots):
-        for number, stream in enumerate(all_of_them):
-            shift = (robot / robots + number / len(all_of_them)) % 1.0
+        for number, stream in enumerate(all_streams):
+            shift = (robot / robots + number / len(all_streams)) % 1.0
             rate = round(stream.topic.rate_hz)
             slots += [((n + shift) / rate, robot, number) for n in range(rate)]
     return sorted(slots)
 
 
 def health(service: str, made: Sequence[Stream]) -> Health:
-    """Return what a service tells of itself once a second."""
+    """Return a health message."""
     rates = {stream.topic.on("berlin-001", **stream.names): 50.123456 for stream in made}
     return Health(
         service=service, version="0.1.0", uptime=12_345.6, lateness=0.0012, rss=45_000_000,
@@ -78,14 +78,16 @@ def histograms() -> Timing:
     )
 
 
-def thinning(robot: str, all_of_them: Sequence[Stream], most_hz: float) -> list[dict[str, object]]:
-    """Return Zenoh's downsampling of a robot's uplink: each stream at most so often.
+def downsampling(
+    robot: str, all_streams: Sequence[Stream], most_hz: float
+) -> list[dict[str, object]]:
+    """Return Zenoh's downsampling rules of a robot's uplink.
 
-    Zenoh keeps one clock for each rule, so each key wants a rule of its own.
+    Zenoh keeps one timer for each rule, so each key needs its own rule.
     """
     rules = [
         {"key_expr": stream.topic.on(robot, **stream.names), "freq": most_hz}
-        for stream in all_of_them
+        for stream in all_streams
         if stream.topic.rate_hz > most_hz
     ]
     return [{"id": "uplink", "flows": ["egress"], "messages": ["put"], "rules": rules}]

@@ -1,4 +1,4 @@
-"""``python -m verification.fleet.subscriber SITE WHAT``: count what a site's consumer receives."""
+"""``python -m verification.fleet.subscriber SITE WHAT``: count messages at a site."""
 
 import sys
 import threading
@@ -11,22 +11,22 @@ import zenoh
 from common import keys
 from common.bus.session import client_config
 from common.messages import Message
-from verification.fleet.child import obey
-from verification.harness.support import at
+from verification.harness.bus import at
+from verification.harness.child_process import serve
 
-# What somebody at the site looks at.
-WORDS = {
-    "nobody": (),
+# Key expressions of each subscription at the site.
+PATHS = {
+    "nothing": (),
     "overview": (keys.SAFETY.path, keys.LINK.path, "evt/*"),
     "everything": ("tel/**", "evt/*"),
 }
-EVERY = 5  # of how many messages one is asked how old it is
+AGE_EVERY = 5  # the age of every n-th message is recorded
 
 _decoder = msgspec.msgpack.Decoder(Message)
 
 
-class Ear:
-    """Counts messages, bytes, losses and ages; in Zenoh's thread, so that nothing waits."""
+class MessageCounter:
+    """Counts messages, bytes, losses and ages, in Zenoh's thread."""
 
     def __init__(self) -> None:
         self._newest: dict[str, int] = {}
@@ -39,7 +39,7 @@ class Ear:
         self._since_s = time.monotonic()
 
     def take(self, sample: zenoh.Sample) -> None:
-        """Take one in."""
+        """Count one message."""
         payload = sample.payload.to_bytes()
         head = _decoder.decode(payload)
         key = str(sample.key_expr)
@@ -49,11 +49,11 @@ class Ear:
         before = self._newest.get(key, head.seq - 1)
         self._lost += max(0, head.seq - before - 1)
         self._newest[key] = head.seq
-        if self._count % EVERY == 0:
+        if self._count % AGE_EVERY == 0:
             self._ages_s.append((time.monotonic_ns() - head.mono_ns) / 1e9)
 
     def end(self) -> object:
-        """Tell it; ``lost`` holds what was thinned out on purpose, too."""
+        """Return the counts; ``lost`` includes messages that downsampling dropped."""
         past_s = time.monotonic() - self._since_s
         robots = Counter(key.split("/")[2] for key in self._keys)
         return {
@@ -66,14 +66,15 @@ class Ear:
 
 
 def main() -> None:
-    """Listen until standard input ends."""
+    """Count until standard input ends."""
     site, what = sys.argv[1:]
-    ear, left = Ear(), threading.Event()
+    counter, left = MessageCounter(), threading.Event()
     with zenoh.open(client_config(at(site))) as session:
         declared = [
-            session.declare_subscriber(f"{keys.ROOT}/*/{word}", ear.take) for word in WORDS[what]
+            session.declare_subscriber(f"{keys.ROOT}/*/{path}", counter.take)
+            for path in PATHS[what]
         ]
-        obey(ear.begin, ear.end, left.set)
+        serve(counter.begin, counter.end, left.set)
         left.wait()
         for each in declared:
             each.undeclare()

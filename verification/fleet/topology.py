@@ -1,4 +1,4 @@
-"""The ground that a fleet is measured on: a site's router, real stacks, light robots."""
+"""The measured fleet: a site's router, real stacks and simulated robots."""
 
 import contextlib
 import time
@@ -6,37 +6,42 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from verification.faults.frames import Frames
 from verification.faults.stack_fixture import QUICK
-from verification.fleet.child import Part
-from verification.fleet.figures import Asked, Window, answers_s
-from verification.fleet.gauges import Machine, Used, links, machine, since, used
-from verification.harness.stack import Chain, chain
-from verification.harness.support import free_port, router_process
+from verification.fleet.figures import Request, Window, answers_s
+from verification.fleet.resource_usage import Usage, connections, since, usage
+from verification.harness.bus import router_process
+from verification.harness.child_process import ChildProcess
+from verification.harness.ports import free_port
+from verification.harness.process_stats import Machine, machine
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.trace import TraceFollower
 
-SETTLE_S = 3.0  # until declarations are known and queues are empty
+SETTLE_S = 3.0  # until declarations have arrived and queues are empty
 ANSWER_S = 1.0  # until the last request is answered
 REAL = 2
 
 
 @dataclass
-class Ground:
-    """What runs."""
+class Fleet:
+    """Running processes of the fleet."""
 
     site: str
     site_pid: int
-    stacks: list[Chain] = field(default_factory=list)
-    light: Part | None = None
-    light_count: int = 0
+    stacks: list[RunningStack] = field(default_factory=list)
+    simulated: ChildProcess | None = None
+    simulated_count: int = 0
 
     @property
     def port(self) -> int:
-        """The site router's."""
+        """Port of the site router."""
         return int(self.site.rpartition(":")[2])
 
     def pids(self) -> dict[str, list[int]]:
-        """Return who runs, by what it is."""
-        mine = {"site": [self.site_pid], "light": [self.light.pid] if self.light else []}
+        """Return the pids by name."""
+        mine = {
+            "site": [self.site_pid],
+            "simulated": [self.simulated.pid] if self.simulated else [],
+        }
         for number, stack in enumerate(self.stacks):
             processes = {name: [it.pid] for name, it in stack.processes.items()}
             mine[f"router {number}"] = processes.pop("router")
@@ -45,109 +50,112 @@ class Ground:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """All gauges at one moment."""
+class Snapshot:
+    """Resource usage at one moment."""
 
     at_s: float
-    used: dict[str, Used]
+    used: dict[str, Usage]
     machine: Machine
     links: dict[int, dict[str, int]]
 
 
-def read(ground: Ground, others: dict[str, list[int]]) -> Reading:
-    """Read them."""
-    pids = ground.pids() | others
-    return Reading(
+def snapshot(fleet: Fleet, others: dict[str, list[int]]) -> Snapshot:
+    """Take a snapshot."""
+    pids = fleet.pids() | others
+    return Snapshot(
         time.monotonic(),
-        {who: used(each) for who, each in pids.items()},
+        {who: usage(each) for who, each in pids.items()},
         machine(),
-        links(ground.port),
+        connections(fleet.port),
     )
 
 
 @contextlib.contextmanager
-def site() -> Iterator[Ground]:
-    """Run the site's router while the context lasts."""
+def site() -> Iterator[Fleet]:
+    """Run the site's router."""
     where = f"tcp/127.0.0.1:{free_port()}"
     with router_process(where) as process:
-        yield Ground(where, process.pid)
+        yield Fleet(where, process.pid)
 
 
 @contextlib.contextmanager
-def stack(ground: Ground, folder: Path) -> Iterator[Chain]:
-    """Run a real robot, whose own router dials the site's, while the context lasts."""
-    number = len(ground.stacks)
-    room = folder / f"robot{number}"
-    room.mkdir(parents=True)
-    sets = [f"robot.id={robot(number)}", f"bus.uplink={ground.site}", *QUICK]
-    with chain(room, sets=sets, shipped=True) as made:
-        ground.stacks.append(made)
+def stack(fleet: Fleet, folder: Path) -> Iterator[RunningStack]:
+    """Run a real robot, whose router connects to the site's router."""
+    number = len(fleet.stacks)
+    stack_folder = folder / f"robot{number}"
+    stack_folder.mkdir(parents=True)
+    sets = [f"robot.id={robot(number)}", f"bus.uplink={fleet.site}", *QUICK]
+    with running_stack(stack_folder, sets=sets, shipped=True) as made:
+        fleet.stacks.append(made)
         try:
             yield made
         finally:
-            ground.stacks.remove(made)
+            fleet.stacks.remove(made)
 
 
 @contextlib.contextmanager
-def crowd(ground: Ground, robots: int, shape: str, thin: float) -> Iterator[None]:
-    """Let light robots make up the number while the context lasts."""
-    names = [robot(number) for number in range(len(ground.stacks), robots)]
+def simulated_robots(fleet: Fleet, robots: int, shape: str, thin: float) -> Iterator[None]:
+    """Run simulated robots for the rest of this number."""
+    names = [robot(number) for number in range(len(fleet.stacks), robots)]
     if not names:
         yield
         return
     words = [
         "verification.fleet.simulated_robot",
-        ground.site,
+        fleet.site,
         *names,
         "--shape",
         shape,
         "--thin",
         str(thin),
     ]
-    with Part(*words) as part:
-        ground.light, ground.light_count = part, len(names)
+    with ChildProcess(*words) as part:
+        fleet.simulated, fleet.simulated_count = part, len(names)
         try:
             yield
         finally:
-            ground.light, ground.light_count = None, 0
+            fleet.simulated, fleet.simulated_count = None, 0
 
 
 def robot(number: int) -> str:
-    """Return the name of a robot, from 0 on."""
+    """Return the name of a robot, numbered from 0."""
     return f"berlin-{number + 1:03d}"
 
 
-def window(ground: Ground, what: str, seconds: float, endpoint: str) -> Window:
-    """Measure for so long while somebody looks at this and one real robot is driven."""
-    frames = Frames(ground.stacks[0].trace_file)
-    hand_words = ("verification.fleet.source", endpoint, robot(0))
-    with Part("verification.fleet.subscriber", ground.site, what) as ear, Part(*hand_words) as hand:
+def window(fleet: Fleet, what: str, seconds: float, endpoint: str) -> Window:
+    """Measure with this subscription while one real robot is driven."""
+    frames = TraceFollower(fleet.stacks[0].trace_file)
+    source_words = ("verification.fleet.source", endpoint, robot(0))
+    with (
+        ChildProcess("verification.fleet.subscriber", fleet.site, what) as subscriber,
+        ChildProcess(*source_words) as source,
+    ):
         time.sleep(SETTLE_S)
-        parts = [part for part in (ground.light, ear, hand) if part]
-        others = {"ear": [ear.pid], "hand": [hand.pid]}
+        parts = [part for part in (fleet.simulated, subscriber, source) if part]
+        others = {"subscriber": [subscriber.pid], "source": [source.pid]}
         for part in parts:
             part.begin()
         frames.follow().forget()
-        before = read(ground, others)
+        before = snapshot(fleet, others)
         time.sleep(seconds)
-        after = read(ground, others)
-        told = [part.end() for part in parts]
+        after = snapshot(fleet, others)
+        counts = [part.end() for part in parts]
         time.sleep(ANSWER_S)
         commands = frames.follow().commands
-    light = told[0] | {"robots": ground.light_count} if ground.light else None
-    asked = [Asked(*each) for each in told[-1]["asked"]]
+    simulated = counts[0] | {"robots": fleet.simulated_count} if fleet.simulated else None
+    requests = [Request(*each) for each in counts[-1]["requests"]]
     return {
-        "robots": len(ground.stacks) + ground.light_count,
+        "robots": len(fleet.stacks) + fleet.simulated_count,
         "what": what,
-        "light": light,
-        "ear": told[-2],
-        "refused": told[-1]["refused"],
-        "answers_s": answers_s(asked, commands),
-    } | gauged(ground, before, after)
+        "simulated": simulated,
+        "subscriber": counts[-2],
+        "refused": counts[-1]["refused"],
+        "answers_s": answers_s(requests, commands),
+    } | usage_of(fleet, before, after)
 
 
-def gauged(ground: Ground, before: Reading, after: Reading) -> Window:
-    """Return what the gauges tell of the time between two readings."""
+def usage_of(fleet: Fleet, before: Snapshot, after: Snapshot) -> Window:
+    """Return the usage between two snapshots."""
     past_s = after.at_s - before.at_s
     parts = {
         who: {"cpu": (now.cpu_s - before.used[who].cpu_s) / past_s, "rss": now.rss}
@@ -156,9 +164,9 @@ def gauged(ground: Ground, before: Reading, after: Reading) -> Window:
     mine_s = past_s * sum(part["cpu"] for part in parts.values())
     whole = [getattr(after.machine, f) - getattr(before.machine, f) for f in FIELDS]
     rates = {pid: since(now, before.links.get(pid, {}), past_s) for pid, now in after.links.items()}
-    light = rates.get(ground.light.pid) if ground.light else None
-    count = ground.light_count
-    router = ground.stacks[0].processes["router"].pid
+    simulated = rates.get(fleet.simulated.pid) if fleet.simulated else None
+    count = fleet.simulated_count
+    router = fleet.stacks[0].processes["router"].pid
     return {
         "site": parts["site"],
         "parts": parts,
@@ -169,8 +177,10 @@ def gauged(ground: Ground, before: Reading, after: Reading) -> Window:
         },
         "real_link": rates[router],
         "real_total": after.links[router],
-        "light_total": _each(after.links.get(ground.light.pid), count) if ground.light else None,
-        "light_link": _each(light, count),
+        "simulated_total": _each(after.links.get(fleet.simulated.pid), count)
+        if fleet.simulated
+        else None,
+        "simulated_link": _each(simulated, count),
     }
 
 

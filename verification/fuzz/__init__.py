@@ -1,1 +1,1 @@
-"""Hostile bytes for all that reads bytes from outside: frames, messages, settings."""
+"""Fuzzing of all parsers of external input: frames, messages, settings."""

@@ -1,7 +1,7 @@
-"""``python -m verification.fuzz``: fuzz each target for so many seconds, guided by what it reaches.
+"""``python -m verification.fuzz``: coverage-guided fuzzing of each target.
 
-Each target runs in a process of its own, because libFuzzer ends the process that it runs in. A
-finding is written to ``out/fuzz``; once it is mended, it belongs into ``verification/fuzz/corpus``.
+Each target runs in its own process, because libFuzzer ends its process. A finding is written to
+``out/fuzz``; after the fix it belongs into ``verification/fuzz/corpus``.
 """
 
 import argparse
@@ -13,16 +13,16 @@ from pathlib import Path
 from random import Random
 
 OUT = Path("out") / "fuzz"
-INSTRUMENTED = ["common", "tomllib", "cli", "services", "sim"]  # before anything imports them
+INSTRUMENTED = ["common", "tomllib", "cli", "services", "sim"]  # before they are imported
 TARGETS = ("frames", "messages", "toml", "environ", "sets")
-LONGEST = 4096  # bytes of an input: more than any datagram of the board and any message of ours
+LONGEST = 4096  # bytes of an input: longer than all datagrams and messages
 
 
 def main() -> int:
-    """Fuzz one target, or all of them; 0 when nothing was found."""
+    """Fuzz one target or all; return 0 without a finding."""
     parser = argparse.ArgumentParser(prog="python -m verification.fuzz", description=__doc__)
-    parser.add_argument("--seconds", type=int, default=60, help="for each target")
-    parser.add_argument("target", nargs="?", choices=TARGETS, help="all of them when left out")
+    parser.add_argument("--seconds", type=int, default=60, help="duration of each target, 60")
+    parser.add_argument("target", nargs="?", choices=TARGETS, help="default: all")
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.here:
@@ -37,7 +37,7 @@ def main() -> int:
 
 
 def absent() -> str:
-    """Say why this Python cannot fuzz."""
+    """Return why fuzzing is not available."""
     return (
         f"atheris is not installed, and this is Python {platform.python_version()} on "
         f"{platform.system()} {platform.machine()}. Its wheels are for Linux on x86_64, Python "
@@ -46,7 +46,7 @@ def absent() -> str:
 
 
 def run(target: str, seconds: int) -> int:
-    """Fuzz a target in a process of its own and print a line about it; 1 for a finding."""
+    """Fuzz a target in its own process and print a summary; return 1 for a finding."""
     (OUT / target).mkdir(parents=True, exist_ok=True)
     log = OUT / target / "log.txt"
     command = [sys.executable, "-m", "verification.fuzz", target, f"--seconds={seconds}", "--here"]
@@ -55,14 +55,14 @@ def run(target: str, seconds: int) -> int:
     text = log.read_text(errors="replace")
     executed = re.search(r"number_of_executed_units: *(\d+)", text)
     reached = re.findall(r"cov: (\d+) ft: \d+ corp: (\d+)", text)
-    told = f"{int(executed[1]):>9} executions" if executed else "no statistics"
+    summary = f"{int(executed[1]):>9} executions" if executed else "no statistics"
     more = f", {reached[-1][0]} points reached by {reached[-1][1]} inputs" if reached else ""
-    print(f"{target:9}{told}{more}: {'nothing found' if code == 0 else f'FOUND, see {log}'}")
+    print(f"{target:9}{summary}{more}: {'nothing found' if code == 0 else f'FOUND, see {log}'}")
     return min(code, 1) if code >= 0 else 1
 
 
 def fuzz(target: str, seconds: int) -> None:
-    """Fuzz in this process, which ends with it."""
+    """Fuzz in this process, which libFuzzer ends."""
     import atheris
 
     with atheris.instrument_imports(include=INSTRUMENTED):
@@ -80,7 +80,7 @@ def fuzz(target: str, seconds: int) -> None:
     def mutate(raw: bytes, max_size: int, seed: int) -> bytes:
         random = Random(seed)
         if random.random() < 0.5:
-            raw = mutation.nearly_right(raws, random)[:max_size]
+            raw = mutation.mutated(raws, random)[:max_size]
         damaged: bytes = atheris.Mutate(raw, max_size) if random.random() < 0.5 else raw
         return damaged
 

@@ -1,7 +1,7 @@
-"""Where fuzzing begins: real frames, one of each message, settings as people write them.
+"""Seeds of the fuzzer: real frames, one of each message, typical settings.
 
-Beside these, ``corpus/`` holds inputs that were found: those that reach what no seed reaches, and
-those that once were a finding, which are named for it.
+``corpus/`` has further inputs: some with additional coverage, and earlier findings, which have
+names.
 """
 
 import json
@@ -95,7 +95,7 @@ TOML = (
 
 
 def seeds(target: str) -> Iterator[bytes]:
-    """Yield what is known for a target, without ``corpus/``."""
+    """Yield the seeds of a target, without ``corpus/``."""
     yield b""
     yield from {
         "frames": _frames, "messages": _messages, "toml": _toml, "environ": _environ, "sets": _sets,

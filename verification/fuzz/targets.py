@@ -1,7 +1,7 @@
-"""What is fuzzed, and what must hold whatever the bytes are.
+"""Fuzz targets, and the properties that hold for all inputs.
 
-A target takes bytes and returns. The declared error of its part is an allowed outcome; any other
-exception, and any property that does not hold, is a finding and leaves the target.
+The declared error of a parser is an allowed outcome. Any other exception, and any violated
+property, is a finding.
 """
 
 import math
@@ -34,15 +34,15 @@ KINDS: tuple[type[Struct], ...] = tuple(
         ]
     )
 )
-SEPARATOR = b"\0"  # as in an argument list and an environment, which cannot hold it
+SEPARATOR = b"\0"  # cannot occur in arguments and environment variables
 
 
 def frames(data: bytes) -> None:
-    """Read a datagram; the first byte picks the sender and what its CRC covers."""
+    """Read a datagram; the first byte selects the sender and the range of the CRC."""
     framing, kinds = FRAMINGS[data[0] % len(FRAMINGS) if data else 0]
     datagram = data[1:]
     parts = framing.read(datagram, kinds)
-    assert b"".join(part.raw for part in parts) == datagram, "bytes were lost or made up"
+    assert b"".join(part.raw for part in parts) == datagram, "bytes were lost or added"
     for part in parts:
         if isinstance(part, Received):
             (again,) = framing.read(framing.pack(part.frame), kinds)
@@ -51,32 +51,32 @@ def frames(data: bytes) -> None:
 
 
 def messages(data: bytes) -> None:
-    """Decode a message or request; the first byte picks which."""
+    """Decode a message or request; the first byte selects its type."""
     kind = KINDS[data[0] % len(KINDS) if data else 0]
     try:
         message = decode(data[1:], kind)
     except MessageError as error:
-        _told(error, kind.__name__)
+        _check_error(error, kind.__name__)
         return
     assert type(message) is kind
     sent = encode(message)
-    assert encode(decode(sent, kind)) == sent, "what goes out does not come back"
+    assert encode(decode(sent, kind)) == sent, "encoding and decoding differ"
 
 
 def toml(data: bytes) -> None:
-    """Read a file of settings."""
+    """Read a settings file."""
     SCRATCH.write_bytes(data)
     _settings((SCRATCH,), {}, ())
 
 
 def environ(data: bytes) -> None:
-    """Read settings from an environment: ``BOARD__PORT=1``, each with our prefix before it."""
+    """Read settings from an environment: ``BOARD__PORT=1``, with the prefix ``T2__``."""
     pairs = (os.fsdecode(part).partition("=") for part in data.split(SEPARATOR))
     _settings((), {f"T2__{name}": value for name, _, value in pairs}, ())
 
 
 def sets(data: bytes) -> None:
-    """Read settings from the command line: the words that follow ``--set``."""
+    """Read settings from the command line: the arguments of ``--set``."""
     _settings((), {}, [os.fsdecode(part) for part in data.split(SEPARATOR)])
 
 
@@ -84,14 +84,14 @@ def _settings(files: Sequence[Path], given: Mapping[str, str], words: Sequence[s
     try:
         loaded = load(Everything, Sources(files, given, words))
     except ConfigError as error:
-        _told(error, ": ")
+        _check_error(error, ": ")
         return
-    strange = [(path, value) for path, value in flatten(loaded.config) if not _finite(value)]
-    assert not strange, f"settings that are no numbers: {strange}"
+    non_finite = [(path, value) for path, value in flatten(loaded.config) if not _finite(value)]
+    assert not non_finite, f"non-finite settings: {non_finite}"
 
 
-def _told(error: RobotError, words: str) -> None:
-    """A refusal names what is wrong."""
+def _check_error(error: RobotError, words: str) -> None:
+    """Check that the error names its subject."""
     assert words in str(error), error
 
 

@@ -1,4 +1,4 @@
-"""A site with keys of its own, for tests that need certificates: made by ``t2 keys`` itself."""
+"""A site with a CA and certificates, issued by ``t2 keys``."""
 
 import contextlib
 from collections.abc import Iterator
@@ -11,13 +11,13 @@ from cli.keys.access import access_control
 from common import members
 from common.bus.session import router
 from common.settings import BusSettings
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
 
 ADDRESS = "127.0.0.1"
 
 
 class Site:
-    """A CA in a folder, and whom it has let in."""
+    """A CA and its members in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -28,7 +28,7 @@ class Site:
         assert main(["keys", *words, "--folder", str(self.folder)]) == 0
 
     def member(self, role: str, name: str, *options: str) -> BusSettings:
-        """Issue a certificate, and return the settings that use it; they dial nothing yet."""
+        """Issue a certificate, and return the settings that use it; without an endpoint."""
         self.keys("issue", role, name, *options)
         return self.settings(role, name)
 
@@ -44,7 +44,7 @@ class Site:
 
     @contextlib.contextmanager
     def router(self, of: BusSettings, *uplink: str) -> Iterator[tuple[str, str]]:
-        """Run a router with this certificate; yield its TLS endpoint, and the one for its board."""
+        """Run a router with this certificate; yield its TLS and its local endpoint."""
         secured = f"tls/{ADDRESS}:{free_port()}"
         onboard = f"unixsock-stream/{self.folder}/bus-{free_port()}.sock"
         where = msgspec.structs.replace(of, listen=(secured, onboard), uplink=uplink)
@@ -53,6 +53,6 @@ class Site:
             yield secured, onboard
 
 
-def dialling(member: BusSettings, endpoint: str) -> BusSettings:
-    """Return the settings of a member that dials an endpoint."""
+def connecting(member: BusSettings, endpoint: str) -> BusSettings:
+    """Return the settings of a member that connects to an endpoint."""
     return msgspec.structs.replace(member, connect=(endpoint,))

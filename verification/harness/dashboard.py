@@ -1,4 +1,4 @@
-"""The dashboard as a process of its own, and a viewer without a browser."""
+"""The dashboard as a process, and a viewer without a browser."""
 
 import contextlib
 import json
@@ -15,7 +15,9 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from verification.harness.support import PATIENCE_S, free_port, wait_until
+from verification.harness.bus import set_options
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 @dataclass
@@ -33,7 +35,7 @@ class Site:
         return f"{'https' if self.tls else 'http'}://127.0.0.1:{self.port}/"
 
     def start(self) -> None:
-        """Start it, and wait until it serves."""
+        """Start the process, and wait until it serves."""
         with self.log.open("ab") as output:
             self.process = subprocess.Popen(self.command, stdout=output, stderr=output)
         wait_until(self.serves, f"the page; {self.log}", 2 * PATIENCE_S)
@@ -44,12 +46,12 @@ class Site:
             with urllib.request.urlopen(self.url, timeout=5, context=self.tls) as answer:
                 return bool(answer.status == 200)
         except urllib.error.HTTPError as error:
-            return error.code == 401  # it asks for a token
+            return error.code == 401  # it requires a token
         except OSError:
             return False
 
     def end(self) -> None:
-        """End it as an operator does; whatever hangs is killed."""
+        """Terminate the process; kill it when it hangs."""
         self.process.terminate()
         try:
             self.process.wait(PATIENCE_S)
@@ -65,11 +67,10 @@ class Site:
 def dashboard(
     endpoint: str, folder: Path, *sets: str, tls: ssl.SSLContext | None = None
 ) -> Iterator[Site]:
-    """Run a dashboard on a free port while the context lasts."""
+    """Run a dashboard on a free port."""
     port = free_port()
     given = [f"bus.connect={endpoint}", f"dashboard.port={port}", "log.format=json", *sets]
-    words = [word for one in given for word in ("--set", one)]
-    command = [sys.executable, "-m", "services.dashboard", *words]
+    command = [sys.executable, "-m", "services.dashboard", *set_options(*given)]
     site = Site(command, port, folder / "dashboard.log", None, tls)  # type: ignore[arg-type]
     site.start()
     try:
@@ -78,8 +79,8 @@ def dashboard(
         site.end()
 
 
-class Eye:
-    """A viewer: the newest word of each kind that it was sent."""
+class Viewer:
+    """A viewer: stores the newest message of each kind."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -89,33 +90,33 @@ class Eye:
         self.socket.send(json.dumps({"k": k, **fields}))
 
     def look(self) -> dict[str, Any]:
-        """Wait for the next picture."""
+        """Wait for the next snapshot."""
         while True:
-            word = json.loads(self.socket.recv(timeout=PATIENCE_S))
-            self.seen[word["k"]] = word
-            if word["k"] == "now":
-                return dict(word)
+            message = json.loads(self.socket.recv(timeout=PATIENCE_S))
+            self.seen[message["k"]] = message
+            if message["k"] == "now":
+                return dict(message)
 
     def waits(self, kind: str) -> Any:
-        """Wait for a word of this kind that has not been seen yet."""
+        """Wait for a new message of this kind."""
         self.seen.pop(kind, None)
         while kind not in self.seen:
             self.look()
         return self.seen[kind]
 
     def takes(self, force: bool = False) -> None:
-        """Take the wheel, and wait until it is ours."""
+        """Take control, and wait until this viewer has it."""
         self.say("take", force=force)
         while self.look()["hands"]["id"] != self.seen["hello"]["id"]:
             pass
 
 
 @contextlib.contextmanager
-def eye(site: Site, robot: str = "001") -> Iterator[Eye]:
-    """Look at a robot while the context lasts."""
+def viewer(site: Site, robot: str = "001") -> Iterator[Viewer]:
+    """View a robot."""
     address = f"ws://127.0.0.1:{site.port}/live"
     with connect(address, origin=Origin(site.url.rstrip("/"))) as socket:
-        it = Eye(socket)
+        it = Viewer(socket)
         it.say("look", robot=robot)
         it.waits("hello")
         yield it

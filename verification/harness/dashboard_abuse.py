@@ -1,4 +1,4 @@
-"""Hostile clients of the web server: a flood of messages, and requests that never end."""
+"""Hostile clients of the web server: message floods and unfinished requests."""
 
 import contextlib
 import socket
@@ -31,7 +31,7 @@ FLOODS = {
 
 
 def flood(site: Site, message: bytes, stop: threading.Event) -> None:
-    """Send a frame at ``PER_SECOND`` over one connection after another until stopped."""
+    """Send a frame at ``PER_SECOND`` until stopped; reconnect when disconnected."""
     batch = message * BATCH
     origin = Origin(site.url.rstrip("/"))
     while not stop.is_set():
@@ -50,7 +50,7 @@ def flood(site: Site, message: bytes, stop: threading.Event) -> None:
 
 @contextlib.contextmanager
 def flooded(site: Site, message: bytes) -> Iterator[None]:
-    """Flood the server while the context lasts."""
+    """Flood the server."""
     stop = threading.Event()
     thread = threading.Thread(target=flood, args=(site, message, stop), daemon=True)
     thread.start()
@@ -63,7 +63,7 @@ def flooded(site: Site, message: bytes) -> Iterator[None]:
 
 @contextlib.contextmanager
 def half_open(site: Site, count: int) -> Iterator[list[socket.socket]]:
-    """Hold this many connections, each with a request whose header never ends."""
+    """Open connections, each with a request whose header never ends."""
     with contextlib.ExitStack() as stack:
         opened = []
         for _ in range(count):

@@ -1,4 +1,4 @@
-"""What somebody does with the page in a browser, and waits to see."""
+"""Actions on the dashboard's page in a browser."""
 
 import shutil
 from collections.abc import Callable
@@ -6,8 +6,8 @@ from collections.abc import Callable
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
 
 from verification.harness.dashboard import Site
-from verification.harness.stack import Chain
-from verification.harness.support import wait_until
+from verification.harness.stack import RunningStack
+from verification.harness.waiting import wait_until
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PHONE: ViewportSize = {"width": 390, "height": 844}
@@ -24,7 +24,7 @@ def text(page: Page, where: str) -> str:
 
 
 def shows(page: Page, where: str, words: str) -> None:
-    """Wait until a part of the page has these words in it."""
+    """Wait until an element contains this text."""
     page.wait_for_function(
         "([where, words]) => document.querySelector(where)?.textContent.includes(words)",
         arg=[where, words],
@@ -33,7 +33,7 @@ def shows(page: Page, where: str, words: str) -> None:
 
 
 def takes(page: Page) -> None:
-    """Sit down at the wheel, whoever has it."""
+    """Take control, also from another viewer."""
     page.click("#take")
     page.wait_for_function(
         "() => document.querySelector('.driving.mine') || document.querySelector('#question').open"
@@ -43,8 +43,8 @@ def takes(page: Page) -> None:
     page.wait_for_selector(".driving.mine")
 
 
-def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None]) -> None:
-    """Hold until the vehicle moves; let go and press again when this machine held somebody up."""
+def drives(stack: RunningStack, press: Callable[[], None], release: Callable[[], None]) -> None:
+    """Press until the vehicle moves; release and press again after a stall of the host."""
     for _ in range(10):
         press()
         try:
@@ -56,12 +56,12 @@ def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None])
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-def stands(stack: Chain) -> None:
+def stands(stack: RunningStack) -> None:
     wait_until(lambda: abs(stack.speed()) < STILL_MPS, "the vehicle stands")
 
 
 def middle(page: Page, where: str) -> tuple[float, float, float]:
-    """Return the middle of a part of the page, and half its height."""
+    """Return the center of an element, and half its height."""
     page.locator(where).scroll_into_view_if_needed()
     box = page.locator(where).bounding_box()
     assert box is not None
@@ -69,7 +69,7 @@ def middle(page: Page, where: str) -> tuple[float, float, float]:
 
 
 def resets(page: Page) -> None:
-    """Reset until nothing is latched; safety wants to see each cause gone first."""
+    """Reset until nothing is latched; safety requires each cause to be gone first."""
 
     def over() -> bool:
         page.wait_for_timeout(300)
@@ -84,7 +84,7 @@ def resets(page: Page) -> None:
 def phone_of(
     browser: Browser, site: Site, locale: str
 ) -> tuple[BrowserContext, Page, Callable[..., None]]:
-    """Return a phone with the page, and what puts fingers on it."""
+    """Open the page on a phone; return context, page and a function for touch events."""
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, locale=locale)
     phone = context.new_page()
     phone.goto(site.url)

@@ -1,4 +1,4 @@
-"""A main board for tests: real UDP, answers what it is told to, remembers what it received."""
+"""A fake main board for tests: real UDP, configurable answers, a record of received commands."""
 
 import socket
 import threading
@@ -10,7 +10,8 @@ from common.wire import commands, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 class Board:
@@ -23,18 +24,18 @@ class Board:
         self.address: tuple[str, int] = self.sock.getsockname()
         self.ports = [free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)]
         self.motions: list[MotionCommand] = []
-        self.sources: list[tuple[str, int]] = []  # where each of ``motions`` came from
+        self.sources: list[tuple[str, int]] = []  # source address of each of ``motions``
         self.leds: list[commands.LedSet] = []
         self.silent = False
-        self.to_ports = [0, 1]  # indices of the ports that it sends to
-        self.answers_to: list[int] | None = None  # of those for answers; None: the same
-        self.hits_to: list[int] | None = None  # of those for a pressed bumper; None: as answers
-        self.lose_every = 0  # n-th bumper answer; 0 for none
+        self.to_ports = [0, 1]  # indices of the destination ports
+        self.answers_to: list[int] | None = None  # for answers; None: the same
+        self.hits_to: list[int] | None = None  # for a pressed bumper; None: as answers
+        self.lose_every = 0  # drop every n-th bumper answer; 0: none
         self.bumper_asks = 0
-        self.times: list[float] = []  # when each of ``motions`` came
+        self.times: list[float] = []  # reception time of each of ``motions``
         self.pressed = False
         self.distance_mm = 1000
-        self.speed_mmps: int | None = 0  # None: its velocity is not told
+        self.speed_mmps: int | None = 0  # None: no velocity reports
         self.echo = True
         self.led_done: bool | None = True
         self.switch_asks = 0
@@ -55,17 +56,17 @@ class Board:
                 self._take(part.frame, source)
 
     def end(self) -> None:
-        """Let ``run`` return."""
+        """Stop ``run``."""
         self._ended.set()
 
     def say(self, frame: Frame, sock: socket.socket | None = None) -> None:
-        """Send a frame to our ports, as the board or from another socket."""
+        """Send a frame to the bridge's ports, as the board or from another socket."""
         self.say_bytes(self._framing.pack(frame), sock)
 
     def say_bytes(
         self, datagram: bytes, sock: socket.socket | None = None, ports: list[int] | None = None
     ) -> None:
-        """Send any bytes to our ports."""
+        """Send any bytes to the bridge's ports."""
         if self.silent:
             return
         for port in self.to_ports if ports is None else ports:
@@ -76,7 +77,7 @@ class Board:
         return self.motions[-1] if self.motions else None
 
     def wait_for(self, kind: MotionKind, linear_mmps: int = 0) -> None:
-        """Wait until the board holds such a command."""
+        """Wait until the board holds this command."""
 
         def holds() -> bool:
             last = self.last()
@@ -125,7 +126,7 @@ class Board:
 
 @contextmanager
 def board() -> Iterator[Board]:
-    """Run a board while the context lasts."""
+    """Run a board."""
     made = Board()
     thread = threading.Thread(target=made.run, daemon=True)
     thread.start()

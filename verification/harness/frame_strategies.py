@@ -39,7 +39,7 @@ reports = st.one_of(
     st.builds(r.LedReport, st.booleans()),
 )
 
-# One of each, with something in every byte that may hold something.
+# One of each, with non-zero bytes where possible.
 COMMANDS: tuple[Frame, ...] = (
     c.MotionCommand(c.MotionKind.RUN, 500, -300),
     c.DistanceQuery(),

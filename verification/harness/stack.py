@@ -1,4 +1,4 @@
-"""The whole stack as processes of its own, with a simulator that writes down what it received."""
+"""The whole stack as processes, with a simulator that writes a trace."""
 
 import contextlib
 import os
@@ -17,37 +17,38 @@ from cli.demo.score import Trace, read
 from cli.run.up import commands
 from cli.settings import Everything
 from common.config import Sources, load
-from common.freshness import NS_PER_S
 from sim.control import Control
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
-BESIDE_OTHERS_S = 0.3  # of stalls, at least, while other tests run
-UP_S = 60.0  # on a machine that others use, too
+BESIDE_OTHERS_S = 0.3  # stalls to expect while other tests run
+UP_S = 60.0  # on a shared host
+SETTINGS_FILE = "stack.toml"  # read by all processes when it is in the folder of the stack
 
 
 @dataclass
-class Chain:
-    """Running processes by name, and how to look at the board."""
+class RunningStack:
+    """Processes by name, and access to the simulated board."""
 
     endpoint: str
     trace_file: Path
     control: Control
     commands: dict[str, list[str]]
     log: Path
-    config: Everything  # in force
+    config: Everything  # effective
     env: Mapping[str, str] | None = None  # of the processes; ours when None
     processes: dict[str, "subprocess.Popen[bytes]"] = field(default_factory=dict)
     others: list["subprocess.Popen[bytes]"] = field(default_factory=list)  # beside the stack
 
     def start(self, name: str) -> None:
-        """Start one of them, or start it again."""
+        """Start or restart a process."""
         with self.log.open("ab") as output:
             self.processes[name] = subprocess.Popen(
                 self.commands[name], stdout=output, stderr=output, env=self.env
             )
 
     def kill(self, name: str) -> int:
-        """Kill one of them with -9; return when, in monotonic nanoseconds."""
+        """Kill a process with SIGKILL; return the time, in monotonic nanoseconds."""
         process = self.processes[name]
         at_ns = time.monotonic_ns()
         process.send_signal(signal.SIGKILL)
@@ -55,7 +56,7 @@ class Chain:
         return at_ns
 
     def trace(self) -> Trace:
-        """Return what the simulator has written down so far."""
+        """Return the trace so far."""
         return read(self.trace_file)
 
     def last(self) -> str:
@@ -64,18 +65,18 @@ class Chain:
         return made[-1].kind if made else "none"
 
     def speed(self) -> float:
-        """Return how fast the vehicle really is, in m/s."""
+        """Return the true speed of the vehicle, in m/s."""
         return self.control.truth().linear
 
     def end(self) -> None:
-        """End them all."""
+        """Kill all processes."""
         for process in (*self.processes.values(), *self.others):
             process.kill()
-            process.communicate()  # closes its pipes, too
+            process.communicate()  # also closes its pipes
 
 
 @contextlib.contextmanager
-def chain(
+def running_stack(
     folder: Path,
     world: str = "empty",
     *,
@@ -85,14 +86,14 @@ def chain(
     log: str = "log.jsonl",
     env: Mapping[str, str] | None = None,
     route: Callable[[Sequence[str]], list[str]] | None = None,
-) -> Iterator[Chain]:
-    """Run the stack while the context lasts, as shipped unless this machine cannot bear it.
+) -> Iterator[RunningStack]:
+    """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
-    ``shipped`` wants the shipped limits on any machine; ``sets`` are settings besides. ``listen``
-    is where the router listens, the way of those on board first; ``log`` is a file in the folder.
-    ``route`` returns the command of a router that is none of ours, for these settings.
+    ``shipped`` keeps the shipped limits on any host; ``sets`` are additional settings. ``listen``
+    is where the router listens, the endpoint of the services first; ``log`` is a file in the
+    folder. ``route`` returns the command of another router, zenohd, for these settings.
     """
-    beside_others = "PYTEST_XDIST_WORKER" in os.environ  # they stall it later, if not now
+    beside_others = "PYTEST_XDIST_WORKER" in os.environ  # other tests may stall it later
     holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
     port = free_port()
@@ -107,7 +108,7 @@ def chain(
         ]
     )
     config = load(Everything, Sources(sets=sets)).config
-    files = [file for file in (folder / "lane.toml",) if file.exists()]
+    files = [file for file in (folder / SETTINGS_FILE,) if file.exists()]
     options = Namespace(no_sim=False, world=world, config=files, sets=sets)
     made = {name: list(command) for name, command in commands(options)}
     if route:
@@ -115,7 +116,7 @@ def chain(
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file)]
     endpoint = config.bus.endpoints[0]
-    it = Chain(endpoint, trace_file, Control(control), made, folder / log, config, env)
+    it = RunningStack(endpoint, trace_file, Control(control), made, folder / log, config, env)
     for name in made:
         it.start(name)
     try:
@@ -125,45 +126,8 @@ def chain(
         it.end()
 
 
-def _is_up(it: Chain) -> bool:
+def _is_up(it: RunningStack) -> bool:
     ended = [name for name, process in it.processes.items() if process.poll() is not None]
     assert not ended, f"{ended} ended: {it.log.read_text()}"
     ours = [command for command in it.commands.values() if command[0] == sys.executable]
     return it.log.read_text().count('"event": "started"') >= len(ours)
-
-
-class Witness:
-    """Notes how long this machine holds a process up that only wants to sleep.
-
-    A deadline that is met late by no more than this was met by the program and missed by the
-    machine.
-    """
-
-    def __init__(self) -> None:
-        # A process of its own: a thread would also wait for this interpreter's lock.
-        self._process = subprocess.Popen(
-            [sys.executable, "-S", "-c", WITNESS], stdout=subprocess.PIPE, text=True
-        )
-
-    def stop(self) -> float:
-        """Return the longest hold-up, in seconds."""
-        self._process.send_signal(signal.SIGTERM)
-        out, _ = self._process.communicate()
-        return float(out)
-
-
-WITNESS = """
-import signal, sys, time
-signal.signal(signal.SIGTERM, lambda *_: (print(worst), sys.exit()))
-worst, last = 0.0, time.monotonic()
-while True:
-    time.sleep(0.005)
-    now = time.monotonic()
-    worst, last = max(worst, now - last - 0.005), now
-"""
-
-
-def until_still_s(trace: Trace, since_ns: int) -> float:
-    """Return how long after a moment the board last received a command to move, in seconds."""
-    moving = [c.mono_ns for c in trace.commands if c.kind == "run" and (c.linear or c.angular)]
-    return max(0.0, (moving[-1] - since_ns) / NS_PER_S) if moving else 0.0

@@ -1,4 +1,4 @@
-"""The screen without a terminal, before an emulator that answers its questions at once."""
+"""The teleop screen without a terminal; cursor queries are answered at once."""
 
 import re
 
@@ -7,11 +7,11 @@ from textual.events import CursorPosition
 from services.teleop.app import TeleopApp
 
 
-class NearApp(TeleopApp):
-    """Answers itself what it asks the terminal."""
+class LocalTerminalApp(TeleopApp):
+    """Answers its own cursor queries, like a local terminal."""
 
     def query_terminal(self, question: str) -> None:
-        """Answer as a terminal does."""
+        """Answer a cursor query."""
         if place := re.search(r"\[(\d+);(\d+)H", question):
             row, column = map(int, place.groups())
             self.post_message(CursorPosition(column - 1, row - 1))

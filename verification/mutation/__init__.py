@@ -1,1 +1,1 @@
-"""Mutation testing as a gate: which mutants may live, and the run that looks for others."""
+"""Mutation testing as a gate with a list of allowed mutants."""

@@ -1,7 +1,7 @@
-"""Run the gate: ``python -m verification.mutation [FILE]...``, all of its files by default.
+"""``python -m verification.mutation [FILE]...``: mutation testing of the gated files.
 
-``--changed`` takes those that differ from where the branch left main. Exit code 1 when a mutant
-lives that is not in ``allowed.toml``, or one in there does not.
+The default is all gated files; ``--changed`` selects those that differ from the fork point of the
+branch. Exit code 1 when a surviving mutant is not in ``allowed.toml``, or a listed one was killed.
 """
 
 import os
@@ -22,17 +22,17 @@ AT_ONCE = os.cpu_count() or 1
 
 
 def gated() -> dict[str, list[str]]:
-    """Return the files of the gate with their tests; exit when one is gone."""
+    """Return the gated files with their tests; exit when one does not exist."""
     settings = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))
     files: dict[str, list[str]] = settings["tool"]["mutants"]
     for path in (*files, *(test for tests in files.values() for test in tests)):
         if not Path(path).exists():
-            sys.exit(f"pyproject.toml: tool.mutants: there is no {path}.")
+            sys.exit(f"pyproject.toml: tool.mutants: {path} does not exist.")
     return files
 
 
 def git(*words: str) -> str | None:
-    """Return what git says, None when it fails or is not there."""
+    """Return the output of git; None when it fails or is missing."""
     try:
         done = subprocess.run(["git", *words], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
@@ -41,55 +41,55 @@ def git(*words: str) -> str | None:
 
 
 def base() -> str | None:
-    """Return the commit to compare with: where the branch left main; on main, the one before."""
+    """Return the commit to compare with: the fork point; on main, the previous commit."""
     head, fork = git("rev-parse", "HEAD"), git("merge-base", "origin/main", "HEAD")
     return fork if fork and fork != head else git("rev-parse", "--verify", "HEAD~1")
 
 
 def changed(files: dict[str, list[str]]) -> list[str]:
-    """Return those of the files that differ from the base, committed or not; say so."""
+    """Return and print the files that differ from the base, committed or not."""
     commit = base()
     diff = None if commit is None else git("diff", "--name-only", "--relative", commit)
     if commit is None or diff is None:
-        print("mutants: skipped, no commit to compare with; `make mutants` tries all files")
+        print("mutants: skipped, no commit to compare with; `make mutants` tests all files")
         return []
     chosen = [file for file in files if file in diff.splitlines()]
-    which = ", ".join(chosen) or "no file of the gate changed"
+    which = ", ".join(chosen) or "no gated file changed"
     print(f"mutants: since {commit[:7]}: {which}", flush=True)
     return chosen
 
 
-def tried(file: str, tests: list[str]) -> tuple[int, list[Mutant]]:
-    """Try one file and say what came of it; exit when nothing did."""
+def run_file(file: str, tests: list[str]) -> tuple[int, list[Mutant]]:
+    """Test one file and print the result; exit when the run fails."""
     began = time.monotonic()
     try:
-        count, alive = run(file, tests, SCRATCH / file.removesuffix(".py").replace("/", "."))
+        count, surviving = run(file, tests, SCRATCH / file.removesuffix(".py").replace("/", "."))
     except (TrialError, subprocess.TimeoutExpired) as error:
         sys.exit(f"mutants: {file}: {error}")
     took_s = time.monotonic() - began
-    print(f"{file}: {count} mutants, {len(alive)} not killed, {took_s:.0f} s", flush=True)
-    return count, alive
+    print(f"{file}: {count} mutants, {len(surviving)} not killed, {took_s:.0f} s", flush=True)
+    return count, surviving
 
 
 def main(words: list[str]) -> None:
-    """Choose, run, judge."""
+    """Choose files, test them, compare with the list."""
     os.chdir(ROOT)
     files = gated()
     chosen = changed(files) if words == ["--changed"] else words or list(files)
-    if strange := set(chosen) - set(files):
-        sys.exit(f"mutants: not in the gate: {', '.join(sorted(strange))}")
-    chosen = sorted(chosen, key=lambda file: -Path(file).stat().st_size)  # the long ones first
+    if unknown := set(chosen) - set(files):
+        sys.exit(f"mutants: not gated: {', '.join(sorted(unknown))}")
+    chosen = sorted(chosen, key=lambda file: -Path(file).stat().st_size)  # largest first
     with ProcessPoolExecutor(AT_ONCE) as pool:
-        results = pool.map(tried, chosen, [files[file] for file in chosen])
+        results = pool.map(run_file, chosen, [files[file] for file in chosen])
         found = dict(zip(chosen, results, strict=True))
     counts = {file: count for file, (count, _) in found.items()}
-    living = [mutant for _, alive in found.values() for mutant in alive]
-    wrong = complaints(counts, living, entries(ALLOWED))
+    survivors = [mutant for _, surviving in found.values() for mutant in surviving]
+    wrong = complaints(counts, survivors, entries(ALLOWED))
     for complaint in wrong:
         print(f"\n{complaint}")
     if wrong:
         sys.exit(
-            f"mutants: {len(wrong)} complaints; write a test, or see docs/adr/0009-mutation.md"
+            f"mutants: {len(wrong)} differences; write a test, or see docs/adr/0009-mutation.md"
         )
 
 

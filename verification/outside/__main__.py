@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from verification.outside.scenarios import SCENARIOS
-from verification.outside.stack import witness
+from verification.outside.stack import stall_meter
 from verification.outside.testbed import Result, Scenario, measure
 
-PRIORITY = 55  # the board is like another host: this one must not delay it
+PRIORITY = 55  # a real board is another computer: load on this host must not delay it
 STALL_S = 0.06  # a longer stall of the host makes a failed measurement void
 REPEATS = 2
 HERE = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ class Measurement:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m verification.outside", description=__doc__)
     parser.add_argument("--tree", type=Path, action="append", metavar="PATH",
-                        help="with a .venv; several are measured side by side")  # fmt: skip
+                        help="checkout with a .venv; repeat to compare several")  # fmt: skip
     parser.add_argument("--only", metavar="N[,N]", help="scenario groups, by number")
     parser.add_argument("--name", help="part of a scenario's function name")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="file for the table")
@@ -50,7 +50,7 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
 
 
 def once(tree: Path, scenario: Scenario) -> Measurement:
-    with witness() as stalls:
+    with stall_meter() as stalls:
         result = measure(tree, scenario)
     return Measurement(result, stalls[0])
 
@@ -65,7 +65,7 @@ def repeated(tree: Path, scenario: Scenario) -> Measurement:
     return found
 
 
-def ahead() -> None:
+def ask_realtime() -> None:
     """Run as SCHED_FIFO, where that is granted."""
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -86,7 +86,7 @@ def main() -> int:
     """Return 1 when the last tree fails an expectation."""
     options = parse()
     trees = [tree.resolve() for tree in options.tree or [HERE]]
-    ahead()
+    ask_realtime()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the processes of the scenario
     rows = []
     begin = time.monotonic()

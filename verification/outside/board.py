@@ -106,7 +106,7 @@ class Board:
         self._socket.close()
 
     def restart(self, dark: float) -> None:
-        """Lose power for so long: counters at zero, emergency brakes off, the last command gone."""
+        """Restart after a time without power: counters, emergency brakes and command are reset."""
         self.faults.silent = True
         time.sleep(dark)
         self._command = wire.Command(0.0, "stop", 0.0, 0.0)
@@ -115,11 +115,11 @@ class Board:
         self.faults.silent = False
 
     def since(self, at: float) -> list[wire.Command]:
-        """Return the motion commands from a moment on."""
+        """Return the motion commands since a time."""
         return [command for command in list(self.commands) if command.at >= at]
 
     def queries(self, command: int, since: float) -> int:
-        """Return how many frames of an id came from a moment on."""
+        """Return how many frames of an id came since a time."""
         return sum(at >= since and name == command for at, name, _ in list(self.received))
 
     def _run(self) -> None:
@@ -153,9 +153,9 @@ class Board:
                 now = time.monotonic()
                 for command, payload in wire.frames(datagram):
                     self.received.append((now, command, payload))
-                    self._obey(command, payload, now)
+                    self._execute(command, payload, now)
 
-    def _obey(self, command: int, payload: bytes, now: float) -> None:
+    def _execute(self, command: int, payload: bytes, now: float) -> None:
         if command == wire.MOTION:
             self._command = wire.motion(payload, now)
             self.commands.append(self._command)

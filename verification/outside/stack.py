@@ -1,4 +1,4 @@
-"""The real processes of a tree, on ports and in a folder of their own."""
+"""The real processes of a tree, on their own ports and in their own folder."""
 
 import contextlib
 import itertools
@@ -29,7 +29,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
 
 
 def wait_for(true: Callable[[], object], seconds: float) -> bool:
-    """Return whether something becomes true within so many seconds."""
+    """Return whether a condition becomes true within a time."""
     end = time.monotonic() + seconds
     while not true():
         if time.monotonic() > end:
@@ -54,7 +54,7 @@ class Stack:
         self.endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
         self.sets = [f"bus.listen={self.endpoint}", *sets]
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
-        # Sockets of the stack lie in its runtime directory: each run has its own.
+        # The runtime directory has the stack's sockets: each run has its own.
         self.env = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), "PYTHONPATH": ""}
 
     def command(self, *words: str) -> list[str]:
@@ -82,14 +82,14 @@ class Stack:
             self.start(name)
 
     def kill(self, name: str) -> None:
-        """Kill one of them with -9."""
+        """Kill a process with SIGKILL."""
         self.processes[name].kill()
         self.processes[name].wait()
 
     def run(
         self, *words: str, sets: Sequence[str] = (), timeout: float = 15.0
     ) -> tuple[int | None, str]:
-        """Run a command of the tree; return its exit code, None when it runs on, and its output."""
+        """Run a command of the tree; return its exit code, None after a timeout, and its output."""
         passed = [word for each in sets for word in ("--set", each)]
         process = subprocess.Popen(
             [*ordinary(), *self.command(*words), *passed], cwd=self.tree, env=self.env,
@@ -107,7 +107,7 @@ class Stack:
         return (self.folder / "log").read_text(errors="replace")[-2000:]
 
     def close(self) -> None:
-        """End all: SIGTERM to the services, then SIGKILL to what is left of each group."""
+        """End all processes: SIGTERM to the services, then SIGKILL to each process group."""
         for name, process in self.processes.items():
             if name != "router" and process.poll() is None:
                 process.terminate()
@@ -119,13 +119,13 @@ class Stack:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-        for pid in self._left():
+        for pid in self._escaped():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _left(self) -> list[int]:
-        """Return the processes of this stack that have left their groups: known by the folder."""
+    def _escaped(self) -> list[int]:
+        """Return the processes of this stack outside their groups, found by their folder."""
         mark, found = f"XDG_RUNTIME_DIR={self.folder}".encode(), []
         for path in Path("/proc").glob("[0-9]*/environ"):
             with contextlib.suppress(OSError):
@@ -140,8 +140,8 @@ def _listens(host: str, port: int) -> bool:
 
 
 @contextlib.contextmanager
-def witness() -> Iterator[list[float]]:
-    """Measure how long this host stalls a process that only sleeps; the list gets the worst."""
+def stall_meter() -> Iterator[list[float]]:
+    """Measure the longest stall of this host; it is appended to the list at the end."""
     found: list[float] = []
     program = (
         "import signal,sys,time\n"

@@ -1,4 +1,4 @@
-"""One scenario's surroundings: a board, a stack on it, and clients on its bus."""
+"""The testbed of a scenario: a board, a stack and bus clients."""
 
 import contextlib
 import time
@@ -31,7 +31,7 @@ class Result:
 
 @dataclass
 class Testbed:
-    """What a scenario works with."""
+    """Access of a scenario to board, stack and clients."""
 
     board: Board
     stack: Stack
@@ -58,14 +58,14 @@ class Testbed:
         return self.board.vehicle.linear
 
     def wait(self, true: Callable[[], object], seconds: float, what: str) -> None:
-        """Wait for a precondition; end the scenario when it does not come."""
+        """Wait for a precondition; end the scenario after a timeout."""
         if not wait_for(true, seconds):
             text = self.observer.last(STATE).get("text", "no state of safety")
             waiting = self.observer.last(LINK).get("waiting", "no link")
             raise NotMeasuredError(f"{what}: {text}; {waiting}".rstrip("; "))
 
     def drive(self, source: Source, linear: float, angular: float = 0.0) -> None:
-        """Request a motion until the vehicle does it."""
+        """Request a motion until the vehicle reaches it."""
         source.request(linear, angular)
         vehicle = self.board.vehicle
 
@@ -89,7 +89,7 @@ class Testbed:
         return at
 
     def first(self, kind: str, since: float, seconds: float) -> float | None:
-        """Return how long after a moment the board received a command of this kind, in s."""
+        """Return the time until the board received a command of this kind, in s."""
         end = since + seconds
         while True:
             found = [c.at - since for c in self.board.since(since) if c.kind == kind]
@@ -152,7 +152,7 @@ def knows(tree: Path, sets: Sequence[str]) -> bool:
 
 @contextlib.contextmanager
 def testbed(tree: Path, scenario: Scenario) -> Iterator[Testbed]:
-    """Start everything for a scenario, and end it."""
+    """Run the testbed of a scenario."""
     port, first, second = (free_port() for _ in range(3))
     sets = [
         f"board.port={port}",

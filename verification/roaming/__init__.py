@@ -1,1 +1,1 @@
-"""Two hosts and the air between them: what the operator has of it, and what the robot."""
+"""Driving over a disturbed link between two hosts."""

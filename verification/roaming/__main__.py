@@ -1,7 +1,6 @@
-"""``python -m verification.roaming``: drive over a bad link, and lose it, as a document."""
+"""``python -m verification.roaming``: drive over a bad link, and lose it."""
 
 import argparse
-import os
 import platform
 import sys
 import tempfile
@@ -12,23 +11,23 @@ from pathlib import Path
 
 from services.safety.config import SafetyConfig
 from verification.faults.__main__ import today
-from verification.faults.catalogue import NOTICE_S
-from verification.faults.frames import SPEED
-from verification.faults.machine import HoldUps
-from verification.faults.namespaces import Need, enter, missing
+from verification.faults.fault import NOTICE_S
+from verification.faults.namespaces import Requirement, enter, missing
+from verification.faults.stack_fixture import SPEED_MPS
+from verification.harness.host import StallRecorder, short_description
 from verification.roaming import page
-from verification.roaming.conditions import OUTAGES, STEADY, Outage, Steady
-from verification.roaming.hosts import Site, site
-from verification.roaming.page import Backs, Wents
-from verification.roaming.trial import Back, Went, outage, steady
+from verification.roaming.conditions import CONDITIONS, OUTAGES, Condition, Outage
+from verification.roaming.hosts import TwoHosts, two_hosts
+from verification.roaming.page import DriveRows, OutageRows
+from verification.roaming.trial import DriveResult, OutageResult, outage, steady
 
 SECONDS = 5.0
 PAGE = Path(__file__).with_name("page.md")
-CANNOT = 3  # exit code where two hosts cannot be made here
-# What a source's request holds, as shipped, and what it takes to notice.
+UNAVAILABLE = 3  # exit code when this machine cannot simulate two hosts
+# The shipped lease of a request, and the time to detect its end.
 SHIPPED = SafetyConfig().safety
 BUDGET_S = SHIPPED.sources["teleop"].lease + NOTICE_S
-NEEDS: tuple[Need, ...] = ("a far driver", "other clocks")
+NEEDS: tuple[Requirement, ...] = ("remote driver", "separate clocks")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -37,27 +36,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     lacking = missing(enter())
     for need in NEEDS:
         if need in lacking:
-            print(f"two hosts cannot be made here: {lacking[need]}", file=sys.stderr)
-            return CANNOT
-    weathers = [one for one in STEADY if _wanted(one.name, options.only)]
-    losses = [
+            print(f"cannot simulate two hosts: {lacking[need]}", file=sys.stderr)
+            return UNAVAILABLE
+    conditions = [one for one in CONDITIONS if _wanted(one.name, options.only)]
+    outage_list = [
         replace(one, times=min(one.times, options.times))
         for one in OUTAGES
         if _wanted(one.name, options.only)
     ]
     began_s = time.monotonic()
-    with HoldUps() as holdups, tempfile.TemporaryDirectory() as folder:
-        wents, backs = campaign(Path(folder), weathers, losses, holdups, options.seconds)
-    text = report(wents, backs, time.monotonic() - began_s)
+    with StallRecorder() as stalls, tempfile.TemporaryDirectory() as folder:
+        drives, outages = campaign(Path(folder), conditions, outage_list, stalls, options.seconds)
+    text = report(drives, outages, time.monotonic() - began_s)
     print(text)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
-    return int(bool(wrong(backs)))
+    return int(bool(wrong(outages)))
 
 
-def wrong(backs: Backs) -> list[str]:
-    """Return what is not as it should be, by the shipped limits."""
-    return page.wrong(backs, BUDGET_S, SHIPPED.bumper_age)
+def wrong(outages: OutageRows) -> list[str]:
+    """Return the violations of the shipped limits."""
+    return page.wrong(outages, BUDGET_S, SHIPPED.bumper_age)
 
 
 def _wanted(name: str, only: Sequence[str]) -> bool:
@@ -66,64 +65,73 @@ def _wanted(name: str, only: Sequence[str]) -> bool:
 
 def campaign(
     folder: Path,
-    weathers: Sequence[Steady],
-    losses: Sequence[Outage],
-    holdups: HoldUps,
+    conditions: Sequence[Condition],
+    outage_list: Sequence[Outage],
+    stalls: StallRecorder,
     seconds: float,
-) -> tuple[Wents, Backs]:
-    """Try all; the robot's router is another one where nothing is thinned."""
-    wents: dict[str, tuple[Steady, Went, float]] = {}
-    backs: list[tuple[Outage, Sequence[Back], float]] = []
+) -> tuple[DriveRows, OutageRows]:
+    """Run all; downsampling and dashboard need separate stacks."""
+    drives: dict[str, tuple[Condition, DriveResult, float]] = {}
+    outages: list[tuple[Outage, Sequence[OutageResult], float]] = []
     for thinned, dashboard in ((True, True), (True, False), (False, True), (False, False)):
-        mine = [w for w in weathers if (w.thinned, w.dashboard) == (thinned, dashboard)]
-        lost = losses if thinned and dashboard else ()
+        mine = [w for w in conditions if (w.thinned, w.dashboard) == (thinned, dashboard)]
+        lost = outage_list if thinned and dashboard else ()
         if not (mine or lost):
             continue
-        room = folder / f"{thinned}-{dashboard}"
-        with site(room, thinned=thinned, dashboard=dashboard) as it:
-            for weather in mine:
-                went = steady(it, weather, seconds)
-                wents[weather.name] = weather, went, _held(holdups, went)
-                print(page.driving([wents[weather.name]], SPEED).splitlines()[-1], file=sys.stderr)
+        stack_folder = folder / f"{thinned}-{dashboard}"
+        with two_hosts(stack_folder, thinned=thinned, dashboard=dashboard) as it:
+            for condition in mine:
+                result = steady(it, condition, seconds)
+                drives[condition.name] = condition, result, _held(stalls, result)
+                print(
+                    page.driving([drives[condition.name]], SPEED_MPS).splitlines()[-1],
+                    file=sys.stderr,
+                )
             for what in lost:
                 some = _lost(it, what)
-                backs.append((what, some, max(_held(holdups, back) for back in some)))
-                print(page.returning(backs[-1:]).splitlines()[-1], file=sys.stderr)
-    return [wents[weather.name] for weather in weathers], backs
+                outages.append((what, some, max(_held(stalls, back) for back in some)))
+                print(page.returning(outages[-1:]).splitlines()[-1], file=sys.stderr)
+    return [drives[condition.name] for condition in conditions], outages
 
 
-def _lost(it: Site, what: Outage) -> list[Back]:
+def _lost(it: TwoHosts, what: Outage) -> list[OutageResult]:
     return [outage(it, what, 3 + n % 2) for n in range(what.times)]
 
 
-def _held(holdups: HoldUps, what: Went | Back) -> float:
-    return holdups.worst_s(what.since_ns, (what.until_ns - what.since_ns) / 1e9)
+def _held(stalls: StallRecorder, what: DriveResult | OutageResult) -> float:
+    return stalls.worst_s(what.since_ns, (what.until_ns - what.since_ns) / 1e9)
 
 
-def report(wents: Wents, backs: Backs, took_s: float) -> str:
-    """Return the campaign as a document."""
+def report(drives: DriveRows, outages: OutageRows, took_s: float) -> str:
+    """Return the document of the campaign."""
     parts = {
         "date": today(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}",
+        "machine": short_description(),
         "python": platform.python_version(),
         "minutes": f"{took_s / 60:.0f}",
-        "driving": page.driving(wents, SPEED),
-        "seen": page.seen(wents),
-        "returning": page.returning(backs),
-        "own": page.own(wents, backs),
-        "verdict": page.verdict(wrong(backs)),
+        "driving": page.driving(drives, SPEED_MPS),
+        "seen": page.seen(drives),
+        "returning": page.returning(outages),
+        "own": page.own(drives, outages),
+        "verdict": page.verdict(wrong(outages)),
     }
     return PAGE.read_text(encoding="utf-8").format(**parts)
 
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="roaming", description=__doc__)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="in each weather")
-    parser.add_argument("--times", type=int, default=99, help="at most, for each loss")
     parser.add_argument(
-        "--only", action="append", default=[], metavar="TEXT", help="what is named so; repeatable"
+        "--seconds", type=float, default=SECONDS, help="duration of each condition, 5"
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where the document goes")
+    parser.add_argument("--times", type=int, default=99, help="trials of each outage, at most")
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="only conditions whose name contains TEXT; repeatable",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What happens between the two hosts."""
+"""Conditions of the link between the two hosts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,45 +7,45 @@ from sim.requests import Wire
 
 
 @dataclass(frozen=True, slots=True)
-class Steady:
-    """Weather that stays; the finger is held all the time."""
+class Condition:
+    """Constant link faults while a key is held."""
 
     name: str
     faults: Sequence[Wire] = ()
-    thinned: bool = True  # as shipped; False: the robot sends laptops everything
+    thinned: bool = True  # as shipped; False: no downsampling to laptops
     dashboard: bool = True  # beside teleop
 
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """The link is down for a while, or the laptop comes back under another address."""
+    """The link is down for some time, or the laptop changes its address."""
 
     name: str
     seconds: float
     times: int
-    moves: bool = False  # to another address, the last number of which changes
+    moves: bool = False  # to another address
 
 
-def thin(bits: float, *, thinned: bool, dashboard: bool) -> Steady:
-    """Return a link that carries so many bit/s each way."""
+def narrow(bits: float, *, thinned: bool, dashboard: bool) -> Condition:
+    """Return a link with limited bandwidth in both directions."""
     size = f"{bits / 1e6:g} Mbit/s" if bits >= 1e6 else f"{bits / 1e3:g} kbit/s"
-    who = "" if dashboard else ", teleop alone"
-    name = f"{size}{who}{'' if thinned else ', not thinned'}"
-    return Steady(name, [Wire(rate=bits, delay=0.01)], thinned, dashboard)
+    clients = "" if dashboard else ", teleop alone"
+    name = f"{size}{clients}{'' if thinned else ', not thinned'}"
+    return Condition(name, [Wire(rate=bits, delay=0.01)], thinned, dashboard)
 
 
-STEADY = [
-    Steady("good"),
-    Steady("good, not thinned", thinned=False),
-    *(Steady(f"{round(100 * p)} % lost", [Wire(drop=p)]) for p in (0.01, 0.1, 0.3)),
-    Steady("30 % lost on the way to the robot", [Wire(direction="to_pc", drop=0.3)]),
-    Steady("30 % lost on the way to the laptop", [Wire(direction="to_board", drop=0.3)]),
-    Steady("100 to 120 ms each way", [Wire(delay=0.1, jitter=0.02)]),
-    Steady("200 to 250 ms each way", [Wire(delay=0.2, jitter=0.05)]),
-    *(thin(1e6, thinned=thinned, dashboard=True) for thinned in (True, False)),
-    *(thin(256e3, thinned=thinned, dashboard=False) for thinned in (True, False)),
-    thin(256e3, thinned=True, dashboard=True),
-    thin(256e3, thinned=False, dashboard=True),
+CONDITIONS = [
+    Condition("good"),
+    Condition("good, not thinned", thinned=False),
+    *(Condition(f"{round(100 * p)} % lost", [Wire(drop=p)]) for p in (0.01, 0.1, 0.3)),
+    Condition("30 % lost on the way to the robot", [Wire(direction="to_pc", drop=0.3)]),
+    Condition("30 % lost on the way to the laptop", [Wire(direction="to_board", drop=0.3)]),
+    Condition("100 to 120 ms each way", [Wire(delay=0.1, jitter=0.02)]),
+    Condition("200 to 250 ms each way", [Wire(delay=0.2, jitter=0.05)]),
+    *(narrow(1e6, thinned=thinned, dashboard=True) for thinned in (True, False)),
+    *(narrow(256e3, thinned=thinned, dashboard=False) for thinned in (True, False)),
+    narrow(256e3, thinned=True, dashboard=True),
+    narrow(256e3, thinned=False, dashboard=True),
 ]
 
 OUTAGES = [

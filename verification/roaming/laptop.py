@@ -1,9 +1,9 @@
 """``python -m verification.roaming.laptop ENDPOINT FILE alone|dashboard [SETTING]...``.
 
-An operator's laptop: teleop, without its screen, and a dashboard that somebody looks at.
+An operator's laptop: teleop without its screen, and a dashboard with a viewer.
 
-Reads lines from standard input: speeds, and while the last one is over zero a finger is on W, in
-the fifth gear; ``e`` presses E. Notes what is heard of the robot, and what it is asked.
+Reads lines from standard input. A speed above zero holds W in the fifth gear until a speed of zero;
+``e`` presses E. Logs the messages that it receives and sends.
 """
 
 import contextlib
@@ -26,43 +26,45 @@ from services.teleop.controller import Desk
 from services.teleop.event_log import Logbook
 from services.teleop.hold import Press
 from verification.faults.remote_host import AHEAD_S, OFFSETS, die_with_parent
-from verification.roaming.notes import Notebook
+from verification.roaming.message_log import MessageLog
 
 REPEAT_S = 0.03  # of a held key
-LOOK_S = 0.01
+POLL_S = 0.01
 FIFTH_GEAR = "5"
-PORT = 8080  # of the dashboard: the host is our own
+PORT = 8080  # of the dashboard, on its own network namespace
 
 
 class Operator:
-    """A finger, and eyes that note what they see; every method in the loop's thread."""
+    """Presses keys and logs messages; all methods run in the loop's thread."""
 
     def __init__(self, node: Node[TeleopConfig], file: Path) -> None:
         self.held = False
         logbook = Logbook()
         logbook.take_log(node.config.log)
         self._desk = Desk(node, logbook)
-        self._asked: Publisher[Drive] = next(
+        self._requests: Publisher[Drive] = next(
             one for one in node.bus.publishers if one.topic is keys.DRIVE
         )
-        self._noted = 0
-        self._notebook = Notebook(file, node.loop, AHEAD_S * NS_PER_S if OFFSETS.exists() else 0)
-        self._notebook.listen(node.bus, keys.SAFETY)
-        self._notebook.listen(node.bus, keys.ODOMETRY)
-        self._notebook.listen(node.bus, keys.BUMPER)
+        self._logged = 0
+        self._message_log = MessageLog(
+            file, node.loop, AHEAD_S * NS_PER_S if OFFSETS.exists() else 0
+        )
+        self._message_log.subscribe(node.bus, keys.SAFETY)
+        self._message_log.subscribe(node.bus, keys.ODOMETRY)
+        self._message_log.subscribe(node.bus, keys.BUMPER)
         self._press(FIFTH_GEAR, time.monotonic_ns())
         node.loop.every(REPEAT_S, self._hold)
-        node.loop.every(LOOK_S, self._look)
+        node.loop.every(POLL_S, self._log_request)
 
     def take(self, line: str) -> None:
-        """Do what is said."""
+        """Execute a line."""
         if line == "e":
             self._press("e", time.monotonic_ns())
         else:
             self.held = float(line) > 0
 
     def _hold(self, now_ns: int) -> None:
-        self._desk.terminal.sent(0, now_ns)  # its terminal is near, and answers at once
+        self._desk.terminal.sent(0, now_ns)  # a local terminal answers at once
         self._desk.terminal.answered(0, now_ns)
         if self.held:
             self._press("w", now_ns)
@@ -70,11 +72,11 @@ class Operator:
     def _press(self, key: str, now_ns: int) -> None:
         self._desk.press(Press(key, now_ns), now_ns)
 
-    def _look(self, _: int) -> None:
-        asked = self._asked.last
-        if asked is not None and asked.seq > self._noted:
-            self._noted = asked.seq
-            self._notebook.note("asked", asked, asked.mono_ns, asked.mono_ns)
+    def _log_request(self, _: int) -> None:
+        request = self._requests.last
+        if request is not None and request.seq > self._logged:
+            self._logged = request.seq
+            self._message_log.add("requested", request, request.mono_ns, request.mono_ns)
 
 
 def main() -> None:
@@ -84,12 +86,12 @@ def main() -> None:
     operator = Operator(node, Path(file))
     node.announce()
 
-    def listen() -> None:
+    def read_lines() -> None:
         for line in sys.stdin:
             node.loop.post(partial(operator.take, line.strip()))
         node.loop.stop()
 
-    threading.Thread(target=listen, daemon=True).start()
+    threading.Thread(target=read_lines, daemon=True).start()
     node.bus.open()
     words = [word for one in sets for word in ("--set", one)]
     with contextlib.ExitStack() as stack:
@@ -102,7 +104,7 @@ def main() -> None:
 
 @contextlib.contextmanager
 def _beside(module: str, *words: str) -> Iterator[None]:
-    """Run something while the context lasts; it ends with this process, however that ends."""
+    """Run a module; the kernel ends it with this process."""
     with subprocess.Popen(
         [sys.executable, "-m", module, *words],
         stdout=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""``python -m verification.roaming.observer ENDPOINT FILE``: note the robot's own chain."""
+"""``python -m verification.roaming.observer ENDPOINT FILE``: log the robot's control chain."""
 
 import sys
 from pathlib import Path
@@ -6,17 +6,17 @@ from pathlib import Path
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from verification.harness.support import at
-from verification.roaming.notes import Notebook
+from verification.harness.bus import at
+from verification.roaming.message_log import MessageLog
 
 
 def main() -> None:
     loop = Loop()
     bus = Bus(at(sys.argv[1]), "001", loop.post)
-    notebook = Notebook(Path(sys.argv[2]), loop)
-    notebook.listen(bus, keys.BUMPER)
-    notebook.listen(bus, keys.ODOMETRY)
-    notebook.listen(bus, keys.MOTION)
+    message_log = MessageLog(Path(sys.argv[2]), loop)
+    message_log.subscribe(bus, keys.BUMPER)
+    message_log.subscribe(bus, keys.ODOMETRY)
+    message_log.subscribe(bus, keys.MOTION)
     bus.open()
     loop.run()
 

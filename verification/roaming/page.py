@@ -1,65 +1,71 @@
-"""What the campaign found, as a document. Pure."""
+"""Blocks of the document of the campaign. Pure."""
 
 from collections.abc import Iterator, Sequence
 from math import inf, isfinite
 
-from verification.faults.table import rank
-from verification.roaming.conditions import Outage, Steady
-from verification.roaming.figures import Chain, Stream
-from verification.roaming.trial import Back, Went
+from verification.harness.results import percentile, table
+from verification.roaming.conditions import Condition, Outage
+from verification.roaming.figures import ControlChain, Stream
+from verification.roaming.trial import DriveResult, OutageResult
 
-Wents = Sequence[tuple[Steady, Went, float]]  # the last: what the machine held up, s
-Backs = Sequence[tuple[Outage, Sequence[Back], float]]
+DriveRows = Sequence[tuple[Condition, DriveResult, float]]  # the last: longest stall of the host, s
+OutageRows = Sequence[tuple[Outage, Sequence[OutageResult], float]]
 
 
-def driving(wents: Wents, asked_mps: float) -> str:
-    """Return how it drove."""
+def block(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table that ends with a line end."""
+    return table(head, rows) + "\n"
+
+
+def driving(drives: DriveRows, asked_mps: float) -> str:
+    """Return the table of driving."""
     head = (
-        "weather",
-        "taken in time",
+        "condition",
+        "accepted in time",
         "longest gap",
         "stops",
-        "finger",
+        "presses",
         "speed",
         "E: BREAK",
-        "E: told",
+        "E: confirmed",
     )
     rows = [
         [
-            weather.name, f"{_percent(w.drive.taken, w.drive.asked)} of {w.drive.asked}",
-            _ms(w.drive.gap_s), str(w.drive.stops), str(w.hands), f"{w.speed / asked_mps:.0%}",
-            _ms(w.braked_s), _ms(w.told_s),
+            condition.name,
+            f"{_percent(w.drive.accepted, w.drive.requested)} of {w.drive.requested}",
+            _ms(w.drive.gap_s), str(w.drive.stops), str(w.presses), f"{w.speed / asked_mps:.0%}",
+            _ms(w.braked_s), _ms(w.confirmed_s),
         ]
-        for weather, w, _ in wents
+        for condition, w, _ in drives
     ]  # fmt: skip
-    return table(head, rows)
+    return block(head, rows)
 
 
-def seen(wents: Wents) -> str:
-    """Return what the laptop saw."""
+def seen(drives: DriveRows) -> str:
+    """Return the table of streams on the laptop."""
     head = (
-        "weather", "sent to it", "state", "its age", "its longest gap", "odometry", "its age",
+        "condition", "sent to it", "state", "its age", "its longest gap", "odometry", "its age",
         "its longest gap",
     )  # fmt: skip
     rows = [
-        [weather.name, f"{w.load_bps / 1e3:.0f} kbit/s", *_stream(w.state), *_stream(w.odometry)]
-        for weather, w, _ in wents
+        [condition.name, f"{w.load_bps / 1e3:.0f} kbit/s", *_stream(w.state), *_stream(w.odometry)]
+        for condition, w, _ in drives
     ]
-    return table(head, rows)
+    return block(head, rows)
 
 
-def own(wents: Wents, backs: Backs) -> str:
-    """Return how the robot's own chain went."""
+def own(drives: DriveRows, outages: OutageRows) -> str:
+    """Return the table of the robot's control chain."""
     head = (
-        "weather", "bumper", "its longest gap", "odometry", "its longest gap", "lost", "verdict",
-        "input's age", "held up",
+        "condition", "bumper", "its longest gap", "odometry", "its longest gap", "lost", "verdict",
+        "input's age", "stall",
     )  # fmt: skip
-    all_ = [(weather.name, [w.chain], held) for weather, w, held in wents]
-    all_ += [(what.name, [back.chain for back in some], held) for what, some, held in backs]
-    return table(head, [[name, *_chain(chains), _ms(held)] for name, chains, held in all_])
+    all_ = [(condition.name, [w.chain], held) for condition, w, held in drives]
+    all_ += [(what.name, [back.chain for back in some], held) for what, some, held in outages]
+    return block(head, [[name, *_chain(chains), _ms(held)] for name, chains, held in all_])
 
 
-def _chain(chains: Sequence[Chain]) -> list[str]:
+def _chain(chains: Sequence[ControlChain]) -> list[str]:
     return [
         f"{min(c.bumper.rate_hz for c in chains):.1f} Hz",
         _ms(max(c.bumper.gap_s for c in chains)),
@@ -71,40 +77,40 @@ def _chain(chains: Sequence[Chain]) -> list[str]:
     ]
 
 
-def returning(backs: Backs) -> str:
-    """Return what came of the link being down."""
-    head = "link", "n", "STOP after", "heard again after", "drives again after", "by"
+def returning(outages: OutageRows) -> str:
+    """Return the table of outages."""
+    head = "link", "n", "STOP after", "received again after", "drives again after", "by"
     rows = []
-    for what, some, _ in backs:
-        stopped = [back.told_s for back in some if back.told_s is not None]
+    for what, some, _ in outages:
+        stopped = [back.stopped_s for back in some if back.stopped_s is not None]
         by = [_by(back) for back in some]
         rows.append([
             what.name, str(len(some)),
             f"{_two(_spread(stopped))} ({len(stopped)})" if stopped else "drove on",
-            _two(_spread([_or_never(back.heard_s) for back in some])),
+            _two(_spread([_or_never(back.received_s) for back in some])),
             _two(_spread([_or_never(back.drove_s) for back in some])),
             ", ".join(f"{word} {by.count(word)}" for word in dict.fromkeys(by)),
         ])  # fmt: skip
-    return table(head, rows)
+    return block(head, rows)
 
 
-def wrong(backs: Backs, budget_s: float, fresh_s: float) -> list[str]:
-    """Return what is not as it should be, in words.
+def wrong(outages: OutageRows, budget_s: float, fresh_s: float) -> list[str]:
+    """Return the violations.
 
-    ``budget_s`` is what a STOP may take, ``fresh_s`` how long safety lives with the last bumper.
+    ``budget_s`` is the limit for STOP, ``fresh_s`` the largest age of a bumper sample.
     """
     found = []
-    for what, some, held_s in backs:
+    for what, some, stall_s in outages:
         for back in some:
             faults = [
-                *_gaps(back.chain, fresh_s + held_s),
-                *_faults(what, back, budget_s + held_s),
+                *_gaps(back.chain, fresh_s + stall_s),
+                *_faults(what, back, budget_s + stall_s),
             ]
             found += [f"{what.name}: {fault}" for fault in faults]
     return found
 
 
-def _gaps(chain: Chain, fresh_s: float) -> Iterator[str]:
+def _gaps(chain: ControlChain, fresh_s: float) -> Iterator[str]:
     lost = chain.bumper.lost + chain.odometry.lost
     if lost:
         yield f"{lost} messages lost on board"
@@ -112,33 +118,31 @@ def _gaps(chain: Chain, fresh_s: float) -> Iterator[str]:
         yield f"no bumper on board for {_ms(chain.bumper.gap_s)}, {_ms(fresh_s)} are allowed"
 
 
-def _faults(what: Outage, back: Back, budget_s: float) -> list[str]:
-    took_s = max(back.told_s or 0.0, back.moved_s)
+def _faults(what: Outage, back: OutageResult, budget_s: float) -> list[str]:
+    took_s = max(back.stopped_s or 0.0, back.moved_s)
     faults = []
-    if what.seconds > budget_s and back.told_s is None:
+    if what.seconds > budget_s and back.stopped_s is None:
         faults.append("it did not stop")
-    elif back.told_s is not None and what.seconds > budget_s and took_s > budget_s:
+    elif back.stopped_s is not None and what.seconds > budget_s and took_s > budget_s:
         faults.append(f"STOP after {_ms(took_s)}, {_ms(budget_s)} are allowed")
-    return [*faults, "it would not drive again"] if back.drove_s is None else faults
+    return [*faults, "it does not drive again"] if back.drove_s is None else faults
 
 
 def verdict(wrong: Sequence[str]) -> str:
     """Return the last line of the document."""
-    return f"Not as it should be: {'; '.join(wrong)}." if wrong else "All is as it should be."
+    return (
+        f"Outside the limits: {'; '.join(wrong)}."
+        if wrong
+        else "All results are within the limits."
+    )
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table for people."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
-
-
-def _by(back: Back) -> str:
+def _by(back: OutageResult) -> str:
     if back.drove_s is None:
         return "did not"
-    if back.told_s is None:
+    if back.stopped_s is None:
         return "drove on"
-    return f"{back.hands} new press" if back.hands else "itself"
+    return f"{back.presses} new press" if back.presses else "itself"
 
 
 def _stream(it: Stream) -> list[str]:
@@ -146,7 +150,7 @@ def _stream(it: Stream) -> list[str]:
 
 
 def _spread(values: Sequence[float]) -> tuple[float, float]:
-    return rank(values, 0.5), max(values)
+    return percentile(values, 0.5), max(values)
 
 
 def _or_never(value: float | None) -> float:

@@ -1,4 +1,4 @@
-"""One condition, tried: driving in it, or the link down and up again."""
+"""One trial: driving under a condition, or an outage of the link."""
 
 import time
 from dataclasses import dataclass
@@ -7,177 +7,178 @@ import msgspec
 
 from common.freshness import NS_PER_S
 from sim.requests import Wire
-from verification.faults.frames import SPEED, first_stop_s, last_move_s, moves
 from verification.faults.remote_host import Address
-from verification.faults.stack_fixture import until
+from verification.faults.stack_fixture import SPEED_MPS
+from verification.harness.trace import first_stop_s, last_move_s, moves
+from verification.harness.waiting import becomes_true
 from verification.roaming import figures
-from verification.roaming.conditions import Outage, Steady
-from verification.roaming.figures import STATE, Chain, Drive, Stream
-from verification.roaming.hosts import Site
+from verification.roaming.conditions import Condition, Outage
+from verification.roaming.figures import STATE, ControlChain, Drive, Stream
+from verification.roaming.hosts import TwoHosts
 
-SETTLE_S = 1.0  # in a weather before it counts
-PATIENCE_S = 2.0  # standing, before the finger is lifted and put back
-LATE_S = 0.2  # the last notes of a time are written by then
+SETTLE_S = 1.0  # under a condition before the measurement
+PATIENCE_S = 2.0  # standing, before the key is pressed again
+LATE_S = 0.2  # until the last entries of a period are written
 ESTOP_S = 5.0
-CALM_S = 1.0
-SURE_S = 1.0  # that it drives on by then
+QUIET_S = 1.0
+SURE_S = 1.0  # of continuous driving or standing
 GIVE_UP_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Went:
-    """How it went in a weather."""
+class DriveResult:
+    """Result of driving under a condition."""
 
     drive: Drive
-    hands: int  # how often the finger was lifted and put back
+    presses: int  # additional key presses
     speed: float  # m/s, on average
     state: Stream
     odometry: Stream
-    chain: Chain
+    chain: ControlChain
     braked_s: float | None  # from E to BREAK at the board
-    told_s: float | None  # from E to "latched" on the laptop
-    load_bps: float  # bit/s that the robot put on the way to the laptop
+    confirmed_s: float | None  # from E to the latched state on the laptop
+    load_bps: float  # bit/s from the robot to the laptop
     since_ns: int = 0
     until_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Back:
-    """How it went when the link was down."""
+class OutageResult:
+    """How it result when the link was down."""
 
-    told_s: float | None  # from the loss to STOP at the board; None: it drove on
-    moved_s: float  # from the loss to the last command to move of those before the return
-    heard_s: float | None  # from the return until the laptop heard safety again
+    stopped_s: float | None  # from the loss to STOP at the board; None: it drove on
+    moved_s: float  # from the loss to the last moving command before the return
+    received_s: float | None  # from the return until the laptop received safety's state
     drove_s: float | None  # from the return until it drove
-    hands: int  # how often the finger was lifted and put back for that
-    chain: Chain
+    presses: int  # additional key presses until then
+    chain: ControlChain
     since_ns: int = 0
     until_ns: int = 0
 
 
-def steady(it: Site, weather: Steady, seconds: float) -> Went:
-    """Drive in a weather for so long, then press the emergency stop in it."""
-    calm(it)
-    it.lane.ready()
-    it.air(*weather.faults)
+def steady(it: TwoHosts, condition: Condition, seconds: float) -> DriveResult:
+    """Drive under a condition, then press the emergency stop."""
+    settle(it)
+    it.fixture.ready()
+    it.disturb(*condition.faults)
     hold(it, SETTLE_S)
-    it.lane.frames.forget()
+    it.fixture.frames.forget()
     carried = it.carried()
-    began_m, since_ns = it.lane.stack.control.truth().distance, time.monotonic_ns()
-    hands = hold(it, seconds)
-    until_ns, ended_m = time.monotonic_ns(), it.lane.stack.control.truth().distance
+    began_m, since_ns = it.fixture.running.control.truth().distance, time.monotonic_ns()
+    presses = hold(it, seconds)
+    until_ns, ended_m = time.monotonic_ns(), it.fixture.running.control.truth().distance
     carried = it.carried() - carried
-    commands = list(it.lane.frames.follow().commands)
-    braked_s, told_s = estop(it)
-    calm(it)
+    commands = list(it.fixture.frames.follow().commands)
+    braked_s, confirmed_s = estop(it)
+    settle(it)
     robot, laptop = it.on_robot(since_ns, until_ns), it.on_laptop(since_ns, until_ns)
-    return Went(
+    return DriveResult(
         drive=figures.drive(robot, laptop, commands, since_ns, until_ns),
-        hands=hands,
+        presses=presses,
         speed=(ended_m - began_m) * NS_PER_S / (until_ns - since_ns),
         state=figures.stream(laptop, STATE, since_ns, until_ns),
         odometry=figures.stream(laptop, figures.ODOMETRY, since_ns, until_ns),
-        chain=figures.chain(robot, since_ns, until_ns),
+        chain=figures.control_chain(robot, since_ns, until_ns),
         braked_s=braked_s,
-        told_s=told_s,
+        confirmed_s=confirmed_s,
         load_bps=8 * carried * NS_PER_S / (until_ns - since_ns),
         since_ns=since_ns,
         until_ns=until_ns,
     )
 
 
-def hold(it: Site, seconds: float) -> int:
-    """Hold the key; lift it and put it back when it stands; return how often that was."""
-    end_s, hands, moved_s = time.monotonic() + seconds, 0, time.monotonic()
+def hold(it: TwoHosts, seconds: float) -> int:
+    """Hold the key; press it again when the vehicle stands; return the number of presses."""
+    end_s, presses, moved_s = time.monotonic() + seconds, 0, time.monotonic()
     while (now_s := time.monotonic()) < end_s:
-        if it.lane.moving():
+        if it.fixture.moving():
             moved_s = now_s
         elif now_s - moved_s > PATIENCE_S:
-            it.press_again(SPEED)
-            hands, moved_s = hands + 1, time.monotonic()
+            it.press_again(SPEED_MPS)
+            presses, moved_s = presses + 1, time.monotonic()
         time.sleep(0.02)
-    return hands
+    return presses
 
 
-def estop(it: Site) -> tuple[float | None, float | None]:
-    """Press E; return how long it took to the board, and until the laptop was told."""
-    it.lane.frames.forget()
+def estop(it: TwoHosts) -> tuple[float | None, float | None]:
+    """Press E; return the time to the board, and to the confirmation on the laptop."""
+    it.fixture.frames.forget()
     pressed_ns = time.monotonic_ns()
-    it.lane.tell(b"e")
+    it.fixture.send_line(b"e")
 
     def braked() -> list[int]:
-        commands = it.lane.frames.follow().commands
+        commands = it.fixture.frames.follow().commands
         return [c.mono_ns for c in commands if c.kind == "brake" and c.mono_ns > pressed_ns]
 
-    def told() -> list[int]:
-        return [note.at_ns for note in it.hears(STATE, pressed_ns) if note.latched]
+    def confirmed() -> list[int]:
+        return [entry.at_ns for entry in it.received(STATE, pressed_ns) if entry.latched]
 
-    until(lambda: braked() and told(), ESTOP_S)
-    it.lane.ask(0.0)
-    return _after_s(braked(), pressed_ns), _after_s(told(), pressed_ns)
+    becomes_true(lambda: braked() and confirmed(), ESTOP_S)
+    it.fixture.ask(0.0)
+    return _after_s(braked(), pressed_ns), _after_s(confirmed(), pressed_ns)
 
 
-def calm(it: Site) -> None:
-    """Let the air be good, and reset until none of the stops that were asked for is under way."""
-    it.air()
-    it.lane.ask(0.0)
+def settle(it: TwoHosts) -> None:
+    """Remove link faults, and reset until no latch is left."""
+    it.disturb()
+    it.fixture.ask(0.0)
     quiet_s = time.monotonic()
-    while time.monotonic() - quiet_s < CALM_S:
-        if it.lane.latched():
-            it.lane.reset()
+    while time.monotonic() - quiet_s < QUIET_S:
+        if it.fixture.latched():
+            it.fixture.reset()
             quiet_s = time.monotonic()
         time.sleep(0.05)
 
 
-def outage(it: Site, what: Outage, address: int) -> Back:
-    """Cut the link with the key held, mend it, and see what it takes to drive on."""
-    calm(it)
-    it.lane.ready()
+def outage(it: TwoHosts, what: Outage, address: int) -> OutageResult:
+    """Cut the link while the key is held, restore it, and wait until the vehicle drives."""
+    settle(it)
+    it.fixture.ready()
     time.sleep(0.3)
-    it.lane.frames.forget()
+    it.fixture.frames.forget()
     cut_ns = time.monotonic_ns()
     if what.seconds:
-        it.air(Wire(drop=1.0))
+        it.disturb(Wire(drop=1.0))
         time.sleep(what.seconds)
     if what.moves:
-        it.lane.tell(msgspec.json.encode(Address(address)))
+        it.fixture.send_line(msgspec.json.encode(Address(address)))
     back_ns = time.monotonic_ns()
-    it.air()
-    drove_s, hands = _drives_again(it, back_ns)
+    it.disturb()
+    drove_s, presses = _drives_again(it, back_ns)
     until_ns = time.monotonic_ns()
     time.sleep(LATE_S)
-    commands = it.lane.frames.commands
-    heard = [note.at_ns for note in it.hears(STATE, back_ns) if note.sent_ns > back_ns]
-    return Back(
-        told_s=first_stop_s(commands, cut_ns),
+    commands = it.fixture.frames.commands
+    received = [entry.at_ns for entry in it.received(STATE, back_ns) if entry.sent_ns > back_ns]
+    return OutageResult(
+        stopped_s=first_stop_s(commands, cut_ns),
         moved_s=last_move_s([c for c in commands if c.mono_ns < back_ns], cut_ns),
-        heard_s=_after_s(heard, back_ns),
+        received_s=_after_s(received, back_ns),
         drove_s=drove_s,
-        hands=hands,
-        chain=figures.chain(it.on_robot(cut_ns, until_ns), cut_ns, until_ns),
+        presses=presses,
+        chain=figures.control_chain(it.on_robot(cut_ns, until_ns), cut_ns, until_ns),
         since_ns=cut_ns,
         until_ns=until_ns,
     )
 
 
-def _drives_again(it: Site, back_ns: int) -> tuple[float | None, int]:
-    """Return how long after the return it drove for good, and how often that took the finger."""
-    began_s, hands = time.monotonic(), 0
-    since_s = began_s  # that it drives, or stands, without a change
-    moving = it.lane.moving()
+def _drives_again(it: TwoHosts, back_ns: int) -> tuple[float | None, int]:
+    """Return the time from the return to continuous driving, and the number of key presses."""
+    began_s, presses = time.monotonic(), 0
+    since_s = began_s  # start of the current driving or standing
+    moving = it.fixture.moving()
     while (now_s := time.monotonic()) - began_s < GIVE_UP_S:
-        if it.lane.moving() != moving:
+        if it.fixture.moving() != moving:
             moving, since_s = not moving, now_s
         elif moving and now_s - since_s > SURE_S and now_s - began_s > SURE_S:
-            commands = it.lane.frames.commands
+            commands = it.fixture.frames.commands
             stood = [c.mono_ns for c in commands if not moves(c)]
             drove = [c.mono_ns for c in commands if c.mono_ns > max(stood, default=0)]
-            return max(0.0, (drove[0] - back_ns) / NS_PER_S) if stood else 0.0, hands
+            return max(0.0, (drove[0] - back_ns) / NS_PER_S) if stood else 0.0, presses
         elif not moving and now_s - since_s > PATIENCE_S:
-            it.press_again(SPEED)
-            hands, since_s = hands + 1, time.monotonic()
+            it.press_again(SPEED_MPS)
+            presses, since_s = presses + 1, time.monotonic()
         time.sleep(0.02)
-    return None, hands
+    return None, presses
 
 
 def _after_s(times_ns: list[int], since_ns: int) -> float | None:

@@ -1,4 +1,4 @@
-"""``python -m verification.roaming.viewer PORT``: looks at the dashboard's robot for good."""
+"""``python -m verification.roaming.viewer PORT``: view the dashboard's robot."""
 
 import contextlib
 import json

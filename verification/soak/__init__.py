@@ -1,1 +1,1 @@
-"""Lap after lap with random faults and kill -9, watching memory and more: ``make soak``."""
+"""Laps with random faults and SIGKILL, and resource usage: ``make soak``."""

@@ -1,8 +1,9 @@
-"""``python -m verification.soak.driver``: lap after lap, by an operator who recovers from faults.
+"""``python -m verification.soak.driver``: drive laps and recover from faults.
 
-He resets what is latched, waits while odometry is away, gives a new odometry the vehicle's true
-pose as a localization would, and puts the vehicle back to its start when a lap gets nowhere. It is
-a process of its own, so that it can be killed like any other.
+The driver resets latches, waits while odometry is silent, sets the vehicle's true pose after a
+restart of odometry (as a localization does), and puts the vehicle back to its start when a lap is
+stuck. It is a separate process, so that it can be killed. It imports nothing of ``verification``:
+the systemd test copies this file to another computer.
 """
 
 import argparse
@@ -27,40 +28,40 @@ from common.messages import Done, PoseRequest
 from sim.control import Control
 from sim.requests import Place
 
-OLD_NS = NS_PER_S // 2  # an older pose is nothing to drive by
-TRY_NS = NS_PER_S // 2  # between two attempts to set things right
+OLD_NS = NS_PER_S // 2  # an older pose is not used
+TRY_NS = NS_PER_S // 2  # between two attempts to recover
 STEP_S = {QUICK: 30.0, PATIENT: 75.0}  # a step takes a third of that; a lap has none longer
 
 
 class Operator:
-    """Drives laps for ever; everything happens in the loop's thread."""
+    """Drives laps forever; all methods run in the loop's thread."""
 
     def __init__(self, bus: Bus, control: Control, pace: Pace) -> None:
         self._bus, self._control, self._pace = bus, control, pace
         self._driver = Driver(bus, self._new_lap(), lambda _: None)
         self._log = log.Logger()
         self._patience_ns = round(STEP_S[pace] * NS_PER_S)
-        self._mend: Callable[[], PoseRequest | None] | None = self._put_back
+        self._recover: Callable[[], PoseRequest | None] | None = self._put_back
         self._tried_ns = 0
-        self._step_ns = 0  # when the step began; 0 when it has yet to
-        self._boot: int | None = None  # of the odometry whose pose is known
+        self._step_ns = 0  # start of the step; 0 before it
+        self._boot: int | None = None  # boot of the odometry whose pose is set
 
     def on_beat(self, now_ns: int) -> None:
-        """Look and act; 20 times a second."""
+        """Run one control step; 20 times a second."""
         driver = self._driver
         del driver.odometry[:-1]
-        if self._mend is not None:
+        if self._recover is not None:
             self._try(now_ns)
         elif not driver.odometry or now_ns - driver.odometry[-1].mono_ns > OLD_NS:
-            return  # silence stops the vehicle
+            return  # without requests the vehicle stops
         elif driver.odometry[-1].boot != self._boot:
-            self._mend = self._relocate
+            self._recover = self._relocate
         elif driver.lap.step is None:
             self._log.info("lap finished", latches=driver.lap.unplanned)
             self._driver.lap, self._step_ns = self._new_lap(), 0
         elif self._step_ns and now_ns - self._step_ns > self._patience_ns:
             self._log.warning("begun anew", stuck=driver.lap.step.name, why=self._why())
-            self._mend = self._put_back
+            self._recover = self._put_back
         else:
             self._drive(now_ns)
 
@@ -77,19 +78,19 @@ class Operator:
 
     def _why(self) -> str:
         safety = self._driver.safety
-        said = [safety.text if safety else "safety was never heard"]
-        return " ".join([*said, *(words for *_, words in self._driver.answers[-1:])])
+        words = [safety.text if safety else "no safety state"]
+        return " ".join([*words, *(text for *_, text in self._driver.answers[-1:])])
 
-    # --- setting things right -----------------------------------------------------------------
+    # --- recovery -----------------------------------------------------------------------------
 
     def _try(self, now_ns: int) -> None:
-        if now_ns - self._tried_ns < TRY_NS or self._mend is None:
+        if now_ns - self._tried_ns < TRY_NS or self._recover is None:
             return
         self._tried_ns = now_ns
         try:
-            pose = self._mend()
+            pose = self._recover()
         except (LinkError, MessageError) as error:
-            self._log.warning("cannot set it right yet", error=str(error))
+            self._log.warning("cannot recover yet", error=str(error))
             return
         safety = self._driver.safety
         if pose is not None and safety is not None:
@@ -110,16 +111,18 @@ class Operator:
     def _done(self, _: Done) -> None:
         if self._driver.odometry:
             self._boot = self._driver.odometry[-1].boot
-            self._mend, self._driver.lap.began, self._step_ns = None, None, 0
+            self._recover, self._driver.lap.began, self._step_ns = None, None, 0
 
     def _refused(self, reason: str) -> None:
-        self._log.warning("cannot set it right yet", error=reason)
+        self._log.warning("cannot recover yet", error=reason)
 
 
 def main() -> int:
     """Drive until SIGTERM."""
     parser = argparse.ArgumentParser(prog="python -m verification.soak.driver")
-    parser.add_argument("--patient", action="store_true", help="for a machine that answers late")
+    parser.add_argument(
+        "--patient", action="store_true", help="relaxed pace for a host with stalls"
+    )
     add_sources(parser)
     options = parser.parse_args()
     config = load(Everything, sources(options)).config

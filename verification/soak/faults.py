@@ -1,8 +1,8 @@
-"""What goes wrong in a soak: faults drawn at random, the same ones for the same seed.
+"""Random faults of a soak, reproducible by their seed.
 
-Each kind comes once before any comes again, in an order of its own, so that a short soak meets them
-all. A fault begins, lasts, and is undone; in some of them the vehicle must stand after a short
-while and until the end.
+Each kind is drawn once, in random order, before any kind is drawn again, so that a short soak has
+all kinds. A fault begins, lasts, and is removed. During some faults the vehicle must stand after a
+short time and until the end.
 """
 
 from collections.abc import Callable
@@ -13,19 +13,19 @@ from typing import Literal, get_args
 from sim import requests as q
 
 PAUSE_S = (3.0, 7.0)  # between the end of a fault and the next one
-WELL = q.Wire()
+NO_FAULT = q.Wire()
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that goes wrong: something done to the vehicle, or a service killed with -9."""
+    """One fault: a request to the simulated vehicle, or SIGKILL of a service."""
 
     name: str
-    seconds: float  # that it lasts; a killed service is left dead for so long
+    seconds: float  # duration; a killed service is not restarted meanwhile
     begin: q.Asked | None = None
-    end: q.Asked | None = None  # undoes it; None when it ends by itself
+    end: q.Asked | None = None  # removes the fault; None when it ends by itself
     kills: str = ""  # the service
-    still: bool = False  # whether the vehicle must not be moved while it lasts
+    still: bool = False  # whether the vehicle must stand during the fault
 
 
 DIRECTIONS: tuple[Literal["to_pc", "to_board", "both"], ...] = ("to_pc", "to_board", "both")
@@ -35,24 +35,24 @@ Draw = Callable[[Random], Fault]
 
 
 class Faults:
-    """Hands out one fault after the other."""
+    """Draws the faults."""
 
     def __init__(self, seed: int) -> None:
         self._random = Random(seed)
-        self._bag: list[tuple[str, Draw]] = []
+        self._remaining: list[tuple[str, Draw]] = []
 
     def next(self, kills: bool) -> Fault:
-        """Return the next fault; with ``kills`` False one that leaves all processes alive."""
+        """Return the next fault; without ``kills`` one that kills no process."""
         while True:
-            if not self._bag:
-                self._bag = list(KINDS.items())
-                self._random.shuffle(self._bag)
-            name, draw = self._bag.pop()
+            if not self._remaining:
+                self._remaining = list(KINDS.items())
+                self._random.shuffle(self._remaining)
+            name, draw = self._remaining.pop()
             if kills or not name.startswith("kill "):
                 return draw(self._random)
 
     def pause_s(self) -> float:
-        """Return how long all is well before the next one."""
+        """Return the pause before the next fault."""
         return self._random.uniform(*PAUSE_S)
 
     def one_of(self, count: int) -> int:
@@ -68,7 +68,7 @@ def _wire(name: str, **chances: float) -> tuple[str, Draw]:
     def draw(random: Random) -> Fault:
         direction = random.choice(DIRECTIONS)
         wire = q.Wire(direction=direction, **chances)
-        return Fault(f"wire {name}", _lasts(random), wire, WELL)
+        return Fault(f"wire {name}", _lasts(random), wire, NO_FAULT)
 
     return f"wire {name}", draw
 
@@ -117,7 +117,7 @@ KINDS: dict[str, Draw] = dict(
         _kill("bridge", still=True),
         _kill("driver", still=True),
         _kill("router", still=True),
-        _kill("sim", still=False),  # a board that is dead holds no command
-        _kill("odom", still=False),  # safety needs no odometry; the operator stops without it
+        _kill("sim", still=False),  # a dead board holds no command
+        _kill("odom", still=False),  # safety needs no odometry; the driver stops without it
     ]
 )

@@ -1,4 +1,4 @@
-"""A soak on paper: memory, log and steps over time, with the faults between them."""
+"""Plot of a soak: memory, log and steps over time, with the faults."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ MB = 2**20
 
 
 def save(files: Sequence[Path], record: Record) -> None:
-    """Draw a soak into each file, in the format that its name says."""
+    """Write the plot to each file, in the format of its suffix."""
     figure = Figure(figsize=(11, 9), layout="constrained")
     FigureCanvasAgg(figure)
     memory, held, progress = figure.subplots(3, 1, sharex=True, height_ratios=[3, 2, 2])
@@ -28,7 +28,7 @@ def save(files: Sequence[Path], record: Record) -> None:
 
 
 def _draw_lives(memory: Axes, held: Axes, record: Record) -> None:
-    """Draw each process in a colour of its own, with a gap where it was dead."""
+    """Draw each process in its own colour, with gaps while it did not run."""
     names = list(dict.fromkeys(life.name for life in record.lives))
     drawn = set()
     for life, samples in record.lives.items():

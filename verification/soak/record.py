@@ -1,4 +1,4 @@
-"""What is seen of a soak: every life of every process, what was done, what was told."""
+"""Record of a soak: samples of every process, faults, progress."""
 
 from dataclasses import dataclass, field
 
@@ -7,7 +7,7 @@ import msgspec
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """One life of a process: who, and which of its incarnations."""
+    """One run of a process between start and end."""
 
     name: str
     pid: int
@@ -16,7 +16,7 @@ class Life:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """How a process fared at one moment."""
+    """Resources of a process at one time."""
 
     at_s: float  # since the soak began
     rss: int  # bytes
@@ -26,7 +26,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Something that the driver has told."""
+    """An event of the driver."""
 
     at_s: float
     what: str  # "step", "lap finished", "begun anew"
@@ -34,7 +34,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A time in which no command may move the vehicle."""
+    """A period in which no command may move the vehicle."""
 
     name: str
     from_ns: int
@@ -43,7 +43,7 @@ class Window:
 
 @dataclass(slots=True)
 class Record:
-    """All that was seen."""
+    """All observations."""
 
     lives: dict[Life, list[Sample]] = field(default_factory=dict)
     progress: list[Progress] = field(default_factory=list)
@@ -54,11 +54,11 @@ class Record:
     moved: list[tuple[str, float]] = field(default_factory=list)  # fault, seconds too late
     health: dict[str, list[float]] = field(default_factory=dict)  # times by service
     faults: list[tuple[float, str]] = field(default_factory=list)
-    late_s: float = 0.0  # how late the watcher itself was at worst
-    seconds: float = 0.0  # that it lasted
+    late_s: float = 0.0  # largest lateness of the soak's own loop
+    seconds: float = 0.0  # duration
 
 
 def encoded(record: Record) -> bytes:
-    """Return all of it as JSON; ``lives`` is a list of pairs there."""
+    """Encode as JSON, with ``lives`` as a list of pairs."""
     fields = {name: getattr(record, name) for name in record.__dataclass_fields__}
     return msgspec.json.encode(fields | {"lives": list(record.lives.items())})

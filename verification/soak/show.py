@@ -1,4 +1,4 @@
-"""What is shown of a soak: a line for each event, the results."""
+"""Terminal output of a soak: a line for each event, and the results."""
 
 import time
 from collections.abc import Sequence
@@ -11,19 +11,19 @@ from cli.demo.score import Result
 
 
 class Show:
-    """Prints one soak of so many seconds."""
+    """Prints events and results of one soak."""
 
     def __init__(self, seconds: float) -> None:
         self._console = Console(highlight=False, markup=False)
         self._seconds = seconds
         self._began_s = time.monotonic()
 
-    def say(self, text: str) -> None:
-        """Print a sentence."""
+    def line(self, text: str) -> None:
+        """Print a line."""
         self._console.print(text)
 
-    def tell(self, text: str) -> None:
-        """Print what happens, with the time since the beginning."""
+    def event(self, text: str) -> None:
+        """Print an event with the time since the start."""
         past_s = time.monotonic() - self._began_s
         clock = f"{_clock(past_s)} of {_clock(self._seconds)}"
         self._console.print(f"{clock}  {text}", soft_wrap=True)

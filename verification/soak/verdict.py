@@ -1,9 +1,8 @@
-"""What came of a soak: whether anything grew, got stuck, broke down or moved when it must not.
+"""Verdict of a soak: growth of resources, stuck laps, crashes, and motion while it must stand.
 
-A process is judged by the longest of its lives: the shorter ones end with a kill and are filled
-with the deaths of others, when sessions come and go. Its first minute is warm-up; of what follows,
-the median of the first fifth is held against the median of the last. Every process must have lived
-long enough once, or nothing is known about it.
+A process is judged by its longest run: shorter runs end with a kill, and sessions come and go in
+them. The first minute is warm-up. Afterwards the median of the first fifth is compared with the
+median of the last fifth. Every process must have one run that is long enough.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,27 +13,28 @@ from statistics import median
 from cli.demo.score import Result
 from common.freshness import NS_PER_S
 from sim import trace as t
+from verification.harness.trace import moves
 from verification.soak.record import Life, Record, Sample, Window
 
 GROWTH_MAX = 2 * 2**20  # bytes of memory
 LOG_MAX = 2000.0  # bytes/s on average, all services together, faults included
 LOG_PEAK_MAX = 10_000.0  # bytes/s in the worst ten seconds
 PEAK_S = 10
-SILENCE_MAX_S = 20.0  # of health: a service is left dead for some seconds, then starts
-SAMPLES_MIN = 10  # of a life that is judged; a fifth of it is 2
+SILENCE_MAX_S = 20.0  # of health: a killed service is restarted after some seconds
+SAMPLES_MIN = 10  # of a run that is judged; a fifth of it is 2
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What is asked of this soak, by its length and by the machine."""
+    """Limits of a soak, by its duration and by the host."""
 
     warm_up_s: float
-    lap_s: float  # in each so many seconds one lap must be finished
+    lap_s: float  # in each such period one lap must be finished
     stuck_s: float  # without a step done
 
 
 def results(record: Record, limits: Limits) -> list[Result]:
-    """Return the table; a soak is good when nothing in it is False."""
+    """Return the results; a soak is good when none is False."""
     return [
         *_processes(record.lives, limits.warm_up_s),
         _log(record.log),
@@ -44,12 +44,12 @@ def results(record: Record, limits: Limits) -> list[Result]:
         ("faults", str(len(record.faults)), len(record.faults) > 0),
         *_laps(record, limits),
         _moved(record),
-        ("the watcher was late by", f"{record.late_s:.2f} s at most", None),
+        ("lateness of the soak's loop", f"{record.late_s:.2f} s at most", None),
     ]
 
 
 def good(rows: Sequence[Result]) -> bool:
-    """Tell whether nothing was wrong."""
+    """Return whether all results are good."""
     return all(fine is not False for _, _, fine in rows)
 
 
@@ -62,13 +62,8 @@ def growth(samples: Sequence[Sample], warm_up_s: float) -> tuple[Sample, Sample]
     return _median(warm[:fifth]), _median(warm[-fifth:])
 
 
-def moves(command: t.Command) -> bool:
-    """Tell whether a command moves the vehicle."""
-    return command.kind == "run" and bool(command.linear or command.angular)
-
-
 def too_late(runs: Iterable[t.Command], window: Window) -> list[tuple[str, float]]:
-    """Return what moves the vehicle when nothing may: the fault, and how late in seconds."""
+    """Return moving commands within a window: the fault, and the time in seconds."""
     return [
         (window.name, (run.mono_ns - window.from_ns) / NS_PER_S)
         for run in runs
@@ -91,7 +86,7 @@ def _processes(lives: Mapping[Life, Sequence[Sample]], warm_up_s: float) -> list
         longest = max((lives[life] for life in lives if life.name == name), key=len)
         span = growth(longest, warm_up_s)
         if span is None:
-            rows.append((f"{name}: memory", "never lived long enough to be judged", False))
+            rows.append((f"{name}: memory", "no run was long enough", False))
             continue
         first, last = span
         grown = last.rss - first.rss
@@ -122,18 +117,18 @@ def _health(health: Mapping[str, Sequence[float]], end_s: float) -> list[Result]
         silence = max(b - a for a, b in pairwise(beats))
         amount = f"{len(times)} messages, silent for {silence:.1f} s at most"
         rows.append((f"{service}: health", amount, silence <= SILENCE_MAX_S))
-    return rows or [("health", "nobody told how it fares", False)]
+    return rows or [("health", "no health message", False)]
 
 
 def _laps(record: Record, limits: Limits) -> list[Result]:
-    said = [progress.what for progress in record.progress]
-    finished, wanted = said.count("lap finished"), int(record.seconds // limits.lap_s)
+    events = [progress.what for progress in record.progress]
+    finished, wanted = events.count("lap finished"), int(record.seconds // limits.lap_s)
     steps = [progress.at_s for progress in record.progress if progress.what == "step"]
     stuck_s = max(b - a for a, b in pairwise([0.0, *steps, record.seconds]))
     moving = bool(steps) and stuck_s <= limits.stuck_s
     return [
         ("laps finished", f"{finished}, at least {wanted} wanted", finished >= wanted),
-        ("laps given up, and begun anew", str(said.count("begun anew")), None),
+        ("laps restarted", str(events.count("begun anew")), None),
         ("longest time without a step done", f"{stuck_s:.0f} s", moving),
     ]
 

@@ -1,4 +1,4 @@
-"""``python -m verification.systemd``: install T2 into a bare Debian, and see systemd keep it."""
+"""``python -m verification.systemd``: test T2's units in a Debian with systemd."""
 
 import argparse
 import subprocess
@@ -14,25 +14,25 @@ PYTHONS = {"bookworm": "3.11", "trixie": "3.13"}  # what Debian has
 
 
 def main() -> int:
-    """Print a row for each check; return 1 when one has failed."""
+    """Print a row for each check; return 1 when one fails."""
     parser = argparse.ArgumentParser(prog="python -m verification.systemd")
-    parser.add_argument("--suite", choices=PYTHONS, default="bookworm", help="which Debian")
-    parser.add_argument("--stay", action="store_true", help="leave a failed machine for a look")
+    parser.add_argument("--suite", choices=PYTHONS, default="bookworm", help="Debian release")
+    parser.add_argument("--stay", action="store_true", help="keep a failed machine")
     options = parser.parse_args()
-    if why := lacking():
-        print(f"did not run: {why}")
+    if reason := lacking():
+        print(f"did not run: {reason}")
         return 0
     subprocess.run(
         ["make", "--silent", "wheelhouse", f"WHEEL_PYTHON={PYTHONS[options.suite]}"],
         cwd=ROOT, check=True,
     )  # fmt: skip
     with booted(options.suite, ROOT / "build" / "wheelhouse") as machine:
-        print(machine.said("systemctl", "--version").splitlines()[0], "on", options.suite)
-        return checked(machine, options.stay)
+        print(machine.run("systemctl", "--version").splitlines()[0], "on", options.suite)
+        return run_checks(machine, options.stay)
 
 
-def checked(machine: Machine, stay: bool) -> int:
-    """Check until something fails."""
+def run_checks(machine: Machine, stay: bool) -> int:
+    """Run the checks until one fails."""
     for check in CHECKS:
         started_s = time.monotonic()
         try:
@@ -42,9 +42,9 @@ def checked(machine: Machine, stay: bool) -> int:
         took_s = time.monotonic() - started_s
         print(f"{check.__name__:16} {took_s:6.1f} s  {seen}", flush=True)
         if code:
-            print(machine.tried("journalctl", "-o", "cat", "-n", "60", "-u", "t2-*").stdout)
+            print(machine.attempt("journalctl", "-o", "cat", "-n", "60", "-u", "t2-*").stdout)
             if stay:
-                input(f"docker exec -it {machine.name} bash; enter ends it ")
+                input(f"docker exec -it {machine.name} bash; press Enter to remove it ")
             return code
     return 0
 

@@ -1,6 +1,6 @@
-"""A computer with a systemd of its own: a container with rights and without a network.
+"""A simulated computer with systemd: a privileged container without a network.
 
-Its image is made of Debian's packages, once, and stays: ``docker rmi t2-systemd-test:SUITE``.
+Its image is built from Debian packages once, and kept: ``docker rmi t2-systemd-test:SUITE``.
 """
 
 import json
@@ -14,12 +14,13 @@ from pathlib import Path
 
 IMAGE = "t2-systemd-test"
 PACKAGES = "systemd,systemd-sysv,dbus,python3"
-# As --privileged, but for one that not every machine has to give: OOMScoreAdjust is skipped then.
+# Like --privileged, without SYS_RESOURCE, which not every host grants: systemd then skips
+# OOMScoreAdjust.
 RIGHTS = (
     "--cap-add=ALL", "--cap-drop=SYS_RESOURCE", "--security-opt=seccomp=unconfined",
     "--security-opt=apparmor=unconfined", "--security-opt=systempaths=unconfined",
 )  # fmt: skip
-# systemd wants a hierarchy of control groups for itself, of the second version.
+# systemd needs its own cgroup hierarchy, version 2.
 BOOT = """
 if [ "$(stat -fc %T /sys/fs/cgroup)" != cgroup2fs ]; then
   mount -t cgroup2 none /mnt && mkdir -p /mnt/NAME && echo $$ > /mnt/NAME/cgroup.procs && umount /mnt
@@ -30,26 +31,26 @@ exec /sbin/init
 
 
 def lacking() -> str:
-    """Return what this machine lacks for the test, or nothing."""
+    """Return what this host lacks for the test; empty when nothing is missing."""
     if os.geteuid() != 0:
-        return "it wants root"
+        return "root is required"
     for tool in ("docker", "debootstrap"):
         if shutil.which(tool) is None:
-            return f"there is no {tool} here"
+            return f"{tool} is not installed"
     if subprocess.run(["docker", "info"], capture_output=True, check=False).returncode:
-        return "no Docker engine answers"
+        return "the Docker engine does not answer"
     return ""
 
 
 def image(suite: str) -> str:
-    """Return the image of a bare Debian with systemd and Python, made when there is none."""
+    """Return the image of a minimal Debian with systemd and Python; build it if missing."""
     name = f"{IMAGE}:{suite}"
     if (
         subprocess.run(["docker", "inspect", name], capture_output=True, check=False).returncode
         == 0
     ):
         return name
-    print(f"making {name} of Debian's packages", flush=True)
+    print(f"building {name} from Debian packages", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "root"
         subprocess.run(
@@ -63,60 +64,60 @@ def image(suite: str) -> str:
 
 
 class Machine:
-    """The running computer, as root sees it."""
+    """The running computer, with root access."""
 
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def said(self, *words: str) -> str:
-        """Return what a command says; its standard error when it fails is ours."""
-        done = self.tried(*words)
+    def run(self, *words: str) -> str:
+        """Return the output of a command; raise AssertionError when it fails."""
+        done = self.attempt(*words)
         assert done.returncode == 0, f"{' '.join(words)}: {done.returncode}\n{done.stdout}"
         return done.stdout
 
-    def tried(self, *words: str) -> "subprocess.CompletedProcess[str]":
-        """Run a command to its end; both of its outputs are in ``stdout``."""
+    def attempt(self, *words: str) -> "subprocess.CompletedProcess[str]":
+        """Run a command; both of its outputs are in ``stdout``."""
         return subprocess.run(
             ["docker", "exec", self.name, *words], text=True, timeout=120, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
 
     def write(self, path: str, text: str) -> None:
-        """Write a file, and its folder."""
+        """Write a file; create its folder."""
         into = ["sh", "-c", 'mkdir -p "${0%/*}"; cat > "$0"', path]
         subprocess.run(
             ["docker", "exec", "-i", self.name, *into], input=text, text=True, check=True
         )
 
-    def carry(self, folder: Path, to: str) -> None:
-        """Copy a folder to a place that does not exist yet."""
+    def copy(self, folder: Path, to: str) -> None:
+        """Copy a folder to a path that does not exist yet."""
         subprocess.run(["docker", "cp", "--quiet", folder, f"{self.name}:{to}"], check=True)
 
     def unit(self, name: str) -> dict[str, str]:
         """Return the properties of a unit."""
-        lines = self.said("systemctl", "show", name).splitlines()
+        lines = self.run("systemctl", "show", name).splitlines()
         return dict(line.split("=", 1) for line in lines if "=" in line)
 
     def truth(self) -> dict[str, float | str]:
-        """Return how the simulated vehicle really is: its speed, and what its board holds."""
+        """Return the true speed of the simulated vehicle, and the command that its board holds."""
         code = (
             "import json; from sim.control import Control; t = Control(4009, 1.0).truth(); "
             "print(json.dumps({'linear': t.linear, 'holds': t.command.kind}))"
         )
-        told: dict[str, float | str] = json.loads(self.python("-c", code))
-        return told
+        state: dict[str, float | str] = json.loads(self.python("-c", code))
+        return state
 
     def python(self, *words: str) -> str:
-        """Return what T2's Python says, run as T2's user."""
+        """Run T2's Python as T2's user; return the output."""
         python = "/opt/t2/current/bin/python"
-        return self.said(
+        return self.run(
             "setpriv", "--reuid=t2", "--regid=t2", "--init-groups", python, "-P", *words
         )
 
 
 @contextmanager
 def booted(suite: str, wheelhouse: Path) -> Iterator[Machine]:
-    """Run a computer while the context lasts; what was carried to it is in /wheelhouse."""
+    """Run a computer with the wheelhouse in /wheelhouse."""
     name = f"{IMAGE}-{os.getpid()}"
     command = [
         "docker", "run", "--detach", "--name", name, *RIGHTS, "--network", "none",
@@ -127,17 +128,17 @@ def booted(suite: str, wheelhouse: Path) -> Iterator[Machine]:
     try:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         machine = Machine(name)
-        machine.tried("systemctl", "is-system-running", "--wait")
+        machine.attempt("systemctl", "is-system-running", "--wait")
         yield machine
     finally:
         subprocess.run(["docker", "rm", "--force", name], check=False, stdout=subprocess.DEVNULL)
-        forget(name)
+        remove_cgroups(name)
 
 
-def forget(name: str) -> None:
-    """Remove the control groups that a machine has left; the innermost go first."""
+def remove_cgroups(name: str) -> None:
+    """Remove the cgroups that a machine left behind, innermost first."""
     for root in Path("/sys/fs/cgroup").rglob(name):
         for folder in (*sorted(root.rglob("*"), reverse=True), root):
             if folder.is_dir():
-                with suppress(OSError):  # its last process is still on its way
+                with suppress(OSError):  # its last process is still ending
                     folder.rmdir()

@@ -1,1 +1,1 @@
-"""Simulated vehicles in simulated time: how far an unkind one comes."""
+"""Simulated vehicles in simulated time."""

@@ -1,8 +1,8 @@
-"""Random wandering through the simulator's office, without a bus and in simulated time.
+"""Random drives through the simulated office, without a bus and in simulated time.
 
-``python -m verification.vehicles.wander`` prints how much of the time the vehicle moves, with the
-sonars as simulated and with sonars that saturate nearer. A contact is counted, and the vehicle is
-put back to where it was a moment before.
+``python -m verification.vehicles.wander`` prints the share of time in motion, for simulated sonars
+and for sonars that saturate at a shorter range. A contact is counted, and the vehicle is put back
+to its pose one second before.
 """
 
 import random
@@ -42,7 +42,7 @@ from sim.world import Plan, World
 
 OFFICE = Path(__file__).parents[2] / "sim/worlds/office.toml"
 TICK_NS, SONAR_TICKS, ASK_TICKS = NS_PER_S // 100, 5, 5
-BACK_TICKS = 100  # of the way that a contact takes back
+BACK_TICKS = 100  # how far a contact puts the vehicle back
 KINDS = {
     Command.RUN: MotionKind.RUN,
     Command.STOP: MotionKind.STOP,
@@ -66,11 +66,11 @@ class Figures:
     moving: float  # share of the time
     metres: float
     contacts: int
-    immobile: bool  # at the end no direction moves it any more
+    immobile: bool  # at the end no request moves it
 
 
 class Walk:
-    """One vehicle in the office and an operator who wanders about."""
+    """One vehicle in the office with a random operator."""
 
     def __init__(self, seed: int, saturation: float = 5.0, noise: float = 0.005) -> None:
         plan = msgspec.toml.decode(OFFICE.read_bytes(), type=Plan)
@@ -91,7 +91,7 @@ class Walk:
         self.asked, self.until_ns, self.blocked_ns = STILL, 0, 0
 
     def tick(self, asked: Twist | None) -> bool:
-        """Let 10 ms pass under a request; return whether the vehicle moves."""
+        """Simulate 10 ms with a request; return whether the vehicle moves."""
         self.now_ns += TICK_NS
         self.ticks += 1
         self._move()
@@ -110,12 +110,12 @@ class Walk:
         return abs(self.twist.linear) > 0.02 or abs(self.twist.angular) > 0.05
 
     def wander(self, seconds: float) -> float:
-        """Wander about; return the share of the time in motion."""
+        """Drive randomly; return the share of time in motion."""
         ticks = round(seconds * NS_PER_S / TICK_NS)
         return sum(self.tick(self._choose()) for _ in range(ticks)) / ticks
 
     def is_immobile(self) -> bool:
-        """Try every way to move for a while; return whether none moves the vehicle."""
+        """Request every direction for some time; return whether none moves the vehicle."""
         for way in EVERY_WAY:
             for _ in range(50):
                 self.tick(STILL)
@@ -124,7 +124,7 @@ class Walk:
         return True
 
     def _choose(self) -> Twist:
-        """Keep the motion for a while; when blocked, choose another one soon."""
+        """Keep the request for some time; choose another one soon when blocked."""
         blocked = "blocked" in self.state.latches
         self.blocked_ns = self.blocked_ns + TICK_NS if blocked else 0
         if self.now_ns >= self.until_ns or self.blocked_ns > NS_PER_S // 2:
@@ -173,7 +173,7 @@ class Walk:
 
 
 def run(seed: int, saturation: float, seconds: float = 60.0, noise: float = 0.005) -> Figures:
-    """Wander once."""
+    """Run one random drive."""
     walk = Walk(seed, saturation, noise)
     moving = walk.wander(seconds)
     metres, contacts = walk.metres, walk.contacts
@@ -190,7 +190,7 @@ def main(seeds: int = 6) -> None:
         stuck = sum(one.immobile for one in runs)
         sys.stdout.write(
             f"sonars saturate at {saturation} m: moves {moving:.0%} of the time, {metres:.1f} m, "
-            f"{contacts} contacts, immobile for good in {stuck} of {seeds} runs\n"
+            f"{contacts} contacts, immobile at the end in {stuck} of {seeds} runs\n"
         )
         sys.stdout.flush()
 

@@ -13,24 +13,25 @@ from common.messages import SONAR_NAMES
 from sim.requests import Bumper, Sonar
 from tests.cli.commission.operator_process import OperatorProcess, checkout
 from tests.cli.processes import ran
-from verification.harness.stack import Chain, chain
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
 
 TRIES = 5  # safety stops on scheduling stalls; an operator tries again, too
 PHRASE = "wheels off the ground"
 
 
 @pytest.fixture
-def stack(tmp_path: Path) -> Iterator[Chain]:
-    with chain(tmp_path) as it:
+def stack(tmp_path: Path) -> Iterator[RunningStack]:
+    with running_stack(tmp_path) as it:
         yield it
 
 
-def at(stack: Chain) -> list[str]:
+def at(stack: RunningStack) -> list[str]:
     return ["--set", f"bus.connect={stack.endpoint}"]
 
 
-def answers(stack: Chain) -> bool:
+def answers(stack: RunningStack) -> bool:
     """Return whether the simulator accepts requests."""
     try:
         stack.control.truth()
@@ -60,7 +61,7 @@ def tries(it: OperatorProcess, title: str) -> Iterator[None]:
     raise AssertionError(it.shown)
 
 
-def hold_a_hand(stack: Chain, it: OperatorProcess) -> None:
+def hold_a_hand(stack: RunningStack, it: OperatorProcess) -> None:
     for name in SONAR_NAMES:
         it.wait(f"NOW the {name.replace('_', ' ')} sonar")
         stack.control.do(Sonar(name=name, range=0.3))  # type: ignore[arg-type]
@@ -68,7 +69,7 @@ def hold_a_hand(stack: Chain, it: OperatorProcess) -> None:
         stack.control.do(Sonar(name=name))  # type: ignore[arg-type]
 
 
-def test_a_complete_checkout(stack: Chain, tmp_path: Path) -> None:
+def test_a_complete_checkout(stack: RunningStack, tmp_path: Path) -> None:
     report = tmp_path / "out" / "report.md"
     with checkout(report, *at(stack)) as it:
         it.begin()
@@ -100,7 +101,7 @@ def test_a_complete_checkout(stack: Chain, tmp_path: Path) -> None:
 
 
 def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
-    stack: Chain, tmp_path: Path
+    stack: RunningStack, tmp_path: Path
 ) -> None:
     stack.kill("sim")
     for direction in ("command", "feedback"):
@@ -153,7 +154,7 @@ def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
     assert 'wire.command_angular_unit = "milliradian".' in text
 
 
-def test_ctrl_c_while_the_wheels_turn_stops_them(stack: Chain, tmp_path: Path) -> None:
+def test_ctrl_c_while_the_wheels_turn_stops_them(stack: RunningStack, tmp_path: Path) -> None:
     report = tmp_path / "report.md"
     with checkout(report, *at(stack), "--only", "estop", "--only", "forward") as it:
         it.begin()
@@ -174,7 +175,7 @@ def test_ctrl_c_while_the_wheels_turn_stops_them(stack: Chain, tmp_path: Path) -
     assert "Not signed." in text
 
 
-def test_an_earlier_latch_is_reset_after_confirmation(stack: Chain, tmp_path: Path) -> None:
+def test_an_earlier_latch_is_reset_after_confirmation(stack: RunningStack, tmp_path: Path) -> None:
     stack.control.do(Bumper(pressed=True))
     # The bridge also sends BRAKE at its start; only safety's log entry proves this hit.
     wait_until(lambda: '"cause": "contact"' in stack.log.read_text(), "safety's latch")

@@ -21,7 +21,8 @@ from sim.trace import Command
 from tests.cli.commission.operator_process import PATIENCE_S, OperatorProcess, checkout
 from tests.cli.processes import ran, sets
 from verification.harness.fake_board import Board, board
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 PHRASE = "wheels off the ground"
 TRIES = 5

@@ -20,7 +20,7 @@ from cli.settings import Everything
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.config import Sources, load
 from tests.cli.processes import PATIENCE_S, children, ran, sets, t2, wait_gone
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 LAP_S = 200.0  # with scheduling stalls; without them a quarter of it
 

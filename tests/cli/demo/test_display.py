@@ -19,7 +19,7 @@ from common.settings import Vehicle
 from sim.config import load_plan
 from sim.geometry import Pose, Rectangle
 from tests.cli.demo.lap_fixture import hit_lap, odometry, safety
-from verification.harness.support import at
+from verification.harness.bus import at
 
 PLAN = load_plan("office", Vehicle())
 BODY = Rectangle(0.55, 0.35)

@@ -13,7 +13,7 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
 from tests.cli.demo.lap_fixture import odometry, safety
-from verification.harness.support import at
+from verification.harness.bus import at
 
 
 class FakeBus(Bus):

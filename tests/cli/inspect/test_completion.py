@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import COMMANDS, main
-from verification.harness.support import PATIENCE_S
+from verification.harness.waiting import PATIENCE_S
 
 PATH = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
 EVERYWHERE = {"--help", "--version"}

@@ -15,8 +15,9 @@ from common.messages import Drive, ResetDone, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.factories import safety_state
-from verification.harness.certificates import Site, dialling
-from verification.harness.support import at, joined, running, wait_until
+from verification.harness.bus import at, joined, running
+from verification.harness.certificates import Site, connecting
+from verification.harness.waiting import wait_until
 
 
 class OnBoard:
@@ -111,8 +112,8 @@ def drives(it: Member, robot: OnBoard) -> bool:
 def test_a_driver_drives_and_a_viewer_is_refused(site: Site, join: Callable[..., Bus]) -> None:
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         robot = on_board(join, onboard)
-        anna = member(join, dialling(site.settings("driver", "anna"), secured))
-        hall = member(join, dialling(site.settings("viewer", "hall"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured))
+        hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert drives(anna, robot)
         assert not drives(hall, robot)
         assert not anna.source.barred
@@ -129,10 +130,12 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
 ) -> None:
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         robot = on_board(join, onboard)
-        planner = member(join, dialling(site.settings("driver", "planner"), secured), source="nav")
+        planner = member(
+            join, connecting(site.settings("driver", "planner"), secured), source="nav"
+        )
         assert drives(planner, robot)
-        stolen = member(join, dialling(site.settings("driver", "planner"), secured))
-        anna = member(join, dialling(site.settings("driver", "anna"), secured), source="nav")
+        stolen = member(join, connecting(site.settings("driver", "planner"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured), source="nav")
         assert not drives(stolen, robot), "it took teleop's priority"
         assert not drives(anna, robot)
         assert stolen.source.barred
@@ -148,10 +151,10 @@ def test_members_reach_their_own_robots_through_the_sites_router(
         site.router(site.settings("robot", "002"), center) as (_, two),
     ):
         first, second = on_board(join, one), on_board(join, two, "002")
-        driver = dialling(site.settings("driver", "anna"), center)
+        driver = connecting(site.settings("driver", "anna"), center)
         assert drives(member(join, driver), first)
         assert not drives(member(join, driver, "002"), second)
-        everybody = member(join, dialling(site.settings("fleet", "room"), center), "*")
+        everybody = member(join, connecting(site.settings("fleet", "room"), center), "*")
 
         def stopped() -> bool:
             everybody.bus.estop()
@@ -203,8 +206,8 @@ def test_a_revoked_certificate_has_no_rights(
         site.router(site.settings("robot", "001")) as (secured, onboard),
     ):
         robot = on_board(join, onboard)
-        anna = member(join, dialling(site.settings("driver", "anna"), secured))
-        hall = member(join, dialling(site.settings("viewer", "hall"), secured))
+        anna = member(join, connecting(site.settings("driver", "anna"), secured))
+        hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert not drives(hall, robot)  # by then it has received safety's state
         for _ in range(20):
             anna.source.ask(0.1, 0.0)

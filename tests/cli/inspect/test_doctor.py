@@ -17,20 +17,22 @@ from common.loop import Loop
 from common.messages import Drive
 from sim.requests import Bumper, Freeze, Sonar
 from tests.cli.inspect.tool import Tool
-from verification.harness.stack import Chain, chain
-from verification.harness.support import at, bus_on, free_port, router_process, running, wait_until
+from verification.harness.bus import at, bus_on, router_process, running
+from verification.harness.ports import free_port
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
 
 TRIES_S = 30.0
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
-    with chain(tmp_path_factory.mktemp("doctor")) as it:
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("doctor")) as it:
         yield it
 
 
 @pytest.fixture
-def doctor(stack: Chain, capsys: pytest.CaptureFixture[str]) -> Callable[[], "list[Any]"]:
+def doctor(stack: RunningStack, capsys: pytest.CaptureFixture[str]) -> Callable[[], "list[Any]"]:
     tool = Tool(stack.endpoint, "001", capsys)
 
     def diagnose() -> list[Any]:
@@ -66,7 +68,7 @@ def until_healthy(doctor: Doctor) -> None:
         assert time.monotonic() - begin_s < TRIES_S, found
 
 
-def test_a_pressed_bumper_and_a_faulty_sonar(stack: Chain, doctor: Doctor) -> None:
+def test_a_pressed_bumper_and_a_faulty_sonar(stack: RunningStack, doctor: Doctor) -> None:
     until_healthy(doctor)
 
     stack.control.do(Bumper(pressed=True))
@@ -81,7 +83,7 @@ def test_a_pressed_bumper_and_a_faulty_sonar(stack: Chain, doctor: Doctor) -> No
     stack.control.do(Sonar(name="rear_left"))
 
 
-def reset(doctor: Doctor, stack: Chain) -> None:
+def reset(doctor: Doctor, stack: RunningStack) -> None:
     """Reset as the remedy says, until safety does."""
     from cli.__main__ import main
 
@@ -90,14 +92,14 @@ def reset(doctor: Doctor, stack: Chain) -> None:
     until_healthy(doctor)
 
 
-def test_a_frozen_board(stack: Chain, doctor: Doctor) -> None:
+def test_a_frozen_board(stack: RunningStack, doctor: Doctor) -> None:
     stack.control.do(Freeze(seconds=3600.0))
     found = until_wrong(doctor, "link", remedies.BOARD_LOST)
     assert any(each["where"] == "sensors" and each["level"] == "unknown" for each in found)
     stack.control.do(Freeze(seconds=0.0))
 
 
-def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
+def test_a_second_driver(stack: RunningStack, doctor: Doctor) -> None:
     sources: list[Any] = []
 
     def request(_: int) -> None:
@@ -116,7 +118,7 @@ def test_a_second_driver(stack: Chain, doctor: Doctor) -> None:
         until_wrong(doctor, "driving", remedies.ONE_DRIVER)
 
 
-def test_missing_services_and_their_return(stack: Chain, doctor: Doctor) -> None:
+def test_missing_services_and_their_return(stack: RunningStack, doctor: Doctor) -> None:
     # The router drops a stopped process, but not one whose loop hangs.
     stack.processes["odom"].send_signal(signal.SIGSTOP)
     begin_s = time.monotonic()

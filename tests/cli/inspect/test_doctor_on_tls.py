@@ -9,7 +9,7 @@ import pytest
 from cli.inspect import remedies
 from cli.inspect.doctor import findings
 from common.settings import BusSettings, Shared
-from verification.harness.certificates import Site, dialling
+from verification.harness.certificates import Site, connecting
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def endpoint(site: Site, driver: BusSettings) -> Iterator[str]:
 
 def found(member: BusSettings, endpoint: str) -> list[tuple[str, str, str]]:
     """Return place, level and text of the findings."""
-    config = Shared(bus=dialling(member, endpoint))
+    config = Shared(bus=connecting(member, endpoint))
     return [(each.where, each.level, each.text) for each in findings(config, 0.5)]
 
 
@@ -57,7 +57,7 @@ def test_a_certificate_of_another_site(
     stranger: BusSettings, driver: BusSettings, endpoint: str
 ) -> None:
     mixed = msgspec.structs.replace(stranger, ca=driver.ca)
-    config = Shared(bus=dialling(mixed, endpoint))
+    config = Shared(bus=connecting(mixed, endpoint))
     first, *_ = findings(config, 0.5)
     assert first.level == "wrong"
     assert f"{endpoint}: the router refuses this certificate: " in first.text

@@ -13,7 +13,9 @@ from common.bus.session import router
 from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from verification.harness.support import free_port, listening, wait_until
+from verification.harness.bus import listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 Join = Callable[[str], BusFixture]
 LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)

@@ -8,7 +8,8 @@ import pytest
 from cli.inspect import echo, estop
 from common.cli_args import EXIT_LINK
 from tests.cli.inspect.tool import Tool
-from verification.harness.support import free_port, router_process
+from verification.harness.bus import router_process
+from verification.harness.ports import free_port
 
 
 @pytest.mark.parametrize("word", ["ls", "services", "health", "estop"])

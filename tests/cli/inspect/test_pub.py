@@ -11,7 +11,7 @@ from common.messages import Drive
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.factories import link
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 ROOT = "t2/v1/001"
 

@@ -9,7 +9,7 @@ from common.bus.calls import Caller
 from common.messages import Cause, Done, Limits, ReleaseRequest, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def state(*latched: str) -> SafetyState:

@@ -17,8 +17,9 @@ from cli.keys.access import Verb
 from common import keys
 from common.bus.session import client_config
 from tools.rights_table import CLASSES, MINE, ROLES, may
-from verification.harness.certificates import Site, dialling
-from verification.harness.support import at, wait_until
+from verification.harness.bus import at
+from verification.harness.certificates import Site, connecting
+from verification.harness.waiting import wait_until
 
 KEYS = tuple(CLASSES.values())
 PLAIN = tuple(key for key in KEYS if "*" not in key)  # usable for a queryable or a token
@@ -43,7 +44,7 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, 
     with site.router(certified["router of 001"]) as (secured, onboard), ExitStack() as closing:
         made = {"on board": zenoh.open(client_config(at(onboard)))}
         for role, member in certified.items():
-            made[role] = zenoh.open(client_config(dialling(member, secured)))
+            made[role] = zenoh.open(client_config(connecting(member, secured)))
         for session in made.values():
             closing.enter_context(session)
         yield made

@@ -22,7 +22,8 @@ from common.config import Sources, load
 from common.errors import LinkError
 from common.members import Members
 from common.settings import BusSettings, Shared
-from verification.harness.support import free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 KEY = "t2/v1/001/tel/bridge/velocity"
 ROBOT = profile("robot", "001", (), ())

@@ -14,7 +14,7 @@ from cli.keys.store import Folder, locked
 from common.errors import RobotError
 from common.members import Members
 from tests.cli.keys.site_fixture import member, members
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 SPAN = Span(1.8e9, 1.8e9 + 10 * DAY_S)
 ROBOT = profile("robot", "001", (), ())

@@ -14,7 +14,8 @@ from tests.cli.inspect.conftest import rig, shared_router, tool
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
-from verification.harness.support import PATIENCE_S, free_port, wait_until
+from verification.harness.ports import free_port
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 __all__ = ["rig", "shared_router", "tool"]
 

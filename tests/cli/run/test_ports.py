@@ -20,7 +20,9 @@ from common.errors import LinkError
 from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
 from tests.cli.stack import ports as own_ports
 from tests.cli.stack import starts
-from verification.harness.support import free_port, listening, wait_until
+from verification.harness.bus import listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
 

@@ -13,7 +13,9 @@ from common.bus.session import client_config
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.settings import BusSettings
 from tests.cli.processes import PATIENCE_S, ran, sets
-from verification.harness.support import at, free_port, router_process, wait_until
+from verification.harness.bus import at, router_process
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 def test_a_taken_port_is_an_error_and_ctrl_c_exits_cleanly() -> None:

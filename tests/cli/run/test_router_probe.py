@@ -18,7 +18,9 @@ from common.bus.session import answers, client_config, router, router_at
 from common.settings import BusSettings, Log
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
-from verification.harness.support import at, free_port, listening, router_process, wait_until
+from verification.harness.bus import at, listening, router_process
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 # Zenoh 1.10.2 needs a minute to match these two: longer than the deadline, but finite.
 EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"

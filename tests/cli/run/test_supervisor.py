@@ -15,7 +15,7 @@ from cli.run.supervisor import Child, Supervisor
 from common.child_process import BACKOFF_S
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import alive, running, wait_gone
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 SLEEP = ["sleep", "1000"]
 

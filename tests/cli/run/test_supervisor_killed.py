@@ -14,8 +14,8 @@ import pytest
 
 from cli.demo import host_stalls
 from tests.cli.processes import children, sets, t2
-from verification.faults.frames import Frames, last_move_s, moves
-from verification.harness.support import free_port
+from verification.harness.ports import free_port
+from verification.harness.trace import TraceFollower, last_move_s, moves
 
 SPEED = 0.4
 BUDGET_S = 0.1
@@ -24,7 +24,7 @@ UP_S = 60.0
 
 
 @contextlib.contextmanager
-def driven(folder: Path) -> Iterator[tuple[int, Frames]]:
+def driven(folder: Path) -> Iterator[tuple[int, TraceFollower]]:
     """Drive a stack of ``t2 up`` on a separate board; yield the supervisor's pid and the frames."""
     board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
     endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -50,7 +50,7 @@ def driven(folder: Path) -> Iterator[tuple[int, Frames]]:
         driver = start(
             [sys.executable, "-m", "verification.faults.driver", endpoint], stdin=subprocess.PIPE
         )
-        frames = Frames(trace)
+        frames = TraceFollower(trace)
         assert driver.stdin is not None
 
         def moving() -> bool:

@@ -14,7 +14,7 @@ from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
 from tests.cli.stack import STACK, ports, starts
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 
 def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
 from tests.common.bus_fixture import BusFixture, rising, until_heard
-from verification.harness.support import at, wait_until
+from verification.harness.bus import at
+from verification.harness.waiting import wait_until
 
 
 def bumper(buses: BusFixture) -> str:

@@ -10,7 +10,8 @@ from common.bus.calls import Caller
 from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
 from tests.common.bus_fixture import BusFixture, until_heard
-from verification.harness.support import at, wait_until
+from verification.harness.bus import at
+from verification.harness.waiting import wait_until
 
 
 class Server:

@@ -15,7 +15,8 @@ from common.messages import Bumper, Motion
 from common.motion import Command
 from common.settings import BusSettings as Settings
 from tests.common.bus_fixture import BusFixture, rising, until_heard
-from verification.harness.support import Lines, at, wait_until
+from verification.harness.bus import Lines, at
+from verification.harness.waiting import wait_until
 
 
 class Ends:

@@ -9,7 +9,7 @@ import pytest
 from common.bus.bus import Bus
 from common.bus.publisher import BOOT_ID, host_id
 from common.messages import Bumper
-from verification.harness.support import at
+from verification.harness.bus import at
 
 
 @pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")

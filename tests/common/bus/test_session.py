@@ -16,7 +16,9 @@ from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_heard
-from verification.harness.support import Lines, at, free_port, listening, wait_until
+from verification.harness.bus import Lines, at, listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 def nowhere() -> str:

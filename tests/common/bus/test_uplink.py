@@ -9,7 +9,9 @@ from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
 from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_heard
-from verification.harness.support import at, free_port, listening, wait_until
+from verification.harness.bus import at, listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 
 def somewhere() -> str:

@@ -1,6 +1,6 @@
-"""The core of the campaign: real processes, each of the worst faults a few times.
+"""Core of the fault campaign: real processes, each of the worst faults twice.
 
-`make faults` tries the whole catalogue, twenty times each, with the shipped limits.
+`make faults` runs the whole catalogue, twenty times each, with the shipped limits.
 """
 
 import re
@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from verification.faults.catalogue import FAULTS, Fault
-from verification.faults.machine import HoldUps
-from verification.faults.stack_fixture import Lane, lane
+from verification.faults.catalogue import FAULTS
+from verification.faults.fault import Fault
+from verification.faults.stack_fixture import StackFixture, stack_fixture
 from verification.faults.table import Row
-from verification.faults.trial import tried
+from verification.faults.trial import run_trial
+from verification.harness.host import StallRecorder
 
 pytestmark = pytest.mark.campaign
 
@@ -24,29 +25,31 @@ CORE = (
     "left driver fault", "front sonar faulty", "NaN on every key",
 )  # fmt: skip
 TIMES = 2
-BEYOND_S = 0.5  # that a fault lasts beyond its budget
+BEYOND_S = 0.5  # how long a fault outlasts its budget
 
 
 @pytest.fixture(scope="module")
-def holdups() -> Iterator[HoldUps]:
-    with HoldUps() as it:
+def stalls() -> Iterator[StallRecorder]:
+    with StallRecorder() as it:
         yield it
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lane]:
-    with lane(tmp_path_factory.mktemp("lane"), shipped=False) as it:
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StackFixture]:
+    with stack_fixture(tmp_path_factory.mktemp("stack"), shipped=False) as it:
         yield it
 
 
 @pytest.mark.parametrize("fault", [f for f in FAULTS if f.name in CORE], ids=lambda f: f.name)
-def test_the_vehicle_is_told_to_stop(stack: Lane, holdups: HoldUps, fault: Fault) -> None:
-    budget_s = fault.budget(stack.stack.config) if fault.budget else None
+def test_the_board_receives_a_stop_in_time(
+    stack: StackFixture, stalls: StallRecorder, fault: Fault
+) -> None:
+    budget_s = fault.budget(stack.running.config) if fault.budget else None
     if budget_s is not None:  # it is longer on a slow host
         fault = replace(fault, hold_s=max(fault.hold_s, budget_s + BEYOND_S))
-    samples = [tried(stack, fault) for _ in range(TIMES)]
-    held = [holdups.worst_s(s.fault_ns, fault.hold_s) for s in samples]
-    assert Row(fault.name, budget_s, fault.outcome, samples, held).faults == []
+    samples = [run_trial(stack, fault) for _ in range(TIMES)]
+    stalls_s = [stalls.worst_s(s.fault_ns, fault.hold_s) for s in samples]
+    assert Row(fault.name, budget_s, fault.outcome, samples, stalls_s).faults == []
 
 
 def test_the_rows_that_the_safety_case_names_are_in_the_catalogue() -> None:

@@ -1,6 +1,6 @@
-"""Robots, sites and a region: the configuration that ``docs/fleet.md`` gives for a site's router.
+"""Robots, sites and a region, with the configuration of a site's router in ``docs/fleet.md``.
 
-Nobody runs this yet. It is tried here, so that what is said about more than one site is true.
+No installation uses it yet; this test verifies the statements about more than one site.
 """
 
 import json
@@ -15,9 +15,11 @@ from common import keys
 from common.bus.session import client_config, router_config
 from common.settings import BusSettings
 from tests.common.bus_fixture import until_heard
-from verification.harness.support import at, free_port, listening, wait_until
+from verification.harness.bus import at, listening
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
-# What a site's router that dials a region's has besides its uplink.
+# Additional settings of a site's router with the uplink to a region.
 SITE: dict[str, object] = {
     "region_name": "site",
     "gateway": {"south": [{"filters": [{"region_names": ["robot"]}, {"modes": ["client"]}]}]},
@@ -28,7 +30,7 @@ ROBOTS = tuple(f"{site}-00{number}" for site in SITES for number in (1, 2))
 
 @dataclass
 class Tree:
-    """Sessions that sit at the region's router, at berlin's, and on each robot."""
+    """Sessions at the routers of the region, of berlin, and of each robot."""
 
     region: zenoh.Session
     berlin: zenoh.Session
@@ -46,7 +48,7 @@ def tree() -> Iterator[Tree]:
     by_name = dict(zip(SITES, sites, strict=True))
     with ExitStack() as stack:
         own = {}
-        for name in ROBOTS:  # before there is anybody to dial
+        for name in ROBOTS:  # before the routers that they connect to
             own[name] = f"tcp/127.0.0.1:{free_port()}"
             uplink = by_name[name.partition("-")[0]]
             stack.enter_context(routing(listening(own[name], uplink), {}))
@@ -64,7 +66,7 @@ def tree() -> Iterator[Tree]:
 
 
 def serve(tree: Tree, name: str, session: zenoh.Session) -> object:
-    """Be that robot."""
+    """Declare what a robot serves."""
     reset = keys.RESET.on(name)
     return (
         session.liveliness().declare_token(keys.live_key(name, "safety", "1")),
@@ -80,7 +82,7 @@ def test_the_region_sees_all_and_a_site_its_own(tree: Tree) -> None:
         seen[where].add(str(sample.key_expr).split("/")[2])
 
     every = keys.VELOCITY.on("*")
-    ears = [
+    subscribers = [
         tree.region.declare_subscriber(every, lambda sample: note("region", sample)),
         tree.berlin.declare_subscriber(every, lambda sample: note("berlin", sample)),
     ]
@@ -92,11 +94,11 @@ def test_the_region_sees_all_and_a_site_its_own(tree: Tree) -> None:
     until_heard(put, lambda: seen["region"] == set(ROBOTS), "all of them")
     until_heard(put, lambda: len(seen["berlin"]) >= 2, "a site's own")
     assert seen["berlin"] == {name for name in ROBOTS if name.startswith("berlin")}
-    for ear in ears:
-        ear.undeclare()
+    for subscriber in subscribers:
+        subscriber.undeclare()
 
 
-def test_the_region_knows_and_asks_each(tree: Tree) -> None:
+def test_the_region_calls_each_robot(tree: Tree) -> None:
     def alive() -> set[str]:
         replies = tree.region.liveliness().get(keys.live_key("*", "*", "*"), timeout=2.0)
         return {str(reply.ok.key_expr).split("/")[2] for reply in replies if reply.ok}
@@ -108,11 +110,13 @@ def test_the_region_knows_and_asks_each(tree: Tree) -> None:
     wait_until(lambda: all(map(answers, ROBOTS)), "every answer")
 
 
-@pytest.mark.parametrize("whom", ["munich-$*", "*"])
-def test_the_region_stops_one_site_or_all(tree: Tree, whom: str) -> None:
-    meant = {name for name in ROBOTS if whom == "*" or name.startswith("munich")}
+@pytest.mark.parametrize("target", ["munich-$*", "*"])
+def test_the_region_stops_one_site_or_all(tree: Tree, target: str) -> None:
+    expected = {name for name in ROBOTS if target == "*" or name.startswith("munich")}
     tree.stops.clear()
     until_heard(
-        lambda: tree.region.put(keys.estop_key(whom), b""), lambda: tree.stops >= meant, "all stops"
+        lambda: tree.region.put(keys.estop_key(target), b""),
+        lambda: tree.stops >= expected,
+        "all stops",
     )
-    assert tree.stops == meant
+    assert tree.stops == expected

@@ -1,4 +1,4 @@
-"""The whole chain: real processes, real UDP, a real router; judged by what the board received."""
+"""The whole stack with real processes, UDP and router; asserts on the commands at the board."""
 
 import threading
 import time
@@ -15,26 +15,28 @@ from tests.drive_source import (
     source,
     stack,
 )
-from verification.harness.stack import Chain, Witness, until_still_s
-from verification.harness.support import wait_until
+from verification.harness.host import StallRecorder
+from verification.harness.stack import RunningStack
 from verification.harness.teleop_terminal import Terminal, terminal
+from verification.harness.trace import last_move_s
+from verification.harness.waiting import wait_until
 
 __all__ = ["source", "stack"]  # fixtures
 
 pytestmark = pytest.mark.alone
 
-# Beside the bridge's lease of 0.2 s as shipped: 0.5 s from the death of a part to the last
-# command to move.
+# In addition to the bridge's lease, 0.2 s as shipped: 0.5 s from the death of a process to the last
+# command that moves the vehicle.
 REST_S = 0.3
 STARTED = '"service": "safety", "robot": "001", "event": "started"'
 
 
-# Teleop takes no key for held that has been down since before it could drive.
+# Teleop does not accept a key that was already held before it could drive.
 SILENCE_S = 1.0
 
 
-class Hand:
-    """An operator who holds W down in ``t2 drive``."""
+class KeyPresser:
+    """Holds W in ``t2 drive``."""
 
     def __init__(self, seat: Terminal) -> None:
         self._seat = seat
@@ -46,12 +48,12 @@ class Hand:
     def hold(self) -> None:
         self._held.set()
 
-    def let_go(self) -> None:
-        """Let the key go, for long enough that the next press is a new one."""
+    def release(self) -> None:
+        """Release the key long enough that the next press is a new one."""
         self._held.clear()
         time.sleep(SILENCE_S)
 
-    def leave(self) -> None:
+    def stop(self) -> None:
         self._gone.set()
         self._thread.join()
 
@@ -63,49 +65,51 @@ class Hand:
 
 
 @pytest.fixture
-def hand(stack: Chain) -> Iterator[Hand]:
+def presser(stack: RunningStack) -> Iterator[KeyPresser]:
     with terminal(stack.endpoint) as seat:
         stack.processes["teleop"] = seat.process
-        hand = Hand(seat)
-        yield hand
-        hand.leave()
+        presser = KeyPresser(seat)
+        yield presser
+        presser.stop()
 
 
-def drives(stack: Chain, hand: Hand) -> None:
-    """Hold the key until the vehicle moves; let go and press again when safety wants a neutral."""
+def drives(stack: RunningStack, presser: KeyPresser) -> None:
+    """Hold the key until the vehicle moves; press again when safety requires neutral."""
 
     def moving() -> bool:
         return stack.last() == "run" and stack.speed() > 0.1
 
     for _ in range(20):
-        hand.hold()
+        presser.hold()
         try:
             wait_until(moving, "the vehicle moves", patience_s=3)
         except AssertionError:
-            hand.let_go()
-            wait_until(lambda: stack.last() != "run", "the board is told to stop")
+            presser.release()
+            wait_until(lambda: stack.last() != "run", "STOP or BREAK at the board")
         else:
             return
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
 @pytest.mark.parametrize("victim", ["teleop", "safety", "router"])
-def test_the_death_of_any_part_stops_the_vehicle(stack: Chain, hand: Hand, victim: str) -> None:
-    drives(stack, hand)
-    witness = Witness()
+def test_the_death_of_any_part_stops_the_vehicle(
+    stack: RunningStack, presser: KeyPresser, victim: str
+) -> None:
+    drives(stack, presser)
+    stalls = StallRecorder()
     killed_ns = stack.kill(victim)
     wait_until(lambda: stack.last() in ("stop", "brake"), "STOP at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
-    held_up_s = witness.stop()
-    took_s = until_still_s(stack.trace(), killed_ns)
-    assert took_s < stack.config.bridge.lease + REST_S + held_up_s, (
-        f"the machine held processes up for {held_up_s:.3f} s"
+    stall_s = stalls.stop()
+    took_s = last_move_s(stack.trace().commands, killed_ns)
+    assert took_s < stack.config.bridge.lease + REST_S + stall_s, (
+        f"the host stalled for {stall_s:.3f} s"
     )
     assert stack.last() in ("stop", "brake")
 
 
 def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(
-    stack: Chain, source: ConstantSource
+    stack: RunningStack, source: ConstantSource
 ) -> None:
     drive_until_moving(stack, source)
     stack.kill("sim")
@@ -118,7 +122,7 @@ def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(
 
 
 def test_a_safety_that_comes_back_is_not_driven_by_what_is_still_asked(
-    stack: Chain, source: ConstantSource
+    stack: RunningStack, source: ConstantSource
 ) -> None:
     drive_until_moving(stack, source)
     stack.kill("safety")
@@ -132,7 +136,7 @@ def test_a_safety_that_comes_back_is_not_driven_by_what_is_still_asked(
 
 
 def test_a_hit_is_latched_until_a_reset_whatever_is_asked(
-    stack: Chain, source: ConstantSource
+    stack: RunningStack, source: ConstantSource
 ) -> None:
     drive_until_moving(stack, source)
     stack.control.do(Bumper(pressed=True))

@@ -69,7 +69,7 @@ def test_an_entry_needs_a_reason() -> None:
 
 
 def test_a_file_without_mutants_is_an_error() -> None:
-    assert complaints({"a.py": 0}, [], []) == ["a.py: mutmut made no mutant of it."]
+    assert complaints({"a.py": 0}, [], []) == ["a.py: mutmut made no mutant."]
 
 
 def test_a_diff_is_known_by_its_changed_lines() -> None:

@@ -1,4 +1,4 @@
-"""The operator of a soak: what he sets right before he drives, and when he begins anew."""
+"""The driver of a soak: recovery before driving, and restarted laps."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from sim.control import Control
 from sim.requests import Asked, Place
 from sim.trace import Truth
 from tests.cli.demo.lap_fixture import odometry, safety, truth
-from verification.harness.support import at
+from verification.harness.bus import at
 from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
 
 BEAT_NS = NS_PER_S // 20
@@ -60,7 +60,7 @@ class Vehicle:
         return self.now
 
 
-class Scene:
+class DriverFixture:
     """An operator, his bus and his vehicle, at a clock of their own."""
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class Scene:
                 return
 
     def drives(self) -> bool:
-        """Beat once and tell whether a request went out."""
+        """Run one control step; return whether a request was sent."""
         (source,) = (p for p in self.desk.publishers if p.topic is keys.DRIVE)
         before = source.last
         self.beat()
@@ -95,77 +95,77 @@ class Scene:
 
 
 @pytest.fixture
-def scene() -> Scene:
-    return Scene()
+def fixture() -> DriverFixture:
+    return DriverFixture()
 
 
-def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(scene: Scene) -> None:
-    assert not scene.drives()
-    assert scene.vehicle.done == [Place(x=0.0, y=0.0)]
-    assert scene.desk.asked == [m.PoseRequest(echo=1)]
-    assert not scene.drives()
-    scene.ready()
-    assert scene.drives()
+def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: DriverFixture) -> None:
+    assert not fixture.drives()
+    assert fixture.vehicle.done == [Place(x=0.0, y=0.0)]
+    assert fixture.desk.asked == [m.PoseRequest(echo=1)]
+    assert not fixture.drives()
+    fixture.ready()
+    assert fixture.drives()
 
 
-def test_what_cannot_be_set_right_is_tried_again(scene: Scene) -> None:
-    scene.vehicle.there = False
-    scene.beat(2.0)
-    assert scene.desk.asked == []
-    scene.vehicle.there = True
-    scene.beat(1.0)
-    scene.desk.refuse("there is no router")
-    scene.beat(2 * TRY_NS / NS_PER_S)
-    assert len(scene.desk.asked) >= 3
-    assert not scene.drives()
+def test_what_cannot_be_set_right_is_tried_again(fixture: DriverFixture) -> None:
+    fixture.vehicle.there = False
+    fixture.beat(2.0)
+    assert fixture.desk.asked == []
+    fixture.vehicle.there = True
+    fixture.beat(1.0)
+    fixture.desk.refuse("there is no router")
+    fixture.beat(2 * TRY_NS / NS_PER_S)
+    assert len(fixture.desk.asked) >= 3
+    assert not fixture.drives()
 
 
-def test_a_new_odometry_is_told_the_true_pose_once_the_vehicle_stands(scene: Scene) -> None:
-    scene.ready()
-    assert scene.drives()
-    scene.desk.asked.clear()
-    scene.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
-    scene.beat(2.0, boot=6)
-    assert scene.desk.asked == []
-    scene.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
-    scene.beat(1.0, boot=6)
-    pose = scene.desk.asked[0]
+def test_a_new_odometry_gets_the_true_pose_once_the_vehicle_stands(fixture: DriverFixture) -> None:
+    fixture.ready()
+    assert fixture.drives()
+    fixture.desk.asked.clear()
+    fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
+    fixture.beat(2.0, boot=6)
+    assert fixture.desk.asked == []
+    fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
+    fixture.beat(1.0, boot=6)
+    pose = fixture.desk.asked[0]
     assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, 7.0 - math.tau))
-    index = scene.driver.lap.index
-    scene.desk.reply(m.Done(text="the pose is set"))
-    scene.beat(boot=6)
-    assert scene.driver.lap.index >= index, "the lap goes on"
+    index = fixture.driver.lap.index
+    fixture.desk.reply(m.Done(text="the pose is set"))
+    fixture.beat(boot=6)
+    assert fixture.driver.lap.index >= index, "the lap goes on"
 
 
-def test_without_odometry_nobody_asks_to_move(scene: Scene) -> None:
-    scene.ready()
-    assert scene.drives()
-    (source,) = (p for p in scene.desk.publishers if p.topic is keys.DRIVE)
+def test_without_odometry_nobody_asks_to_move(fixture: DriverFixture) -> None:
+    fixture.ready()
+    assert fixture.drives()
+    (source,) = (p for p in fixture.desk.publishers if p.topic is keys.DRIVE)
     before = source.last
-    scene.operator.on_beat(scene.now_ns + OLD_NS + 1)
+    fixture.operator.on_beat(fixture.now_ns + OLD_NS + 1)
     assert source.last is before
 
 
-def test_a_lap_that_gets_nowhere_is_begun_anew(scene: Scene) -> None:
-    scene.ready()
-    scene.vehicle.done.clear()
-    scene.beat(STEP_S[QUICK] - 1.0, verdict="stop")
-    assert scene.vehicle.done == []
-    scene.beat(2.0, verdict="stop")
-    assert scene.vehicle.done[0] == Place(x=0.0, y=0.0)
-    assert scene.driver.lap.index == 0
+def test_a_lap_that_gets_nowhere_is_begun_anew(fixture: DriverFixture) -> None:
+    fixture.ready()
+    fixture.vehicle.done.clear()
+    fixture.beat(STEP_S[QUICK] - 1.0, verdict="stop")
+    assert fixture.vehicle.done == []
+    fixture.beat(2.0, verdict="stop")
+    assert fixture.vehicle.done[0] == Place(x=0.0, y=0.0)
+    assert fixture.driver.lap.index == 0
 
 
-def test_after_a_lap_comes_the_next_one(scene: Scene) -> None:
-    scene.ready()
-    first = scene.driver.lap
+def test_after_a_lap_comes_the_next_one(fixture: DriverFixture) -> None:
+    fixture.ready()
+    first = fixture.driver.lap
     first.index = len(lap(fast=False))
-    scene.beat()
-    assert scene.driver.lap is not first
-    assert scene.drives()
+    fixture.beat()
+    assert fixture.driver.lap is not first
+    assert fixture.drives()
 
 
-def test_old_poses_are_not_kept(scene: Scene) -> None:
-    scene.ready()
-    scene.beat(5.0)
-    assert len(scene.driver.odometry) == 1
+def test_old_poses_are_not_kept(fixture: DriverFixture) -> None:
+    fixture.ready()
+    fixture.beat(5.0)
+    assert len(fixture.driver.odometry) == 1

@@ -10,7 +10,7 @@ import pytest
 
 from common.cli_args import EXIT_CONFIG
 from tests.cli.processes import children, running, wait_gone
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 from verification.soak.__main__ import main
 
 SOAK_S = 50
@@ -35,7 +35,7 @@ def test_a_short_soak(tmp_path: Path) -> None:
     wrong = [line for line in lines if "WRONG" in line]
     growth = ("memory", "threads, descriptors")
     assert [line for line in wrong if not any(word in line for word in growth)] == [], everything
-    assert "never lived long enough" not in everything
+    assert "no run was long enough" not in everything
     assert result.returncode == (1 if wrong else 0), everything
     assert "Traceback" not in everything
     assert "kill " in result.stdout
@@ -65,12 +65,12 @@ def test_a_folder_that_cannot_be_written_is_named(
     assert "cannot be written" in capsys.readouterr().err
 
 
-def test_a_system_without_proc_is_told_so(
+def test_without_proc_the_error_names_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("verification.soak.__main__.PROC", tmp_path)
     assert main(["--out", str(tmp_path)]) == 1
-    assert "reads /proc" in capsys.readouterr().err
+    assert "needs /proc" in capsys.readouterr().err
 
 
 def test_ctrl_c_ends_it_with_what_is_known_and_leaves_nothing(tmp_path: Path) -> None:

@@ -6,8 +6,9 @@ from cli.demo.score import Result
 from common import motion
 from common.freshness import NS_PER_S
 from sim import trace as t
+from verification.harness.trace import moves
 from verification.soak.record import Life, Progress, Record, Sample, Window
-from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, moves, results, too_late
+from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, results, too_late
 
 RUN, STOP, BRAKE = motion.Command
 
@@ -118,7 +119,7 @@ def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> N
     record.lives = {Life("safety", 9, 0): life(20, rss_per_s=MB), SAFETY: life(200)}
     assert row(record, "safety: memory")[2] is True
     del record.lives[SAFETY]
-    assert row(record, "safety: memory")[1:] == ("never lived long enough to be judged", False)
+    assert row(record, "safety: memory")[1:] == ("no run was long enough", False)
 
 
 # --- log, health, laps --------------------------------------------------------------------------
@@ -130,7 +131,7 @@ def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> N
         ([(float(s), 500 * s) for s in range(300)], True),
         ([(float(s), 2100 * s) for s in range(300)], False),
         ([(float(s), 120_000 * (s > 100)) for s in range(300)], False),  # all at once
-        ([(float(s), 0) for s in range(300)], False),  # nobody said anything
+        ([(float(s), 0) for s in range(300)], False),  # no log lines
         ([(1.0, 300)], True),  # too short for a worst ten seconds
         ([], False),
     ],

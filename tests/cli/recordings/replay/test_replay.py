@@ -21,7 +21,7 @@ from tests.common.bus_fixture import BusFixture
 from tests.factories import link
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
-from verification.harness.support import wait_until
+from verification.harness.waiting import wait_until
 
 FAST = ("--rate", "1000")
 

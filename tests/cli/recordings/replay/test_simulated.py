@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from verification.harness.stack import chain
-from verification.harness.support import wait_until
+from verification.harness.stack import running_stack
+from verification.harness.waiting import wait_until
 
 LAP = Path(__file__).parents[3] / "recorder" / "lap.mcap"
 MOVING_MPS = 0.1
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.campaign
 
 
 def test_a_simulated_vehicle_repeats_the_drive(tmp_path: Path) -> None:
-    with chain(tmp_path, "office") as stack:
+    with running_stack(tmp_path, "office") as stack:
         wait_until(lambda: '"service": "safety"' in stack.log.read_text(), "safety")
         words = ["replay", str(LAP), "--simulator", "--set", f"bus.connect={stack.endpoint}"]
         with subprocess.Popen([sys.executable, "-m", "cli", *words]) as process:

@@ -1,0 +1,117 @@
+"""CPU time, memory and children of processes, and UDP drops, from ``/proc`` of Linux."""
+
+import contextlib
+import os
+import re
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from common.freshness import NS_PER_S
+
+PROC = Path("/proc")
+PAGE = os.sysconf("SC_PAGE_SIZE")
+TICKS = os.sysconf("SC_CLK_TCK")
+GONE = (FileNotFoundError, ProcessLookupError)
+
+
+@dataclass(frozen=True, slots=True)
+class Stat:
+    """Fields of ``/proc/PID/stat``, see proc(5)."""
+
+    state: str
+    cpu_s: float  # user and system, all threads
+    threads: int
+    started: int  # clock ticks since boot
+    rss: int  # bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """CPU time of all cores since boot."""
+
+    busy_s: float
+    idle_s: float
+    stolen_s: float  # taken by other virtual machines on the same host
+
+
+def stat(pid: int) -> Stat:
+    """Return the state of a process; raise one of ``GONE`` when it does not exist."""
+    text = (PROC / str(pid) / "stat").read_text(encoding="ascii", errors="replace")
+    rest = text.rpartition(")")[2].split()  # from field 3 of proc(5) on
+    cpu_s = (int(rest[11]) + int(rest[12])) / TICKS
+    return Stat(rest[0], cpu_s, int(rest[17]), int(rest[19]), int(rest[21]) * PAGE)
+
+
+def machine() -> Machine:
+    """Return the CPU time of the machine."""
+    line = (PROC / "stat").read_text(encoding="ascii").splitlines()[0]
+    user, nice, system, idle, wait, irq, soft, steal = (int(n) / TICKS for n in line.split()[1:9])
+    return Machine(user + nice + system + irq + soft, idle + wait, steal)
+
+
+def children(pid: int) -> list[int]:
+    """Return the living child processes; empty when the process does not exist."""
+    # A child belongs to the thread that started it.
+    found: list[int] = []
+    with contextlib.suppress(*GONE):
+        for task in sorted((PROC / str(pid) / "task").iterdir()):
+            with contextlib.suppress(*GONE):
+                found += map(int, (task / "children").read_text(encoding="ascii").split())
+    return found
+
+
+def tree(name: str, pid: int) -> Iterator[tuple[str, int]]:
+    """Yield a process and all its descendants, ``bridge``, ``bridge/1``, with their pids."""
+    yield name, pid
+    for number, child in enumerate(children(pid), 1):
+        yield from tree(f"{name}/{number}", child)
+
+
+def memory(pid: int) -> dict[str, int]:
+    """Return resident bytes: ``rss``, and ``pss``, where shared pages are divided."""
+    text = (PROC / str(pid) / "smaps_rollup").read_text(encoding="ascii")
+    found = re.findall(r"^(Rss|Pss): +(\d+)", text, re.MULTILINE)
+    return {name.lower(): 1024 * int(kb) for name, kb in found}
+
+
+def udp_drops(port: int) -> int:
+    """Return how many datagrams the kernel dropped at a UDP port of this host (buffer full)."""
+    for line in (PROC / "net" / "udp").read_text(encoding="ascii").splitlines()[1:]:
+        fields = line.split()
+        if int(fields[1].rpartition(":")[2], 16) == port:
+            return int(fields[-1])
+    raise LookupError(f"no process has UDP port {port}")
+
+
+class CpuShares:
+    """CPU share of processes over the context: user and system, all threads.
+
+    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile; its entry
+    ``machine`` is the sum of all cores, of all processes.
+    """
+
+    def __init__(self, pids: Mapping[str, int]) -> None:
+        self.ns: dict[str, int] = {}
+        self._pids = pids
+
+    def __enter__(self) -> Self:
+        self._before, self._since_s = self._read(), time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        past_s = time.monotonic() - self._since_s
+        after = self._read()
+        self.ns = {
+            name: round((now - self._before[name]) * NS_PER_S / past_s)
+            for name, now in after.items()
+        }
+
+    def _read(self) -> dict[str, float]:
+        found = {"machine": machine().busy_s}
+        for name, pid in self._pids.items():
+            with contextlib.suppress(*GONE):
+                found[name] = stat(pid).cpu_s
+        return found

@@ -1,0 +1,74 @@
+"""The trace of the simulated board, read while the simulator writes it."""
+
+import os
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Self
+
+from common.freshness import NS_PER_S
+from sim.trace import BumperSent, Command, read
+
+
+class Tail:
+    """Reads a growing file, whole lines at a time; a truncated file from its start."""
+
+    def __init__(self, file: Path) -> None:
+        self.bytes = 0  # read so far
+        self._file = file
+
+    def read(self) -> bytes:
+        """Return the lines since the last call; an incomplete line waits."""
+        try:
+            with self._file.open("rb") as file:
+                if os.fstat(file.fileno()).st_size < self.bytes:
+                    self.bytes = 0
+                file.seek(self.bytes)
+                new = file.read()
+        except FileNotFoundError:
+            self.bytes = 0
+            return b""
+        whole = new[: new.rfind(b"\n") + 1]
+        self.bytes += len(whole)
+        return whole
+
+
+class TraceFollower:
+    """Collects motion commands and bumper hits from a growing trace."""
+
+    def __init__(self, file: Path) -> None:
+        self.commands: list[Command] = []
+        self.hits: list[BumperSent] = []  # frames from the board that report a pressed bumper
+        self._tail = Tail(file)
+
+    def follow(self) -> Self:
+        """Read what was written since the last call."""
+        for line in read(self._tail.read()):
+            if isinstance(line, Command):
+                self.commands.append(line)
+            elif isinstance(line, BumperSent) and line.pressed:
+                self.hits.append(line)
+        return self
+
+    def forget(self) -> None:
+        """Drop all hits, and all commands but the last."""
+        del self.commands[:-1]
+        self.hits.clear()
+
+
+def moves(command: Command) -> bool:
+    """Return whether a command moves the vehicle."""
+    return command.kind == "run" and bool(command.linear or command.angular)
+
+
+def first_stop_s(
+    commands: Sequence[Command], since_ns: int, kinds: Collection[str] = ("stop", "brake")
+) -> float | None:
+    """Return the time until the first STOP or BREAK, in seconds; None if there is none."""
+    stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= since_ns]
+    return (stops[0] - since_ns) / NS_PER_S if stops else None
+
+
+def last_move_s(commands: Sequence[Command], since_ns: int) -> float:
+    """Return the time until the last command that moves the vehicle, in seconds; 0 if none."""
+    moving = [c.mono_ns for c in commands if moves(c) and c.mono_ns >= since_ns]
+    return (moving[-1] - since_ns) / NS_PER_S if moving else 0.0
