@@ -1,4 +1,4 @@
-"""The oracle's book on one bridge: what it was told, and which RUN it may therefore pass on."""
+"""Oracle's book on one bridge: messages delivered to it, and the RUN frames they permit."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ CLEAR_SAMPLES = 3
 
 @dataclass(slots=True)
 class BridgeBook:
-    """What one bridge was told, by the time of delivery."""
+    """Messages delivered to one bridge, by the time of delivery."""
 
     boot: int
     heard_ns: int | None = None
@@ -27,10 +27,10 @@ class BridgeBook:
     neutral: bool = False
     clear: int = CLEAR_SAMPLES  # samples in a row
     published: int = 0  # bumper samples
-    brake_due: bool = False  # whether a hit was told and no BREAK has left yet
+    brake_due: bool = False  # whether a hit was delivered and no BREAK has been sent yet
 
     def on_report(self, frame: Frame, now_ns: int) -> bool:
-        """Take a frame of the board in; tell whether a hit begins with it."""
+        """Record a frame of the board; return whether a hit begins with it."""
         if self.heard_ns is None or now_ns - self.heard_ns > SILENCE_NS + SLACK_NS:
             self.ultrasonic = self.bumper = None
             self.neutral = False
@@ -52,7 +52,7 @@ class BridgeBook:
         return hit
 
     def on_motion(self, motion: Motion, now_ns: int) -> bool:
-        """Take a motion in; tell whether it comes from who has the say, and in order."""
+        """Record a motion; return whether it comes from the authority and in order."""
         over = now_ns - self.renewed_ns > LEASE_NS
         if motion.boot != self.authority:
             if self.authority is not None and not over:
@@ -68,12 +68,12 @@ class BridgeBook:
         return True
 
     def ready(self, now_ns: int) -> bool:
-        """Tell whether the board is there, with both of its brakes on."""
+        """Return whether the board is connected, with both brakes on."""
         heard = self.heard_ns is not None and now_ns - self.heard_ns <= SILENCE_NS + SLACK_NS
         return heard and self.ultrasonic is True and self.bumper is True
 
     def complaints(self, now_ns: int) -> Iterator[str]:
-        """Say why no RUN must leave now."""
+        """Yield the reasons why no RUN may be sent now."""
         if not self.ready(now_ns):
             yield "the board is silent, or its brakes are not both on"
         if not self.neutral:

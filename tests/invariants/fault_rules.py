@@ -1,4 +1,4 @@
-"""What may go wrong around the stack, as rules; what people do is in ``test_machine.py``."""
+"""Fault rules: sensors, board, processes, bus and hostile messages; operators: ``test_machine``."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ from tests.invariants.strategies import (
 
 
 class FaultRules(RuleBasedStateMachine):
-    """Sensors, board, processes, bus, cable and strangers."""
+    """Rules for faults of sensors, board, processes, bus and cable, and for forged messages."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,13 +45,13 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(sonar=st.integers(0, 7), mm=RANGES_MM)
     def sonar(self, sonar: int, mm: int) -> None:
-        """Let one sonar see something, or be faulty."""
+        """Set the range of one sonar, or a fault."""
         self.stack.vehicle.ranges[sonar] = mm
         self.stack.run(60)
 
     @rule(mm=RANGES_MM)
     def sonars(self, mm: int) -> None:
-        """Let all sonars see the same."""
+        """Set the range of all sonars."""
         self.stack.vehicle.ranges[:] = [mm] * 8
         self.stack.run(60)
 
@@ -63,13 +63,13 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(linear=st.sampled_from([1.5, -1.5, 0.0, None]), ms=SHORT)
     def runaway(self, linear: float | None, ms: int) -> None:
-        """Let the board measure another speed than it was told."""
+        """Report a measured speed that differs from the command."""
         self.stack.vehicle.measured = None if linear is None else Twist(linear)
         self.stack.run(ms)
 
     @rule(tells=st.booleans(), ms=SHORT | LONG)
     def velocities(self, tells: bool, ms: int) -> None:
-        """Let the board tell its velocity no more, or again."""
+        """Stop or resume the velocity reports."""
         self.stack.vehicle.tells_velocity = tells
         self.stack.run(ms)
 
@@ -80,7 +80,7 @@ class FaultRules(RuleBasedStateMachine):
         self.stack.run(60)
 
     def trip(self, kind: str) -> None:
-        """Let something latch that is gone at once."""
+        """Trip a latch whose cause ends at once."""
         vehicle = self.stack.vehicle
         if kind == "estop":
             self.stack.estop()
@@ -98,7 +98,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(ms=SHORT | LONG)
     def freeze(self, ms: int) -> None:
-        """Let the board hear and say nothing."""
+        """Freeze the board: it neither receives nor sends."""
         self.stack.vehicle.freeze(ms)
         self.stack.run(60)
 
@@ -109,7 +109,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(garbage=st.binary(max_size=40))
     def garbage(self, garbage: bytes) -> None:
-        """Let the cable bring nonsense."""
+        """Send garbage to the bridge."""
         self.stack.vehicle.say_bytes(b"GS" + garbage)
         self.stack.run(5)
 
@@ -123,13 +123,13 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(ms=SHORT | LONG)
     def stall_safety(self, ms: int) -> None:
-        """Let safety do nothing, and then go on as if nothing was."""
+        """Stall safety."""
         self.stack.stall("safety", ms)
         self.stack.run(60)
 
     @rule(ms=st.sampled_from([50, 120, 180]))
     def stall_bridge(self, ms: int) -> None:
-        """Let the bridge do nothing, for less than its guard bears."""
+        """Stall the bridge for less than its guard's limit."""
         self.stack.stall("bridge", ms)
         self.oracle.slack_ns = max(self.oracle.slack_ns, ms * MS)
         self.stack.run(60)
@@ -144,13 +144,13 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(route=BUS, disturbance=ON_BUS, ms=SHORT)
     def bus_disturbance(self, route: str, disturbance: Disturbance, ms: int) -> None:
-        """Let messages be late, lost, doubled or out of order."""
+        """Delay, lose, duplicate or reorder messages."""
         self.stack.net.disturbances[route] = disturbance
         self.stack.run(ms)
 
     @rule(route=CABLE, disturbance=ON_CABLE, ms=SHORT)
     def cable_disturbance(self, route: str, disturbance: Disturbance, ms: int) -> None:
-        """Let datagrams be late, lost or doubled; a cable keeps their order."""
+        """Delay, lose or duplicate datagrams; a cable keeps their order."""
         self.stack.net.disturbances[route] = disturbance
         # Every second one lost: a STOP of 20 Hz may be the third one that goes out.
         slack_ms = disturbance.late_ms + (100 if disturbance.lose else 0)
@@ -159,7 +159,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(route=BUS, ms=SHORT)
     def cut(self, route: str, ms: int) -> None:
-        """Let everything on one route get lost for a while."""
+        """Lose everything on one route for a while."""
         before = self.stack.net.disturbances.get(route, CLEAR)
         self.bus_disturbance(route, Disturbance(lose=1), ms)
         self.stack.net.disturbances[route] = before
@@ -167,7 +167,7 @@ class FaultRules(RuleBasedStateMachine):
     @precondition(lambda self: self.stack.net.disturbances)
     @rule(settled=st.booleans())
     def end_disturbances(self, settled: bool) -> None:
-        """Let everything arrive at once again, before what is late or after it."""
+        """End all disturbances, before or after delayed messages arrive."""
         self.stack.run(ECHO_MS + HOLD_MS + 120 if settled else 0)
         self.stack.net.disturbances.clear()
 
@@ -175,7 +175,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(source=st.sampled_from(["teleop", "nav", "nobody"]), kind=st.sampled_from([*HOSTILE]))
     def hostile_request(self, source: str, kind: str) -> None:
-        """Put a request that must not be taken."""
+        """Send a request that safety must refuse."""
         stick = self.stack.sticks.get(source, self.stack.sticks["teleop"])
         bad = HOSTILE[kind]
         step = 0 if kind == "again" else 1

@@ -1,4 +1,4 @@
-"""Protections taken out one by one, and what the judge then objects to."""
+"""Mutations: remove one protection each, with the objection expected from the oracle."""
 
 import dataclasses
 from collections.abc import Callable
@@ -29,12 +29,12 @@ from tests.invariants.net import Disturbance, Envelope
 from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
 
-# What is taken out, by what; the scenario in which that matters; the judge's objection.
+# Owner, attribute and replacement of a protection; its scenario; the oracle's objection.
 Mutation = tuple[object, str, object, Callable[[Stack], None], str]
 
 
 def driving(linear: float = 0.5) -> Stack:
-    """Return a stack that drives as teleop asks."""
+    """Return a stack that drives on request of teleop."""
     stack = Stack()
     stack.run(700)
     stack.sticks["teleop"].asks = (0.0, 0.0)
@@ -79,21 +79,21 @@ def hit_while_a_run_is_under_way(stack: Stack) -> None:
 
 
 def motions_get_lost(stack: Stack) -> None:
-    """Let the bridge's lease end without safety hearing of it in time."""
+    """End the bridge's lease without safety noticing in time."""
     stack.net.disturbances.update(streams=Disturbance(late_ms=120), motion=Disturbance(lose=1))
     stack.run(250)
     stack.net.disturbances.pop("motion")
 
 
 def board_freezes_and_safety_hears_late(stack: Stack) -> None:
-    """Let the board be back before safety has missed its samples."""
+    """Freeze the board for less than safety notices."""
     stack.net.disturbances["streams"] = Disturbance(late_ms=120)
     stack.run(300)
     stack.vehicle.freeze(240)
 
 
 def brakes_go_off_and_on(stack: Stack) -> None:
-    """Let safety hear too late that the board's brake was off."""
+    """Report to safety too late that the board's brake was off."""
     stack.net.disturbances["streams"] = Disturbance(late_ms=120)
     stack.run(300)
     for on, ms in ((False, 60), (True, 60)):
@@ -135,7 +135,7 @@ def reset_too_early(stack: Stack) -> None:
 
 
 def driver_blinks(stack: Stack) -> None:
-    """Let a driver report a fault and its end in one breath."""
+    """Report a driver fault and its end at the same time."""
     for bits in (1, 0):
         stack.vehicle.fault(Side.LEFT, bits)
     stack.vehicle.say(stack.vehicle.board.driver(Side.LEFT))
@@ -150,7 +150,7 @@ def velocities_fall_silent(stack: Stack) -> None:
 
 
 def reset_without_a_velocity(stack: Stack) -> None:
-    """Let the velocity dry up while the vehicle stands, and reset."""
+    """Stop the velocities at standstill, then reset."""
     stack.sticks["teleop"].asks = (0.0, 0.0)
     stack.run(1500)
     stack.estop()
@@ -167,7 +167,7 @@ def however_old(inputs: Inputs, *_: object) -> Twist | None:
 
 
 def successor(stack: Stack, hear: Callable[[Callable[[Envelope], None], Envelope], None]) -> None:
-    """Let safety die of an emergency stop; the next one hears of the link by ``hear``."""
+    """Kill safety with a latched emergency stop; ``hear`` delivers the link to its successor."""
     stack.estop()
     stack.kill("safety", 20)
     stack.run(25)
@@ -180,7 +180,7 @@ def successor(stack: Stack, hear: Callable[[Callable[[Envelope], None], Envelope
 
 
 def successor_hits_something(stack: Stack) -> None:
-    """Let it latch a contact before it hears of the link, and creep off."""
+    """Latch a contact in the successor before it receives the link, then release."""
     deaf_until_ns = stack.net.now_ns + NS_PER_S
 
     def late(take: Callable[[Envelope], None], envelope: Envelope) -> None:
@@ -197,7 +197,7 @@ def successor_hits_something(stack: Stack) -> None:
 
 
 def successor_hears_of_no_latch(stack: Stack) -> None:
-    """Let what it hears of the link be older than the latch."""
+    """Deliver to the successor a link sample from before the latch."""
 
     def old(take: Callable[[Envelope], None], envelope: Envelope) -> None:
         assert isinstance(envelope.message, m.Link)
@@ -237,7 +237,7 @@ def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
 
 
 def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
-    """Take what comes through the router, too."""
+    """Subscribe on the router as well."""
     link._process.subscribe(topic, handler, **names)
 
 

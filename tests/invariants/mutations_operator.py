@@ -1,4 +1,4 @@
-"""Protections of an operator's calls taken out one by one, and what the judge then objects to."""
+"""Mutations of operator calls: remove one protection each, with the expected objection."""
 
 from typing import Any
 
@@ -90,7 +90,7 @@ AFTER = Release.after
 
 OPERATOR_MUTATIONS: dict[str, Mutation] = {
     "late calls are obeyed": (
-        Heartbeat, "refusal", lambda *_: "", late_holds, "nobody holds the release",
+        Heartbeat, "refusal", lambda *_: "", late_holds, "no operator holds the release",
     ),
     "a late reset is obeyed": (
         Heartbeat, "refusal", lambda *_: "", late_reset, "safety knows of contact",

@@ -1,4 +1,4 @@
-"""Protections of safety taken out: standstill, override, and what sonars and bumper polls hide."""
+"""Mutations of safety: standstill supervision, source priority and sonar overrides."""
 
 from collections.abc import Callable
 from typing import Any
@@ -35,7 +35,7 @@ def nav_goes_on(stack: Stack) -> None:
 
 
 def goes_on_blind(stack: Stack) -> None:
-    """Let the front sonar fail while the stick is held on."""
+    """Fail the front sonar while the operator holds the stick."""
     stack.vehicle.ranges[2] = FAULT_MM
 
 

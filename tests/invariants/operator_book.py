@@ -39,19 +39,19 @@ class OperatorBook:
     speed: float = 0.0  # of that verdict
 
     def on_state(self, state: SafetyState, now_ns: int) -> None:
-        """Note what operators can see."""
+        """Record a state that operators can see."""
         self.beats[state.heartbeat] = now_ns
         self.names |= {cause.id: cause.name for cause in state.causes}
 
     def on_trip(self, name: str, now_ns: int) -> None:
-        """Note a trip, repeated or new."""
+        """Record a trip, repeated or new."""
         again_ns = round(AGAIN_S.get(name, 0.1) * NS_PER_S)
         if now_ns - self.seen.get(name, -again_ns - 1) > again_ns:
             self.began[name] = now_ns
         self.seen[name] = now_ns
 
     def on_bumper(self, sample: Bumper, is_new: bool, now_ns: int) -> None:
-        """Note a new press: an occurrence, and perhaps a forbidden direction."""
+        """Record a new press: an occurrence, and perhaps a forbidden direction."""
         if not sample.pressed:
             self.clears += is_new
             return
@@ -77,12 +77,12 @@ class OperatorBook:
         )
 
     def on_cleared(self) -> None:
-        """Note that the contact was cleared: a release has its full distance again."""
+        """Record a cleared contact: a release has its full distance again."""
         self.crept, self.moved, self.hold = 0.0, None, None
         self.forbidden.clear()
 
     def on_hold(self, request: ReleaseRequest, now_ns: int) -> None:
-        """Note a call that may be granted."""
+        """Record a call that may be granted."""
         sent_ns = self.beats.get(request.echo or 0)
         if not request.held:
             self.hold = None
@@ -92,7 +92,7 @@ class OperatorBook:
             self.hold = request.direction, now_ns
 
     def on_verdict(self, motion: Motion, now_ns: int) -> None:
-        """Count the way that a release was commanded."""
+        """Add up the commanded travel of a release."""
         if self.stepped_ns is not None:
             self.crept += self.speed * min((now_ns - self.stepped_ns) / NS_PER_S, LONGEST_STEP_S)
         self.stepped_ns = None
@@ -103,7 +103,7 @@ class OperatorBook:
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
         """Return why a release must not move the vehicle like this."""
         if self.hold is None or now_ns - self.hold[1] > HOLD_S * NS_PER_S:
-            yield "nobody holds the release"
+            yield "no operator holds the release"
         elif direction_of(motion) != self.hold[0]:
             yield "a release the other way than the operator chose"
         if abs(motion.linear) > CREEP_MPS + ROUNDING or motion.angular != 0:
@@ -115,5 +115,5 @@ class OperatorBook:
 
 
 def direction_of(motion: Motion) -> Direction:
-    """Return which way a motion goes."""
+    """Return the direction of a motion."""
     return "forward" if motion.linear > 0 else "backward"

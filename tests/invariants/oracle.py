@@ -210,7 +210,7 @@ class Oracle(Watch):
         ]
         neutral_ns = book.neutral.get(motion.source or "", 0)
         if not creeps and neutral_ns <= self.comeback_ns:
-            complaints.append("nobody was neutral since something came back")
+            complaints.append("no source was neutral since a restart")
         return complaints
 
     def on_leaving(self, process: Process, datagram: bytes) -> tuple[str, ...]:
@@ -238,7 +238,7 @@ class Oracle(Watch):
             return ["bridge: a RUN that no safety sent"]
         complaints = [*record.complaints, *bridge_book.complaints(self.now_ns)]
         if bridge_book.authority != motion.boot or bridge_book.seq != motion.seq:
-            complaints.append("bridge: from who has not the say, or out of order")
+            complaints.append("bridge: not from the authority, or out of order")
         if not follows(frame, motion):
             complaints.append(f"bridge: {frame} is not {motion}")
         complaints += [

@@ -1,7 +1,7 @@
-"""The oracle's book on one safety service: what it was told, and what it may therefore let run.
+"""Oracle's book on one safety service: messages delivered to it, and the motion they permit.
 
-Nothing here is taken from the code under test: times, limits and the geometry stand in
-the safety case (``docs/safety.md``) and are written down here a second time, on purpose.
+Nothing here comes from the code under test: times, limits and geometry are those of the safety case
+(``docs/safety.md``), repeated here on purpose.
 """
 
 import math
@@ -67,7 +67,7 @@ class Wish:
 
 @dataclass(slots=True)
 class SafetyBook:
-    """What one safety service was told, by the time of delivery."""
+    """Messages delivered to one safety service, by the time of delivery."""
 
     boot: int
     samples: dict[str, tuple[int, Message]] = field(default_factory=dict)

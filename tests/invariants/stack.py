@@ -1,4 +1,4 @@
-"""The real shells of bridge and safety, a vehicle, and people, in one thread and simulated time."""
+"""Stack: the real shells of bridge and safety, a vehicle and operators, in simulated time."""
 
 import sys
 import time as real_time
@@ -124,7 +124,7 @@ class Stack:
         self.hand.subscribe(keys.SAFETY, self._look)
 
     def run(self, duration_ms: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
         end_ns = self.net.now_ns + duration_ms * MS
         while self.net.now_ns < end_ns:
             self.net.now_ns += STEP_NS

@@ -1,4 +1,4 @@
-"""What the machine draws from: few values, dense where something tips over."""
+"""Value strategies of the state machine: few values, dense around thresholds."""
 
 import math
 

@@ -39,7 +39,7 @@ EXAMPLES = int(os.environ.get("T2_EXAMPLES", "0"))
 
 
 class StackMachine(FaultRules):
-    """What people do, on top of all troubles; the judge looks at every frame at the board."""
+    """Rules for operators, besides all faults; the oracle checks every frame at the board."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -160,7 +160,7 @@ class StackMachine(FaultRules):
 
     @rule(linear=FAST, gap_ms=st.sampled_from([450, 600, 1200]))
     def burst(self, linear: float, gap_ms: int) -> None:
-        """Let a driver fall silent, and his old requests come all at once after a gap."""
+        """Silence a source, then deliver its old requests all at once."""
         stick = self.stack.sticks["teleop"]
         stick.asks, echo = None, stick.echo
         self.stack.run(gap_ms)
@@ -183,13 +183,13 @@ class StackMachine(FaultRules):
 
     @rule(source=SOURCES, ms=SHORT | LONG)
     def let_go(self, source: str, ms: int) -> None:
-        """Fall silent, as a driver program that has died."""
+        """Stop requesting, as a source that has died."""
         self.stack.sticks[source].asks = None
         self.stack.run(ms)
 
     @rule(ms=SHORT | LONG)
     def wait(self, ms: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.stack.run(ms)
 
     @rule(ms=SHORT)
@@ -218,7 +218,7 @@ class StackMachine(FaultRules):
 
     @invariant()
     def no_frame_breaks_an_invariant(self) -> None:
-        """Look at all frames since the last look."""
+        """Check all frames since the last check."""
         violations = list(dict.fromkeys(self.oracle.violations))[:5]
         assert not violations
 
@@ -232,7 +232,7 @@ class StackMachine(FaultRules):
             self.no_frame_breaks_an_invariant()
 
     def teardown(self) -> None:
-        """When everything falls silent, the vehicle is told to stop, and it stays so."""
+        """When all sources fall silent, the vehicle is stopped and stays stopped."""
         for stick in self.stack.sticks.values():
             stick.asks = None
         self.stack.kill("safety", 10_000)
@@ -241,7 +241,7 @@ class StackMachine(FaultRules):
 
 
 def search(examples: int, phases: list[Phase], machine: type[StackMachine]) -> None:
-    """Let a machine run that often."""
+    """Run a state machine with so many examples."""
     run_state_machine_as_test(
         machine,
         settings=settings(

@@ -1,4 +1,4 @@
-"""The judge sees what it should, and objects to a stack that has a protection taken out."""
+"""The oracle observes drives, and objects to a stack with a protection removed."""
 
 import pytest
 

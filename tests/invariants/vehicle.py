@@ -1,4 +1,4 @@
-"""The vehicle at the end of its cable: the simulator's board, wheels that obey, sensors by hand."""
+"""Simulated vehicle: the simulator's board, ideal wheels, and sensors set by the test."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,14 +20,14 @@ Complaints = tuple[str, ...]
 
 
 class Vehicle:
-    """Hears datagrams with the complaints about them, and says its own."""
+    """Receives datagrams with their complaints, and sends reports."""
 
     def __init__(self, net: Net) -> None:
         self.received = 0  # frames
         self.ranges = [NO_ECHO_MM] * 8
         self.board = Board(Wire(), Sim(), self._measure())
         self.twist = Twist()
-        self.measured: Twist | None = None  # what the board says instead of the truth
+        self.measured: Twist | None = None  # reported instead of the true twist
         self.pressed = False
         self.silent_until_ns = 0
         self.tells_velocity = True
@@ -39,21 +39,21 @@ class Vehicle:
 
     @property
     def silent(self) -> bool:
-        """Whether the board hears and says nothing for now."""
+        """Whether the board is frozen."""
         return self._net.now_ns < self.silent_until_ns
 
     def freeze(self, duration_ms: int) -> None:
-        """Let the board hear and say nothing for so long; it goes on as it was told."""
+        """Freeze the board for a while; it keeps its command."""
         self.silent_until_ns = self._net.now_ns + duration_ms * MS
 
     def power_cycle(self, duration_ms: int) -> None:
-        """Start the board anew: it forgets its command, its counters and its brakes."""
+        """Restart the board: it loses its command, counters and brake switches."""
         self.twist = Twist()
         self.board.power_on()
         self.freeze(duration_ms)
 
     def fault(self, side: Side, bits: int) -> None:
-        """Set a driver's fault bits; a fault is told unasked."""
+        """Set a driver's fault bits; the board reports a fault unasked."""
         self.board.driver_bits[side] = bits
         if bits:
             self.say(self.board.driver(side))
@@ -68,13 +68,13 @@ class Vehicle:
             self._net.later("from_board", lambda: self.inbox.append(datagram))
 
     def receive(self, datagram: bytes, complaints: Complaints) -> None:
-        """Let a datagram travel to the board."""
+        """Send a datagram to the board."""
         moves = any(isinstance(frame, MotionCommand) for frame in frames(self._framing, datagram))
         kind = "motion" if moves else "query"  # or all that is lost might be of one kind
         self._net.later("to_board", lambda: self._take(datagram, complaints), kind=kind)
 
     def turn(self) -> None:
-        """Move on to now."""
+        """Advance to the current time."""
         while self._due_ns <= self._net.now_ns:
             self._due_ns += STEP_NS
             self._move()
@@ -117,7 +117,7 @@ class Vehicle:
 
 
 def frames(framing: Framing, datagram: bytes) -> Iterator[Frame]:
-    """Yield what the board understands of a datagram."""
+    """Yield the valid frames of a datagram."""
     for part in framing.read(datagram, TO_BOARD):
         if isinstance(part, Received):
             yield part.frame
