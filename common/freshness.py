@@ -1,4 +1,4 @@
-"""The newest value of a stream and when it came, on the receiver's own clock."""
+"""Newest value of a stream with its receive time, on the receiver's monotonic clock."""
 
 from typing import Generic, TypeVar
 
@@ -16,7 +16,7 @@ class Latest(Struct, Generic[T], frozen=True):
     received_ns: int
 
     def age_s(self, now_ns: int) -> float:
-        """Return how long ago it came, in seconds."""
+        """Return the age in seconds."""
         return (now_ns - self.received_ns) / NS_PER_S
 
 

@@ -12,7 +12,7 @@ from tests.invariants.stack import Stack
 ALL = MUTATIONS | OPERATOR_MUTATIONS | SAFETY_MUTATIONS
 
 
-def test_a_drive_is_seen_and_found_good() -> None:
+def test_a_drive_is_observed_without_violations() -> None:
     stack = driving()
     assert stack.oracle.runs > 50
     assert stack.oracle.violations == []
@@ -46,7 +46,7 @@ def stuck() -> Stack:
     return stack
 
 
-def test_who_stands_on_the_bumper_gets_off_after_a_reset_and_not_before() -> None:
+def test_a_pressed_bumper_is_released_after_a_reset_and_not_before() -> None:
     stack = stuck()
     runs = stack.oracle.runs
     hold(stack)
@@ -125,7 +125,7 @@ def test_a_fault_that_is_over_at_once_latches_however_late_it_is_read(hung_ms: i
 
 
 @pytest.mark.parametrize("name", ["safety", "bridge", "board", "router"])
-def test_what_came_back_drives_after_a_neutral_request_and_not_before(name: str) -> None:
+def test_a_restarted_part_drives_after_a_neutral_request_and_not_before(name: str) -> None:
     stack = driving()
     if name == "board":
         stack.power_cycle(500)
@@ -150,7 +150,7 @@ def test_what_came_back_drives_after_a_neutral_request_and_not_before(name: str)
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_protection_that_is_missing_is_objected_to(
+def test_the_oracle_objects_to_a_missing_protection(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner, attribute, broken, scenario, objection = ALL[name]
@@ -163,7 +163,7 @@ def test_a_protection_that_is_missing_is_objected_to(
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_same_scenario_is_harmless_as_shipped(name: str) -> None:
+def test_the_same_scenario_is_harmless_with_the_protection(name: str) -> None:
     stack = driving()
     ALL[name][3](stack)
     stack.run(2000)

@@ -52,7 +52,7 @@ class StarvedError(Exception):
 
 
 class Peers:
-    """Plays the bridge at 50 Hz and a driver that asks what it is told to."""
+    """Plays the bridge at 50 Hz, and a source with a settable request."""
 
     def __init__(self, loop: Loop) -> None:
         self.loop = loop
@@ -113,12 +113,12 @@ class Peers:
         return self.answers[-1]
 
     def reset(self) -> ResetRequest:
-        """Return the request that an operator makes who sees the newest state."""
+        """Return an operator's reset request for the newest state."""
         assert self.state is not None
         return reset_request(self.state)
 
     def release(self) -> ReleaseRequest:
-        """Return the request of an operator who holds backward."""
+        """Return an operator's request that holds backward."""
         return release_request(self.state, "backward", held=True)
 
     def until(self, command: str, verdict: str, moving: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""A bridge, a driver and a clock for the policy, without a bus: time passes only here."""
+"""Policy fixture: bridge, source and clock for the policy, without a bus."""
 
 import math
 
@@ -52,7 +52,7 @@ def link(state: str = "up", armed: bool = True) -> Link:
 
 
 class PolicyFixture:
-    """All streams come at every tick unless they are muted; the vehicle moves as commanded."""
+    """Feeds all streams at every tick unless muted; the vehicle moves as commanded."""
 
     def __init__(self, settings: Safety | None = None) -> None:
         self.policy = Policy(settings or Safety(), Vehicle())
@@ -82,7 +82,7 @@ class PolicyFixture:
         return self.verdict
 
     def feed(self) -> None:
-        """Let one sample of every stream that is not muted come in."""
+        """Feed one sample of every stream that is not muted."""
         self.seq += 1
         sent = self.verdict.twist
         linear = sent.linear if self.linear is None else self.linear
@@ -110,7 +110,7 @@ class PolicyFixture:
         self.inputs = replace(self.inputs, **{name: latest})
 
     def tick(self, ticks: int = 1) -> Verdict:
-        """Let time pass, with samples."""
+        """Advance the time, with samples."""
         for _ in range(ticks):
             self.now_ns += round(TICK_S * NS_PER_S)
             self.feed()
@@ -144,14 +144,14 @@ class PolicyFixture:
         return self.verdict
 
     def ready(self) -> "PolicyFixture":
-        """Come up and let the driver be neutral."""
+        """Start, and send neutral requests."""
         self.tick(40)
         self.drive()
         assert self.verdict.command == "run", self.state.latches
         return self
 
     def running(self, linear: float = 0.5, angular: float = 0.0) -> "PolicyFixture":
-        """Come up and drive."""
+        """Start and drive."""
         self.ready().drive(linear, angular, 2.0)
         assert self.verdict.command == "run", self.state.latches
         return self

@@ -1,4 +1,4 @@
-"""Each reason to refuse a request, who drives, and who is armed."""
+"""Arbiter: reasons of refusal, the source in control, and arming."""
 
 import math
 
@@ -41,7 +41,7 @@ def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: floa
 
 
 @pytest.mark.parametrize("linear", [math.nan, math.inf, -math.inf])
-def test_no_number_no_motion(linear: float) -> None:
+def test_a_non_finite_request_is_refused(linear: float) -> None:
     assert ask(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
     wrong = Drive(linear=0.0, angular=linear, echo=41)
     assert Arbiter(SOURCES).accept(DriveRequest("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
@@ -116,7 +116,7 @@ def test_all_rivals_are_named() -> None:
     assert arbiter.conflicts(0) == "teleop, web"
 
 
-def test_a_source_is_at_first_unheard() -> None:
+def test_a_source_starts_without_requests() -> None:
     assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False, "")
     assert CONFLICT_NS == 500_000_000
 
@@ -153,7 +153,7 @@ def test_a_lease_counts_from_the_reception() -> None:
     assert refused == ""
 
 
-def test_who_held_the_wheel_overrules_who_is_below_and_only_them() -> None:
+def test_the_source_in_control_overrules_lower_ones_only() -> None:
     arbiter = Arbiter(SOURCES)
     lowest = accepted(arbiter, 0, "nav")
     for nobody_below in (arbiter, lowest):

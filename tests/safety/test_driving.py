@@ -90,7 +90,7 @@ def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_re
     assert fixture.drive(0.2, source="nav").command == "run"
 
 
-def test_who_takes_the_wheel_from_below_needs_nothing_more() -> None:
+def test_a_higher_source_takes_control_without_further_conditions() -> None:
     fixture = PolicyFixture().ready()
     fixture.tick(20)
     fixture.drive(source="nav")

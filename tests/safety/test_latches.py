@@ -98,7 +98,7 @@ def test_a_reset_clears_the_named_occurrences_only() -> None:
     assert reset(held, []) == held
 
 
-def test_a_cause_that_began_in_a_decision_is_told_from_older_ones() -> None:
+def test_a_cause_that_began_in_a_decision_differs_from_older_ones() -> None:
     held = observe({}, [Observation("estop", True, (0, 0))], 0, decision=8)
     held = observe(held, [Observation("runaway", True, (0, 1))], 1, decision=9)
     held = observe(held, [Observation("link", True, (0, 1))], 1, decision=9)

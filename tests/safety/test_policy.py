@@ -269,7 +269,7 @@ def test_the_switches_may_be_accepted_as_missing() -> None:
     assert fixture.ready().verdict.command == "run"
 
 
-def test_every_cause_of_the_table_can_be_told() -> None:
+def test_every_cause_of_the_table_can_be_reported() -> None:
     for rule in BY_NAME.values():
         assert rule.text.endswith(".")
         assert rule.action != "slow" or rule.clears is Clears.AT_ONCE

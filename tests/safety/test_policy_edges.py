@@ -93,9 +93,7 @@ def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
 
 
 @pytest.mark.parametrize(("late_ns", "command"), [(0, "run"), (1, "stop")])
-def test_what_waited_for_a_stalled_process_is_not_taken_for_fresh(
-    late_ns: int, command: str
-) -> None:
+def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str) -> None:
     fixture = PolicyFixture().running()
     fixture.now_ns += round(Safety().bumper_age * NS_PER_S) + late_ns
     fixture.feed()
@@ -108,7 +106,7 @@ def test_what_waited_for_a_stalled_process_is_not_taken_for_fresh(
     assert fixture.drive(0.5).command == "run"
 
 
-def test_what_is_held_knows_since_when() -> None:
+def test_a_held_cause_knows_since_when() -> None:
     fixture = PolicyFixture().ready()
     lease_ticks = round(0.3 / TICK_S)
     fixture.tick(lease_ticks)
@@ -159,7 +157,7 @@ def test_room_is_not_looked_for_while_motion_is_barred() -> None:
     assert fixture.verdict.twist == STILL
 
 
-def test_a_wish_that_is_not_followed_is_not_told_as_a_motion() -> None:
+def test_a_request_that_is_stopped_commands_no_motion() -> None:
     fixture = PolicyFixture()
     fixture.tick(40)
     fixture.drive(0.5)
@@ -168,7 +166,7 @@ def test_a_wish_that_is_not_followed_is_not_told_as_a_motion() -> None:
     assert fixture.verdict.twist == STILL
 
 
-def test_nothing_creeps_while_two_publishers_ask() -> None:
+def test_nothing_creeps_while_two_publishers_are_active() -> None:
     fixture = hit()
     fixture.ask(0.0)
     assert fixture.hold() == ""

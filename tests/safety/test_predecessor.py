@@ -25,7 +25,7 @@ def successor(latched_by: int | None) -> PolicyFixture:
     return fixture
 
 
-def test_a_latch_is_told_until_it_is_reset() -> None:
+def test_a_latch_is_reported_until_it_is_reset() -> None:
     fixture = PolicyFixture().running()
     assert not motion_message(fixture.state, fixture.inputs).latched
     fixture.estop()
@@ -64,7 +64,7 @@ def test_a_motion_that_the_bridge_braked_alone_has_its_own_text() -> None:
     )
 
 
-def test_a_successor_that_has_heard_nothing_names_no_predecessor() -> None:
+def test_a_successor_without_a_link_sample_names_no_predecessor() -> None:
     fixture = successor(latched_by=OLD)
     fixture.muted = {"link"}
     fixture.tick()

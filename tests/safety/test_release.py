@@ -258,7 +258,7 @@ def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
     assert fixture.hold() == ""
 
 
-def test_touched_after_an_hour_the_age_is_told_and_nothing_moves_by_itself() -> None:
+def test_a_contact_after_an_hour_reports_the_age_and_nothing_moves_by_itself() -> None:
     fixture = PolicyFixture().running()
     fixture.drive(0.0, seconds=2)
     fixture.now_ns += 3600 * NS_PER_S

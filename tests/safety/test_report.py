@@ -1,4 +1,4 @@
-"""What is told: sentences, causes, limits, and events on transitions only."""
+"""Reports: texts, causes, limits, and events on transitions only."""
 
 import pytest
 from msgspec.structs import replace
@@ -107,7 +107,7 @@ def test_one_sentence_says_why() -> None:
     assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
 
 
-def test_transitions_are_told_once() -> None:
+def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
     assert ticked(fixture) == []
     fixture.pressed = True
@@ -129,14 +129,14 @@ def test_transitions_are_told_once() -> None:
     assert noted(fixture, Reset(fixture.echo, (1,))) == ["reset_refused"]
 
 
-def test_a_change_of_source_is_told() -> None:
+def test_a_change_of_source_is_reported() -> None:
     fixture = PolicyFixture().ready()
     for _ in range(15):
         assert ticked(fixture) == []
     assert ticked(fixture) == ["stop", "source"]
 
 
-def test_a_release_is_told_when_it_begins_and_ends() -> None:
+def test_a_release_is_reported_when_it_begins_and_ends() -> None:
     fixture = hit()
     held = Hold(True, "backward", fixture.echo)
     assert noted(fixture, held) == ["source", "release"]
@@ -144,7 +144,7 @@ def test_a_release_is_told_when_it_begins_and_ends() -> None:
     assert noted(fixture, Hold(False)) == ["stop", "source", "release_end"]
 
 
-def test_what_changes_is_told_at_once_and_distances_are_not_a_change() -> None:
+def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:
     fixture = PolicyFixture().running()
     fixture.sonar(front=1.0)
     fixture.drive(1.0)
@@ -162,7 +162,7 @@ def test_what_changes_is_told_at_once_and_distances_are_not_a_change() -> None:
     assert signature(replace(fixture.state, release=release)) != before
 
 
-def test_causes_are_told_with_their_identities() -> None:
+def test_causes_are_reported_with_their_identities() -> None:
     fixture = hit()
     fixture.estop()
     told = fixture.published()
@@ -172,7 +172,7 @@ def test_causes_are_told_with_their_identities() -> None:
     assert len({cause.id for cause in told.causes}) == len(told.causes)
 
 
-def test_what_is_known_of_a_way_off_is_told_while_a_contact_is_latched() -> None:
+def test_the_release_is_reported_while_a_contact_is_latched() -> None:
     assert PolicyFixture().ready().published().release is None
     fixture = hit()
     first = fixture.published().release

@@ -235,9 +235,7 @@ def test_passing_through_zero_is_no_standstill_yet() -> None:
 @pytest.mark.parametrize(
     ("linear", "angular"), [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1), (1.0, 0.0)]
 )
-def test_velocities_alone_find_a_motion_that_nobody_commanded(
-    linear: float, angular: float
-) -> None:
+def test_velocities_alone_detect_an_uncommanded_motion(linear: float, angular: float) -> None:
     board = standing()
     took_s = 0.0
     while not board.run(TICK_S, linear, angular):
