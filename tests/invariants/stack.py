@@ -243,7 +243,7 @@ class Stack:
         return caller.done is True
 
     def switches(self, *, on: bool) -> bool:
-        """DriveRequest the bridge to set the board's bumper brake."""
+        """Ask the bridge to set the board's bumper brake."""
         echo = self.seen.heartbeat if self.seen else None
         with self.time():
             caller = self.bridge.call(

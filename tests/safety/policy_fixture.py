@@ -137,7 +137,7 @@ class PolicyFixture:
         seconds: float = 0.2,
         source: str = "teleop",
     ) -> Verdict:
-        """DriveRequest the same at every tick for a while."""
+        """Repeat a request at every tick for a while."""
         for _ in range(round(seconds / TICK_S)):
             self.tick()
             self.ask(linear, angular, source)
@@ -166,7 +166,7 @@ class PolicyFixture:
         return tuple(self.state.latches[name].id for name in latched(self.state.latches))
 
     def reset(self, *causes: int, echo: int | None = None) -> str:
-        """DriveRequest to reset these causes, all by default; return the reason of a refusal."""
+        """Reset these causes, all by default; return the reason of a refusal."""
         reply = self.decide(Reset(echo or self.echo, causes or self.latched())).reply
         assert reply
         return "" if reply.done else reply.text
