@@ -64,7 +64,7 @@ class Odometer:
             caller.refuse(late)
             return
         if not finite(request.x, request.y, request.heading):
-            caller.refuse("x, y and heading must be finite numbers")
+            caller.refuse("x, y and heading must be finite, not NaN or infinity")
             return
         pose = Pose(request.x, request.y, request.heading)
         self._estimator.place(pose, time.monotonic_ns())
