@@ -1,6 +1,6 @@
-"""``t2 dashboard``: see it, drive it and stop it in a browser."""
+"""``t2 dashboard``: show, drive and stop robots in a browser."""
 
-from services.dashboard import life
+from services.dashboard import __main__ as dashboard
 
-add_arguments = life.add_arguments
-run = life.run
+add_arguments = dashboard.add_arguments
+run = dashboard.run

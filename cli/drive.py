@@ -1,6 +1,6 @@
 """``t2 drive``: drive from this terminal, by keys or gamepad."""
 
-from services.teleop import life
+from services.teleop import __main__ as teleop
 
-add_arguments = life.add_arguments
-run = life.drive
+add_arguments = teleop.add_arguments
+run = teleop.drive

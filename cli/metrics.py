@@ -4,7 +4,7 @@ import argparse
 
 from cli.run.up import passed_on
 from common.cli_args import add_sources
-from services.metrics import life
+from services.metrics import __main__ as metrics
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,4 +20,4 @@ def run(options: argparse.Namespace) -> int:
     given = {name: getattr(options, name) for name in ("host", "port", "robots")}
     sets = [f"metrics.{name}={value}" for name, value in given.items() if value is not None]
     options.sets = [*options.sets, *sets]
-    return life.main(passed_on(options))
+    return metrics.main(passed_on(options))

@@ -13,8 +13,8 @@ from playwright.sync_api import Browser, sync_playwright
 from common.config import Sources, load
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.controller import Desk
-from services.teleop.event_log import Logbook
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
 from sim.requests import Place
 from verification.harness.dashboard import dashboard
@@ -47,14 +47,14 @@ async def terminal_screen(stack: Chain) -> str:
     """Drive from a terminal, and return what it shows then, as SVG."""
     sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
-    desk = Desk(node, Logbook())
+    controller = Controller(node, EventLog())
     node.present()
-    desk.plug(find(node.config.teleop))
-    app = NearApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    controller.use_gamepad(find(node.config.teleop))
+    app = NearApp(controller, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):
         node.bus.open()
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
-            while desk.view.safety is None or desk.view.safety.verdict == "inhibited":
+            while controller.view.safety is None or controller.view.safety.verdict == "inhibited":
                 await pilot.pause(REPEAT_S)
             await pilot.press(GEAR)
             for _ in range(HELD):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cli.run.up import passed_on
 from common.cli_args import add_sources
-from services.recorder import life
+from services.recorder import __main__ as recorder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,4 +24,4 @@ def run(options: argparse.Namespace) -> int:
     }
     sets = [f"{path}={value}" for path, value in given.items() if value is not None]
     options.sets = ["recorder.make_room=false", *options.sets, *sets]
-    return life.main(passed_on(options))
+    return recorder.main(passed_on(options))

@@ -86,7 +86,7 @@ def drive(it: Eye, world: World) -> None:
     while not world.moving():
         assert time.monotonic() < deadline, "nothing was ever asked"
         picture = it.look()
-        if picture["hands"]["grip"] == "lapsed":
+        if picture["driver"]["hold"] == "lapsed":
             it.say("free")  # this machine held somebody up
         else:
             it.say("hold", n=picture["n"], **HOLD)

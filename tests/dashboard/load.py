@@ -29,7 +29,7 @@ def watch(port: str, counts: list[int], index: int) -> None:
     with connect(f"ws://127.0.0.1:{port}/live", origin=origin) as socket:
         socket.send('{"k":"look","robot":"001"}')
         for text in socket:
-            counts[index] += '"now"' in str(text)[:12]
+            counts[index] += '"fast"' in str(text)[:12]
 
 
 def main() -> None:

@@ -130,14 +130,14 @@ def test_an_emergency_stop_among_messages_that_are_dropped(site: Site, world: Wo
             it.say("free")
         it.say("estop", robot="001")
         wait_until(lambda: world.estops, "the emergency stop")
-        while (rest := it.waits("rest")) and not dropped(rest):
+        while (rest := it.waits("slow")) and not dropped(rest):
             pass
 
 
 def dropped(rest: dict[str, Any]) -> int:
     """Return the count of dropped messages in the dashboard's health; 0 until there is one."""
     own = [one for one in rest["services"] if one["name"] == "dashboard"]
-    return sum(int(one["troubles"].get("messages_dropped", 0)) for one in own)
+    return sum(int(one["counters"].get("messages_dropped", 0)) for one in own)
 
 
 def test_who_goes_on_sending_is_closed(site: Site) -> None:

@@ -8,10 +8,10 @@ import pytest
 
 from common import keys
 from common.freshness import NS_PER_S
-from services.dashboard import client_messages as w
+from services.dashboard import client_messages as client
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
-from services.dashboard.fleet import REST_TICKS, ROBOTS_MAX, UNWANTED_S, Fleet
+from services.dashboard.fleet import IDLE_S, ROBOTS_MAX, SLOW_TICKS, Fleet
 from verification.harness.support import wait_until
 
 
@@ -37,9 +37,9 @@ def test_a_robot_that_nobody_knows_is_not_stopped(fleet: Fleet, buses: dict[str,
     fleet.join("1")
     assert fleet.knows("001")  # by the settings, alive or not
     assert not fleet.knows("made-up")
-    fleet.take_in("1", w.Estop("made-up"))
+    fleet.handle("1", client.Estop("made-up"))
     assert buses == {}
-    fleet.take_in("1", w.Estop("001"))
+    fleet.handle("1", client.Estop("001"))
     assert buses["001"].estop.called
     assert fleet._node.bus.estop.called  # type: ignore[attr-defined]
 
@@ -53,29 +53,29 @@ def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
     note_alive(token, False)
     assert fleet.knows("002")
     fleet.join("1")
-    fleet.take_in("1", w.Look("003"))
+    fleet.handle("1", client.Look("003"))
     assert fleet.knows("003")
-    fleet.take_in("1", w.Look("002"))
-    fleet.tick(time.monotonic_ns() + round((UNWANTED_S + 1) * NS_PER_S))
+    fleet.handle("1", client.Look("002"))
+    fleet.tick(time.monotonic_ns() + round((IDLE_S + 1) * NS_PER_S))
     assert not fleet.knows("003")
     assert fleet.knows("002")
 
 
 def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
-    fleet.take_in("1", w.Look("002"))
+    fleet.handle("1", client.Look("002"))
     fleet.estop("003", "somebody")
     now_ns = time.monotonic_ns()
     fleet.tick(now_ns)
-    fleet.take_in("1", w.Look("001"))
-    late_ns = now_ns + round((UNWANTED_S + 1) * NS_PER_S)
+    fleet.handle("1", client.Look("001"))
+    late_ns = now_ns + round((IDLE_S + 1) * NS_PER_S)
     buses["003"].connected = False  # it is still being looked for
     fleet.tick(late_ns)
     wait_until(lambda: buses["002"].close.called, "the end of its session")
     assert not buses["001"].close.called
     assert not buses["003"].close.called
     first = buses["002"]
-    fleet.take_in("1", w.Look("002"))
+    fleet.handle("1", client.Look("002"))
     assert buses["002"] is not first
     assert not buses["002"].close.called
 
@@ -91,15 +91,15 @@ def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock])
     note_alive(keys.live_key(names[-1], "safety", "1"), False)
     fleet.join("1")
     for name in names[: ROBOTS_MAX + 1]:
-        fleet.take_in("1", w.Look(name))
+        fleet.handle("1", client.Look(name))
     assert set(buses) == {"001", *names[: ROBOTS_MAX - 1]}  # the settings' robot is one of them
     assert b"too_many_robots" in b"".join(shown)
     fleet.estop(names[-2], "somebody")
     assert buses[names[-2]].estop.called
     shown.clear()
-    for tick in range(REST_TICKS):
+    for tick in range(SLOW_TICKS):
         fleet.tick(time.monotonic_ns() + tick)
-    (rest,) = (json.loads(text) for text in shown if b'"k":"rest"' in text)
+    (rest,) = (json.loads(text) for text in shown if b'"k":"slow"' in text)
     assert rest["robots"] == {"001": False} | dict.fromkeys(names, True) | {names[-1]: False}
 
 
@@ -113,11 +113,11 @@ def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:
         return sum(b'"path"' in text for text in shown)
 
     fleet.join("1")
-    fleet.take_in("1", w.Look("001"))
+    fleet.handle("1", client.Look("001"))
     assert paths() == 1
-    fleet.take_in("1", w.Look("001", "Ada"))
+    fleet.handle("1", client.Look("001", "Ada"))
     assert paths() == 1
     assert b'"Ada"' in shown[-1]
-    fleet.take_in("1", w.Look("002", "Ada"))
+    fleet.handle("1", client.Look("002", "Ada"))
     assert paths() == 2
     assert set(buses) == {"001", "002"}

@@ -38,7 +38,7 @@ def seen(it: Eye, cause: Cause) -> int:
 
 
 def told(it: Eye) -> tuple[str, str]:
-    word = it.waits("told")
+    word = it.waits("notice")
     return word["level"], word["text"]
 
 
@@ -103,7 +103,7 @@ def test_a_switch_carries_the_echo_of_what_was_seen(ada: Eye, servers: Servers) 
 def test_a_release_names_the_direction_and_what_was_seen(ada: Eye, servers: Servers) -> None:
     for _ in range(20):
         ada.say("hold", n=ada.look()["n"], release="backward")
-    assert ada.seen["now"]["safety"]["release"]["believed_free"] == "backward"
+    assert ada.seen["fast"]["safety"]["release"]["believed_free"] == "backward"
     ada.say("free")
     wait_until(lambda: servers.releases and not servers.releases[-1].held, "the end of it")
     held, end = servers.releases[:-1], servers.releases[-1]

@@ -6,7 +6,7 @@ import pytest
 
 from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
 from common.settings import Vehicle
-from services.dashboard.sectors import Protection, Tone, named, tones, wheel_angles
+from services.dashboard.sectors import Protection, Tone, sonars_named, tones, wheel_angles
 from services.safety.config import Safety
 from services.safety.zones import zones
 
@@ -69,10 +69,10 @@ def test_what_is_worse_stays() -> None:
 
 
 def test_the_names_in_a_sentence() -> None:
-    assert [SONAR_NAMES[i] for i in named("Sonar not trusted: front left, rear.")] == [
+    assert [SONAR_NAMES[i] for i in sonars_named("Sonar not trusted: front left, rear.")] == [
         "front_left", "rear",
     ]  # fmt: skip
-    assert named("All is well.") == []
+    assert sonars_named("All is well.") == []
 
 
 def test_the_shipped_protection_is_safetys() -> None:

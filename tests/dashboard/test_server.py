@@ -49,13 +49,13 @@ def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Eye, world: Wor
     silent_ns = time.monotonic_ns()  # the socket stays open, and nothing is answered
     wait_until(lambda: world.zeros() >= 3, "zeros")
     assert time.monotonic_ns() - silent_ns > 0.1 * NS_PER_S
-    while ada.look()["hands"]["grip"] != "lapsed":
+    while ada.look()["driver"]["hold"] != "lapsed":
         pass  # pictures from before, which nobody has read yet
     count = len(world.requests)
     for _ in range(10):
         picture = ada.look()
         ada.say("hold", n=picture["n"], **HOLD)
-        assert picture["hands"]["grip"] == "lapsed"
+        assert picture["driver"]["hold"] == "lapsed"
     assert len(world.requests) == count
     ada.say("free")
     drive(ada, world)
@@ -70,7 +70,7 @@ def test_an_old_picture_is_no_reason_to_drive(ada: Eye, world: World) -> None:
     world.requests.clear()
     ada.say("hold", n=first, **HOLD)
     for _ in range(4):
-        assert ada.look()["hands"]["grip"] == "free"
+        assert ada.look()["driver"]["hold"] == "free"
     assert world.requests == []
 
 
@@ -81,7 +81,7 @@ def test_a_viewer_who_is_gone_has_let_go(site: Site, world: World) -> None:
         drive(it, world)
     wait_until(lambda: world.zeros() >= 3, "zeros")
     with eye(site) as it:
-        assert it.look()["hands"]["id"] is None
+        assert it.look()["driver"]["id"] is None
 
 
 def test_a_silent_safety_lets_go(ada: Eye, world: World) -> None:
@@ -89,7 +89,7 @@ def test_a_silent_safety_lets_go(ada: Eye, world: World) -> None:
     world.requests.clear()
     drive(ada, world)
     world.safe = False
-    while (picture := ada.look())["hands"]["grip"] != "lapsed":
+    while (picture := ada.look())["driver"]["hold"] != "lapsed":
         ada.say("hold", n=picture["n"], **HOLD)
     assert picture["safety"] is None
     wait_until(lambda: world.zeros() >= 3, "zeros")
@@ -100,16 +100,16 @@ def test_one_drives_and_taking_over_asks(site: Site, ada: Eye, world: World) -> 
     ada.say("look", robot="001", name="Ada")
     with eye(site) as bob:
         bob.say("take")
-        assert bob.waits("ask")["who"] == "Ada"
+        assert bob.waits("taken")["by"] == "Ada"
         picture = bob.look()
-        assert picture["hands"]["name"] == "Ada"
+        assert picture["driver"]["name"] == "Ada"
         world.requests.clear()
         bob.say("hold", n=picture["n"], **HOLD)
         bob.say("reset")
-        assert bob.waits("told")["text"] == "take_first"
+        assert bob.waits("notice")["text"] == "take_first"
         assert world.requests == []
         bob.takes(force=True)
-        assert ada.waits("told")["text"] == "taken_over"
+        assert ada.waits("notice")["text"] == "taken_over"
 
 
 def test_anybody_may_stop_and_it_is_asked_until_it_is_confirmed(ada: Eye, world: World) -> None:
@@ -136,15 +136,15 @@ def taps(site: Site, robot: str) -> None:
 def test_a_refusal_is_told(ada: Eye) -> None:
     ada.takes()
     ada.say("reset", n=ada.look()["n"])
-    assert "safety does not answer" in ada.waits("told")["text"]
+    assert "safety does not answer" in ada.waits("notice")["text"]
 
 
 def test_several_robots(site: Site, ada: Eye) -> None:
-    wait_until(lambda: "002" in ada.waits("rest")["robots"], "the other robot")
-    assert "two words" not in ada.seen["rest"]["robots"]
+    wait_until(lambda: "002" in ada.waits("slow")["robots"], "the other robot")
+    assert "two words" not in ada.seen["slow"]["robots"]
     with eye(site, "002") as it:
         assert it.look()["safety"] is None
-        assert [one["name"] for one in it.waits("rest")["services"]] == ["bridge"]
+        assert [one["name"] for one in it.waits("slow")["services"]] == ["bridge"]
     ada.say("look", robot="003")
     assert ada.waits("hello")["robot"] == "003"
 
@@ -153,7 +153,7 @@ def test_not_any_number_of_robots_but_for_a_stop(site: Site, world: World) -> No
     with eye(site) as it:
         for number in range(ROBOTS_MAX + 1):
             it.say("look", robot=f"many-{number}")
-        assert it.waits("told")["text"] == "too_many_robots"
+        assert it.waits("notice")["text"] == "too_many_robots"
     world.stops_elsewhere.clear()
     taps(site, "one-more")
     wait_until(lambda: world.stops_elsewhere, "a stop of one more")
@@ -173,10 +173,10 @@ def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Eye) ->
     )
     with pytest.raises(urllib.error.HTTPError, match="404") as refused:
         urllib.request.urlopen(request)
-    assert b"no robot 'made-up' is known here" in refused.value.read()
+    assert b"robot 'made-up' is unknown" in refused.value.read()
     ada.say("estop", robot="made-up")
-    assert ada.waits("told")["text"] == "estop_unknown"
-    assert "made-up" not in ada.waits("rest")["robots"]
+    assert ada.waits("notice")["text"] == "estop_unknown"
+    assert "made-up" not in ada.waits("slow")["robots"]
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])

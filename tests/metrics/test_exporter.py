@@ -14,7 +14,8 @@ from common import codec, keys
 from common import messages as m
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.members import Member, Members
-from services.metrics import exporter, life
+from services.metrics import __main__ as metrics
+from services.metrics import exporter
 from services.metrics.exporter import asked
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
@@ -156,7 +157,7 @@ def test_without_its_library_it_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "services.metrics.exporter", None)
-    assert life.main([]) == EXIT_CONFIG
+    assert metrics.main([]) == EXIT_CONFIG
     assert "install the extra `metrics`" in capsys.readouterr().err
 
 

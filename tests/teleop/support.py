@@ -12,11 +12,11 @@ from common.config import Loaded
 from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Release, SafetyState
-from common.requests import Twist
+from common.operator import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.controller import Desk
-from services.teleop.event_log import Logbook
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.view import View
 from verification.harness.support import at
 
@@ -64,13 +64,13 @@ class FakeBus(Bus):
 
 
 class FakeNode(Node[TeleopConfig]):
-    """A node on a ``FakeBus``; its log goes to a logbook, its loop does not run."""
+    """A node on a ``FakeBus``; its log goes to a event_log, its loop does not run."""
 
     def __init__(self, **settings: Any) -> None:
-        self.logbook = Logbook()
+        self.event_log = EventLog()
         config = TeleopConfig()
         super().__init__("teleop", Loaded(config, {}))
-        self.logbook.take_log(config.log)
+        self.event_log.capture_logs(config.log)
 
     def open_bus(self) -> FakeBus:
         """Return the fake."""
@@ -169,7 +169,7 @@ def view(**fields: Any) -> View:
     return View(**usual | fields)
 
 
-def answer(desk: Desk, now_ns: int) -> None:
-    """Let a desk know a terminal that answers at once."""
-    desk.terminal.sent(0, now_ns - NS_PER_S // 1000)
-    desk.terminal.answered(0, now_ns)
+def answer(controller: Controller, now_ns: int) -> None:
+    """Let a controller know a terminal that answers at once."""
+    controller.terminal.sent(0, now_ns - NS_PER_S // 1000)
+    controller.terminal.answered(0, now_ns)

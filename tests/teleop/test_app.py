@@ -1,4 +1,4 @@
-"""The screen, with a real desk on a bus that never opens; the test moves the desk's clock."""
+"""The screen with a real controller on a bus that never opens, and a clock of the test."""
 
 import asyncio
 import time
@@ -16,32 +16,32 @@ from common.freshness import NS_PER_S
 from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
-from services.teleop.controller import Desk
+from services.teleop.controller import Controller
 from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
 from verification.harness.support import PATIENCE_S
 from verification.harness.teleop_app import NearApp
 
 
 class Bench:
-    """A node, its desk and the screen in front of it."""
+    """A node, its controller and the screen in front of it."""
 
     def __init__(self) -> None:
         self.node = FakeNode()
-        self.desk = Desk(self.node, self.node.logbook)
+        self.controller = Controller(self.node, self.node.event_log)
         self.ended = False
         self.now_ns = 100 * NS_PER_S
-        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
-        self.app = NearApp(self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
+        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the controller's here
+        self.app = NearApp(self.controller, post, lambda: self.ended, Teleop(), lambda: self.now_ns)
         # However long this machine takes to hand a key over.
-        self.app._came_ns = lambda event: self.now_ns  # type: ignore[method-assign]
+        self.app._received_ns = lambda event: self.now_ns  # type: ignore[method-assign]
 
     def speeds(self, count: int) -> list[float]:
-        """Let the desk's clock tick, and return the speeds asked for, in order."""
+        """Let the controller's clock tick, and return the speeds asked for, in order."""
         sent = []
         for _ in range(count):
             before, _ = self.node.requests
             self.answer()
-            self.desk.tick(self.now_ns)
+            self.controller.tick(self.now_ns)
             self.now_ns += NS_PER_S // 20
             after, last = self.node.requests
             if after > before and last is not None:
@@ -51,7 +51,7 @@ class Bench:
     def answer(self) -> None:
         """Let the terminal have been near, so that a key counts that the machine held up."""
         for ago in range(10, 0, -1):
-            answer(self.desk, self.now_ns - ago * NS_PER_S // 20)
+            answer(self.controller, self.now_ns - ago * NS_PER_S // 20)
 
     def words(self, name: str) -> str:
         """Return what a panel shows; nothing before it is there."""
@@ -123,7 +123,7 @@ def test_calls_are_made_by_their_keys(bench: Bench) -> None:
 def tell_contact(bench: Bench) -> None:
     """Let safety report a pressed bumper."""
     bench.node.fake.tell(keys.SAFETY, contact_state(), bench.now_ns)
-    bench.desk.tick(bench.now_ns)
+    bench.controller.tick(bench.now_ns)
 
 
 def test_a_reset_clears_what_the_screen_showed(bench: Bench) -> None:
@@ -145,7 +145,7 @@ def test_a_reset_clears_what_the_screen_showed(bench: Bench) -> None:
 def test_a_key_carries_the_time_when_it_came(bench: Bench) -> None:
     key = Key("w", "w")
     key.time = time.monotonic() - 3.0
-    came_ns = NearApp._came_ns(bench.app, key)
+    came_ns = NearApp._received_ns(bench.app, key)
     assert (bench.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
 
 
@@ -158,7 +158,7 @@ def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
         drawn_ns = bench.now_ns
         bench.now_ns += 10 * NS_PER_S
         posted[0]()  # late
-        assert bench.desk._watched_ns == drawn_ns
+        assert bench.controller._drawn_ns == drawn_ns
 
     play(bench, act)
 
@@ -166,7 +166,7 @@ def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
 def test_the_terminal_is_asked_and_its_answer_counts(bench: Bench) -> None:
     async def act(pilot: Pilot[None]) -> None:
         bench.now_ns += 10 * NS_PER_S  # what was answered so far is old
-        await until(lambda: not bench.desk.terminal.refusal(bench.now_ns), "an answer")
+        await until(lambda: not bench.controller.terminal.refusal(bench.now_ns), "an answer")
 
     play(bench, act)
 
@@ -190,7 +190,7 @@ def test_a_terminal_that_does_not_answer_is_asked_less_often(
 def test_keys_that_do_not_count_are_said_to(bench: Bench) -> None:
     async def act(pilot: Pilot[None]) -> None:
         bench.now_ns += 10 * NS_PER_S
-        bench.desk.tick(bench.now_ns)
+        bench.controller.tick(bench.now_ns)
         await until(lambda: "KEYS OFF" in bench.words("hints"), "the refusal")
 
     play(bench, act)
@@ -216,8 +216,8 @@ def test_a_contact_makes_room_for_its_release(bench: Bench, size: tuple[int, int
             await until(partial(fits, bench, name), f"{name} to fit")
         assert "0.12 m left" in bench.words("safety")
         refusal = "release refused: " + "the vehicle needs two rows to say why it may not. " * 2
-        bench.node.logbook.add("safety", "warning", refusal.strip())
-        bench.desk.tick(bench.now_ns)
+        bench.node.event_log.add("safety", "warning", refusal.strip())
+        bench.controller.tick(bench.now_ns)
         await until(
             lambda: " ".join(bench.words("events").split())[16:] == refusal.strip(), "all of it"
         )
@@ -264,14 +264,14 @@ def test_what_is_known_is_shown(bench: Bench) -> None:
         fake.tell(
             keys.ULTRASONIC, Ultrasonic(ranges=(1.5, *(None,) * 7), status=("ok", *("fault",) * 7))
         )
-        bench.desk.tick(0)
+        bench.controller.tick(0)
         await until(lambda: "Driving, slowly." in bench.words("safety"), "safety's words")
         assert "10.7.5.224:4002" in bench.words("motion")
         assert "1.50 m" in bench.words("around")
         assert bench.words("around").count("fault") == 7
         assert "no router yet" in bench.words("header")
-        bench.node.logbook.add("safety", "error", "contact")
-        bench.desk.tick(0)
+        bench.node.event_log.add("safety", "error", "contact")
+        bench.controller.tick(0)
         await until(lambda: "contact" in bench.words("events"), "the event")
 
     play(bench, act)

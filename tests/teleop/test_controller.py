@@ -1,4 +1,4 @@
-"""The desk: presses in, requests and calls out, and the picture; on a bus that never opens."""
+"""The controller: key presses in, requests, calls and view out; on a bus that never opens."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -22,8 +22,8 @@ from common.messages import (
     SafetyState,
     Velocity,
 )
-from common.requests import Twist
-from services.teleop.controller import ESTOP_TICKS, Desk
+from common.operator import ESTOP_TICKS, Twist
+from services.teleop.controller import Controller
 from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick
 from tests.teleop.support import FakeNode, answer, contact_state, link, safety_state
@@ -34,7 +34,7 @@ PERIOD_NS = NS_PER_S // 20
 class FakeGamepad:
     """Pushed forward, with its deadman as told."""
 
-    words = "Fake Pad"
+    status = "Fake Pad"
     stick: Stick | None = None
 
     def read(self) -> Stick | None:
@@ -42,24 +42,24 @@ class FakeGamepad:
 
 
 class Operator:
-    """A desk on a clock that only ticks move."""
+    """A controller on a clock that only ticks move."""
 
     def __init__(self) -> None:
         self.node = FakeNode()
-        self.desk = Desk(self.node, self.node.logbook)
+        self.controller = Controller(self.node, self.node.event_log)
         self.now_ns = 100 * NS_PER_S
         self.near = True  # the terminal answers at once
         self.shown: SafetyState | None = None
-        answer(self.desk, self.now_ns)
+        answer(self.controller, self.now_ns)
 
     def press(self, key: str, waited_s: float = 0.0) -> None:
         at_ns = self.now_ns - round(waited_s * NS_PER_S)
-        self.desk.press(Press(key, at_ns, self.shown), self.now_ns)
+        self.controller.press(Press(key, at_ns, self.shown), self.now_ns)
 
     def wait(self, seconds: float) -> None:
         """Let time pass in which nothing at all happens; after that the terminal is near."""
         self.now_ns += round(seconds * NS_PER_S)
-        answer(self.desk, self.now_ns)
+        answer(self.controller, self.now_ns)
 
     def tell_safety(self, **fields: Any) -> None:
         self.node.fake.tell(keys.SAFETY, safety_state(**fields), self.now_ns)
@@ -73,13 +73,13 @@ class Operator:
         sent = []
         for _ in range(count):
             before, _ = self.node.requests
-            self.desk.tick(self.now_ns)
+            self.controller.tick(self.now_ns)
             after, last = self.node.requests
             assert after - before <= 1
             sent.append(last if after > before else None)
             self.now_ns += PERIOD_NS
             if self.near:
-                answer(self.desk, self.now_ns)
+                answer(self.controller, self.now_ns)
         return sent
 
     def speeds(self, count: int) -> list[float | None]:
@@ -87,7 +87,7 @@ class Operator:
 
     @property
     def lines(self) -> list[str]:
-        return [line.text for line in self.node.logbook.last(99)]
+        return [line.text for line in self.node.event_log.last(99)]
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ def test_estop_lets_go_and_stops_the_robot(operator: Operator) -> None:
     operator.press("e")
     assert operator.node.fake.estops == 1
     assert operator.speeds(5) == [0.0] * 3 + [None] * 2
-    assert operator.lines == ["emergency stop asked by the operator"]
+    assert operator.lines == ["emergency stop requested by the operator"]
 
 
 def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> None:
@@ -148,7 +148,7 @@ def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
         speeds += operator.speeds(1)
     assert speeds[1] == 0.2
     assert speeds[-5:] == [None] * 5
-    assert "safety is not heard" in operator.lines[0]
+    assert "no state of safety" in operator.lines[0]
     operator.tell_safety()
     for _ in range(20):
         operator.press("w")
@@ -201,7 +201,7 @@ def test_a_reset_that_another_program_answers_is_not_confirmed(operator: Operato
 
 def assert_unconfirmed(operator: Operator) -> None:
     operator.ticks(3)
-    (line,) = (line for line in operator.node.logbook.last(99) if "NOT CONFIRMED" in line.text)
+    (line,) = (line for line in operator.node.event_log.last(99) if "NOT CONFIRMED" in line.text)
     assert line.level == "error"
 
 
@@ -259,13 +259,13 @@ def test_a_release_is_asked_again_while_held_one_at_a_time(
     fake.answers[-1][1]("safety does not answer")
     operator.ticks(1)
     fake.answers[-1][1]("safety does not answer")
-    assert operator.desk.view.release == direction
+    assert operator.controller.view.release == direction
     assert [request.echo for _, request in fake.asked] == [7, 8, 8, 8]
     for _ in range(20):
         operator.tell_contact(heartbeat=9)
         operator.ticks(1)
     assert fake.asked[-1][1] == ReleaseRequest(held=False, echo=9)
-    released: Direction | None = operator.desk.view.release
+    released: Direction | None = operator.controller.view.release
     assert released is None
     fake.answers[-1][0](Done(text="released"))
     count = len(fake.asked)
@@ -331,11 +331,11 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
         operator.press(key, waited_s=0.51)
     assert operator.speeds(3) == [None] * 3
     assert operator.node.fake.asked == []
-    assert (operator.desk.view.gear, operator.desk.view.turbo) == (1, False)
-    assert operator.lines == [f"key {key.upper()} ignored: it waited 0.5 s"]
+    assert (operator.controller.view.gear, operator.controller.view.turbo) == (1, False)
+    assert operator.lines == [f"key {key.upper()} ignored: it is 0.5 s old"]
     operator.wait(1.5)
     operator.press(key, waited_s=3.0)
-    assert operator.lines[1:] == [f"key {key.upper()} ignored: it waited 3.0 s"]
+    assert operator.lines[1:] == [f"key {key.upper()} ignored: it is 3.0 s old"]
 
 
 def test_an_estop_and_a_stop_count_however_late(operator: Operator) -> None:
@@ -355,8 +355,8 @@ def test_a_press_that_waited_shortly_counts_from_when_it_came(operator: Operator
 def slow(operator: Operator, took_s: float = 0.42) -> None:
     """Let the terminal answer late from now on."""
     operator.near = False
-    operator.desk.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
-    operator.desk.terminal.answered(1, operator.now_ns)
+    operator.controller.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
+    operator.controller.terminal.answered(1, operator.now_ns)
 
 
 @pytest.mark.parametrize("key", ["w", "left", "f", "b", "r"])
@@ -371,7 +371,7 @@ def test_on_a_slow_terminal_keys_move_and_reset_nothing(operator: Operator, key:
         "keys ignored: terminal too slow: 0.42 s, allowed 0.15 s; "
         "use `t2 drive` on a machine near the robot, or the dashboard"
     ]
-    assert operator.desk.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
+    assert operator.controller.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
 
 
 def test_on_a_slow_terminal_a_stop_counts(operator: Operator) -> None:
@@ -410,18 +410,18 @@ def test_a_terminal_that_no_longer_answers_lets_go_of_its_keys(operator: Operato
 
 def test_a_multiplexer_over_ssh_does_not_drive() -> None:
     node = FakeNode()
-    desk = Desk(node, node.logbook, "tmux over ssh hides the terminal's delay")
-    answer(desk, NS_PER_S)
-    desk.press(Press("w", NS_PER_S), NS_PER_S)
-    desk.tick(NS_PER_S)
+    controller = Controller(node, node.event_log, "tmux over ssh hides the terminal's delay")
+    answer(controller, NS_PER_S)
+    controller.press(Press("w", NS_PER_S), NS_PER_S)
+    controller.tick(NS_PER_S)
     assert node.requests == (0, None)
     node.loop.close()
 
 
 def test_a_gamepad_drives_while_the_screen_is_watched(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
-    operator.desk.watch(operator.now_ns)
+    operator.controller.use_gamepad(pad)
+    operator.controller.screen_drawn(operator.now_ns)
     pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
     operator.ticks(1)
     pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False)
@@ -432,14 +432,14 @@ def test_a_gamepad_drives_while_the_screen_is_watched(operator: Operator) -> Non
 
 def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
+    operator.controller.use_gamepad(pad)
     pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
     speeds: list[float | None] = []
     hinted = 0
     for tick in range(70):
-        operator.desk.watch(operator.now_ns)
+        operator.controller.screen_drawn(operator.now_ns)
         speeds += operator.speeds(1)
-        hinted += operator.desk.view.move_stick
+        hinted += operator.controller.view.move_stick
         pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False, events=min(tick, 10))
     assert speeds.count(0.2) == 10 + 40
     assert speeds[-10:] == [None] * 10
@@ -452,9 +452,9 @@ def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: O
 
 def test_a_gamepad_that_comes_is_told(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
+    operator.controller.use_gamepad(pad)
     operator.ticks(1)
-    pad.read = lambda: setattr(pad, "words", "none")  # type: ignore[method-assign]
+    pad.read = lambda: setattr(pad, "status", "none")  # type: ignore[method-assign]
     operator.ticks(2)
     assert operator.lines == ["gamepad: none"]
 
@@ -462,7 +462,7 @@ def test_a_gamepad_that_comes_is_told(operator: Operator) -> None:
 def test_losing_the_focus_lets_go(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(2)
-    operator.desk.let_go()
+    operator.controller.release_controls()
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
@@ -471,8 +471,8 @@ def test_leaving_sends_three_zeros_then_stops_the_loop(operator: Operator, drivi
     if driving:
         operator.press("w")
         operator.ticks(3)
-    operator.desk.leave()
-    operator.desk.leave()  # once is enough
+    operator.controller.leave()
+    operator.controller.leave()  # once is enough
     operator.press("w")
     operator.press("e")
     assert operator.speeds(4) == [0.0] * 3 + [None]
@@ -487,8 +487,8 @@ def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
     fake.tell(keys.BUMPER, Bumper(pressed=False))
     fake.tell(keys.LINK, link())
     fake.tell(keys.DRIVER, Driver(faults=("encoder",), bits=4), side="right")
-    operator.desk.tick(0)  # a clock behind the messages': nothing is old
-    view = operator.desk.view
+    operator.controller.tick(0)  # a clock behind the messages': nothing is old
+    view = operator.controller.view
     assert view.safety is not None
     assert view.safety.text == "Driving."
     assert view.velocity == Velocity(linear=0.2, angular=0.0)
@@ -496,8 +496,8 @@ def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
     assert view.link == link()
     assert (view.left, view.right) == (None, Driver(faults=("encoder",), bits=4))
     assert (view.connected, view.robot, view.top) == (False, "001", Twist(0.2, 0.3))
-    operator.desk.tick(1 << 62)
-    assert operator.desk.view.safety is None
+    operator.controller.tick(1 << 62)
+    assert operator.controller.view.safety is None
 
 
 def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) -> None:
@@ -507,7 +507,7 @@ def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) ->
     mine = Event(name="estop", level="info", text="mine", boot=fake.boot)
     fake.tell(keys.EVENTS, contact, declared=everyone, service="safety")
     fake.tell(keys.EVENTS, mine, declared=everyone, service="teleop")
-    (line,) = operator.node.logbook.last(9)
+    (line,) = operator.node.event_log.last(9)
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from common.requests import STILL, Twist
+from common.operator import ZERO_TWIST, Twist
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls
 from services.teleop.mapping import Deflection, Stick
@@ -40,7 +40,7 @@ def hands() -> Hands:
 def test_a_tap_is_a_zero_the_twist_for_its_time_three_zeros_and_silence(hands: Hands) -> None:
     assert hands.ticks(2) == [None, None]
     hands.press("w")
-    assert hands.ticks(18) == [STILL] + [FIRST_GEAR] * 11 + [STILL] * 3 + [None] * 3
+    assert hands.ticks(18) == [ZERO_TWIST] + [FIRST_GEAR] * 11 + [ZERO_TWIST] * 3 + [None] * 3
     assert hands.controls.silent
 
 
@@ -56,7 +56,7 @@ def test_space_ends_a_hold_at_once(hands: Hands) -> None:
     hands.press("w")
     hands.ticks(3)
     hands.press("space")
-    assert hands.ticks(5) == [STILL] * 3 + [None] * 2
+    assert hands.ticks(5) == [ZERO_TWIST] * 3 + [None] * 2
 
 
 @pytest.mark.parametrize("key", ["x", "enter", "6", "0", "e", ""])
@@ -94,7 +94,7 @@ def test_a_release_and_driving_exclude_each_other(hands: Hands, key: str, direct
     hands.ticks(2)
     hands.press(key)
     assert hands.controls.released(hands.now_ns) == direction
-    assert hands.ticks(4) == [STILL] * 3 + [None]
+    assert hands.ticks(4) == [ZERO_TWIST] * 3 + [None]
     hands.press("w")
     assert hands.controls.released(hands.now_ns) is None
 
@@ -129,8 +129,8 @@ def test_muted_keys_count_again_after_a_pause(hands: Hands, key: str) -> None:
 
 def test_a_gamepad_drives_while_its_deadman_is_down(hands: Hands) -> None:
     assert hands.ticks(2, UP) == [None, None]
-    assert hands.ticks(3, DOWN) == [STILL, FIRST_GEAR, FIRST_GEAR]
-    assert hands.ticks(4, UP) == [STILL] * 3 + [None]
+    assert hands.ticks(3, DOWN) == [ZERO_TWIST, FIRST_GEAR, FIRST_GEAR]
+    assert hands.ticks(4, UP) == [ZERO_TWIST] * 3 + [None]
 
 
 def test_a_gamepad_has_turbo_of_its_own(hands: Hands) -> None:
@@ -142,10 +142,10 @@ def test_a_gamepad_has_turbo_of_its_own(hands: Hands) -> None:
 def test_a_lost_gamepad_is_a_release_and_its_return_moves_nothing(hands: Hands) -> None:
     hands.ticks(1, UP)
     hands.ticks(3, DOWN)
-    assert hands.ticks(4, None) == [STILL] * 3 + [None]
+    assert hands.ticks(4, None) == [ZERO_TWIST] * 3 + [None]
     assert hands.ticks(3, DOWN) == [None] * 3
     hands.ticks(1, UP)
-    assert hands.ticks(2, DOWN) == [STILL, FIRST_GEAR]
+    assert hands.ticks(2, DOWN) == [ZERO_TWIST, FIRST_GEAR]
 
 
 @pytest.mark.parametrize("key", ["space", "f", "b"])
@@ -182,7 +182,7 @@ def test_a_gamepad_that_freezes_while_it_drives_is_released(hands: Hands) -> Non
         assert hands.ticks(1, pushed(event)) != [None]
     frozen = hands.ticks(100, pushed(59))
     driven = [twist for twist in frozen if twist]
-    assert driven == [driven[0]] * LIMIT_TICKS + [STILL] * 3
+    assert driven == [driven[0]] * LIMIT_TICKS + [ZERO_TWIST] * 3
     assert frozen[len(driven) :] == [None] * (100 - len(driven))
     assert hands.controls.gamepad_expired
 
@@ -200,13 +200,13 @@ def test_a_frozen_gamepad_that_comes_back_wants_its_deadman_anew(hands: Hands) -
 @pytest.mark.parametrize("linear", [0.0, 0.05])
 def test_a_stick_at_rest_needs_no_event(hands: Hands, linear: float) -> None:
     hands.ticks(1, pushed(0, deadman=False))
-    assert hands.ticks(400, pushed(1, linear)) == [STILL] * 400
-    assert hands.ticks(1, pushed(2)) != [STILL]  # its own movement is an event
+    assert hands.ticks(400, pushed(1, linear)) == [ZERO_TWIST] * 400
+    assert hands.ticks(1, pushed(2)) != [ZERO_TWIST]  # its own movement is an event
 
 
 def test_full_deflection_gets_no_longer_limit(hands: Hands) -> None:
     hands.ticks(1, pushed(0, deadman=False))
-    assert hands.ticks(LIMIT_TICKS + 3, pushed(1, 1.0))[-2:] == [STILL] * 2
+    assert hands.ticks(LIMIT_TICKS + 3, pushed(1, 1.0))[-2:] == [ZERO_TWIST] * 2
 
 
 def test_the_operator_is_asked_to_move_the_stick_in_time(hands: Hands) -> None:

@@ -75,9 +75,9 @@ def gamepad(pygame: FakePygame, settings: Teleop | None = None) -> SdlGamepad:
 
 def test_sticks_and_buttons_are_read() -> None:
     pad = gamepad(FakePygame())
-    assert pad.words == "none"
+    assert pad.status == "none"
     assert pad.read() == Stick(Deflection(0.5, -0.25), deadman=True, turbo=False)
-    assert pad.words == "Fake Pad"
+    assert pad.status == "Fake Pad"
 
 
 def test_what_a_gamepad_lacks_is_at_rest() -> None:
@@ -91,7 +91,7 @@ def test_a_lost_one_reads_as_none_and_may_come_back() -> None:
     pad.read()
     pygame.count, pygame.events = 0, [SimpleNamespace(type=REMOVED, instance_id=3)]
     assert pad.read() is None
-    assert pad.words == "none"
+    assert pad.status == "none"
     pygame.count = 1
     assert pad.read() is not None
 
@@ -141,12 +141,12 @@ def test_one_that_is_not_wanted_does_not_import_pygame(monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "pygame", None)  # importing it would fail
     pad = find(Teleop(gamepad=False))
     assert isinstance(pad, NoGamepad)
-    assert (pad.words, pad.read()) == ("off", None)
+    assert (pad.status, pad.read()) == ("off", None)
 
 
 def test_without_pygame_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    assert find(Teleop()).words == "none: pygame-ce is not installed"
+    assert find(Teleop()).status == "none: pygame-ce is not installed"
 
 
 def test_without_sdl_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,7 +156,7 @@ def test_without_sdl_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     pygame = FakePygame()
     pygame.joystick.init = fail
     monkeypatch.setitem(sys.modules, "pygame", pygame)
-    assert find(Teleop()).words == "none: no joystick subsystem"
+    assert find(Teleop()).status == "none: no joystick subsystem"
 
 
 def test_sdl_itself_starts_without_display_and_in_silence(

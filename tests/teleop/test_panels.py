@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Bumper, Cause, Direction
-from common.requests import Twist
+from common.operator import Twist
 from services.teleop import panels
 from services.teleop.round_trip import UNKNOWN, multiplexer
 from services.teleop.view import Line
@@ -84,7 +84,7 @@ def test_the_hints_say_what_the_key_repeat_means_and_fit() -> None:
     keys, limit = panels.hints(view(), 0.6, 0.3).plain.split("\n")
     assert "E ESTOP" in keys
     assert "FB release" in keys
-    assert "a tap drives 0.6 s, a hold 0.3 s past the last repeat" in limit
+    assert "a tap drives 0.6 s, a hold 0.3 s past its last repeat" in limit
     assert max(len(keys), len(limit)) <= 78
 
 

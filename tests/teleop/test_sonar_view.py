@@ -4,7 +4,7 @@ import pytest
 from rich.text import Text
 
 from common.messages import Bumper, RangeStatus, Ultrasonic
-from services.teleop.sonar_view import BANDS, DIM, TROUBLE, around, reading
+from services.teleop.sonar_view import BANDS, DIM, FAULT, around, reading
 
 OK: tuple[RangeStatus, ...] = ("ok",) * 8
 
@@ -21,7 +21,7 @@ def style_at(text: Text, words: str) -> str:
         (0.5, "ok", "0.50 m", BANDS[1][1], {1}),
         (1.99, "ok", "1.99 m", BANDS[2][1], {2}),
         (2.0, "ok", "2.00 m", "green", set()),
-        (None, "fault", "fault", TROUBLE, {0, 1, 2}),
+        (None, "fault", "fault", FAULT, {0, 1, 2}),
         (None, "too_near", "near", BANDS[0][1], {0, 1, 2}),
         (None, "no_echo", "-", DIM, set()),
         (None, "ok", "-", DIM, set()),
@@ -31,7 +31,7 @@ def test_a_reading_has_words_a_colour_and_arcs(
     distance: float | None, status: RangeStatus, words: str, style: str, lit: set[int]
 ) -> None:
     seen = reading(distance, status)
-    assert (seen.words, seen.style, set(seen.lit)) == (words, style, lit)
+    assert (seen.label, seen.style, set(seen.lit)) == (words, style, lit)
 
 
 def test_every_sonar_stands_where_it_looks() -> None:

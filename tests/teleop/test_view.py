@@ -3,14 +3,14 @@
 from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Bumper
-from services.teleop.view import Ear
+from services.teleop.view import LatestTopic
 from tests.teleop.support import FakeBus
 from verification.harness.support import at
 
 
 def test_a_value_is_shown_while_it_is_worth_it() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    ear = Ear(bus, keys.BUMPER, 0.5)
+    ear = LatestTopic(bus, keys.BUMPER, 0.5)
     assert ear.at(0) is None
     bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
     assert ear.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
@@ -19,8 +19,8 @@ def test_a_value_is_shown_while_it_is_worth_it() -> None:
 
 def test_each_side_has_its_own_ear() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    Ear(bus, keys.DRIVER, 2.0, side="left")
-    Ear(bus, keys.DRIVER, 2.0, side="right")
+    LatestTopic(bus, keys.DRIVER, 2.0, side="left")
+    LatestTopic(bus, keys.DRIVER, 2.0, side="right")
     assert sorted(bus.handlers) == [
         "t2/v1/001/tel/bridge/driver/left",
         "t2/v1/001/tel/bridge/driver/right",

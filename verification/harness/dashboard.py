@@ -93,7 +93,7 @@ class Eye:
         while True:
             word = json.loads(self.socket.recv(timeout=PATIENCE_S))
             self.seen[word["k"]] = word
-            if word["k"] == "now":
+            if word["k"] == "fast":
                 return dict(word)
 
     def waits(self, kind: str) -> Any:
@@ -106,7 +106,7 @@ class Eye:
     def takes(self, force: bool = False) -> None:
         """Take the wheel, and wait until it is ours."""
         self.say("take", force=force)
-        while self.look()["hands"]["id"] != self.seen["hello"]["id"]:
+        while self.look()["driver"]["id"] != self.seen["hello"]["id"]:
             pass
 
 

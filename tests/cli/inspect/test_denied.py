@@ -102,7 +102,7 @@ def drives(it: Member, robot: OnBoard) -> bool:
     def settled() -> bool:
         robot.state.put(safety_state(heartbeat=1))
         it.source.ask(0.1, 0.0)
-        return came() or it.source.barred
+        return came() or it.source.denied
 
     wait_until(settled, "a request, or the refusal of one")
     return came()
@@ -117,7 +117,7 @@ def test_a_driver_drives_and_a_viewer_is_told_that_it_may_not(
         hall = member(join, dialling(site.settings("viewer", "hall"), secured))
         assert drives(anna, robot)
         assert not drives(hall, robot)
-        assert not anna.source.barred
+        assert not anna.source.denied
         assert anna.reset() == "reset"
         assert hall.reset() == "safety does not answer; `t2 doctor` tells why"
         hall.bus.estop()
@@ -137,8 +137,8 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
         anna = member(join, dialling(site.settings("driver", "anna"), secured), source="nav")
         assert not drives(stolen, robot), "it took teleop's priority"
         assert not drives(anna, robot)
-        assert stolen.source.barred
-        assert anna.source.barred
+        assert stolen.source.denied
+        assert anna.source.denied
 
 
 def test_through_the_sites_router_each_reaches_its_own(

@@ -3,8 +3,8 @@
 import pytest
 
 from common.messages import Direction, Driver, Limits, Velocity
-from common.requests import Twist
-from services.teleop.table import motion
+from common.operator import Twist
+from services.teleop.motion_panel import motion
 from services.teleop.view import View
 from tests.teleop.support import contact_state, link, odometry, safety_state, view
 
@@ -25,7 +25,7 @@ def test_without_data_nothing_is_made_up() -> None:
     table = rows(view())
     assert table["m/s"].split() == ["-", "-", "-"]
     assert {table[name] for name in ("pose", "odom", "board", "rates", "motor L")} == {"no data"}
-    assert table["driver"] == "nobody"
+    assert table["driver"] == "none"
 
 
 @pytest.mark.parametrize(("linear", "allowed"), [(0.35, "0.22"), (0.0, "0.22"), (-0.35, "0.50")])
@@ -33,7 +33,7 @@ def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
     limits = Limits(forward=0.22, backward=0.5, angular=0.9)
     table = rows(
         view(
-            asked=Twist(linear, 0.1),
+            requested=Twist(linear, 0.1),
             safety=safety_state(limits=limits),
             velocity=Velocity(linear=0.21, angular=-0.02),
         )
@@ -43,7 +43,7 @@ def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
 
 
 def test_zero_has_no_minus() -> None:
-    assert rows(view(asked=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
+    assert rows(view(requested=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
 
 
 def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
@@ -83,7 +83,7 @@ def test_driver_faults_are_named_by_side() -> None:
 @pytest.mark.parametrize(
     ("held", "source", "words"),
     [
-        (None, None, "nobody"),
+        (None, None, "none"),
         (None, "teleop", "teleop (you)"),
         (None, "nav", "nav"),
         ("forward", None, "you, release forward"),

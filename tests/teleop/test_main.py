@@ -12,7 +12,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Drive, Health
-from services.teleop import life
+from services.teleop import __main__ as teleop
 from verification.harness.support import bus_on, free_port, running, wait_until
 from verification.harness.teleop_terminal import Terminal, terminal
 
@@ -72,7 +72,9 @@ def leave(it: Terminal) -> None:
 
 
 @pytest.mark.usefixtures("bus")
-@pytest.mark.parametrize(("end", "code"), [(hang_up, life.EXIT_HANGUP), (terminate, 0), (leave, 0)])
+@pytest.mark.parametrize(
+    ("end", "code"), [(hang_up, teleop.EXIT_HANGUP), (terminate, 0), (leave, 0)]
+)
 def test_every_end_is_zeros_and_then_silence(
     endpoint: str, requests: list[Drive], end: Callable[[Terminal], None], code: int
 ) -> None:
@@ -120,8 +122,8 @@ def test_without_a_router_the_screen_says_so() -> None:
 def test_without_a_terminal_there_is_nothing_to_drive_with(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(life, "terminal_is_there", lambda: False)
-    assert life.main([]) == 1
+    monkeypatch.setattr(teleop, "terminal_is_there", lambda: False)
+    assert teleop.main([]) == 1
     assert "needs a terminal" in capsys.readouterr().err
 
 
@@ -136,17 +138,17 @@ def test_without_a_terminal_there_is_nothing_to_drive_with(
 def test_a_bad_setting_ends_it_before_anything_opens(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert life.main(words) == 78
+    assert teleop.main(words) == 78
     assert named in capsys.readouterr().err
 
 
 def test_a_missing_extra_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(life, "terminal_is_there", lambda: True)
+    monkeypatch.setattr(teleop, "terminal_is_there", lambda: True)
     monkeypatch.delitem(sys.modules, "services.teleop.app", raising=False)
     monkeypatch.setitem(sys.modules, "textual", None)
-    assert life.main(["--no-gamepad"]) == 1
+    assert teleop.main(["--no-gamepad"]) == 1
     assert "install the extra `teleop`" in capsys.readouterr().err
 
 
@@ -154,9 +156,9 @@ def test_the_ancestors_are_named() -> None:
     parent = Path(f"/proc/{os.getppid()}/comm")
     if not parent.exists():
         pytest.skip("there is no /proc")
-    assert life.ancestors()[0] == parent.read_text().strip()
+    assert teleop.ancestors()[0] == parent.read_text().strip()
 
 
 def test_without_proc_there_are_no_ancestors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "getppid", lambda: -5)
-    assert life.ancestors() == []
+    assert teleop.ancestors() == []
