@@ -18,7 +18,7 @@ from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
 from sim.requests import Place
 from verification.harness.dashboard import dashboard
-from verification.harness.dashboard_page import CHROMIUM, opened, takes
+from verification.harness.dashboard_page import CHROMIUM, open_page, take_control
 from verification.harness.stack import Chain, chain
 from verification.harness.support import running, wait_until
 from verification.harness.teleop_app import NearApp
@@ -75,10 +75,10 @@ def picture_terminal(screen: str, browser: Browser) -> None:
 
 def picture_dashboard(stack: Chain, browser: Browser, folder: Path) -> None:
     """Drive by the page's keys, and keep what it shows then."""
-    with dashboard(stack.endpoint, folder) as site:
+    with dashboard(stack.endpoint, folder) as server:
         page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")
-        opened(page, site)
-        takes(page)
+        open_page(page, server)
+        take_control(page)
         page.keyboard.press(GEAR)
         page.keyboard.down("w")
         wait_until(lambda: stack.speed() > 0.1, "it drives")

@@ -8,13 +8,13 @@ from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, Release
 from tests.teleop.support import safety_state
-from verification.harness.dashboard import Eye
+from verification.harness.dashboard import Client
 from verification.harness.support import PATIENCE_S, wait_until
 
 HOLD = {"x": 1.0, "y": 0.0}
 
 
-class World:
+class Peer:
     """What else is on the bus: a safety that runs, and ears for what is asked."""
 
     def __init__(self, loop: Loop) -> None:
@@ -80,13 +80,13 @@ class World:
         return count
 
 
-def drive(it: Eye, world: World) -> None:
+def drive(it: Client, peer: Peer) -> None:
     """Answer every picture with a push, until requests to move go out."""
     deadline = time.monotonic() + PATIENCE_S
-    while not world.moving():
+    while not peer.moving():
         assert time.monotonic() < deadline, "nothing was ever asked"
-        picture = it.look()
-        if picture["driver"]["hold"] == "lapsed":
-            it.say("free")  # this machine held somebody up
+        snapshot = it.next_snapshot()
+        if snapshot["driver"]["hold"] == "lapsed":
+            it.send("free")  # this machine held somebody up
         else:
-            it.say("hold", n=picture["n"], **HOLD)
+            it.send("hold", n=snapshot["n"], **HOLD)

@@ -1,12 +1,12 @@
-"""A router, a world on it and a dashboard that shows it, for the tests of one file."""
+"""A router, a peer on it and a dashboard that shows it, for the tests of one file."""
 
 from collections.abc import Iterator
 
 import pytest
 
 from common.loop import Loop
-from tests.dashboard.bus_fixture import World
-from verification.harness.dashboard import Site, dashboard
+from tests.dashboard.bus_fixture import Peer
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.support import bus_on, free_port, router_process, running
 
 
@@ -18,14 +18,14 @@ def endpoint() -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def world(endpoint: str) -> Iterator[World]:
+def peer(endpoint: str) -> Iterator[Peer]:
     with running(Loop()) as loop:
-        world = World(loop)
-        with bus_on(endpoint, loop, world.declare):
-            yield world
+        peer = Peer(loop)
+        with bus_on(endpoint, loop, peer.declare):
+            yield peer
 
 
 @pytest.fixture(scope="module")
-def site(endpoint: str, world: World, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with dashboard(endpoint, tmp_path_factory.mktemp("site"), "dashboard.round_trip=0.5") as it:
+def server(endpoint: str, peer: Peer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with dashboard(endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=0.5") as it:
         yield it

@@ -17,7 +17,7 @@ from verification.harness.support import wait_until
 
 @pytest.fixture
 def buses(monkeypatch: pytest.MonkeyPatch) -> dict[str, Mock]:
-    """Return the buses that are opened, by robot."""
+    """Return the buses that are open_page, by robot."""
     opened: dict[str, Mock] = {}
 
     def bus(_endpoints: object, robot: str, *_: object) -> Mock:

@@ -6,107 +6,107 @@ from collections.abc import Iterator
 import pytest
 
 from common.messages import Cause
-from tests.dashboard.bus_fixture import World
-from tests.dashboard.servers import CONTACT, NEWER, Servers, serving
-from verification.harness.dashboard import Eye, Site, eye
+from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.servers import CONTACT, NEWER, CallServers, serving
+from verification.harness.dashboard import Client, Server, connected
 from verification.harness.support import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
 
 
 @pytest.fixture
-def servers(endpoint: str, world: World) -> Iterator[Servers]:
-    with serving(endpoint, world) as it:
+def calls(endpoint: str, peer: Peer) -> Iterator[CallServers]:
+    with serving(endpoint, peer) as it:
         yield it
 
 
 @pytest.fixture
-def ada(site: Site, servers: Servers) -> Iterator[Eye]:
+def ada(server: Server, calls: CallServers) -> Iterator[Client]:
     """The driver's connection, at a contact."""
-    with eye(site) as it:
-        it.takes()
+    with connected(server) as it:
+        it.take_control()
         seen(it, CONTACT)
         yield it
 
 
-def seen(it: Eye, cause: Cause) -> int:
+def seen(it: Client, cause: Cause) -> int:
     """Wait for a picture with a cause, and return its number."""
     while True:
-        picture = it.look()
-        if picture["safety"] and [one["id"] for one in picture["safety"]["causes"]] == [cause.id]:
-            return int(picture["n"])
+        snapshot = it.next_snapshot()
+        if snapshot["safety"] and [one["id"] for one in snapshot["safety"]["causes"]] == [cause.id]:
+            return int(snapshot["n"])
 
 
-def told(it: Eye) -> tuple[str, str]:
-    word = it.waits("notice")
+def told(it: Client) -> tuple[str, str]:
+    word = it.wait_for("notice")
     return word["level"], word["text"]
 
 
-def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Eye, servers: Servers) -> None:
-    ada.say("reset", n=seen(ada, CONTACT))
+def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Client, calls: CallServers) -> None:
+    ada.send("reset", n=seen(ada, CONTACT))
     assert told(ada) == ("info", "Reset.")
-    (request,) = servers.resets
+    (request,) = calls.resets
     assert request.causes == (CONTACT.id,)
     assert request.echo is not None
-    assert 0 <= time.monotonic_ns() - request.echo < 20e9  # a heartbeat of this world
+    assert 0 <= time.monotonic_ns() - request.echo < 20e9  # a heartbeat of this peer
 
 
-def test_a_reset_does_not_name_a_newer_contact(ada: Eye, servers: Servers) -> None:
-    servers.is_effective = False
+def test_a_reset_does_not_name_a_newer_contact(ada: Client, calls: CallServers) -> None:
+    calls.is_effective = False
     number = seen(ada, CONTACT)
-    servers.world.causes = (NEWER,)
+    calls.peer.causes = (NEWER,)
     seen(ada, NEWER)
-    ada.say("reset", n=number)
-    wait_until(lambda: servers.resets, "the reset")
-    assert servers.resets[0].causes == (CONTACT.id,)
+    ada.send("reset", n=number)
+    wait_until(lambda: calls.resets, "the reset")
+    assert calls.resets[0].causes == (CONTACT.id,)
 
 
-def test_a_reset_that_a_proxy_held_clears_nothing(ada: Eye, servers: Servers) -> None:
+def test_a_reset_that_a_proxy_held_clears_nothing(ada: Client, calls: CallServers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
-    servers.world.causes = (NEWER,)
+    calls.peer.causes = (NEWER,)
     while time.monotonic() - began < PROXY_S:
-        ada.look()
-    ada.say("reset", n=number)
+        ada.next_snapshot()
+    ada.send("reset", n=number)
     assert told(ada) == ("warning", "too_late")
-    ada.say("switch", n=number, to={"bumper_brake": False})
+    ada.send("switch", n=number, to={"bumper_brake": False})
     assert told(ada) == ("warning", "too_late")
-    ada.say("reset")
+    ada.send("reset")
     assert told(ada) == ("warning", "too_late")
-    assert servers.resets == []
-    assert servers.switches == []
-    assert servers.world.causes == (NEWER,)
+    assert calls.resets == []
+    assert calls.switches == []
+    assert calls.peer.causes == (NEWER,)
 
 
-def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Eye, servers: Servers) -> None:
-    servers.boot += 1
-    servers.is_effective = False
-    ada.say("reset", n=seen(ada, CONTACT))
+def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Client, calls: CallServers) -> None:
+    calls.boot += 1
+    calls.is_effective = False
+    ada.send("reset", n=seen(ada, CONTACT))
     assert told(ada) == ("error", "reset_unconfirmed")
 
 
-def test_a_reset_without_effect_is_not_confirmed(ada: Eye, servers: Servers) -> None:
-    servers.is_effective = False
+def test_a_reset_without_effect_is_not_confirmed(ada: Client, calls: CallServers) -> None:
+    calls.is_effective = False
     began = time.monotonic()
-    ada.say("reset", n=seen(ada, CONTACT))
+    ada.send("reset", n=seen(ada, CONTACT))
     assert told(ada) == ("error", "reset_unconfirmed")
     assert time.monotonic() - began > 0.9
 
 
-def test_a_switch_carries_the_echo_of_what_was_seen(ada: Eye, servers: Servers) -> None:
-    ada.say("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
+def test_a_switch_carries_the_echo_of_what_was_seen(ada: Client, calls: CallServers) -> None:
+    ada.send("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
     assert told(ada) == ("info", "done")
-    (request,) = servers.switches
+    (request,) = calls.switches
     assert request.bumper_brake is False
     assert (request.echo or 0) > 1
 
 
-def test_a_release_names_the_direction_and_what_was_seen(ada: Eye, servers: Servers) -> None:
+def test_a_release_names_the_direction_and_what_was_seen(ada: Client, calls: CallServers) -> None:
     for _ in range(20):
-        ada.say("hold", n=ada.look()["n"], release="backward")
-    assert ada.seen["fast"]["safety"]["release"]["believed_free"] == "backward"
-    ada.say("free")
-    wait_until(lambda: servers.releases and not servers.releases[-1].held, "the end of it")
-    held, end = servers.releases[:-1], servers.releases[-1]
+        ada.send("hold", n=ada.next_snapshot()["n"], release="backward")
+    assert ada.received["fast"]["safety"]["release"]["believed_free"] == "backward"
+    ada.send("free")
+    wait_until(lambda: calls.releases and not calls.releases[-1].held, "the end of it")
+    held, end = calls.releases[:-1], calls.releases[-1]
     assert {one.direction for one in held} == {"backward"}
     echoes = [one.echo or 0 for one in held]
     assert echoes == sorted(echoes)
@@ -114,11 +114,11 @@ def test_a_release_names_the_direction_and_what_was_seen(ada: Eye, servers: Serv
     assert end.direction is None
 
 
-def test_a_release_that_comes_late_is_not_asked(ada: Eye, servers: Servers) -> None:
+def test_a_release_that_comes_late_is_not_asked(ada: Client, calls: CallServers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
     while time.monotonic() - began < 1.0:
-        ada.look()
+        ada.next_snapshot()
     for _ in range(20):
-        ada.say("hold", n=number, release="backward")
-        ada.look()
-    assert servers.releases == []
+        ada.send("hold", n=number, release="backward")
+        ada.next_snapshot()
+    assert calls.releases == []

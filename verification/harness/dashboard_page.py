@@ -1,11 +1,11 @@
-"""What somebody does with the page in a browser, and waits to see."""
+"""Actions and checks on the page in a browser."""
 
 import shutil
 from collections.abc import Callable
 
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
 
-from verification.harness.dashboard import Site
+from verification.harness.dashboard import Server
 from verification.harness.stack import Chain
 from verification.harness.support import wait_until
 
@@ -14,37 +14,39 @@ PHONE: ViewportSize = {"width": 390, "height": 844}
 STILL_MPS = 0.005
 
 
-def opened(page: Page, site: Site) -> None:
-    page.goto(site.url)
-    shows(page, "#link", "Board: up")
+def open_page(page: Page, server: Server) -> None:
+    page.goto(server.url)
+    wait_for_text(page, "#link", "Board: up")
 
 
 def text(page: Page, where: str) -> str:
     return page.inner_text(where, timeout=20_000)
 
 
-def shows(page: Page, where: str, words: str) -> None:
-    """Wait until a part of the page has these words in it."""
+def wait_for_text(page: Page, where: str, expected: str) -> None:
+    """Wait until an element of the page contains this text."""
     page.wait_for_function(
-        "([where, words]) => document.querySelector(where)?.textContent.includes(words)",
-        arg=[where, words],
+        "([where, text]) => document.querySelector(where)?.textContent.includes(text)",
+        arg=[where, expected],
         timeout=20_000,
     )
 
 
-def takes(page: Page) -> None:
-    """Sit down at the wheel, whoever has it."""
+def take_control(page: Page) -> None:
+    """Take the driver lock, also from another viewer."""
     page.click("#take")
     page.wait_for_function(
-        "() => document.querySelector('.driving.mine') || document.querySelector('#question').open"
+        "() => document.querySelector('.is-driver') || document.querySelector('#question').open"
     )
     if page.is_visible("#question-yes"):
         page.click("#question-yes")
-    page.wait_for_selector(".driving.mine")
+    page.wait_for_selector(".driving.is-driver")
 
 
-def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None]) -> None:
-    """Hold until the vehicle moves; let go and press again when this machine held somebody up."""
+def drive_until_moving(
+    stack: Chain, press: Callable[[], None], release: Callable[[], None]
+) -> None:
+    """Hold until the vehicle moves; release and retry after a stall of the host."""
     for _ in range(10):
         press()
         try:
@@ -56,20 +58,20 @@ def drives(stack: Chain, press: Callable[[], None], release: Callable[[], None])
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-def stands(stack: Chain) -> None:
+def wait_for_standstill(stack: Chain) -> None:
     wait_until(lambda: abs(stack.speed()) < STILL_MPS, "the vehicle stands")
 
 
-def middle(page: Page, where: str) -> tuple[float, float, float]:
-    """Return the middle of a part of the page, and half its height."""
+def center_of(page: Page, where: str) -> tuple[float, float, float]:
+    """Return the centre of an element, and half its height."""
     page.locator(where).scroll_into_view_if_needed()
     box = page.locator(where).bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["height"] / 2
 
 
-def resets(page: Page) -> None:
-    """Reset until nothing is latched; safety wants to see each cause gone first."""
+def reset_all(page: Page) -> None:
+    """Reset until nothing is latched; safety requires that each cause is gone first."""
 
     def over() -> bool:
         page.wait_for_timeout(300)
@@ -82,12 +84,12 @@ def resets(page: Page) -> None:
 
 
 def phone_of(
-    browser: Browser, site: Site, locale: str
+    browser: Browser, server: Server, locale: str
 ) -> tuple[BrowserContext, Page, Callable[..., None]]:
-    """Return a phone with the page, and what puts fingers on it."""
+    """Return a phone with the page, and a function that sends touch events."""
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, locale=locale)
     phone = context.new_page()
-    phone.goto(site.url)
+    phone.goto(server.url)
     phone.wait_for_selector("#robots option", state="attached")
     touch = context.new_cdp_session(phone)
 
