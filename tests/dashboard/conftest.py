@@ -1,4 +1,4 @@
-"""A router, a peer on it and a dashboard that shows it, for the tests of one file."""
+"""A router, its simulated safety and a dashboard, for the tests of one module."""
 
 from collections.abc import Iterator
 

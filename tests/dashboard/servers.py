@@ -1,4 +1,4 @@
-"""Safety's and the bridge's calls, with configured answers."""
+"""Call servers of safety and bridge with configured answers."""
 
 import contextlib
 import time
@@ -29,7 +29,7 @@ FREE = Release(believed_free="backward", travelled=0.4, age=2.0, forbidden=(), l
 
 @dataclass
 class CallServers:
-    """Safety's and the bridge's calls: what they were asked, and what they answer."""
+    """Call servers of safety and bridge: received requests and configured answers."""
 
     peer: Peer
     resets: list[ResetRequest] = field(default_factory=list)

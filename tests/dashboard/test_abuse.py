@@ -51,7 +51,7 @@ def worst_s(peer: Peer, ask: Callable[[], None]) -> float:
     worst = 0.0
     for _ in range(TRIES):
         peer.latched = ("estop",)
-        peer.quiet()
+        peer.wait_for_silence()
         peer.estops.clear()
         peer.latched = ()
         began = time.monotonic()
@@ -123,7 +123,7 @@ def test_beyond_the_limit_only_an_emergency_stop_is_served(
 
 def test_an_emergency_stop_among_messages_that_are_dropped(server: Server, peer: Peer) -> None:
     peer.latched = ("estop",)
-    peer.quiet()
+    peer.wait_for_silence()
     peer.estops.clear()
     with connected(server) as it:
         for _ in range(300):  # more than a burst, less than abuse
@@ -140,7 +140,7 @@ def dropped(rest: dict[str, Any]) -> int:
     return sum(int(one["counters"].get("messages_dropped", 0)) for one in own)
 
 
-def test_who_goes_on_sending_is_closed(server: Server) -> None:
+def test_a_viewer_that_keeps_flooding_is_disconnected(server: Server) -> None:
     def go_on(it: Client) -> None:
         for _ in range(600):
             it.send("free")

@@ -1,4 +1,4 @@
-"""Who may come in to the dashboard, and who may not."""
+"""Authentication of the dashboard's web server."""
 
 import json
 import re
@@ -23,7 +23,7 @@ def test_another_page_of_the_same_browser_cannot_act(server: Server, peer: Peer)
         with pytest.raises(InvalidStatus):
             connect(f"ws://127.0.0.1:{server.port}/live", origin=origin)
     peer.latched = ("estop",)  # so that earlier stops are repeated no more
-    peer.quiet()
+    peer.wait_for_silence()
     peer.estops.clear()
     request = urllib.request.Request(f"{server.url}estop/001", method="POST")
     with pytest.raises(urllib.error.HTTPError, match="403"):
@@ -32,7 +32,7 @@ def test_another_page_of_the_same_browser_cannot_act(server: Server, peer: Peer)
     peer.latched = ()
 
 
-def test_a_bent_name_is_shown_the_right_one(server: Server) -> None:
+def test_a_rebound_host_name_is_refused(server: Server) -> None:
     request = urllib.request.Request(server.url, headers={"Host": "evil.example"})
     with pytest.raises(urllib.error.HTTPError, match="403") as refused:
         urllib.request.urlopen(request)
@@ -40,7 +40,7 @@ def test_a_bent_name_is_shown_the_right_one(server: Server) -> None:
 
 
 @pytest.mark.parametrize("path", ["", "t2/dashboard.js", "t2/none.js", "nowhere", "estop/001"])
-def test_every_answer_keeps_other_pages_out(server: Server, path: str) -> None:
+def test_every_response_has_the_security_headers(server: Server, path: str) -> None:
     request = urllib.request.Request(server.url + path, headers={"Origin": "http://evil.example"})
     try:
         answer = urllib.request.urlopen(request)
@@ -78,11 +78,11 @@ def test_the_page_has_no_inline_code(server: Server) -> None:
 
 
 def browser() -> urllib.request.OpenerDirector:
-    """Return something that keeps cookies."""
+    """Return a client that stores cookies."""
     return urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
 
 
-def test_on_the_network_a_token_is_asked_for(endpoint: str, tmp_path: Path) -> None:
+def test_from_the_network_a_token_is_required(endpoint: str, tmp_path: Path) -> None:
     secret = tmp_path / "token"
     secret.write_text("open sesame\n", encoding="utf-8")
     sets = ("dashboard.host=0.0.0.0", f"dashboard.token_file={secret}")
@@ -104,14 +104,14 @@ def test_on_the_network_a_token_is_asked_for(endpoint: str, tmp_path: Path) -> N
         assert "open sesame" not in server.log.read_text()
 
 
-def test_the_address_that_is_named() -> None:
+def test_the_logged_address() -> None:
     assert reachable("127.0.0.1") == "127.0.0.1"
     assert reachable("fe80::1") == "[fe80::1]"
     for everywhere in ("0.0.0.0", "::"):
         assert reachable(everywhere).strip("[]") not in ("", everywhere)
 
 
-def test_a_new_token_is_printed(endpoint: str, tmp_path: Path) -> None:
+def test_a_new_token_is_logged(endpoint: str, tmp_path: Path) -> None:
     with dashboard(endpoint, tmp_path, "dashboard.host=0.0.0.0") as server:
         lines = [json.loads(line) for line in server.log.read_text().splitlines()]
         where = next(line["open"] for line in lines if line["event"] == "started")

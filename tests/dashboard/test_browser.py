@@ -70,7 +70,7 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     assert problems == []
 
 
-def test_what_is_on_the_screen(page: Page, stack: Chain) -> None:
+def test_the_content_of_the_page(page: Page, stack: Chain) -> None:
     wait_for_text(page, "#verdict", "STOP")
     wait_for_text(page, "#sentence", "Nobody asks to move.")
     wait_for_text(page, "#speed", "0.00")
@@ -95,7 +95,7 @@ def test_what_is_on_the_screen(page: Page, stack: Chain) -> None:
     reset_all(page)
 
 
-def test_by_mouse(page: Page, stack: Chain) -> None:
+def test_driving_by_mouse(page: Page, stack: Chain) -> None:
     take_control(page)
     x, y, way = center_of(page, "#stick")
 
@@ -112,7 +112,7 @@ def test_by_mouse(page: Page, stack: Chain) -> None:
     wait_for_text(page, "#hold", "Released")
 
 
-def test_by_keyboard_and_a_lost_focus(page: Page, stack: Chain) -> None:
+def test_driving_by_keyboard_and_a_lost_focus(page: Page, stack: Chain) -> None:
     take_control(page)
     page.keyboard.press("3")
     wait_for_text(page, "#top", "0.50")
@@ -127,7 +127,7 @@ def test_by_keyboard_and_a_lost_focus(page: Page, stack: Chain) -> None:
     page.keyboard.up("s")
 
 
-def test_a_key_whose_way_up_is_lost(page: Page, stack: Chain) -> None:
+def test_a_lost_key_up_releases(page: Page, stack: Chain) -> None:
     take_control(page)
     ways: tuple[Callable[[], None], ...] = (
         lambda: page.keyboard.press("Meta"),
@@ -154,7 +154,7 @@ PAD = """() => {
 }"""
 
 
-def test_by_gamepad(page: Page, stack: Chain) -> None:
+def test_driving_by_gamepad(page: Page, stack: Chain) -> None:
     def deadman(down: bool) -> None:
         page.evaluate("down => { window.pad.buttons[4].pressed = down; }", down)
         page.wait_for_timeout(200)  # the page looks at it with each picture
@@ -173,7 +173,7 @@ def test_by_gamepad(page: Page, stack: Chain) -> None:
     )
 
 
-def test_in_the_background(page: Page, stack: Chain) -> None:
+def test_a_page_in_the_background_releases(page: Page, stack: Chain) -> None:
     take_control(page)
     drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
     page.evaluate(
@@ -186,7 +186,7 @@ def test_in_the_background(page: Page, stack: Chain) -> None:
     page.keyboard.up("w")
 
 
-def test_by_touch_and_a_stop_from_somebody_who_watches(
+def test_driving_by_touch_and_a_stop_from_another_viewer(
     browser: Browser, page: Page, server: Server, stack: Chain
 ) -> None:
     context, phone, finger = phone_of(browser, server, "zh-CN")

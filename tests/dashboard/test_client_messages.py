@@ -1,4 +1,4 @@
-"""What a browser may say."""
+"""Messages from the browser."""
 
 import msgspec
 import pytest
@@ -31,7 +31,7 @@ READ = msgspec.json.Decoder(client.AnyMessage)
         ('{"k":"lamp","to":{"channel":1,"mode":2}}', client.Lamp(LedRequest(channel=1, mode=2))),
     ],
 )
-def test_the_words(text: str, word: client.ClientMessage) -> None:
+def test_valid_messages_are_decoded(text: str, word: client.ClientMessage) -> None:
     assert READ.decode(text) == word
 
 
@@ -55,6 +55,6 @@ def test_the_words(text: str, word: client.ClientMessage) -> None:
         '{"k":"lamp","to":{"channel":256,"mode":1}}',
     ],
 )
-def test_anything_else_is_refused(text: str) -> None:
+def test_invalid_messages_are_refused(text: str) -> None:
     with pytest.raises(msgspec.DecodeError):
         READ.decode(text)

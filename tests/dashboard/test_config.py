@@ -1,4 +1,4 @@
-"""The dashboard's settings, and what stands in the way of its start."""
+"""The dashboard's settings, and errors at its start."""
 
 import socket
 import sys
@@ -36,14 +36,14 @@ from services.dashboard.config import Dashboard
         ),
     ],
 )
-def test_a_bad_setting_ends_it_before_anything_opens(
+def test_an_invalid_setting_ends_the_start(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert dashboard.main(words) == EXIT_CONFIG
     assert named in capsys.readouterr().err
 
 
-def test_a_taken_port_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_in_use_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -54,7 +54,7 @@ def test_a_taken_port_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert "set another one" in said
 
 
-def test_a_missing_extra_is_named(
+def test_a_missing_extra_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delitem(sys.modules, "services.dashboard.host", raising=False)
@@ -64,7 +64,7 @@ def test_a_missing_extra_is_named(
     assert "install the extra `dashboard`" in capsys.readouterr().err
 
 
-def test_this_machine_needs_no_token_and_others_get_a_new_one() -> None:
+def test_localhost_needs_no_token_and_other_hosts_get_a_new_one() -> None:
     assert host.token(Dashboard()) == ""
     assert host.token(Dashboard(host="::1")) == ""
     assert len(host.token(Dashboard(host="0.0.0.0"))) >= 16

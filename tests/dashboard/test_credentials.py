@@ -1,4 +1,4 @@
-"""Who may come in, and who may act."""
+"""Credentials: which requests may view and which may act."""
 
 import pytest
 
@@ -9,32 +9,32 @@ COOKIE_HEADER = {"cookie": f"other=1; {COOKIE}={WITH_TOKEN.cookie}"}
 
 
 @pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "localhost", "[::1]:8080"])
-def test_this_machine_may_come_in_without_a_token(host: str) -> None:
+def test_localhost_may_view_and_act_without_a_token(host: str) -> None:
     assert LOCAL.may_view({"host": host})
     assert LOCAL.may_act({"host": host, "origin": f"http://{host}"})
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "", "[::1", "10.7.5.9:8080"])
-def test_a_name_that_somebody_else_has_bent_opens_nothing(host: str) -> None:
+def test_another_host_name_is_refused_without_a_token(host: str) -> None:
     assert not LOCAL.may_view({"host": host})
     assert not LOCAL.may_act({"host": host, "origin": f"http://{host}"})
 
 
-def test_without_any_host_nothing_opens() -> None:
+def test_a_request_without_a_host_is_refused() -> None:
     assert not LOCAL.may_view({})
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://localhost:9999", "null", "", "localhost:8080"]
 )
-def test_another_page_may_look_and_not_act(origin: str) -> None:
+def test_another_origin_may_view_but_not_act(origin: str) -> None:
     headers = {"host": "localhost:8080", "origin": origin}
     assert LOCAL.may_view(headers)
     assert not LOCAL.may_act(headers)
     assert not LOCAL.may_act({"host": "localhost:8080"})
 
 
-def test_with_a_token_only_its_badge_opens() -> None:
+def test_with_a_token_only_its_cookie_is_accepted() -> None:
     robot = {"host": "10.7.5.220:8080"}
     assert WITH_TOKEN.may_view(robot | COOKIE_HEADER)
     assert WITH_TOKEN.may_act(robot | COOKIE_HEADER | {"origin": "https://10.7.5.220:8080"})
@@ -53,18 +53,18 @@ def test_with_a_token_only_its_badge_opens() -> None:
         f"{COOKIE}=\xff",
     ],
 )
-def test_any_other_cookie_opens_nothing(cookie: str) -> None:
+def test_any_other_cookie_is_refused(cookie: str) -> None:
     assert not WITH_TOKEN.may_view({"host": "localhost:8080", "cookie": cookie})
 
 
-def test_the_token_and_nothing_else_is_the_token() -> None:
+def test_only_the_token_is_the_token() -> None:
     assert WITH_TOKEN.is_token("a long token")
     assert not WITH_TOKEN.is_token("a long toke")
     assert not WITH_TOKEN.is_token("")
     assert not WITH_TOKEN.is_token("ü")
 
 
-def test_the_badge_does_not_show_the_token() -> None:
+def test_the_cookie_does_not_contain_the_token() -> None:
     assert "a long token" not in WITH_TOKEN.cookie
     assert WITH_TOKEN.cookie != Credentials("another").cookie
 

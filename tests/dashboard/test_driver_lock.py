@@ -1,4 +1,4 @@
-"""Who drives, and what holds count: the table, the round trip, hostile values."""
+"""The driver lock: its table, the round trip, hostile values."""
 
 import math
 
@@ -19,28 +19,28 @@ def at(seconds: float) -> int:
 
 @pytest.fixture
 def lock() -> DriverLock:
-    """The viewer "a" drives, and picture 1 went out at 10 s."""
+    """The viewer "a" drives, and snapshot 1 was sent at 10 s."""
     lock = DriverLock(LIMIT_S)
     assert lock.take("a", force=False)
     lock.sent(1, at(10))
     return lock
 
 
-def test_nobody_drives_at_first() -> None:
+def test_there_is_no_driver_at_first() -> None:
     lock = DriverLock(LIMIT_S)
     lock.sent(1, at(10))
     assert not lock.hold("a", 1, AHEAD, at(10))
     assert lock.held(at(10)) is None
 
 
-def test_the_wheel_is_one_viewers(lock: DriverLock) -> None:
+def test_one_viewer_has_the_lock(lock: DriverLock) -> None:
     assert not lock.take("b", force=False)
     assert lock.driver == "a"
     assert not lock.hold("b", 1, AHEAD, at(10))
     assert lock.take("a", force=False)
 
 
-def test_taking_over_lets_go_and_starts_in_the_first_gear(lock: DriverLock) -> None:
+def test_a_takeover_ends_the_hold_and_starts_in_gear_1(lock: DriverLock) -> None:
     lock.shift("a", 4)
     lock.hold("a", 1, AHEAD, at(10))
     assert lock.take("b", force=True)
@@ -48,14 +48,14 @@ def test_taking_over_lets_go_and_starts_in_the_first_gear(lock: DriverLock) -> N
     assert not lock.hold("a", 1, AHEAD, at(10))
 
 
-def test_taking_it_again_changes_nothing(lock: DriverLock) -> None:
+def test_taking_the_lock_again_changes_nothing(lock: DriverLock) -> None:
     lock.shift("a", 4)
     lock.hold("a", 1, AHEAD, at(10))
     assert lock.take("a", force=True)
     assert (lock.gear, lock.held(at(10))) == (4, AHEAD)
 
 
-def test_who_leaves_lets_go(lock: DriverLock) -> None:
+def test_leaving_ends_the_hold(lock: DriverLock) -> None:
     lock.hold("a", 1, AHEAD, at(10))
     lock.leave("b")
     assert lock.held(at(10)) == AHEAD
@@ -69,36 +69,36 @@ def test_only_the_driver_shifts(lock: DriverLock) -> None:
     assert lock.gear == 1
 
 
-def test_only_the_driver_lets_go(lock: DriverLock) -> None:
+def test_only_the_driver_ends_the_hold(lock: DriverLock) -> None:
     lock.hold("a", 1, AHEAD, at(10))
     lock.let_go("b")
     assert lock.state is HoldState.HELD
 
 
-def test_a_hold_counts_for_the_round_trip_of_its_picture(lock: DriverLock) -> None:
+def test_a_hold_is_valid_for_the_round_trip_of_its_snapshot(lock: DriverLock) -> None:
     assert lock.hold("a", 1, AHEAD, at(10.3))
     assert lock.held(at(10.3)) == AHEAD
     assert lock.held(at(10.3) + 1) is None
     assert lock.state is HoldState.LAPSED
 
 
-def test_an_answer_to_an_old_picture_is_refused(lock: DriverLock) -> None:
+def test_an_answer_to_an_old_snapshot_is_refused(lock: DriverLock) -> None:
     assert not lock.hold("a", 1, AHEAD, at(10.3) + 1)
     assert lock.state is HoldState.FREE
 
 
-def test_an_answer_to_no_picture_is_refused(lock: DriverLock) -> None:
+def test_an_answer_to_an_unknown_snapshot_is_refused(lock: DriverLock) -> None:
     assert not lock.hold("a", 2, AHEAD, at(10))
 
 
-def test_a_picture_of_long_ago_is_forgotten(lock: DriverLock) -> None:
+def test_only_the_newest_snapshots_are_kept(lock: DriverLock) -> None:
     for number in range(2, 2 + SNAPSHOTS_KEPT):
         lock.sent(number, at(10))
     assert not lock.hold("a", 1, AHEAD, at(10))
     assert lock.hold("a", 2, AHEAD, at(10))
 
 
-def test_every_round_trip_renews(lock: DriverLock) -> None:
+def test_every_answer_renews_the_hold(lock: DriverLock) -> None:
     for number in range(2, 40):
         now_ns = at(10) + number * NS_PER_S // 20
         lock.sent(number, now_ns)
@@ -106,7 +106,7 @@ def test_every_round_trip_renews(lock: DriverLock) -> None:
         assert lock.held(now_ns + NS_PER_S // 4) == AHEAD
 
 
-def test_what_was_overtaken_changes_nothing(lock: DriverLock) -> None:
+def test_a_reordered_hold_changes_nothing(lock: DriverLock) -> None:
     lock.sent(2, at(10.05))
     assert lock.hold("a", 2, AHEAD, at(10.1))
     assert not lock.hold("a", 1, Push(-1.0), at(10.1))
@@ -114,7 +114,7 @@ def test_what_was_overtaken_changes_nothing(lock: DriverLock) -> None:
     assert lock.answered == 2
 
 
-def test_after_a_lapse_the_hand_must_come_off(lock: DriverLock) -> None:
+def test_after_a_lapse_a_release_is_required(lock: DriverLock) -> None:
     lock.hold("a", 1, AHEAD, at(10))
     assert lock.held(at(11)) is None
     lock.sent(2, at(11))
@@ -123,19 +123,19 @@ def test_after_a_lapse_the_hand_must_come_off(lock: DriverLock) -> None:
     assert lock.hold("a", 2, AHEAD, at(11))
 
 
-def test_a_free_hand_does_not_lapse(lock: DriverLock) -> None:
+def test_a_free_lock_does_not_lapse(lock: DriverLock) -> None:
     lock.lapse()
     assert lock.state is HoldState.FREE
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_no_number_is_refused(lock: DriverLock, wrong: float) -> None:
+def test_a_non_finite_push_is_refused(lock: DriverLock, wrong: float) -> None:
     assert not lock.hold("a", 1, Push(wrong, 0.0), at(10))
     assert not lock.hold("a", 1, Push(0.0, wrong), at(10))
     assert lock.held(at(10)) is None
 
 
-def test_more_than_full_is_full(lock: DriverLock) -> None:
+def test_a_push_is_clamped(lock: DriverLock) -> None:
     lock.hold("a", 1, Push(7.0, -7.0, release="backward"), at(10))
     assert lock.held(at(10)) == Push(1.0, -1.0, release="backward")
 
@@ -152,7 +152,7 @@ STEPS = st.lists(
 
 
 class Play:
-    """A lock, and when each viewer's hold last counted."""
+    """A lock, and the time of each viewer's last valid hold."""
 
     def __init__(self) -> None:
         self.lock = DriverLock(LIMIT_S)
@@ -176,7 +176,7 @@ class Play:
 
 
 @given(STEPS)
-def test_what_is_held_was_held_by_the_driver_within_the_round_trip(
+def test_a_valid_hold_is_the_drivers_and_within_the_round_trip(
     steps: list[tuple[str, str, int, float]],
 ) -> None:
     play = Play()

@@ -1,4 +1,4 @@
-"""Which robots are looked at: with buses that carry nothing, as time here is not the clock's."""
+"""Robots and viewers, with fake buses and a time that the test sets."""
 
 import json
 import time
@@ -33,7 +33,7 @@ def fleet() -> Fleet:
     return Fleet(Mock(config=DashboardConfig()), Mock())
 
 
-def test_a_robot_that_nobody_knows_is_not_stopped(fleet: Fleet, buses: dict[str, Mock]) -> None:
+def test_an_unknown_robot_is_not_stopped(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
     assert fleet.knows("001")  # by the settings, alive or not
     assert not fleet.knows("made-up")
@@ -44,7 +44,7 @@ def test_a_robot_that_nobody_knows_is_not_stopped(fleet: Fleet, buses: dict[str,
     assert fleet._node.bus.estop.called  # type: ignore[attr-defined]
 
 
-def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
+def test_a_robot_is_known_after_it_was_alive_or_while_it_has_viewers(
     fleet: Fleet, buses: dict[str, Mock]
 ) -> None:
     _, note_alive = fleet._node.bus.watch_live.call_args.args  # type: ignore[attr-defined]
@@ -61,7 +61,7 @@ def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
     assert fleet.knows("002")
 
 
-def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, Mock]) -> None:
+def test_a_robot_without_viewers_is_closed(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
     fleet.handle("1", client.Look("002"))
     fleet.estop("003", "somebody")
@@ -80,7 +80,7 @@ def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, M
     assert not buses["002"].close.called
 
 
-def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock]) -> None:
+def test_fifty_robots_are_listed_some_open_and_any_stopped(buses: dict[str, Mock]) -> None:
     shown: list[bytes] = []
     node = Mock(config=DashboardConfig())
     fleet = Fleet(node, lambda _viewers, text, _newer_wins: shown.append(text))
@@ -103,7 +103,7 @@ def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock])
     assert rest["robots"] == {"001": False} | dict.fromkeys(names, True) | {names[-1]: False}
 
 
-def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:
+def test_a_new_name_does_not_restore_the_trail(buses: dict[str, Mock]) -> None:
     shown: list[bytes] = []
     fleet = Fleet(
         Mock(config=DashboardConfig()), lambda _viewers, text, _newer_wins: shown.append(text)

@@ -34,7 +34,7 @@ def used_keys() -> set[str]:
     return found | set(re.findall(r'"(?:error|info|warning)", "(\w+)"', robot))
 
 
-def test_the_search_finds_some() -> None:
+def test_the_search_finds_known_keys() -> None:
     assert {
         "estop",
         "follow",
@@ -46,7 +46,7 @@ def test_the_search_finds_some() -> None:
     } <= used_keys()
 
 
-def test_every_text_that_is_asked_for_is_there() -> None:
+def test_every_used_key_has_a_text() -> None:
     assert used_keys() <= set(TEXTS)
 
 
@@ -61,7 +61,7 @@ def test_every_text_that_is_asked_for_is_there() -> None:
         ("bumper", ["true", "false", "none"]),
     ],
 )
-def test_every_name_of_the_contract_has_its_text(prefix: str, names: list[str]) -> None:
+def test_every_name_of_the_messages_has_its_text(prefix: str, names: list[str]) -> None:
     assert {f"{prefix}.{getattr(name, 'value', name)}" for name in names} <= set(TEXTS)
 
 
@@ -114,7 +114,7 @@ def test_both_languages_have_a_text(key: str) -> None:
         assert HAN.search(chinese)
 
 
-def test_the_table_goes_to_the_page_by_language() -> None:
+def test_the_table_has_the_texts_by_language() -> None:
     both = table()
     assert tuple(both) == LANGUAGES
     assert (both["en"]["estop"], both["zh"]["estop"]) == TEXTS["estop"]

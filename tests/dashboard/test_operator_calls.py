@@ -1,4 +1,4 @@
-"""Reset, switches and release from the browser: what was seen, how old it is, what it changed."""
+"""Reset, switches and release from the browser: the answered snapshot, its age, the effect."""
 
 import time
 from collections.abc import Iterator
@@ -30,21 +30,21 @@ def ada(server: Server, calls: CallServers) -> Iterator[Client]:
 
 
 def seen(it: Client, cause: Cause) -> int:
-    """Wait for a picture with a cause, and return its number."""
+    """Wait for a snapshot with a cause and return its number."""
     while True:
         snapshot = it.next_snapshot()
         if snapshot["safety"] and [one["id"] for one in snapshot["safety"]["causes"]] == [cause.id]:
             return int(snapshot["n"])
 
 
-def told(it: Client) -> tuple[str, str]:
-    word = it.wait_for("notice")
-    return word["level"], word["text"]
+def notice(it: Client) -> tuple[str, str]:
+    message = it.wait_for("notice")
+    return message["level"], message["text"]
 
 
 def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Client, calls: CallServers) -> None:
     ada.send("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("info", "Reset.")
+    assert notice(ada) == ("info", "Reset.")
     (request,) = calls.resets
     assert request.causes == (CONTACT.id,)
     assert request.echo is not None
@@ -67,11 +67,11 @@ def test_a_reset_that_a_proxy_held_clears_nothing(ada: Client, calls: CallServer
     while time.monotonic() - began < PROXY_S:
         ada.next_snapshot()
     ada.send("reset", n=number)
-    assert told(ada) == ("warning", "too_late")
+    assert notice(ada) == ("warning", "too_late")
     ada.send("switch", n=number, to={"bumper_brake": False})
-    assert told(ada) == ("warning", "too_late")
+    assert notice(ada) == ("warning", "too_late")
     ada.send("reset")
-    assert told(ada) == ("warning", "too_late")
+    assert notice(ada) == ("warning", "too_late")
     assert calls.resets == []
     assert calls.switches == []
     assert calls.peer.causes == (NEWER,)
@@ -81,20 +81,20 @@ def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Client, calls: Call
     calls.boot += 1
     calls.is_effective = False
     ada.send("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("error", "reset_unconfirmed")
+    assert notice(ada) == ("error", "reset_unconfirmed")
 
 
 def test_a_reset_without_effect_is_not_confirmed(ada: Client, calls: CallServers) -> None:
     calls.is_effective = False
     began = time.monotonic()
     ada.send("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("error", "reset_unconfirmed")
+    assert notice(ada) == ("error", "reset_unconfirmed")
     assert time.monotonic() - began > 0.9
 
 
 def test_a_switch_carries_the_echo_of_what_was_seen(ada: Client, calls: CallServers) -> None:
     ada.send("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
-    assert told(ada) == ("info", "done")
+    assert notice(ada) == ("info", "done")
     (request,) = calls.switches
     assert request.bumper_brake is False
     assert (request.echo or 0) > 1
@@ -114,7 +114,7 @@ def test_a_release_names_the_direction_and_what_was_seen(ada: Client, calls: Cal
     assert end.direction is None
 
 
-def test_a_release_that_comes_late_is_not_asked(ada: Client, calls: CallServers) -> None:
+def test_a_late_release_is_not_called(ada: Client, calls: CallServers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
     while time.monotonic() - began < 1.0:
         ada.next_snapshot()

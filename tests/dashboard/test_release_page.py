@@ -78,9 +78,7 @@ def test_the_operator_chooses_the_direction(page: Page, calls: CallServers) -> N
     wait_until(lambda: not calls.releases[-1].held, "the end of them")
 
 
-def test_a_direction_that_is_forbidden_is_let_go_and_disabled(
-    page: Page, calls: CallServers
-) -> None:
+def test_a_forbidden_direction_is_released_and_disabled(page: Page, calls: CallServers) -> None:
     take_control(page)
     page.keyboard.down("b")
     wait_until(lambda: directions(calls) == {"backward"}, "calls backward")

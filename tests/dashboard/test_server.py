@@ -1,4 +1,4 @@
-"""The whole program without a browser: a real bus, real sockets, real requests."""
+"""The whole program without a browser, on a real bus and real sockets."""
 
 import signal
 import time
@@ -20,7 +20,7 @@ from verification.harness.support import wait_until
 
 @pytest.fixture
 def ada(server: Server, peer: Peer) -> Iterator[Client]:
-    """A viewer who sees that safety runs."""
+    """A viewer with a state of safety."""
     peer.safe = True
     with connected(server) as it:
         while not it.next_snapshot()["safety"]:
@@ -28,7 +28,7 @@ def ada(server: Server, peer: Peer) -> Iterator[Client]:
         yield it
 
 
-def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Client, peer: Peer) -> None:
+def test_a_hold_drives_and_a_release_sends_three_zeros(ada: Client, peer: Peer) -> None:
     ada.take_control()
     peer.requests.clear()
     drive(ada, peer)
@@ -42,7 +42,7 @@ def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Client, peer: Pe
     assert peer.zeros() == 3
 
 
-def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Client, peer: Peer) -> None:
+def test_a_missed_round_trip_ends_the_hold_until_a_release(ada: Client, peer: Peer) -> None:
     ada.take_control()
     peer.requests.clear()
     drive(ada, peer)
@@ -50,7 +50,7 @@ def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Client, peer: P
     wait_until(lambda: peer.zeros() >= 3, "zeros")
     assert time.monotonic_ns() - silent_ns > 0.1 * NS_PER_S
     while ada.next_snapshot()["driver"]["hold"] != "lapsed":
-        pass  # pictures from before, which nobody has read yet
+        pass  # earlier snapshots that are not yet read
     count = len(peer.requests)
     for _ in range(10):
         snapshot = ada.next_snapshot()
@@ -61,7 +61,7 @@ def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Client, peer: P
     drive(ada, peer)
 
 
-def test_an_old_picture_is_no_reason_to_drive(ada: Client, peer: Peer) -> None:
+def test_an_answer_to_an_old_snapshot_does_not_drive(ada: Client, peer: Peer) -> None:
     ada.take_control()
     ada.send("free")
     first = ada.next_snapshot()["n"]
@@ -74,7 +74,7 @@ def test_an_old_picture_is_no_reason_to_drive(ada: Client, peer: Peer) -> None:
     assert peer.requests == []
 
 
-def test_a_viewer_who_is_gone_has_let_go(server: Server, peer: Peer) -> None:
+def test_a_disconnect_ends_the_hold(server: Server, peer: Peer) -> None:
     with connected(server) as it:
         it.take_control()
         peer.requests.clear()
@@ -84,7 +84,7 @@ def test_a_viewer_who_is_gone_has_let_go(server: Server, peer: Peer) -> None:
         assert it.next_snapshot()["driver"]["id"] is None
 
 
-def test_a_silent_safety_lets_go(ada: Client, peer: Peer) -> None:
+def test_a_silent_safety_ends_the_hold(ada: Client, peer: Peer) -> None:
     ada.take_control()
     peer.requests.clear()
     drive(ada, peer)
@@ -95,7 +95,7 @@ def test_a_silent_safety_lets_go(ada: Client, peer: Peer) -> None:
     wait_until(lambda: peer.zeros() >= 3, "zeros")
 
 
-def test_one_drives_and_taking_over_asks(server: Server, ada: Client, peer: Peer) -> None:
+def test_one_viewer_drives_and_a_takeover_asks(server: Server, ada: Client, peer: Peer) -> None:
     ada.take_control()
     ada.send("look", robot="001", name="Ada")
     with connected(server) as bob:
@@ -112,20 +112,20 @@ def test_one_drives_and_taking_over_asks(server: Server, ada: Client, peer: Peer
         assert ada.wait_for("notice")["text"] == "taken_over"
 
 
-def test_anybody_may_stop_and_it_is_asked_until_it_is_confirmed(ada: Client, peer: Peer) -> None:
+def test_any_viewer_may_stop_and_the_stop_is_repeated(ada: Client, peer: Peer) -> None:
     peer.estops.clear()
     ada.send("estop")
     wait_until(lambda: len(peer.estops) > 5, "stops, again and again")
 
 
-def test_one_tap_gets_through_without_a_socket(server: Server, peer: Peer) -> None:
+def test_a_stop_by_post_needs_no_websocket(server: Server, peer: Peer) -> None:
     peer.estops.clear()
-    taps(server, "001")
+    post_stop(server, "001")
     wait_until(lambda: peer.estops, "a stop")
 
 
-def taps(server: Server, robot: str) -> None:
-    """Stop a robot beside the socket."""
+def post_stop(server: Server, robot: str) -> None:
+    """Stop a robot by POST."""
     request = urllib.request.Request(
         f"{server.url}estop/{robot}", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
@@ -133,7 +133,7 @@ def taps(server: Server, robot: str) -> None:
         assert answer.status == 200
 
 
-def test_a_refusal_is_told(ada: Client) -> None:
+def test_a_refusal_is_reported(ada: Client) -> None:
     ada.take_control()
     ada.send("reset", n=ada.next_snapshot()["n"])
     assert "safety does not answer" in ada.wait_for("notice")["text"]
@@ -149,17 +149,17 @@ def test_several_robots(server: Server, ada: Client) -> None:
     assert ada.wait_for("hello")["robot"] == "003"
 
 
-def test_not_any_number_of_robots_but_for_a_stop(server: Server, peer: Peer) -> None:
+def test_the_number_of_robots_is_limited_except_for_a_stop(server: Server, peer: Peer) -> None:
     with connected(server) as it:
         for number in range(ROBOTS_MAX + 1):
             it.send("look", robot=f"many-{number}")
         assert it.wait_for("notice")["text"] == "too_many_robots"
     peer.stops_elsewhere.clear()
-    taps(server, "one-more")
+    post_stop(server, "one-more")
     wait_until(lambda: peer.stops_elsewhere, "a stop of one more")
 
 
-def test_no_robot_is_called_so(server: Server) -> None:
+def test_an_invalid_robot_name_is_refused(server: Server) -> None:
     request = urllib.request.Request(
         f"{server.url}estop/*", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
@@ -167,7 +167,7 @@ def test_no_robot_is_called_so(server: Server) -> None:
         urllib.request.urlopen(request)
 
 
-def test_a_stop_of_a_robot_that_is_not_known_is_refused(server: Server, ada: Client) -> None:
+def test_a_stop_of_an_unknown_robot_is_refused(server: Server, ada: Client) -> None:
     request = urllib.request.Request(
         f"{server.url}estop/made-up", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
@@ -180,18 +180,20 @@ def test_a_stop_of_a_robot_that_is_not_known_is_refused(server: Server, ada: Cli
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])
-def test_who_says_something_else_is_hung_up_on(server: Server, text: str) -> None:
+def test_an_invalid_message_closes_the_connection(server: Server, text: str) -> None:
     with connected(server) as it:
         it.socket.send(text)
         with pytest.raises(ConnectionClosed):
             it.wait_for("never")
 
 
-def test_it_is_alive_on_the_bus(peer: Peer) -> None:
+def test_the_dashboard_is_alive_on_the_bus(peer: Peer) -> None:
     wait_until(lambda: peer.alive, "presence")
 
 
-def test_a_signal_is_zeros_and_the_end(endpoint: str, peer: Peer, tmp_path: Path) -> None:
+def test_a_signal_sends_zeros_and_ends_the_process(
+    endpoint: str, peer: Peer, tmp_path: Path
+) -> None:
     peer.safe = True
     with dashboard(endpoint, tmp_path, "dashboard.round_trip=1.0") as server:
         with connected(server) as it:

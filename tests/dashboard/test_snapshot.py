@@ -1,4 +1,4 @@
-"""What is shown, from what was telemetry and when."""
+"""Snapshots from telemetry, and the log of sent snapshots."""
 
 import json
 import math
@@ -91,7 +91,7 @@ def fast(
     )
 
 
-def test_what_moves() -> None:
+def test_the_fast_snapshot() -> None:
     seen = fast(full())
     assert (seen.n, seen.connected, seen.link, seen.bumper) == (7, True, "up", True)
     assert (seen.measured, seen.allowed) == ((0.5, 0.1), (0.0, 0.0))
@@ -104,7 +104,7 @@ def test_what_moves() -> None:
     assert seen.driver == snapshot.DriverState(None, "", HoldState.FREE, 1)
 
 
-def test_what_is_asked_is_of_the_source_that_drives() -> None:
+def test_the_request_is_that_of_the_driving_source() -> None:
     assert fast(full()).requested == (0.7, 0.2)
 
 
@@ -116,7 +116,7 @@ def test_who_drives() -> None:
 
 
 @pytest.mark.parametrize("telemetry", [TelemetryCache(), full()], ids=["never", "long ago"])
-def test_what_is_not_fresh_is_not_shown(telemetry: TelemetryCache) -> None:
+def test_old_values_are_not_shown(telemetry: TelemetryCache) -> None:
     seen = fast(telemetry, at=AT + 10 * NS_PER_S)
     known = (seen.measured, seen.requested, seen.allowed, seen.pose, seen.bumper, seen.link)
     assert known == (None,) * 6
@@ -126,7 +126,7 @@ def test_what_is_not_fresh_is_not_shown(telemetry: TelemetryCache) -> None:
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_what_is_no_number_is_not_shown(number: float) -> None:
+def test_non_finite_values_are_not_shown(number: float) -> None:
     telemetry = full()
     telemetry.update("tel/bridge/velocity", Velocity(linear=0.1, angular=number), AT)
     telemetry.update(
@@ -138,7 +138,7 @@ def test_what_is_no_number_is_not_shown(number: float) -> None:
     assert seen.wheels == (0.0,) * 4
 
 
-def test_nobody_drives_and_nothing_is_asked() -> None:
+def test_without_a_driving_source_there_is_no_request() -> None:
     telemetry = full()
     state = telemetry.newest(keys.SAFETY, AT)
     assert state is not None
@@ -146,7 +146,7 @@ def test_nobody_drives_and_nothing_is_asked() -> None:
     assert fast(telemetry).requested is None
 
 
-def test_what_stands_still() -> None:
+def test_the_slow_snapshot() -> None:
     seen = snapshot.slow_snapshot(full(), {"001": True}, {"1": "Ada"}, Protection(), AT)
     assert [(it.name, it.instances, it.version) for it in seen.services] == [
         ("odom", 1, ""),
@@ -169,7 +169,7 @@ def test_the_events() -> None:
     ]
 
 
-def test_it_is_small_json() -> None:
+def test_the_fast_snapshot_is_small() -> None:
     coded = msgspec.json.encode(fast(full()))
     read: dict[str, Any] = json.loads(coded)
     assert read["k"] == "fast"
@@ -201,11 +201,13 @@ def snapshots() -> SentSnapshots:
         (3, 10 * NS_PER_S, None),
     ],
 )
-def test_what_was_seen(snapshots: SentSnapshots, number: int, now_ns: int, seen: object) -> None:
+def test_the_state_in_a_sent_snapshot(
+    snapshots: SentSnapshots, number: int, now_ns: int, seen: object
+) -> None:
     assert snapshots.seen(number, now_ns, LIMIT_S) == seen
 
 
-def test_the_oldest_are_forgotten(snapshots: SentSnapshots) -> None:
+def test_only_the_newest_sent_snapshots_are_kept(snapshots: SentSnapshots) -> None:
     for number in range(3, 3 + SNAPSHOTS_KEPT):
         snapshots.sent(number, STATE, 10 * NS_PER_S)
     assert snapshots.seen(1, 10 * NS_PER_S, LIMIT_S) is None

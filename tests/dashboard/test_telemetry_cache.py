@@ -1,4 +1,4 @@
-"""The newest of everything, as long as it is worth showing."""
+"""Newest messages, rates, events and trajectory of a robot."""
 
 import pytest
 
@@ -27,13 +27,13 @@ def event(number: int) -> Event:
     return Event(name="n", level="info", text=str(number), t_ns=number)
 
 
-def test_nothing_is_known_before_it_was_heard() -> None:
+def test_an_empty_cache() -> None:
     telemetry = TelemetryCache()
     assert telemetry.newest(keys.BUMPER, 0) is None
     assert telemetry.services() == []
 
 
-def test_the_newest_until_it_is_too_old() -> None:
+def test_the_newest_message_until_it_is_too_old() -> None:
     telemetry = TelemetryCache()
     telemetry.update(BUMPER, Bumper(pressed=False), 0)
     telemetry.update(BUMPER, Bumper(pressed=True), NS_PER_S)
@@ -42,7 +42,7 @@ def test_the_newest_until_it_is_too_old() -> None:
     assert telemetry.ages_s(2 * NS_PER_S) == {BUMPER: 1.0}
 
 
-def test_names_that_anybody_makes_up_share_an_entry_and_push_nothing_out() -> None:
+def test_invented_names_share_an_entry_and_displace_nothing() -> None:
     telemetry = TelemetryCache()
     for number in range(1000):
         telemetry.update(f"@cmd/drive/{number}", Drive(linear=0.0, angular=0.0, echo=0), number)
@@ -54,18 +54,18 @@ def test_names_that_anybody_makes_up_share_an_entry_and_push_nothing_out() -> No
     assert telemetry.services() == ["safety"]
 
 
-def test_slow_streams_are_worth_more() -> None:
+def test_slow_streams_have_a_longer_limit() -> None:
     assert (max_age_s(keys.BUMPER), max_age_s(keys.LINK)) == (0.5, 0.8)
     assert (max_age_s(keys.DRIVER), max_age_s(keys.HEALTH)) == (2.0, 3.0)
 
 
-def test_a_message_of_another_kind_is_not_shown() -> None:
+def test_a_message_of_another_type_is_not_returned() -> None:
     telemetry = TelemetryCache()
     telemetry.update(BUMPER, Velocity(linear=0.0, angular=0.0), 0)
     assert telemetry.newest(keys.BUMPER, 0) is None
 
 
-def test_rates_are_of_the_last_seconds() -> None:
+def test_rates_cover_the_last_seconds() -> None:
     telemetry = TelemetryCache()
     telemetry.update_rates(0)
     for _ in range(20):
@@ -78,7 +78,7 @@ def test_rates_are_of_the_last_seconds() -> None:
     assert telemetry.rates == {}
 
 
-def test_the_rate_of_a_slow_stream_stands_still() -> None:
+def test_the_rate_of_a_slow_stream_is_constant() -> None:
     telemetry, seen = TelemetryCache(), set()
     for tick in range(40):
         if tick % 2:
@@ -89,7 +89,7 @@ def test_the_rate_of_a_slow_stream_stands_still() -> None:
     assert seen == {1.0}
 
 
-def test_events_stand_in_the_order_of_their_senders_and_the_oldest_go() -> None:
+def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
     telemetry = TelemetryCache()
     for number in (2, 1, 3):
         telemetry.add_event("safety", event(number))
@@ -118,21 +118,21 @@ def test_the_path_behind_the_robot() -> None:
     assert path_of("t2/v1/001/tel/bridge/driver/left") == "tel/bridge/driver/left"
 
 
-def test_near_points_are_left_out() -> None:
+def test_near_points_are_skipped() -> None:
     trail = Trail()
     for x in (0.0, SPACING_M / 2, SPACING_M, SPACING_M * 1.5):
         assert not trail.add(x, 0.0, epoch=0)
     assert list(trail.points) == [(0.0, 0.0), (SPACING_M, 0.0)]
 
 
-def test_a_new_epoch_begins_anew() -> None:
+def test_a_new_epoch_clears_the_trail() -> None:
     trail = Trail()
     trail.add(0.0, 0.0, epoch=0)
     assert trail.add(5.0, 5.0, epoch=1)
     assert list(trail.points) == [(5.0, 5.0)]
 
 
-def test_the_oldest_go() -> None:
+def test_the_trail_is_bounded() -> None:
     trail = Trail()
     for x in range(POINTS + 1):
         trail.add(float(x), 0.0, epoch=0)
@@ -140,7 +140,7 @@ def test_the_oldest_go() -> None:
     assert trail.points[0] == (1.0, 0.0)
 
 
-def test_what_odometry_remembers_comes_before() -> None:
+def test_stored_points_of_odometry_are_prepended() -> None:
     trail = Trail()
     trail.add(2.0, 0.0, epoch=4)
     trail.begin([(0.0, 0.0), (1.0, 0.0)], epoch=4)
@@ -149,7 +149,7 @@ def test_what_odometry_remembers_comes_before() -> None:
     assert len(trail.points) == 3
 
 
-def test_a_memory_may_be_all_there_is() -> None:
+def test_stored_points_may_come_first() -> None:
     trail = Trail()
     trail.begin([(1.0, 0.0)], epoch=2)
     assert trail.add(3.0, 0.0, epoch=3)

@@ -1,9 +1,9 @@
-"""Order of the calls that wait for the fleet, and a full queue."""
+"""Order of the calls that wait for the fleet's thread, and a full queue."""
 
 from services.dashboard.websocket_hub import CALLS_MAX, Call, CallQueue, Inbox
 
 
-def test_an_emergency_stop_is_made_before_what_waits() -> None:
+def test_an_emergency_stop_is_made_before_waiting_calls() -> None:
     posted: list[Call] = []
     made: list[str] = []
     inbox, queue = Inbox(posted.append), CallQueue()
@@ -15,7 +15,7 @@ def test_an_emergency_stop_is_made_before_what_waits() -> None:
     assert made == ["stop", "first", "second"]
 
 
-def test_stops_of_one_robot_that_wait_are_one() -> None:
+def test_waiting_stops_of_one_robot_are_merged() -> None:
     posted: list[Call] = []
     made: list[str] = []
     inbox = Inbox(posted.append)
@@ -29,7 +29,7 @@ def test_stops_of_one_robot_that_wait_are_one() -> None:
     assert made[-1] == "again"
 
 
-def test_a_queue_has_an_end() -> None:
+def test_a_queue_is_bounded() -> None:
     inbox, queue = Inbox(lambda _: None), CallQueue()
     for _ in range(CALLS_MAX):
         assert not queue.is_full

@@ -32,7 +32,7 @@ PERIOD_NS = NS_PER_S // 20
 
 
 class FakeGamepad:
-    """Pushed forward, with its deadman as told."""
+    """A gamepad with a configured state."""
 
     status = "Fake Pad"
     stick: Stick | None = None
@@ -42,7 +42,7 @@ class FakeGamepad:
 
 
 class Operator:
-    """A controller on a clock that only ticks move."""
+    """A controller with a simulated clock that advances by ticks."""
 
     def __init__(self) -> None:
         self.node = FakeNode()
@@ -57,7 +57,7 @@ class Operator:
         self.controller.press(Press(key, at_ns, self.shown), self.now_ns)
 
     def wait(self, seconds: float) -> None:
-        """Let time pass in which nothing at all happens; after that the terminal is near."""
+        """Advance the clock without ticks; then the terminal answers at once."""
         self.now_ns += round(seconds * NS_PER_S)
         answer(self.controller, self.now_ns)
 
@@ -65,7 +65,7 @@ class Operator:
         self.node.fake.tell(keys.SAFETY, safety_state(**fields), self.now_ns)
 
     def tell_contact(self, **fields: Any) -> None:
-        """Let safety report a pressed bumper, and the screen show it."""
+        """Simulate a pressed bumper in safety's state and on the screen."""
         self.shown = contact_state(**{"boot": 5} | fields)
         self.node.fake.tell(keys.SAFETY, self.shown, self.now_ns)
 
@@ -97,7 +97,7 @@ def operator() -> Iterator[Operator]:
     operator.node.loop.close()
 
 
-def test_a_tap_is_asked_for_and_then_there_is_silence(operator: Operator) -> None:
+def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
     assert operator.speeds(3) == [None] * 3
     operator.press("w")
     assert operator.speeds(17) == [0.0] + [0.2] * 11 + [0.0] * 3 + [None] * 2
@@ -111,7 +111,7 @@ def test_requests_carry_the_echo(operator: Operator) -> None:
     assert request.echo == 99
 
 
-def test_estop_lets_go_and_stops_the_robot(operator: Operator) -> None:
+def test_estop_releases_and_stops_the_robot(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(3)
     operator.press("e")
@@ -129,7 +129,7 @@ def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> No
     assert operator.node.fake.estops == 4
 
 
-def test_an_estop_that_nobody_confirms_is_said(operator: Operator) -> None:
+def test_an_unconfirmed_estop_is_reported(operator: Operator) -> None:
     operator.press("e")
     operator.ticks(ESTOP_TICKS - 1)
     assert len(operator.lines) == 1
@@ -138,12 +138,12 @@ def test_an_estop_that_nobody_confirms_is_said(operator: Operator) -> None:
     assert "NOT CONFIRMED" in operator.lines[-1]
 
 
-def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
+def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
     operator: Operator,
 ) -> None:
     operator.tell_safety()
     speeds = []
-    for _ in range(40):  # held all the time: two seconds, safety is heard no more
+    for _ in range(40):  # held for two seconds, without a state of safety
         operator.press("w")
         speeds += operator.speeds(1)
     assert speeds[1] == 0.2
@@ -154,7 +154,7 @@ def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
         operator.press("w")
         operator.tell_safety()
         assert operator.speeds(1) == [None]
-    for _ in range(13):  # let go
+    for _ in range(13):  # released
         operator.tell_safety()
         operator.ticks(1)
     operator.press("w")
@@ -165,7 +165,7 @@ def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
 DONE = ResetDone(text="cleared contact", boot=5, heartbeat=8, cleared=(42,))
 
 
-def test_a_reset_clears_what_the_screen_shows_and_is_confirmed(operator: Operator) -> None:
+def test_a_reset_clears_the_shown_causes_and_is_confirmed(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     request = ResetRequest(echo=7, causes=(42,))
@@ -178,7 +178,7 @@ def test_a_reset_clears_what_the_screen_shows_and_is_confirmed(operator: Operato
     assert operator.lines == ["reset: cleared contact"]
 
 
-def test_a_reset_that_safety_does_not_show_is_not_confirmed(operator: Operator) -> None:
+def test_a_reset_without_effect_is_not_confirmed(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.node.fake.answers[0][0](DONE)
@@ -205,7 +205,7 @@ def assert_unconfirmed(operator: Operator) -> None:
     assert line.level == "error"
 
 
-def test_a_refused_reset_says_why_and_the_next_one_is_sent(operator: Operator) -> None:
+def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.press("r")  # the key repeats
@@ -218,7 +218,7 @@ def test_a_refused_reset_says_why_and_the_next_one_is_sent(operator: Operator) -
     assert len(operator.node.fake.asked) == 2
 
 
-def test_a_new_reset_takes_the_place_of_one_that_waits_for_its_state(operator: Operator) -> None:
+def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.node.fake.answers[0][0](DONE)
@@ -242,7 +242,7 @@ def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bo
 
 
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
-def test_a_release_is_asked_again_while_held_one_at_a_time(
+def test_a_release_is_repeated_while_held_one_at_a_time(
     operator: Operator, key: str, direction: Direction
 ) -> None:
     fake = operator.node.fake
@@ -301,7 +301,7 @@ def test_a_release_in_the_other_direction_ends_the_first_one(operator: Operator)
     ]
 
 
-def test_the_answer_to_an_end_does_not_hurry_a_hold(operator: Operator) -> None:
+def test_the_answer_to_an_end_does_not_complete_a_hold(operator: Operator) -> None:
     fake = operator.node.fake
     operator.tell_contact(heartbeat=7)
     operator.press("f")
@@ -338,7 +338,7 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
     assert operator.lines[1:] == [f"key {key.upper()} ignored: it is 3.0 s old"]
 
 
-def test_an_estop_and_a_stop_count_however_late(operator: Operator) -> None:
+def test_an_estop_and_a_stop_count_at_any_age(operator: Operator) -> None:
     operator.press("e", waited_s=60.0)
     assert operator.node.fake.estops == 1
     operator.ticks(5)
@@ -346,14 +346,14 @@ def test_an_estop_and_a_stop_count_however_late(operator: Operator) -> None:
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
-def test_a_press_that_waited_shortly_counts_from_when_it_came(operator: Operator) -> None:
+def test_a_recent_press_counts_from_its_receive_time(operator: Operator) -> None:
     operator.ticks(10)
     operator.press("w", waited_s=0.3)
     assert [speed for speed in operator.speeds(10) if speed] == [0.2] * 5
 
 
 def slow(operator: Operator, took_s: float = 0.42) -> None:
-    """Let the terminal answer late from now on."""
+    """Simulate a terminal that answers late from now on."""
     operator.near = False
     operator.controller.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
     operator.controller.terminal.answered(1, operator.now_ns)
@@ -383,7 +383,7 @@ def test_on_a_slow_terminal_a_stop_counts(operator: Operator) -> None:
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
-def test_a_terminal_that_becomes_slow_lets_go_of_its_keys(operator: Operator) -> None:
+def test_a_terminal_that_becomes_slow_releases_its_keys(operator: Operator) -> None:
     operator.press("w")
     assert operator.speeds(2) == [0.0, 0.2]
     slow(operator)
@@ -398,7 +398,7 @@ def test_a_terminal_that_becomes_slow_lets_go_of_its_keys(operator: Operator) ->
     assert len([line for line in operator.lines if "keys ignored" in line]) == 1
 
 
-def test_a_terminal_that_no_longer_answers_lets_go_of_its_keys(operator: Operator) -> None:
+def test_a_terminal_that_stops_answering_releases_its_keys(operator: Operator) -> None:
     operator.near = False
     speeds = []
     for _ in range(20):
@@ -418,7 +418,7 @@ def test_a_multiplexer_over_ssh_does_not_drive() -> None:
     node.loop.close()
 
 
-def test_a_gamepad_drives_while_the_screen_is_watched(operator: Operator) -> None:
+def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> None:
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)
     operator.controller.screen_drawn(operator.now_ns)
@@ -427,10 +427,10 @@ def test_a_gamepad_drives_while_the_screen_is_watched(operator: Operator) -> Non
     pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False)
     sent = operator.speeds(24)
     assert sent[:19] == [0.0] + [0.2] * 18
-    assert sent[20:] == [0.0, 0.0, 0.0, None]  # nobody looks any more
+    assert sent[20:] == [0.0, 0.0, 0.0, None]  # the screen is not redrawn any more
 
 
-def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: Operator) -> None:
+def test_a_gamepad_that_freezes_is_released_and_reported(operator: Operator) -> None:
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)
     pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
@@ -450,7 +450,7 @@ def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: O
     ]
 
 
-def test_a_gamepad_that_comes_is_told(operator: Operator) -> None:
+def test_a_gamepad_change_is_reported(operator: Operator) -> None:
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)
     operator.ticks(1)
@@ -459,7 +459,7 @@ def test_a_gamepad_that_comes_is_told(operator: Operator) -> None:
     assert operator.lines == ["gamepad: none"]
 
 
-def test_losing_the_focus_lets_go(operator: Operator) -> None:
+def test_losing_the_focus_releases(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(2)
     operator.controller.release_controls()
@@ -467,7 +467,7 @@ def test_losing_the_focus_lets_go(operator: Operator) -> None:
 
 
 @pytest.mark.parametrize("driving", [True, False])
-def test_leaving_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
+def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
     if driving:
         operator.press("w")
         operator.ticks(3)
@@ -480,7 +480,7 @@ def test_leaving_sends_three_zeros_then_stops_the_loop(operator: Operator, drivi
     operator.node.loop.run()  # returns, for it has been stopped
 
 
-def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
+def test_the_view_shows_fresh_values(operator: Operator) -> None:
     fake = operator.node.fake
     fake.tell(keys.SAFETY, safety_state(text="Driving."))
     fake.tell(keys.VELOCITY, Velocity(linear=0.2, angular=0.0))
@@ -500,7 +500,7 @@ def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
     assert operator.controller.view.safety is None
 
 
-def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) -> None:
+def test_events_of_others_are_shown_and_own_ones_only_once(operator: Operator) -> None:
     fake = operator.node.fake
     everyone = keys.EVENTS.on("001", service="*")
     contact = Event(name="contact", level="error", text="the bumper was hit", boot=5, t_ns=7)
@@ -511,7 +511,7 @@ def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) ->
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
 
 
-def test_an_operator_who_may_not_drive_is_told_once(
+def test_a_denied_operator_is_notified_once(
     operator: Operator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Publisher, "passed_on", False)

@@ -1,4 +1,4 @@
-"""The log ends in the event_log, and nowhere else."""
+"""The event log: newest lines, repeated lines, captured log lines."""
 
 import pytest
 
@@ -19,7 +19,9 @@ def test_lines_are_kept_the_newest_last() -> None:
     assert len(event_log.last(1000)) == CAPACITY
 
 
-def test_log_lines_come_here_and_not_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+def test_log_lines_go_to_the_event_log_and_not_to_the_terminal(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     event_log = EventLog()
     event_log.capture_logs(Log(level="info"))
     log = Logger()
@@ -36,7 +38,7 @@ def test_log_lines_come_here_and_not_to_the_terminal(capfd: pytest.CaptureFixtur
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_line_that_repeats_is_kept_once_with_its_last_time() -> None:
+def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
     event_log = EventLog()
     for t_ns, text in ((1, "stop"), (2, "refused"), (3, "refused"), (4, "stop")):
         event_log.add("safety", "info", text, t_ns)

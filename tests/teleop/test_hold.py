@@ -41,7 +41,7 @@ def test_each_key_has_its_own_deadline(keys: Keys) -> None:
     assert keys.held(at(10.7)) == ["a"]
 
 
-def test_a_key_pressed_alone_lets_the_others_go_and_repeats(keys: Keys) -> None:
+def test_a_key_pressed_alone_releases_the_others_and_repeats(keys: Keys) -> None:
     keys.press("f", at(10))
     keys.press_alone("b", at(10.1))
     assert keys.held(at(10.15)) == ["b"]
@@ -50,7 +50,7 @@ def test_a_key_pressed_alone_lets_the_others_go_and_repeats(keys: Keys) -> None:
     assert keys.held(at(10.8)) == []
 
 
-def test_clear_lets_all_go(keys: Keys) -> None:
+def test_clear_releases_all_keys(keys: Keys) -> None:
     keys.press("w", at(10))
     keys.clear()
     assert keys.held(at(10)) == []
@@ -83,7 +83,9 @@ def watchdog() -> GamepadWatchdog:
     [(0.0, False, False), (1.0, False, False), (1.05, True, False), (2.0, True, False),
      (2.05, True, True), (60.0, True, True)],
 )  # fmt: skip
-def test_silence(watchdog: GamepadWatchdog, quiet_s: float, due: bool, expired: bool) -> None:
+def test_the_limits_of_the_gamepad_watchdog(
+    watchdog: GamepadWatchdog, quiet_s: float, due: bool, expired: bool
+) -> None:
     now_ns = 10 * NS_PER_S + round(quiet_s * NS_PER_S)
     watchdog.update(5, now_ns)
     assert watchdog.quiet_s(now_ns) == pytest.approx(quiet_s)
@@ -91,14 +93,14 @@ def test_silence(watchdog: GamepadWatchdog, quiet_s: float, due: bool, expired: 
 
 
 @pytest.mark.parametrize("events", [6, 0, None])
-def test_an_event_a_new_gamepad_and_none_begin_anew(
+def test_an_event_and_a_new_or_lost_gamepad_restart_the_time(
     watchdog: GamepadWatchdog, events: int | None
 ) -> None:
     watchdog.update(events, 15 * NS_PER_S)
     assert not watchdog.is_due(15 * NS_PER_S)
 
 
-def test_it_begins_without_a_gamepad() -> None:
+def test_the_watchdog_starts_without_a_gamepad() -> None:
     watchdog = GamepadWatchdog(2.0)
     assert watchdog.quiet_s(10 * NS_PER_S) == 10.0
     watchdog.update(0, 10 * NS_PER_S)

@@ -1,4 +1,4 @@
-"""The whole program in a terminal of its own, on a real bus."""
+"""The whole program in a pseudo terminal, on a real bus."""
 
 import os
 import signal
@@ -40,7 +40,7 @@ def bus(endpoint: str, loop: Loop, requests: list[Drive]) -> Iterator[Bus]:
 
 
 def drive_off(it: Terminal, requests: list[Drive]) -> None:
-    """Hold W until the vehicle is asked to move."""
+    """Hold W until a drive request is sent."""
 
     def hold(key: str) -> bool:
         it.type(key)
@@ -54,7 +54,7 @@ def drive_off(it: Terminal, requests: list[Drive]) -> None:
 
 
 def zeros(requests: list[Drive]) -> int:
-    """Return how many zeros came last."""
+    """Return the number of zeros at the end."""
     moving = [i for i, request in enumerate(requests) if request.linear]
     return len(requests) - 1 - moving[-1]
 
@@ -75,7 +75,7 @@ def leave(it: Terminal) -> None:
 @pytest.mark.parametrize(
     ("end", "code"), [(hang_up, teleop.EXIT_HANGUP), (terminate, 0), (leave, 0)]
 )
-def test_every_end_is_zeros_and_then_silence(
+def test_every_end_sends_zeros_and_then_nothing(
     endpoint: str, requests: list[Drive], end: Callable[[Terminal], None], code: int
 ) -> None:
     with terminal(endpoint) as it:
@@ -88,7 +88,7 @@ def test_every_end_is_zeros_and_then_silence(
 
 
 @pytest.mark.usefixtures("bus")
-def test_letting_go_is_zeros_and_then_silence(endpoint: str, requests: list[Drive]) -> None:
+def test_a_release_sends_zeros_and_then_nothing(endpoint: str, requests: list[Drive]) -> None:
     with terminal(endpoint) as it:
         drive_off(it, requests)
         wait_until(lambda: it.reading() and zeros(requests) >= 3, "zeros")
@@ -98,7 +98,7 @@ def test_letting_go_is_zeros_and_then_silence(endpoint: str, requests: list[Driv
     assert zeros(requests) == 6  # three for the release, three for the end: silence in between
 
 
-def test_it_is_alive_and_well_on_the_bus(endpoint: str, loop: Loop) -> None:
+def test_presence_and_health_are_on_the_bus(endpoint: str, loop: Loop) -> None:
     alive: list[str] = []
     health: list[Health] = []
 
@@ -111,7 +111,7 @@ def test_it_is_alive_and_well_on_the_bus(endpoint: str, loop: Loop) -> None:
     assert health[0].service == "teleop"
 
 
-def test_without_a_router_the_screen_says_so() -> None:
+def test_a_missing_router_is_shown() -> None:
     with terminal(f"tcp/127.0.0.1:{free_port()}") as it:
         wait_until(lambda: it.shows(b"no router yet"), "the words")
         it.type("q")
@@ -119,7 +119,7 @@ def test_without_a_router_the_screen_says_so() -> None:
         assert it.process.returncode == 0
 
 
-def test_without_a_terminal_there_is_nothing_to_drive_with(
+def test_a_missing_terminal_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(teleop, "terminal_is_there", lambda: False)
@@ -135,14 +135,14 @@ def test_without_a_terminal_there_is_nothing_to_drive_with(
         (["--robot", "a/b"], "robot.id"),
     ],
 )
-def test_a_bad_setting_ends_it_before_anything_opens(
+def test_an_invalid_setting_ends_the_start(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert teleop.main(words) == 78
     assert named in capsys.readouterr().err
 
 
-def test_a_missing_extra_is_named(
+def test_a_missing_extra_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(teleop, "terminal_is_there", lambda: True)
@@ -152,7 +152,7 @@ def test_a_missing_extra_is_named(
     assert "install the extra `teleop`" in capsys.readouterr().err
 
 
-def test_the_ancestors_are_named() -> None:
+def test_the_names_of_the_parent_processes() -> None:
     parent = Path(f"/proc/{os.getppid()}/comm")
     if not parent.exists():
         pytest.skip("there is no /proc")

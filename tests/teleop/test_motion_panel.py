@@ -21,7 +21,7 @@ def test_it_fits_between_its_borders() -> None:
         assert max(len(line) for line in lines) <= 40
 
 
-def test_without_data_nothing_is_made_up() -> None:
+def test_without_data_no_values_are_shown() -> None:
     table = rows(view())
     assert table["m/s"].split() == ["-", "-", "-"]
     assert {table[name] for name in ("pose", "odom", "board", "rates", "motor L")} == {"no data"}
@@ -29,7 +29,7 @@ def test_without_data_nothing_is_made_up() -> None:
 
 
 @pytest.mark.parametrize(("linear", "allowed"), [(0.35, "0.22"), (0.0, "0.22"), (-0.35, "0.50")])
-def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
+def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> None:
     limits = Limits(forward=0.22, backward=0.5, angular=0.9)
     table = rows(
         view(
@@ -46,7 +46,7 @@ def test_zero_has_no_minus() -> None:
     assert rows(view(requested=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
 
 
-def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
+def test_the_pose_and_its_residual() -> None:
     table = rows(view(odometry=odometry()))
     assert table["pose"] == "x +1.23  y -0.40 m  +90°"
     assert table["odom"] == "residual +0.004 m  no slip"
@@ -63,7 +63,7 @@ def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
         ({"armed": False}, "not armed"),
     ],
 )
-def test_the_way_to_the_board(fields: dict[str, object], words: str) -> None:
+def test_the_link_to_the_board(fields: dict[str, object], words: str) -> None:
     assert rows(view(link=link(**fields)))["board"] == words
 
 

@@ -1,4 +1,4 @@
-"""A stream's newest value, while it is worth showing."""
+"""A topic's newest value, until it is too old."""
 
 from common import keys
 from common.freshness import NS_PER_S
@@ -8,7 +8,7 @@ from tests.teleop.support import FakeBus
 from verification.harness.support import at
 
 
-def test_a_value_is_shown_while_it_is_worth_it() -> None:
+def test_a_value_is_shown_until_it_is_too_old() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     ear = LatestTopic(bus, keys.BUMPER, 0.5)
     assert ear.at(0) is None
@@ -17,7 +17,7 @@ def test_a_value_is_shown_while_it_is_worth_it() -> None:
     assert ear.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
 
 
-def test_each_side_has_its_own_ear() -> None:
+def test_each_side_has_its_own_topic() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
     LatestTopic(bus, keys.DRIVER, 2.0, side="left")
     LatestTopic(bus, keys.DRIVER, 2.0, side="right")
