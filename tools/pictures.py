@@ -1,6 +1,6 @@
-"""``python -m tools.pictures``: the README's pictures of both operator's screens, while they drive.
+"""``python -m tools.pictures``: screenshots of the terminal and the dashboard for the docs.
 
-The real ones, before the real services and the simulated vehicle; chromium takes the pictures.
+Both drive the simulated vehicle through the real services; chromium takes the screenshots.
 """
 
 import asyncio
@@ -25,11 +25,11 @@ from verification.harness.teleop_app import NearApp
 
 IMAGES = Path("docs/images")
 COLUMNS, ROWS = 104, 34
-GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # that many presses of W; ms
+GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # presses of W; ms
 
 
 def main() -> None:
-    """Make them anew."""
+    """Renew both screenshots."""
     with tempfile.TemporaryDirectory() as folder, chain(Path(folder), "office") as stack:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
@@ -44,7 +44,7 @@ def main() -> None:
 
 
 async def terminal_screen(stack: Chain) -> str:
-    """Drive from a terminal, and return what it shows then, as SVG."""
+    """Drive from a terminal and return its screen as SVG."""
     sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
     controller = Controller(node, EventLog())
@@ -62,11 +62,11 @@ async def terminal_screen(stack: Chain) -> str:
                 await pilot.pause(REPEAT_S)
             screen = app.export_screenshot(title="t2 drive")
         node.bus.close()
-    return re.sub(r"@font-face \{.*?\}", "", screen, flags=re.DOTALL)  # they lie elsewhere
+    return re.sub(r"@font-face \{.*?\}", "", screen, flags=re.DOTALL)  # the fonts are remote
 
 
 def picture_terminal(screen: str, browser: Browser) -> None:
-    """Keep what a terminal shows."""
+    """Save the screenshot of the terminal."""
     page = browser.new_page(viewport={"width": 1300, "height": 900})
     page.set_content(screen)
     page.locator("svg").screenshot(path=IMAGES / "drive.png", omit_background=True)
@@ -74,14 +74,14 @@ def picture_terminal(screen: str, browser: Browser) -> None:
 
 
 def picture_dashboard(stack: Chain, browser: Browser, folder: Path) -> None:
-    """Drive by the page's keys, and keep what it shows then."""
+    """Drive with the page's keys and save its screenshot."""
     with dashboard(stack.endpoint, folder) as server:
         page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")
         open_page(page, server)
         take_control(page)
         page.keyboard.press(GEAR)
         page.keyboard.down("w")
-        wait_until(lambda: stack.speed() > 0.1, "it drives")
+        wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
         page.keyboard.down("a")
         page.wait_for_timeout(HELD_MS)
         page.screenshot(path=IMAGES / "dashboard.png")

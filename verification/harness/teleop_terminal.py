@@ -1,4 +1,4 @@
-"""A program as an operator runs it, in a pseudo terminal; teleop unless another is named."""
+"""A program in a pseudo terminal with a simulated delay; teleop by default."""
 
 import contextlib
 import fcntl
@@ -15,21 +15,25 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-# A machine that runs tests holds up terminals, too, for longer than a vehicle may accept.
+# A host that runs tests stalls terminals for longer than a vehicle may accept.
 PATIENT = (
     "--set", 'teleop.unsafe_overrides=["round_trip"]', "--set", "teleop.round_trip=2.0",
 )  # fmt: skip
 STRICT = ("services.teleop", "--no-gamepad")
 TELEOP = (*STRICT, *PATIENT)
 
-# What teleop asks a terminal: where is the cursor, after it was moved there?
-QUESTION = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
+# Teleop's query of the cursor position.
+QUERY = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
 POLL_S = 0.005
-MULTIPLEXERS = ("TMUX", "STY", "ZELLIJ")  # what the tests run in is not what teleop runs in
+MULTIPLEXERS = (
+    "TMUX",
+    "STY",
+    "ZELLIJ",
+)  # of the test's terminal, removed from teleop's environment
 
 
-class Line:
-    """One direction of the way to a terminal: first in, first out, after a delay."""
+class DelayLine:
+    """One direction of the connection to a terminal: first in, first out, after a delay."""
 
     def __init__(self, delay_s: float) -> None:
         self.delay_s = delay_s
@@ -40,7 +44,7 @@ class Line:
         self._parts.append((time.monotonic() + self.delay_s, part))
 
     def take(self) -> bytes:
-        """Return what has arrived."""
+        """Return the bytes that have arrived."""
         now, arrived = time.monotonic(), b""
         while self._parts and max(self._parts[0][0], self.held_until) <= now:
             arrived += self._parts.popleft()[1]
@@ -48,7 +52,7 @@ class Line:
 
 
 class Terminal:
-    """A pseudo terminal with a program in it, and an emulator that answers it, far away or not."""
+    """A pseudo terminal with a program and an emulator that answers its queries after a delay."""
 
     def __init__(
         self,
@@ -76,8 +80,8 @@ class Terminal:
         os.set_blocking(self.fd, False)
         self.shown = b""
         self._answers = answers
-        self._keys, self._picture = Line(delay_s), Line(delay_s)
-        self._seen = 0  # bytes of ``shown`` that were looked through for questions
+        self._keys, self._output = DelayLine(delay_s), DelayLine(delay_s)
+        self._seen = 0  # bytes of ``shown`` that were searched for queries
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
@@ -86,20 +90,16 @@ class Terminal:
         self._keys.put(keys_.encode())
 
     def stall(self, seconds: float) -> None:
-        """Hold everything up, both ways, and let it arrive all at once after that."""
-        self._keys.held_until = self._picture.held_until = time.monotonic() + seconds
+        """Delay both directions; then deliver everything at once."""
+        self._keys.held_until = self._output.held_until = time.monotonic() + seconds
 
     def read(self) -> None:
-        """Wait until what was drawn and typed so far has been passed on, if there is no delay."""
+        """Wait until all output and keys are delivered, if there is no delay."""
         time.sleep(2 * POLL_S)
 
-    def reading(self) -> bool:
-        """Read on beside another condition; always true."""
-        return True
-
-    def shows(self, words: bytes) -> bool:
-        """Tell whether the words have been drawn."""
-        return words in self.shown
+    def shows(self, text: bytes) -> bool:
+        """Return whether this text was drawn."""
+        return text in self.shown
 
     def hang_up(self) -> None:
         if self.fd >= 0:
@@ -109,16 +109,16 @@ class Terminal:
             self.fd = -1
 
     def ends(self) -> bool:
-        """Tell whether the program has ended."""
+        """Return whether the program has ended."""
         return self.process.poll() is not None
 
     def _serve(self) -> None:
-        """Read all the time: the program stalls otherwise."""
+        """Read continuously: otherwise the program stalls."""
         while not self._closed.is_set():
-            with contextlib.suppress(OSError):  # the program has ended, or reads no more
+            with contextlib.suppress(OSError):  # the program has ended
                 if select.select([self.fd], [], [], POLL_S)[0]:
-                    self._picture.put(os.read(self.fd, 65536))
-            self._draw(self._picture.take())
+                    self._output.put(os.read(self.fd, 65536))
+            self._draw(self._output.take())
             with contextlib.suppress(OSError):
                 if typed := self._keys.take():
                     os.write(self.fd, typed)
@@ -127,10 +127,10 @@ class Terminal:
 
     def _draw(self, part: bytes) -> None:
         self.shown += part
-        for question in QUESTION.finditer(self.shown, self._seen):
-            self._seen = question.end()
+        for query in QUERY.finditer(self.shown, self._seen):
+            self._seen = query.end()
             if self._answers:
-                row, column = question.groups()
+                row, column = query.groups()
                 self._keys.put(b"\x1b[%s;%sR" % (row, column))
 
 
@@ -138,7 +138,7 @@ class Terminal:
 def terminal(
     endpoint: str, *program: str, delay_s: float = 0.0, answers: bool = True
 ) -> Iterator[Terminal]:
-    """Run a module with its arguments on the bus at an endpoint while the context lasts."""
+    """Run a module with its arguments in a terminal while the context lasts."""
     module = [sys.executable, "-m", *(program or TELEOP), "--set", f"bus.connect={endpoint}"]
     with at_terminal(Terminal(module, delay_s=delay_s, answers=answers)) as it:
         yield it
@@ -146,7 +146,7 @@ def terminal(
 
 @contextlib.contextmanager
 def at_terminal(it: Terminal) -> Iterator[Terminal]:
-    """End what runs in a terminal with the context."""
+    """Kill the program in a terminal at the end of the context."""
     try:
         yield it
     finally:
