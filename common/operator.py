@@ -32,7 +32,6 @@ ends when the direction is released or changes. Safety refuses a hold whose echo
 the end, so the next hold waits for a newer state.
 """
 
-from dataclasses import dataclass
 from enum import Enum
 
 from msgspec import Struct
@@ -46,10 +45,10 @@ MAX_CALL_AGE_NS = 1_000_000_000  # of a call to odometry or the bridge; safety h
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 ZEROS = 3  # requests after a drive: one may be lost
 ESTOP_TICKS = 60  # 3 s at 20 Hz
+NO_ECHO = (0, -1)  # boot and heartbeat before any
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Struct, frozen=True):
     """A motion in the plane, in ``base_link``."""
 
     linear: float = 0.0  # m/s
@@ -67,8 +66,7 @@ class Phase(Enum):
     RELEASING = "releasing"
 
 
-@dataclass
-class DriveRequests:
+class DriveRequests(Struct):
     """The sequence of drive requests, one tick at a time."""
 
     phase: Phase = Phase.SILENT
@@ -102,8 +100,7 @@ class EstopStep(Enum):
     LAST = "last"  # repeat it for the last time and report that it is not confirmed
 
 
-@dataclass
-class EstopRepetition:
+class EstopRepetition(Struct):
     """An emergency stop that is repeated until safety has latched it."""
 
     ticks: int = 0  # left; 0 when no stop is pending
@@ -156,14 +153,13 @@ class ResetCheck:
         return False if now_ns > self._until_ns else None
 
 
-class ReleaseCalls:
+class ReleaseCalls(Struct):
     """The calls of a release that an operator holds, one tick at a time."""
 
-    def __init__(self) -> None:
-        self.direction: Direction | None = None  # held in the last tick
-        self._is_pending = False  # a hold without its answer
-        self._ended: tuple[int, int] | None = None  # boot and heartbeat that the last end echoed
-        self._reported = ""  # the last result of this release
+    direction: Direction | None = None  # held in the last tick
+    is_pending: bool = False  # a hold waits for its answer
+    ended: tuple[int, int] = NO_ECHO  # boot and heartbeat that the last end echoed
+    reported: str = ""  # the last result of this release
 
     def tick(
         self, direction: Direction | None, seen: SafetyState | None, newest: SafetyState | None
@@ -174,30 +170,30 @@ class ReleaseCalls:
         """
         calls = []
         if self.direction is not None and direction != self.direction:
-            self._ended = (newest.boot, newest.heartbeat) if newest else None
-            self._reported = ""
+            self.ended = (newest.boot, newest.heartbeat) if newest else NO_ECHO
+            self.reported = ""
             calls.append(release_request(newest, None, held=False))
         self.direction = direction
         if direction is not None and seen is not None and self._may_hold(seen):
-            self._is_pending = True
+            self.is_pending = True
             calls.append(release_request(seen, direction, held=True))
         return calls
 
     def answered(self) -> None:
         """Note that the pending hold was answered or has timed out; the next one may follow."""
-        self._is_pending = False
+        self.is_pending = False
 
     def is_new(self, result: str) -> bool:
         """Return whether to report this result: once per release, and only while it is held."""
-        is_new = self.direction is not None and result != self._reported
+        is_new = self.direction is not None and result != self.reported
         if is_new:
-            self._reported = result
+            self.reported = result
         return is_new
 
     def _may_hold(self, seen: SafetyState) -> bool:
-        if self._is_pending:
+        if self.is_pending:
             return False
-        boot, heartbeat = self._ended or (None, 0)
+        boot, heartbeat = self.ended
         return seen.boot != boot or seen.heartbeat > heartbeat
 
 
@@ -219,8 +215,8 @@ class Echoes(Struct, frozen=True):
         counts as the newest number, and has its age.
         """
         newest = self.heartbeat.number
-        if echo is not None and newest < echo <= newest + AHEAD:
-            echo = newest
+        if echo is not None and echo <= newest + AHEAD:
+            echo = min(echo, newest)
         return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)
 
 

@@ -45,13 +45,13 @@ PAGE: dict[str, tuple[str, str]] = {
     "link.up": ("Board: up", "主板：在线"),
     "link.lost": ("Board: LOST", "主板：失联"),
     "link.never": ("Board: never seen", "主板：从未连接"),
-    "link.none": ("Bridge: no data", "网桥：无数据"),
+    "link.none": ("Bridge: no data", "桥接服务：无数据"),
     "bumper.true": ("BUMPER PRESSED", "防撞条被压下"),
     "bumper.false": ("Bumper: clear", "防撞条：正常"),
     "bumper.none": ("Bumper: unknown", "防撞条：未知"),
     # --- causes, by the names of safety's table -------------------------------------------------
     "cause.contact": ("The bumper was hit.", "防撞条被碰撞。"),
-    "cause.estop": ("Emergency stop.", "紧急停车。"),
+    "cause.estop": ("Emergency stop.", "急停。"),
     "cause.estop_reader": ("The emergency stop could not be heard.", "无法接收急停信号。"),
     "cause.predecessor": (
         "Safety started anew with a reset still due.", "安全服务已重启，仍需复位。"),
@@ -71,7 +71,7 @@ PAGE: dict[str, tuple[str, str]] = {
         "The board's emergency brakes are not verified.", "主板的紧急制动尚未确认。"),
     "cause.bumper": ("The bumper is not being read.", "读不到防撞条。"),
     "cause.silent": ("An input is too old.", "输入数据过旧。"),
-    "cause.unarmed": ("The bridge does not obey yet.", "网桥尚未就绪。"),
+    "cause.unarmed": ("The bridge does not obey yet.", "桥接服务尚未就绪。"),
     "cause.two_publishers": ("Two publishers ask on one source.", "同一来源有两个发布者。"),
     "cause.neutral": (
         "Waiting for a neutral request: release the controls, then drive.",

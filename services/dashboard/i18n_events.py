@@ -35,10 +35,10 @@ EVENTS: dict[str, tuple[str, str]] = {
     ),
     "event.guard_gone": (
         "The guard process has ended; the bridge stops the vehicle and ends.",
-        "守护进程已终止，网桥将停车并退出。",
+        "守护进程已终止，桥接服务将停车并退出。",
     ),
-    "event.drive_link_up": ("The drive link is back.", "驱动链路已恢复。"),
-    "event.drive_link_lost": ("The drive link is lost.", "驱动链路已断开。"),
+    "event.drive_link_up": ("The drive link is back.", "运动指令链路已恢复。"),
+    "event.drive_link_lost": ("The drive link is lost.", "运动指令链路已断开。"),
     # --- safety -------------------------------------------------------------------------------
     "event.contact": ("The bumper was hit.", "防撞条被碰撞，已锁定。"),
     "event.estop": ("Emergency stop.", "急停，已锁定。"),
@@ -66,7 +66,7 @@ EVENTS: dict[str, tuple[str, str]] = {
     # --- odom ---------------------------------------------------------------------------------
     "event.reanchored": (
         "Odometry continues after a restart of board or bridge.",
-        "主板或网桥重启后，里程计已无跳变地继续。",
+        "主板或桥接服务重启后，里程计已无跳变地继续。",
     ),
     "event.pose_set": ("The pose was set.", "位姿已设置。"),
     "event.silent": (

@@ -84,20 +84,20 @@ class Keys:
         self._muted_until_ns = now_ns + self._first_ns
 
 
+@dataclass
 class Deadman:
     """A button that enables motion while it is down, after it was seen up once."""
 
-    def __init__(self) -> None:
-        self._seen_up = False
+    seen_up: bool = False
 
     def held(self, down: bool) -> bool:
         """Update the button's state and return whether it counts as held."""
-        self._seen_up = self._seen_up or not down
-        return down and self._seen_up
+        self.seen_up = self.seen_up or not down
+        return down and self.seen_up
 
     def drop(self) -> None:
         """Require a release before it counts again."""
-        self._seen_up = False
+        self.seen_up = False
 
 
 class GamepadWatchdog:

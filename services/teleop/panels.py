@@ -144,7 +144,7 @@ def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
     if view.keys_refused:
         return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
     limit = (
-        f"\nTerminals report no key-up: a tap drives {hold_first_s:g} s, "
+        f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
         f"a hold {hold_s:g} s past its last repeat"
     )
     return row.append(limit, style=DIM)

@@ -1,7 +1,5 @@
 """Requests and calls of an operator: drive requests, E-STOP repetition, reset, release, echoes."""
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,7 +54,7 @@ DRIVE_TABLE = [  # before, requested, request, after
 def test_the_table_of_drive_requests(
     before: DriveRequests, requested: Twist | None, request_: Twist | None, after: DriveRequests
 ) -> None:
-    requests = replace(before)  # the table's own must not change
+    requests = structs.replace(before)  # the table's own must not change
     assert requests.tick(requested) == request_
     assert requests == after
 
@@ -103,11 +101,9 @@ def test_without_a_stop_nothing_is_repeated() -> None:
 def test_a_stop_is_repeated_for_a_limited_time(state: SafetyState | None) -> None:
     estop = EstopRepetition()
     estop.start()
-    steps = []
-    while estop.is_pending:
-        steps.append(estop.tick(state))
-    assert steps == [EstopStep.REPEAT] * 59 + [EstopStep.LAST]
-    assert estop.tick(state) is EstopStep.NONE
+    steps = [estop.tick(state) for _ in range(61)]
+    assert steps == [EstopStep.REPEAT] * 59 + [EstopStep.LAST, EstopStep.NONE]
+    assert not estop.is_pending
 
 
 def test_a_latched_stop_is_not_repeated() -> None:
@@ -183,6 +179,7 @@ def test_a_release_is_called_one_at_a_time_and_ended_once() -> None:
     assert held_now == "forward"
     assert calls.tick("forward", state_at(8), state_at(8)) == []  # without an answer yet
     calls.answered()
+    assert calls.is_pending is False
     assert calls.tick("forward", state_at(9), state_at(10)) == [held("forward", 9)]
     assert calls.tick(None, None, state_at(11)) == [ended(11)]
     released: Direction | None = calls.direction
@@ -236,6 +233,7 @@ def test_a_result_is_reported_once_per_release() -> None:
     assert not calls.is_new("refused")
     assert calls.is_new("held")
     calls.tick(None, None, SEEN)
+    assert calls.reported == ""
     assert not calls.is_new("refused")
     calls.tick("forward", None, SEEN)
     assert calls.is_new("held")

@@ -205,7 +205,7 @@ def test_driving_by_touch_and_a_stop_from_another_viewer(
     wait_for_standstill(stack)
     wait_for_text(page, "#verdict", "BRAKE")
     wait_for_text(phone, "#verdict", "制动")
-    wait_for_text(phone, "#causes", "紧急停车")
+    wait_for_text(phone, "#causes", "急停")
     finger("touchEnd")
     assert phone.is_visible("#estop")
     reset_all(phone)

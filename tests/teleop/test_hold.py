@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from services.teleop.hold import Deadman, GamepadWatchdog, Keys
+from services.teleop.hold import Deadman, GamepadWatchdog, Keys, Press
 
 
 def at(seconds: float) -> int:
@@ -56,6 +56,21 @@ def test_clear_releases_all_keys(keys: Keys) -> None:
     assert keys.held(at(10)) == []
 
 
+def test_muted_keys_count_again_after_a_pause(keys: Keys) -> None:
+    keys.press("w", at(10))
+    keys.mute(at(10.1))
+    assert keys.held(at(10.1)) == []
+    for still_held in (10.699, 11.298):
+        keys.press("w", at(still_held))
+        assert keys.held(at(still_held)) == []
+    keys.press("w", at(11.898))
+    assert keys.held(at(11.898)) == ["w"]
+
+
+def test_the_age_of_a_press() -> None:
+    assert Press("w", at(10)).age_s(at(12.5)) == 2.5
+
+
 def test_a_deadman_that_is_found_down_does_not_count() -> None:
     deadman = Deadman()
     assert [deadman.held(down) for down in (True, True, False, True)] == [False, False, False, True]
@@ -66,6 +81,7 @@ def test_a_dropped_deadman_must_come_up_again() -> None:
     deadman.held(False)
     assert deadman.held(True)
     deadman.drop()
+    assert deadman.seen_up is False
     assert not deadman.held(True)
     assert not deadman.held(False)
     assert deadman.held(True)
