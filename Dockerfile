@@ -1,10 +1,9 @@
-# Three images, each on top of the one before: `robot` holds what the industrial PC needs, `dashboard`
-# adds the page, `laptop` the operator's tools.
+# Three images, each based on the previous one: `robot` for the industrial PC, `dashboard` adds the web
+# page, `laptop` adds the operator's tools.
 #
-# BASE is any Debian that has Python 3.11 or newer with its venv. It builds, and lends the images its
-# Python and its C libraries. Nothing else of it is in them: no shell, no pip, no package manager.
-# Wheels come from build/wheelhouse (`make wheelhouse SET=laptop`) where there is one, T2's own among
-# them; else from pip's index, and T2 from this folder.
+# BASE is any Debian with Python 3.11 or newer and venv. The images contain only its Python and its C
+# libraries: no shell, no pip, no package manager. Wheels come from build/wheelhouse (`make wheelhouse
+# SET=laptop`) if it exists, including T2's own; otherwise from pip's index, and T2 from this folder.
 ARG BASE=python:3.13-slim
 
 FROM ${BASE} AS build
@@ -17,9 +16,9 @@ RUN cd /opt/src/deploy/image && sh install.sh requirements-robot.lock && sh inst
 FROM scratch AS robot
 COPY --from=build /opt/robot /
 COPY deploy/image/etc /etc
-# A volume that is mounted here for the first time takes over whose folder it is.
+# A new volume takes over the owner of the folder that it is mounted on.
 COPY --from=build --chown=10001:10001 /opt/empty /run/t2
-# Of what is copied, a folder inside keeps its mode; bridge and safety want 700.
+# Copied subfolders keep their mode; bridge and safety need 700.
 COPY --from=build --chown=10001:10001 /opt/private /run
 COPY --from=build --chown=10001:10001 /opt/empty /recordings
 ENV PATH=/opt/venv/bin HOME=/tmp LANG=C.UTF-8 PYTHONUNBUFFERED=1

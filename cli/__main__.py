@@ -1,7 +1,7 @@
-"""The ``t2`` command: each subcommand lives in a module of its name, or a package's ``command``.
+"""The ``t2`` command: each subcommand is a module of its name, or the one that ``PLACES`` names.
 
-Such a module has a docstring whose first line is its help, ``add_arguments(parser)`` and
-``run(options) -> int``. Only the one that is asked for is imported, so that ``t2`` starts fast.
+Such a module has ``add_arguments(parser)`` and ``run(options) -> int``. Only the module of the
+given command is imported, so that ``t2`` starts fast.
 """
 
 import argparse
@@ -11,8 +11,7 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
-from types import ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError, LinkError, RobotError
@@ -23,15 +22,15 @@ GROUPS = {
         "up": "the whole stack with a simulated vehicle, until Ctrl-C",
         "demo": "a simulated T2 drives a lap through the real services",
         "drive": "drive from this terminal, by keys or gamepad",
-        "dashboard": "see the robot, drive it and stop it in a browser",
+        "dashboard": "show, drive and stop the robot in a browser",
         "estop": "emergency stop: a robot, a site or all, until a reset",
         "router": "the embedded Zenoh router alone",
         "sim": "the simulated vehicle alone",
     },
     "Inspect": {
-        "doctor": "find what is wrong between this laptop and the wheels",
+        "doctor": "diagnose the path from this laptop to the wheels",
         "robots": "the robots on the bus: verdict, speed, driver",
-        "services": "the services on the bus, and who publishes and reads what",
+        "services": "the services on the bus, with publishers and readers of each key",
         "health": "service health",
         "ls": "the keys that are alive: type, rate, publisher",
         "list": "the same as ls",
@@ -47,11 +46,11 @@ GROUPS = {
     },
     "Record": {
         "record": "record everything on the bus to files, until Ctrl-C",
-        "info": "show what is in a recording",
-        "replay": "play a recording onto the bus, or its frames to a bridge",
-        "report": "a recording as one page: path, speeds, stops, streams",
-        "foxglove": "the bus, live, to Foxglove or Lichtblick",
-        "metrics": "health, link, safety and odometry for Prometheus",
+        "info": "show the content of a recording",
+        "replay": "play a recording onto the bus, or its raw frames to a bridge",
+        "report": "HTML report of a recording: path, speeds, stops, streams",
+        "foxglove": "stream the bus live to Foxglove or Lichtblick",
+        "metrics": "export health, link, safety and odometry to Prometheus",
     },
     "Commission": {
         "checkout": "check the real vehicle before its first drive",
@@ -71,16 +70,21 @@ INSPECT = (
 )  # fmt: skip
 PLACES = {
     "checkout": "commission.command",
+    "config": "settings",
+    "dashboard": "run.services:dashboard",
     "demo": "demo.command",
+    "drive": "run.services:drive",
     "foxglove": "recordings.foxglove",
     "info": "recordings.info",
     "install": "run.install",
     "keys": "keys.command",
     "list": "inspect.ls",
-    "record": "recordings.record",
+    "metrics": "run.services:metrics",
+    "record": "run.services:record",
     "replay": "recordings.replay.command",
     "report": "recordings.report.command",
     "router": "run.router",
+    "sim": "run.services:sim",
     "up": "run.up",
     "wire": "wire.command",
 } | {name: f"inspect.{name}" for name in INSPECT}
@@ -88,7 +92,7 @@ EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the subcommand that the arguments name, and return its exit code."""
+    """Run a subcommand and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:
         words = ["--help"]
@@ -99,17 +103,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except RobotError as error:
         print(f"t2 {options.command}: {error}", file=sys.stderr)
         return EXIT_CODES.get(type(error), 1)
-    except KeyboardInterrupt:  # ctrl-c while a command does not yet, or no more, see to it itself
+    except KeyboardInterrupt:  # before or after the command's own handling of Ctrl-C
         return 128 + signal.SIGINT
-    except BrokenPipeError:  # nobody reads any more, as after `| head`
-        # Python would write what is left once more on its way out.
+    except BrokenPipeError:  # the reader has closed the pipe, as `| head` does
+        # Otherwise Python flushes the rest to the pipe again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code
 
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
-    """Return the options; end with usage and exit code 2 when they are wrong."""
+    """Return the parsed options; exit with usage and code 2 if they are invalid."""
     parser = argparse.ArgumentParser(
         prog="t2",
         usage="t2 COMMAND [OPTIONS]",
@@ -127,14 +131,14 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
         refuse(parser, words)
     subparser = subparsers.add_parser(named, description=COMMANDS[named])
     module(named).add_arguments(subparser)
-    options, strange = parser.parse_known_args(words)
-    if strange:
-        subparser.error(f"unrecognized arguments: {' '.join(strange)}")
+    options, unknown = parser.parse_known_args(words)
+    if unknown:
+        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
     return options
 
 
 def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
-    """Show help or version, or say which command may be meant, and end."""
+    """Show help or version, or suggest a command, and exit."""
     first = words[0]
     if first in ("-h", "--help", "--version"):
         parser.parse_args(words[:1])
@@ -146,7 +150,7 @@ def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
 
 
 def overview() -> str:
-    """Return the commands by groups."""
+    """Return the list of commands by group."""
     width = max(map(len, COMMANDS)) + 2
     lines: list[str] = []
     for title, commands in GROUPS.items():
@@ -154,9 +158,11 @@ def overview() -> str:
     return "\n".join([*lines, '"t2 COMMAND --help" shows the options of a command.'])
 
 
-def module(name: str) -> ModuleType:
-    """Import the module of a command."""
-    return import_module(f"cli.{PLACES.get(name, name)}")
+def module(name: str) -> Any:
+    """Import the module of a command, or return the ``ServiceCommand`` that stands for it."""
+    path, _, function = PLACES.get(name, name).partition(":")
+    found = import_module(f"cli.{path}")
+    return getattr(found, function)() if function else found
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Ctrl-c and SIGTERM for a command that has a loop and processes to end in order."""
+"""Ctrl-C and SIGTERM for commands."""
 
 import contextlib
 import signal
@@ -9,16 +9,16 @@ from common.loop import Loop
 
 @contextlib.contextmanager
 def interruptible(loop: Loop) -> Iterator[list[int]]:
-    """Let SIGINT and SIGTERM stop the loop while the context lasts; yield those that have come."""
-    came: list[int] = []
+    """Stop the loop on SIGINT or SIGTERM while the context lasts; yield the signals received."""
+    received: list[int] = []
 
-    def leave(number: int, _: object) -> None:
-        came.append(number)
+    def stop(number: int, _: object) -> None:
+        received.append(number)
         loop.stop()
 
-    before = {name: signal.signal(name, leave) for name in (signal.SIGINT, signal.SIGTERM)}
+    before = {name: signal.signal(name, stop) for name in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield came
+        yield received
     finally:
         for name, handler in before.items():
             signal.signal(name, handler)

@@ -1,13 +1,12 @@
-"""``t2 latency``: how fast the bridge reacts, hop by hop, live.
+"""``t2 latency``: reaction times of the bridge, hop by hop, live.
 
-A table, or with ``-o json`` a JSON line for each of the bridge's health messages, one a second. All
-figures are since the bridge's start. p50 and p99 are upper bounds of buckets a third apart.
+It shows a table, or with ``-o json`` a JSON line for each health message of the bridge (1 Hz). All
+figures are since the bridge's start. p50 and p99 are upper bounds of histogram buckets whose bounds
+differ by a third.
 """
 
 import argparse
 import json
-import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from cli.inspect.shell import add_output, wants_json
+from cli.interrupt import interruptible
 from common import keys, log
 from common.bus.bus import Arrival, Bus
 from common.cli_args import add_sources, sources
@@ -29,14 +29,14 @@ from services.bridge.timing import quantile
 if TYPE_CHECKING:
     from rich.table import Table
 
-PATIENCE_S = 5.0  # the bridge tells once a second
-SILENCE = f"the bridge has told nothing for {PATIENCE_S:g} s"
+PATIENCE_S = 5.0  # the bridge publishes its health once a second
+SILENCE = f"no health from the bridge for {PATIENCE_S:g} s"
 NAMES = {
     "board_to_bridge": "board → bridge",
     "bridge_to_break": "bridge → BREAK",
     "bridge_to_safety": "bridge → safety",
     "driver_to_safety": "driver → safety",
-    "in_safety": "safety decides",
+    "in_safety": "safety's decision",
     "safety_to_bridge": "safety → bridge",
     "bridge_to_frame": "bridge → frame",
     "contact_to_break": "contact → BREAK, the reflex",
@@ -44,61 +44,59 @@ NAMES = {
     "request_to_frame": "request → frame",
 }
 
-# What the bridge told last, and whether it has told nothing for a while.
+# Shows the latest health, and whether the bridge is silent.
 Show = Callable[[Health | None, bool], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--once", action="store_true", help="show it once, and end")
+    parser.add_argument("--once", action="store_true", help="show the figures once and exit")
     add_output(parser)
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show it until SIGINT or SIGTERM; raise ``LinkError`` when there is nothing to show once."""
+    """Show figures until SIGINT or SIGTERM; raise ``LinkError`` if ``--once`` gets no health."""
     config = load(Shared, sources(options)).config
     log.configure(config.log, "latency")
     with (
         closing(Loop()) as loop,
         closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
         shown(options.once, wants_json(options)) as show,
+        interruptible(loop),
     ):
         watch = Watch(loop, show, options.once)
-        bus.subscribe(keys.HEALTH, watch.take, service="bridge")
-        loop.every(1.0, watch.look)
-        for name in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(name, lambda *_: loop.stop())
+        bus.subscribe(keys.HEALTH, watch.on_health, service="bridge")
+        loop.every(1.0, watch.check)
         bus.open()
-        with until_nobody_reads():
-            loop.run()
+        loop.run()
     if options.once and watch.silent:
         where = ", ".join(config.bus.endpoints)
-        raise LinkError(f"no bridge was heard of at {where} for {PATIENCE_S:g} s: is `t2 up` on?")
+        raise LinkError(f"no bridge at {where} within {PATIENCE_S:g} s; is `t2 up` running?")
     return 0
 
 
 class Watch:
-    """Passes on what the bridge tells, and notices when it tells nothing."""
+    """Shows the bridge's health, and detects when it stops."""
 
     def __init__(self, loop: Loop, show: Show, once: bool) -> None:
         self.newest: Health | None = None
         self._loop = loop
         self._show = show
         self._once = once
-        self._heard_ns = time.monotonic_ns()
+        self._received_ns = time.monotonic_ns()
         self.silent = False
 
-    def take(self, arrival: Arrival[Health]) -> None:
-        """Show what came."""
-        self.newest, self._heard_ns, self.silent = arrival.message, arrival.received_ns, False
+    def on_health(self, arrival: Arrival[Health]) -> None:
+        """Show a health message."""
+        self.newest, self._received_ns, self.silent = arrival.message, arrival.received_ns, False
         self._show(self.newest, False)
         if self._once:
             self._loop.stop()
 
-    def look(self, now_ns: int) -> None:
-        """Show that nothing comes any more; give up when it is to be shown once."""
-        if self.silent or now_ns - self._heard_ns < PATIENCE_S * NS_PER_S:
+    def check(self, now_ns: int) -> None:
+        """Show that the bridge is silent; with ``--once``, stop."""
+        if self.silent or now_ns - self._received_ns < PATIENCE_S * NS_PER_S:
             return
         self.silent = True
         if self._once:
@@ -108,18 +106,8 @@ class Watch:
 
 
 @contextmanager
-def until_nobody_reads() -> Iterator[None]:
-    """End without a word when the other end of the pipe is gone, as after ``| head``."""
-    try:
-        yield
-    except BrokenPipeError:
-        # Python would write what is left once more on its way out.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextmanager
 def shown(once: bool, as_json: bool) -> Iterator[Show]:
-    """Yield what shows: JSON lines, or a table, which a terminal shows in place."""
+    """Yield the display: JSON lines, or a table that a terminal updates in place."""
     if as_json:
         yield print_line
         return
@@ -128,7 +116,7 @@ def shown(once: bool, as_json: bool) -> Iterator[Show]:
         from rich.live import Live
     except ImportError as error:
         raise RobotError(
-            f"the table wants {error.name}: pip install -e '.[demo]', or use: t2 latency -o json"
+            f"the table needs {error.name}: pip install -e '.[demo]', or use: t2 latency -o json"
         ) from None
     console = Console(highlight=False, markup=False)
     if once or not console.is_terminal:
@@ -139,7 +127,7 @@ def shown(once: bool, as_json: bool) -> Iterator[Show]:
 
 
 def print_line(newest: Health | None, silent: bool) -> None:
-    """Print a line of JSON; silence is told on standard error."""
+    """Print a JSON line; report silence on standard error."""
     if silent:
         print(f"t2 latency: {SILENCE}", file=sys.stderr)
     elif newest:
@@ -147,7 +135,7 @@ def print_line(newest: Health | None, silent: bool) -> None:
 
 
 def figures(health: Health) -> dict[str, Any]:
-    """Return what one health message tells, durations in seconds; None where there are none."""
+    """Return the figures of a health message; durations in seconds, None if there are none."""
     timing = health.timing or Timing(bounds=(), durations={}, not_counted={})
     return {
         "t_ns": health.t_ns,
@@ -167,7 +155,7 @@ def figures(health: Health) -> dict[str, Any]:
 
 
 def table(newest: Health | None, silent: bool) -> "Table":
-    """Return the figures as a table, in milliseconds; the hops stand under the whole."""
+    """Return a table in milliseconds, with the hops below their reaction."""
     from rich.table import Table
 
     made = Table(title="Reactions in ms", title_justify="left", caption_justify="left")
@@ -177,18 +165,22 @@ def table(newest: Health | None, silent: bool) -> "Table":
     made.caption = SILENCE if silent else "waiting for the bridge"
     if newest is None:
         return made
-    told = figures(newest)
-    for name, each in told["durations"].items():
+    shown_figures = figures(newest)
+    for name, each in shown_figures["durations"].items():
         whole, _, hop = name.partition(".")
         text = f"  {NAMES.get(hop, hop)}" if hop else NAMES.get(whole, whole)
         times = (milliseconds(each[key]) for key in ("p50", "p99", "worst"))
         made.add_row(text, str(each["count"]), *times, style="" if hop else "bold")
     if not silent:
-        left_out = ", ".join(f"{count} {name}" for name, count in told["not_counted"].items())
-        made.caption = f"up for {told['uptime']:.0f} s; not counted: {left_out or 'nothing'}"
+        left_out = ", ".join(
+            f"{count} {name}" for name, count in shown_figures["not_counted"].items()
+        )
+        made.caption = (
+            f"up for {shown_figures['uptime']:.0f} s; not counted: {left_out or 'nothing'}"
+        )
     return made
 
 
 def milliseconds(seconds: float | None) -> str:
-    """Return a duration for people."""
+    """Format a duration in milliseconds."""
     return "" if seconds is None else f"{seconds * 1000:.3f}"

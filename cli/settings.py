@@ -1,6 +1,11 @@
-"""Every section of every service, as one configuration."""
+"""The settings of the whole stack, and ``t2 config``, which shows them with their sources."""
+
+import argparse
+import json
 
 from common import settings
+from common.cli_args import add_sources, sources
+from common.config import Loaded, load
 from services.bridge.config import Bridge
 from services.dashboard.config import Dashboard
 from services.metrics.config import Metrics
@@ -12,7 +17,7 @@ from sim.config import Sim
 
 
 class Everything(settings.Shared, frozen=True, kw_only=True):
-    """What may stand in ``config/``."""
+    """All sections that a file in ``config/`` may have."""
 
     board: settings.Board = settings.Board()
     wire: settings.Wire = settings.Wire()
@@ -25,3 +30,37 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     recorder: Recorder = Recorder()
     metrics: Metrics = Metrics()
     sim: Sim = Sim()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("--json", action="store_true", help="one JSON object")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print every setting with its value and source."""
+    loaded = load(Everything, sources(options))
+    print(as_json(loaded) if options.json else as_table(loaded))
+    return 0
+
+
+def as_json(loaded: Loaded[Everything]) -> str:
+    """Return value and source of each setting, by path."""
+    table = {
+        path: {"value": setting.value, "origin": setting.origin}
+        for path, setting in loaded.settings.items()
+    }
+    return json.dumps(table, ensure_ascii=False)
+
+
+def as_table(loaded: Loaded[Everything]) -> str:
+    """Return one line per setting: path, value, source."""
+    rows = [
+        (path, json.dumps(setting.value, ensure_ascii=False), setting.origin)
+        for path, setting in loaded.settings.items()
+    ]
+    widths = max(len(path) for path, _, _ in rows), max(len(value) for _, value, _ in rows)
+    return "\n".join(
+        f"{path:{widths[0]}}  {value:{widths[1]}}  {origin}" for path, value, origin in rows
+    )

@@ -1,6 +1,7 @@
-"""Entry point of the ``t2`` command: puts our packages ahead of others of the same names.
+"""Entry point of the ``t2`` command: puts our packages first in ``sys.path``.
 
-It imports nothing of ours before that; see ``common.child_process``.
+It imports none of them before that: other packages may have the same names. See
+``common.child_process``.
 """
 
 import sys

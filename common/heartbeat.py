@@ -8,8 +8,9 @@ random, so that echoes of an earlier start are unknown.
 
 from msgspec import Struct
 
+from common.freshness import NS_PER_S
+
 CAPACITY = 256  # at 20 states a second, and some at once: over 10 s, more than any limit needs
-NS_PER_S = 1_000_000_000
 
 
 class Heartbeat(Struct, frozen=True):

@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from common.motion import Command
+
 # In the manual's order: counted clockwise from the left.
 SONAR_NAMES = (
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",
@@ -19,7 +21,6 @@ FaultName = Literal["over_current", "over_voltage", "encoder", "under_voltage", 
 LinkState = Literal["up", "lost", "never"]
 Verdict = Literal["run", "slow", "stop", "brake", "inhibited"]
 Action = Literal["slow", "stop", "brake"]
-Command = Literal["run", "stop", "brake"]
 Level = Literal["info", "warning", "error"]
 Direction = Literal["forward", "backward"]
 

@@ -39,23 +39,14 @@ from msgspec import Struct
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Direction, ReleaseRequest, ResetDone, ResetRequest, SafetyState
+from common.motion import STILL, Twist
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
-MAX_CALL_AGE_NS = 1_000_000_000  # of a call to odometry or the bridge; safety has a setting
+MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 ZEROS = 3  # requests after a drive: one may be lost
 ESTOP_TICKS = 60  # 3 s at 20 Hz
 NO_ECHO = (0, -1)  # boot and heartbeat before any
-
-
-class Twist(Struct, frozen=True):
-    """A motion in the plane, in ``base_link``."""
-
-    linear: float = 0.0  # m/s
-    angular: float = 0.0  # rad/s
-
-
-ZERO_TWIST = Twist()
 
 
 class Phase(Enum):
@@ -77,7 +68,7 @@ class DriveRequests(Struct):
         if requested is not None:
             first = self.phase is not Phase.DRIVING
             self.phase = Phase.DRIVING
-            return ZERO_TWIST if first else requested
+            return STILL if first else requested
         if self.phase is Phase.DRIVING:
             self.stop()
         if self.phase is Phase.SILENT:
@@ -85,7 +76,7 @@ class DriveRequests(Struct):
         self.zeros -= 1
         if self.zeros == 0:
             self.phase = Phase.SILENT
-        return ZERO_TWIST
+        return STILL
 
     def stop(self) -> None:
         """Send the final zeros in the next ticks, from any phase."""

@@ -18,6 +18,7 @@ all the time (manual 2.2).
 
 import math
 
+from common.motion import Twist
 from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
@@ -25,7 +26,6 @@ from common.wire.frame import Frame, Side
 from sim.config import Sim
 from sim.geometry import wrapped
 from sim.sonar import Ranges
-from sim.vehicle import Twist
 
 # rad/s for one unit of the wire; which unit it is each way, is a setting.
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}

@@ -3,6 +3,7 @@
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
+from common.motion import STILL
 from common.wire import reports as r
 from common.wire.frame import Frame
 from sim import requests as q
@@ -10,7 +11,6 @@ from sim.board import DRIVER_SIDES
 from sim.geometry import Pose
 from sim.simulation import Simulation
 from sim.trace import Disturbed, Truth
-from sim.vehicle import Twist
 from sim.world import World
 
 REPORTS: dict[q.ReportName, type[Frame]] = {
@@ -112,7 +112,7 @@ class Injection:
         simulation = self._simulation
         if simulation.world.blocks(simulation.body, pose):
             return f"something is in the way at x {pose.x:g}, y {pose.y:g}"
-        simulation.pose, simulation.twist = pose, Twist()
+        simulation.pose, simulation.twist = pose, STILL
         simulation.feel()
         return ""
 

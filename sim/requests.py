@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from common.motion import Command
 from sim.geometry import Pose
 from sim.world import Angle, Box, Coordinate
 
@@ -19,7 +20,6 @@ SonarName = Literal[
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left"
 ]
 ReportName = Literal["velocity", "mileage", "ultrasonic", "bumper", "driver"]
-MotionName = Literal["stop", "run", "break"]
 Where = Literal["asked", "first", "second", "both"]  # of the PC's two ports
 Seconds = Annotated[float, Meta(ge=0.0, le=3600.0)]
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -75,7 +75,7 @@ class Firmware(Request, frozen=True, kw_only=True, tag="firmware"):
     answers: Where = "asked"  # where answers go: to the port that asked, by default
     hits: Where | None = None  # where reports of a pressed bumper go; None: as answers
     echoes: bool = True  # whether it echoes its emergency brake switches
-    ignores: tuple[MotionName, ...] = ()  # motion commands that it does not obey
+    ignores: tuple[Command, ...] = ()  # motion commands that it does not obey
 
 
 class Lose(Request, frozen=True, kw_only=True, tag="lose"):

@@ -12,7 +12,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from common.freshness import NS_PER_S
-from common.wire.commands import TO_BOARD, MotionCommand
+from common.motion import STILL, Command
+from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
 from common.wire.reports import (
@@ -28,7 +29,7 @@ from sim.faults import Cable, Datagram
 from sim.geometry import Rectangle
 from sim.requests import Firmware, Where
 from sim.sonar import Sonars
-from sim.vehicle import Twist, go, next_twist, wheels
+from sim.vehicle import go, next_twist, wheels
 from sim.world import Plan, World
 
 STEP_NS = NS_PER_S // 100
@@ -39,7 +40,11 @@ CATCH_UP_NS = NS_PER_S // 2  # a longer hole is skipped: the world stood still m
 GARBAGE = b"GS" + bytes(20)  # begins as a frame does
 
 ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
-KINDS: tuple[t.Kind, ...] = ("stop", "run", "break")
+COMMANDS = {
+    MotionKind.STOP: Command.STOP,
+    MotionKind.RUN: Command.RUN,
+    MotionKind.BREAK: Command.BRAKE,
+}
 
 
 class Simulation:
@@ -50,7 +55,7 @@ class Simulation:
         self.world = World.of(plan)
         self.body = Rectangle(config.vehicle.length / 2, config.vehicle.width / 2)
         self.pose = plan.start.pose
-        self.twist = Twist()
+        self.twist = STILL
         self.hand_on_bumper = False
         sim = config.sim
         self.sonars = Sonars(config.vehicle, sim.sonar_cone, sim.sonar_noise, sim.seed)
@@ -73,7 +78,7 @@ class Simulation:
         self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
         self._flood_until_ns = now_ns
         self._said_pressed = False
-        self._command = t.Command(mono_ns=now_ns, kind="stop", linear=0.0, angular=0.0)
+        self._command = t.Command(mono_ns=now_ns, kind=Command.STOP, linear=0.0, angular=0.0)
 
     def advance(self, now_ns: int) -> None:
         """Step up to now, or leave out what is too long ago."""
@@ -117,7 +122,7 @@ class Simulation:
     def power_cycle(self, seconds: float, now_ns: int) -> None:
         """Cut the board's power; it speaks again that much later, with all counters at zero."""
         self._powered = False
-        self.twist = Twist()  # unpowered wheels hold: their motors are geared and shorted
+        self.twist = STILL  # unpowered wheels hold: their motors are geared and shorted
         self.board.power_on()
         self._hold(self.board.command, now_ns)
         self.freeze(seconds, now_ns)
@@ -190,11 +195,11 @@ class Simulation:
         command = self.board.drive()
         drive = self._config.sim.drive
         twist = next_twist(self.twist, command.kind, self.board.target(command), drive, dt)
-        if twist == Twist():
+        if twist == STILL:
             self.twist = twist
             return
         way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
-        self.pose, self.twist = way.pose, Twist() if way.held else twist
+        self.pose, self.twist = way.pose, STILL if way.held else twist
         self._driven += abs(way.distance)
         self.board.count(way.distance, way.turn)
         self._contact = self.world.contact(self.body, self.pose)
@@ -248,7 +253,7 @@ class Simulation:
         target = self.board.target(command)
         self._command = t.Command(
             mono_ns=now_ns,
-            kind=KINDS[command.kind],
+            kind=COMMANDS[command.kind],
             linear=target.linear,
             angular=target.angular,
         )

@@ -4,14 +4,11 @@
 a message there can be told apart in time. SI units and radians, in the world's frame.
 """
 
-from typing import Literal
-
 import msgspec
 from msgspec import Struct
 
+from common import motion
 from sim.requests import Asked
-
-Kind = Literal["stop", "run", "break"]
 
 
 class Record(Struct, frozen=True, kw_only=True, tag_field="event"):
@@ -23,7 +20,7 @@ class Record(Struct, frozen=True, kw_only=True, tag_field="event"):
 class Command(Record, frozen=True, kw_only=True, tag="command"):
     """The board took a motion command; queries are only counted."""
 
-    kind: Kind
+    kind: motion.Command
     linear: float  # m/s
     angular: float  # rad/s
 

@@ -8,20 +8,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from common.motion import STILL, Twist, clamp
 from common.settings import Vehicle
 from common.wire.commands import MotionKind
 from sim.config import Drive
 from sim.geometry import Pose
 
 BISECTIONS = 12  # of one step's way, 15 mm at 1.5 m/s: contact is found to some micrometres
-
-
-@dataclass(frozen=True, slots=True)
-class Twist:
-    """How the body moves, in ``base_link``: m/s forward and rad/s counter-clockwise."""
-
-    linear: float = 0.0
-    angular: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +38,17 @@ class Way:
 def next_twist(twist: Twist, kind: MotionKind, target: Twist, drive: Drive, dt: float) -> Twist:
     """Return the velocity after ``dt`` seconds under a command (manual 2.2)."""
     if kind is MotionKind.BREAK:
-        return Twist()
+        return STILL
     if kind is MotionKind.STOP:
         return Twist(
             _toward(twist.linear, 0.0, drive.coast * dt),
             _toward(twist.angular, 0.0, drive.angular_coast * dt),
         )
     return Twist(
-        _toward(twist.linear, _within(target.linear, drive.max_linear), drive.acceleration * dt),
+        _toward(twist.linear, clamp(target.linear, drive.max_linear), drive.acceleration * dt),
         _toward(
             twist.angular,
-            _within(target.angular, drive.max_angular),
+            clamp(target.angular, drive.max_angular),
             drive.angular_acceleration * dt,
         ),
     )
@@ -103,8 +96,4 @@ def _wheel(twist: Twist, x: float, y: float) -> Wheel:
 
 
 def _toward(value: float, target: float, most: float) -> float:
-    return value + _within(target - value, most)
-
-
-def _within(value: float, most: float) -> float:
-    return max(-most, min(most, value))
+    return value + clamp(target - value, most)

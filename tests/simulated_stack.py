@@ -9,8 +9,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from cli.demo.script import Ask as Wish
-from cli.demo.script import Lap, View
+from cli.demo.script import Ask, Lap, View
 from common import messages as m
 from common.freshness import NS_PER_S, Latest
 from common.operator import reset_request
@@ -20,7 +19,7 @@ from services.bridge.output import Output, Send
 from services.odom.config import Odom
 from services.odom.estimator import Estimator
 from services.safety.config import SafetyConfig
-from services.safety.inputs import Ask, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Event, Hold, Inputs, Reset
 from services.safety.policy import Policy
 from services.safety.report import motion_message, state_message
 from sim import trace as t
@@ -50,7 +49,7 @@ class Clockwork:
         self._seq: Counter[str] = Counter()
         self._policy = Policy(safety.safety, safety.vehicle)
         self._state = self._policy.start()
-        self._inputs = Inputs(reader=True, boot=1)
+        self._inputs = Inputs(estop_session_up=True, boot=1)
         self._estimator = Estimator(Odom())
         self._pressed = False
         self._told: m.SafetyState | None = None
@@ -154,18 +153,18 @@ class Clockwork:
         if not self.odometry:
             return
         view = View(self.odometry[-1], self._told, self._pressed, self._refusal, self._granted)
-        wish = self.lap.advance(view, self.now_ns)
+        ask = self.lap.advance(view, self.now_ns)
         if self.lap.index != self._index:
             self._index, self._refusal, self._granted = self.lap.index, None, False
-        self._wish(wish, self._told.heartbeat)
+        self._request(ask, self._told.heartbeat)
 
-    def _wish(self, wish: Wish, echo: int) -> None:
+    def _request(self, ask: Ask, echo: int) -> None:
         self._seq["drive"] += 1
-        linear, angular = wish.twist
+        linear, angular = ask.twist.linear, ask.twist.angular
         request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)
-        self._decide(Ask("demo", request, self.now_ns))
+        self._decide(DriveRequest("demo", request, self.now_ns))
         assert self._told is not None
-        if wish.press == "reset":
+        if ask.press == "reset":
             self._decide(Reset(echo, reset_request(self._told).causes))
-        elif wish.press == "release":  # the lap hits its box driving forward
+        elif ask.press == "release":  # the lap hits its box driving forward
             self._decide(Hold(True, "backward", echo))

@@ -15,6 +15,7 @@ from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
 from common.loop import Loop
+from common.motion import Command
 from common.source import DriveSource
 from sim.requests import Bumper
 from verification.harness.stack import Chain, chain
@@ -108,7 +109,7 @@ def armed(observer: Observer) -> None:
 def copied(observer: Observer, seq: int) -> m.Motion:
     """Return a RUN that bears the newest motion's authority."""
     last = observer.motions[-1]
-    return replace(last, command="run", linear=ROGUE_MPS, source="teleop", seq=seq)
+    return replace(last, command=Command.RUN, linear=ROGUE_MPS, source="teleop", seq=seq)
 
 
 def attack(stack: Chain, observer: Observer) -> None:
@@ -139,7 +140,7 @@ def test_a_copied_authority_moves_nothing(stack: Chain, observer: Observer) -> N
     wait_until(lambda: "contact" in observer.latched(), "the contact")
     attack(stack, observer)
     assert obeyed(stack) == 0
-    assert stack.last() == "break"
+    assert stack.last() == "brake"
 
 
 def test_a_number_far_ahead_does_not_lock_safety_out(stack: Chain, observer: Observer) -> None:
@@ -151,7 +152,7 @@ def test_a_number_far_ahead_does_not_lock_safety_out(stack: Chain, observer: Obs
     observer.linear = 0.3
     wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
     observer.bus.estop()
-    wait_until(lambda: stack.last() == "break", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
 
 
 def test_copied_measurements_are_no_inputs_of_safety(stack: Chain, observer: Observer) -> None:
@@ -184,18 +185,18 @@ def test_without_a_router_it_brakes_until_a_reset(stack: Chain, observer: Observ
     wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
     count = len(stack.trace().commands)
     killed_ns = stack.kill("router")
-    wait_until(lambda: stack.last() == "break", "BREAK at the board")
-    braked = next(c for c in stack.trace().commands[count:] if c.kind == "break")
+    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
+    braked = next(c for c in stack.trace().commands[count:] if c.kind == "brake")
     assert (braked.mono_ns - killed_ns) / 1e9 < stack.config.bridge.lease
     observer.linear = 0.0
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     time.sleep(1.0)
     # By a BRAKE of its own, not by the lease: the lease sends STOP alone at standstill.
-    assert {c.kind for c in stack.trace().commands if c.mono_ns > braked.mono_ns} == {"break"}
+    assert {c.kind for c in stack.trace().commands if c.mono_ns > braked.mono_ns} == {"brake"}
     stack.start("router")
     wait_until(lambda: observer.bus.connected, "the router")
     observer.newest.clear()
     wait_until(lambda: "estop_reader" in observer.latched(), "the latch")
-    assert stack.last() == "break"
+    assert stack.last() == "brake"
     wait_until(lambda: observer.reset() == "", "a reset that is granted")
     armed(observer)

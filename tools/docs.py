@@ -121,7 +121,7 @@ def causes() -> str:
 def metrics() -> str:
     """Return the table of what Prometheus is told."""
     rows = [
-        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.what)
+        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.help)
         for one in FAMILIES
     ]
     return table(("metric", "kind", "labels", ""), rows)

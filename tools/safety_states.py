@@ -27,7 +27,7 @@ from common.messages import (
 from common.settings import Vehicle
 from services.safety.causes import RULES, SEVERITY, Clears, clears
 from services.safety.config import Safety
-from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
 from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.state import State
@@ -40,7 +40,7 @@ M = TypeVar("M", bound=Message)
 DRIVER_BOOT, BRIDGE_BOOT = 1, 2
 
 
-class Scene(Struct, frozen=True):
+class Situation(Struct, frozen=True):
     """What is so around the policy, and its memory."""
 
     state: State
@@ -71,7 +71,7 @@ class Scene(Struct, frozen=True):
         return verdict.name
 
 
-Stimulus = Callable[[Scene], tuple[Scene, Event | None]]
+Stimulus = Callable[[Situation], tuple[Situation, Event | None]]
 
 STIMULI: dict[str, Stimulus] = {
     "inputs good": lambda it: (replace(it, link=True), None),
@@ -97,7 +97,7 @@ STIMULI: dict[str, Stimulus] = {
 def transitions() -> list[tuple[str, str, str]]:
     """Return from, stimulus and to of everything that changes the state; sorted."""
     policy = Policy(Safety(), Vehicle())
-    first = _run(policy, Scene(policy.start(), link=False), None)
+    first = _run(policy, Situation(policy.start(), link=False), None)
     known, due = {_situation(first)}, [first]
     found = {("[*]", "", first.name)}
     while due:
@@ -142,74 +142,81 @@ def causes() -> Iterator[tuple[str, str, str, str, str]]:
         yield f"`{rule.name}`", rule.action.upper(), yes, how[rule.clears], rule.text
 
 
-def _situation(scene: Scene) -> tuple[object, ...]:
+def _situation(situation: Situation) -> tuple[object, ...]:
     """Return what tells situations apart; the rest is history."""
-    armed = any(one.neutral for one in scene.state.arbiter.channels.values())
-    around = scene.asks, scene.holds, scene.link, scene.pressed, scene.faulty, scene.ahead_m
-    return scene.name, armed, latched(scene.state.latches), around
+    armed = any(one.neutral for one in situation.state.arbiter.channels.values())
+    around = (
+        situation.asks,
+        situation.holds,
+        situation.link,
+        situation.pressed,
+        situation.faulty,
+        situation.ahead_m,
+    )
+    return situation.name, armed, latched(situation.state.latches), around
 
 
-def _reset(scene: Scene) -> Reset:
+def _reset(situation: Situation) -> Reset:
     """Return an operator's call for everything that is latched."""
-    latches = scene.state.latches
+    latches = situation.state.latches
     ids = tuple(latches[name].id for name in latched(latches))
-    return Reset(scene.state.heartbeat.number, ids)
+    return Reset(situation.state.heartbeat.number, ids)
 
 
-def _run(policy: Policy, scene: Scene, event: Event | None) -> Scene:
+def _run(policy: Policy, situation: Situation, event: Event | None) -> Situation:
     """Let a stimulus act, with an event at its beginning, until it has settled."""
     for tick in range(PATIENCE):
-        settling = any(clears(name) is Clears.SETTLED for name in scene.state.latches)
-        if tick >= QUICK and not (scene.link and settling):
+        settling = any(clears(name) is Clears.SETTLED for name in situation.state.latches)
+        if tick >= QUICK and not (situation.link and settling):
             break
-        scene = replace(scene, now_ns=scene.now_ns + TICK_NS, seq=scene.seq + 1)
-        beat = scene.state.heartbeat.beat(scene.now_ns)
-        scene = replace(scene, state=replace(scene.state, heartbeat=beat))
-        for one in _events(scene, event if tick == 0 else None):
-            inputs = replace(_inputs(scene), event=one)
-            state, _ = policy.decide(scene.state, inputs, scene.now_ns)
-            scene = replace(scene, state=state)
-    return scene
+        situation = replace(situation, now_ns=situation.now_ns + TICK_NS, seq=situation.seq + 1)
+        beat = situation.state.heartbeat.beat(situation.now_ns)
+        situation = replace(situation, state=replace(situation.state, heartbeat=beat))
+        for one in _events(situation, event if tick == 0 else None):
+            inputs = replace(_inputs(situation), event=one)
+            state, _ = policy.decide(situation.state, inputs, situation.now_ns)
+            situation = replace(situation, state=state)
+    return situation
 
 
-def _events(scene: Scene, event: Event | None) -> Iterator[Event | None]:
+def _events(situation: Situation, event: Event | None) -> Iterator[Event | None]:
     yield event
-    if scene.asks is not None:
+    if situation.asks is not None:
         drive = Drive(
-            linear=scene.asks,
+            linear=situation.asks,
             angular=0.0,
-            echo=scene.state.heartbeat.number,
-            seq=scene.seq,
+            echo=situation.state.heartbeat.number,
+            seq=situation.seq,
             boot=DRIVER_BOOT,
         )
-        yield Ask("teleop", drive, scene.now_ns)
-    if scene.holds:
-        yield Hold(True, "backward", scene.state.heartbeat.number)
+        yield DriveRequest("teleop", drive, situation.now_ns)
+    if situation.holds:
+        yield Hold(True, "backward", situation.state.heartbeat.number)
 
 
-def _inputs(scene: Scene) -> Inputs:
+def _inputs(situation: Situation) -> Inputs:
     status: list[RangeStatus] = ["no_echo"] * 8
     ranges: list[float | None] = [None] * 8
-    for sonar in FRONT if scene.ahead_m is not None else ():
-        status[sonar], ranges[sonar] = "ok", scene.ahead_m
-    way = "" if scene.link else "link lost"
+    for sonar in FRONT if situation.ahead_m is not None else ():
+        status[sonar], ranges[sonar] = "ok", situation.ahead_m
+    way = "" if situation.link else "link lost"
     link = Link(
-        state="up" if scene.link else "lost", board="", epoch=0, armed=scene.link, waiting=way,
-        rates={}, rejected={}, round_trip=None,
+        state="up" if situation.link else "lost", board="", epoch=0, armed=situation.link,
+        waiting=way, rates={}, rejected={}, round_trip=None,
     )  # fmt: skip
-    twist = scene.state.verdict.twist
+    twist = situation.state.verdict.twist
     return Inputs(
-        velocity=_new(Velocity(linear=twist.linear, angular=twist.angular), scene),
-        ultrasonic=_new(Ultrasonic(ranges=tuple(ranges), status=tuple(status)), scene),
-        bumper=_new(Bumper(pressed=scene.pressed), scene),
-        left=_new(Driver(faults=(), bits=int(scene.faulty)), scene),
-        right=_new(Driver(faults=(), bits=0), scene),
-        switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), scene),
-        link=_new(link, scene),
-        reader=True,
+        velocity=_new(Velocity(linear=twist.linear, angular=twist.angular), situation),
+        ultrasonic=_new(Ultrasonic(ranges=tuple(ranges), status=tuple(status)), situation),
+        bumper=_new(Bumper(pressed=situation.pressed), situation),
+        left=_new(Driver(faults=(), bits=int(situation.faulty)), situation),
+        right=_new(Driver(faults=(), bits=0), situation),
+        switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), situation),
+        link=_new(link, situation),
+        estop_session_up=True,
     )
 
 
-def _new(message: M, scene: Scene) -> Latest[M]:
+def _new(message: M, situation: Situation) -> Latest[M]:
     """Return a sample that has just come."""
-    return Latest(replace(message, seq=scene.seq, boot=BRIDGE_BOOT), scene.now_ns)
+    return Latest(replace(message, seq=situation.seq, boot=BRIDGE_BOOT), situation.now_ns)

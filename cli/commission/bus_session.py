@@ -19,9 +19,9 @@ from common.errors import LinkError
 from common.freshness import NS_PER_S
 from common.keys import Call
 from common.loop import Loop
+from common.motion import STILL, Twist, is_standing
 from common.settings import Shared
 from common.source import DriveSource
-from services.safety.twist import STILL, Twist
 
 SOURCE = "checkout"  # as safety's settings name it
 ASK_S, LOOK_S = 0.05, 0.02
@@ -139,7 +139,7 @@ class Bench:
         ):
             return False
         velocity = self.tape.velocities[-1].value
-        return Twist(velocity.linear, velocity.angular).is_standing
+        return is_standing(velocity.linear, velocity.angular)
 
     def _ask(self, _: int) -> None:
         if self._wish is not None:

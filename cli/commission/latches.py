@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from cli.commission.verdict import Row, Verdict, judged
 from common.freshness import NS_PER_S, Latest
 from common.messages import Motion, SafetyState
+from common.motion import Command
 
 PROMPT_S = 0.5  # from the cause to the latch and to BREAK, a slow bus included
 
@@ -74,7 +75,7 @@ def latched_after_s(trip: Trip) -> float | None:
 
 def braked_after_s(trip: Trip) -> float | None:
     """Return how long it took until safety commanded BREAK; the bridge may have been quicker."""
-    return _first(trip, [m.received_ns for m in trip.motions if m.value.command == "brake"])
+    return _first(trip, [m.received_ns for m in trip.motions if m.value.command is Command.BRAKE])
 
 
 def _first(trip: Trip, times_ns: Sequence[int]) -> float | None:
@@ -84,19 +85,19 @@ def _first(trip: Trip, times_ns: Sequence[int]) -> float | None:
 
 def _let_through(trip: Trip) -> list[str]:
     """Return what else was commanded between the first BREAK and the reset."""
-    begun_ns = next(m.received_ns for m in trip.motions if m.value.command == "brake")
+    begun_ns = next(m.received_ns for m in trip.motions if m.value.command is Command.BRAKE)
     end_ns = trip.reset.asked_ns if trip.reset else trip.motions[-1].received_ns
     return sorted(
         {
             m.value.command.upper()
             for m in trip.motions
-            if begun_ns < m.received_ns <= end_ns and m.value.command != "brake"
+            if begun_ns < m.received_ns <= end_ns and m.value.command is not Command.BRAKE
         }
     )
 
 
 def _data(trip: Trip) -> list[Row]:
-    braked = sum(m.value.command == "brake" for m in trip.motions)
+    braked = sum(m.value.command is Command.BRAKE for m in trip.motions)
     reset = trip.reset
     return [
         ("latched after", _seconds(latched_after_s(trip))),

@@ -27,7 +27,7 @@ from statistics import mean
 from cli.commission.verdict import Row, Verdict, judged
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, SafetyState, Velocity
-from services.safety.twist import Twist
+from common.motion import Command, Twist, is_standing
 
 SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; much is known of no vehicle
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
@@ -107,7 +107,8 @@ def measure(run: Run) -> Measured | None:
     full = [
         m.received_ns
         for m in run.motions
-        if m.value.command == "run" and run.part(m.value.linear, m.value.angular) / asked >= FULL
+        if m.value.command is Command.RUN
+        and run.part(m.value.linear, m.value.angular) / asked >= FULL
     ]
     if not full:
         return None
@@ -137,7 +138,7 @@ def stood_after_s(run: Run) -> float | None:
     for velocity in run.velocities:
         if velocity.received_ns < run.released_ns:
             continue
-        if not Twist(velocity.value.linear, velocity.value.angular).is_standing:
+        if not is_standing(velocity.value.linear, velocity.value.angular):
             stood_ns = None
         elif stood_ns is None:
             stood_ns = velocity.received_ns

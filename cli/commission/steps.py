@@ -18,7 +18,7 @@ from cli.commission.motion import Run, judge_motion
 from cli.commission.operator import Operator
 from cli.commission.resets import reset, unlatch
 from cli.commission.verdict import Verdict, judged
-from services.safety.twist import Twist
+from common.motion import Command, Twist
 
 LINK_S = 5.0
 CRC_S = 30.0
@@ -82,7 +82,7 @@ def estop(bench: Bench, operator: Operator) -> Verdict:
         bench.bus.estop()
         if bench.until(lambda: "estop" in bench.latched(), ESTOP_S):
             break
-    bench.until(lambda: any(m.value.command == "brake" for m in tape.motions), ESTOP_S)
+    bench.until(lambda: any(m.value.command is Command.BRAKE for m in tape.motions), ESTOP_S)
     states, motions = list(tape.safety), list(tape.motions)
     done: Reset = reset(bench)
     return judge_estop(Trip("estop", at_ns, True, states, motions, done))

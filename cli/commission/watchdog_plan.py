@@ -14,8 +14,8 @@ from typing import Literal
 
 from cli.commission.verdict import Verdict
 from common.freshness import NS_PER_S
+from common.motion import is_standing
 from common.wire.commands import MotionCommand, MotionKind
-from services.bridge.lease import standing
 
 LINEAR_MPS = 0.05
 RUN_NS = NS_PER_S
@@ -29,7 +29,7 @@ STANDS_NS = NS_PER_S // 5  # for so long, to count as standing
 RUN = MotionCommand(MotionKind.RUN, round(LINEAR_MPS * 1000))
 BREAK = MotionCommand(MotionKind.BREAK)
 
-Phase = Literal["run", "silence", "break", "over"]
+Phase = Literal["run", "silence", "brake", "over"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Sample:
     @property
     def stands(self) -> bool:
         """Whether it counts as standstill."""
-        return standing(self.linear, self.angular)
+        return is_standing(self.linear, self.angular)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +66,9 @@ class Trial:
 
     def end(self, reason: str, now_ns: int) -> "Trial":
         """Return the trial with BREAK from now on, for a reason, unless it is there already."""
-        if self.phase in ("break", "over"):
+        if self.phase in ("brake", "over"):
             return self
-        return replace(self, phase="break", cut=reason, sent_ns=None, broken_ns=now_ns)
+        return replace(self, phase="brake", cut=reason, sent_ns=None, broken_ns=now_ns)
 
     def tick(self, now_ns: int) -> tuple["Trial", MotionCommand | None]:
         """Return the trial at this moment, and the command to send now, if any."""
@@ -88,8 +88,8 @@ class Trial:
         if self.phase == "run" and now_ns - self.begun_ns >= RUN_NS:
             return replace(self, phase="silence", stood_ns=None)
         if self.phase == "silence" and self._silence_over(now_ns):
-            return replace(self, phase="break", sent_ns=None, broken_ns=now_ns)
-        if self.phase == "break" and self._rests():
+            return replace(self, phase="brake", sent_ns=None, broken_ns=now_ns)
+        if self.phase == "brake" and self._rests():
             return replace(self, phase="over")
         return self
 

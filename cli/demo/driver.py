@@ -8,6 +8,7 @@ from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.freshness import NS_PER_S
+from common.motion import STILL
 from common.operator import release_request, reset_request
 from common.source import DriveSource
 
@@ -25,7 +26,7 @@ class Driver:
         self.velocity: m.Velocity | None = None
         self.safety: m.SafetyState | None = None
         self.link: m.Link | None = None
-        self.asked: tuple[float, float] = (0.0, 0.0)
+        self.asked = STILL
         self.answers: list[tuple[str, Press, bool, str]] = []  # step, button, granted, words
         self._pressed = False
         self._bus = bus
@@ -44,7 +45,7 @@ class Driver:
         view = View(self.odometry[-1], self.safety, self._pressed, self._refusal, self._granted)
         ask = self.lap.advance(view, now_ns)
         self._announce()
-        self._source.ask(*ask.twist)
+        self._source.ask(ask.twist.linear, ask.twist.angular)
         self.asked = ask.twist
         self._press(ask, self.safety, now_ns)
 

@@ -106,7 +106,7 @@ def _steps(driver: Driver, now_ns: int) -> Text:
 def _state(driver: Driver) -> RenderableType:
     table = Table.grid(padding=(0, 1))
     measured = driver.velocity
-    table.add_row("asked", f"{driver.asked[0]:5.2f} m/s  {driver.asked[1]:5.2f} rad/s")
+    table.add_row("asked", f"{driver.asked.linear:5.2f} m/s  {driver.asked.angular:5.2f} rad/s")
     if measured is not None:
         table.add_row("measured", f"{measured.linear:5.2f} m/s  {measured.angular:5.2f} rad/s")
     if driver.safety is not None:

@@ -11,6 +11,7 @@ from matplotlib.patches import Polygon
 from cli.demo.score import Trace
 from common.freshness import NS_PER_S
 from common.messages import Odometry
+from common.motion import Command
 from sim import trace as t
 from sim.geometry import Pose, Rectangle
 from sim.world import Box, Plan
@@ -80,7 +81,7 @@ def _draw_body(axes: Axes, body: Rectangle, at: t.Truth, color: str, label: str)
 
 def _draw_speeds(axes: Axes, trace: Trace) -> None:
     start_ns = trace.truth[0].mono_ns
-    runs = [(c.mono_ns, c.linear if c.kind == "run" else 0.0) for c in trace.commands]
+    runs = [(c.mono_ns, c.linear if c.kind is Command.RUN else 0.0) for c in trace.commands]
     axes.step([(at - start_ns) / NS_PER_S for at, _ in runs], [v for _, v in runs], where="post",
               color=COUNTED, linewidth=1.2, label="commanded, at the board")  # fmt: skip
     times_s = [(x.mono_ns - start_ns) / NS_PER_S for x in trace.truth]

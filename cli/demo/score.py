@@ -13,6 +13,7 @@ from pathlib import Path
 from cli.demo.script import Lap
 from common.freshness import NS_PER_S
 from common.messages import Odometry
+from common.motion import Command
 from sim import trace as t
 
 Result = tuple[str, str, bool | None]  # what, how much, whether it is as it should be
@@ -119,7 +120,7 @@ def good(rows: Sequence[Result]) -> bool:
 
 
 def _stop(trace: Trace, hit_ns: int) -> Stop:
-    breaks = (c.mono_ns for c in trace.commands if c.mono_ns >= hit_ns and c.kind == "break")
+    breaks = (c.mono_ns for c in trace.commands if c.mono_ns >= hit_ns and c.kind is Command.BRAKE)
     first = next(breaks, None)
     before = [x for x in trace.truth if x.mono_ns <= hit_ns] or trace.truth[:1]
     after = (x for x in trace.truth if x.mono_ns > hit_ns)

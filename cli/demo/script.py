@@ -12,13 +12,11 @@ from typing import Literal
 
 from common.freshness import NS_PER_S
 from common.messages import Odometry, SafetyState
+from common.motion import STILL, Twist, clamp, is_standing
 
-STANDING = 0.02  # m/s
 UNDER_WAY = 0.5  # m; before that it is the start that is blocked, by a sonar not heard yet
 
 Press = Literal["reset", "release"]
-Twist = tuple[float, float]  # m/s, rad/s
-STILL: Twist = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class View:
     @property
     def standing(self) -> bool:
         """Whether the vehicle stands, by odometry."""
-        return abs(self.odometry.linear) < STANDING and abs(self.odometry.angular) < STANDING
+        return is_standing(self.odometry.linear, self.odometry.angular)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +154,7 @@ def ahead(pace: Pace, linear: float) -> Callable[[View, Odometry], Twist]:
 
     def drive(view: View, began: Odometry) -> Twist:
         off = wrap(began.heading - view.odometry.heading)
-        return linear, clamp(pace.gain * off, 0.3)
+        return Twist(linear, clamp(pace.gain * off, 0.3))
 
     return drive
 
@@ -165,7 +163,8 @@ def turn(pace: Pace, heading: float) -> Callable[[View, Odometry], Twist]:
     """Ask for a turn on the spot to a heading (rad)."""
 
     def drive(view: View, _: Odometry) -> Twist:
-        return 0.0, clamp(pace.gain * wrap(heading - view.odometry.heading), pace.spin)
+        off = wrap(heading - view.odometry.heading)
+        return Twist(0.0, clamp(pace.gain * off, pace.spin))
 
     return drive
 
@@ -177,7 +176,7 @@ def toward(pace: Pace, linear: float) -> Callable[[View, Odometry], Twist]:
         off = bearing(view.odometry)
         slower = 0.4 * pace.gain * distance(view.odometry, 0.0, 0.0)
         speed = min(linear, slower) if abs(off) < 0.5 else 0.0
-        return speed, clamp(pace.gain * off, pace.spin)
+        return Twist(speed, clamp(pace.gain * off, pace.spin))
 
     return drive
 
@@ -231,8 +230,3 @@ def bearing(pose: Odometry) -> float:
 def wrap(angle: float) -> float:
     """Return an angle within -pi..pi."""
     return math.remainder(angle, math.tau)
-
-
-def clamp(value: float, limit: float) -> float:
-    """Return a value, not beyond the limit either way."""
-    return max(-limit, min(limit, value))

@@ -7,6 +7,7 @@ import argparse
 import difflib
 import inspect
 import re
+from enum import StrEnum
 from typing import Literal, get_args, get_origin
 
 import msgspec
@@ -88,4 +89,6 @@ def fields_of(kind: type[Struct]) -> list[tuple[str, str, str, str]]:
 def spelt(kind: str) -> str:
     """Return a type with the words that it allows, where the source has a name for them."""
     words = getattr(messages, kind, None)
+    if isinstance(words, type) and issubclass(words, StrEnum):
+        return " | ".join(repr(word.value) for word in words)
     return " | ".join(map(repr, get_args(words))) if get_origin(words) is Literal else kind

@@ -1,1 +1,1 @@
-"""``t2 keys``: a site's own certificate authority."""
+"""``t2 keys``: the certificate authority of a site."""

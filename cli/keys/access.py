@@ -1,8 +1,8 @@
-"""Who may do what on the bus, by role, as rules for Zenoh's access control. Pure.
+"""Access rules of the bus by role, for Zenoh's access control. Pure.
 
-A role has rights: a verb on key expressions, made from ``common/keys.py``. A verb is a handful of
-Zenoh's messages, by the side that they come from. Whatever is not allowed here is dropped by the
-router, and nobody is told; see ``docs/security.md``.
+A role has rights: a verb on key expressions from ``common/keys.py``. A verb stands for a set of
+Zenoh messages in each direction. The router drops all other messages without notice; see
+``docs/security.md``.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,15 +16,15 @@ from common.members import Member
 Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
 Rights = Mapping[Verb, Sequence[str]]
 
-# What comes in from a member, and what goes out to it.
+# Messages from a member (ingress), and messages to it (egress).
 VERBS: Mapping[Verb, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "read": (
         ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber"),
         ("put", "delete", "liveliness_token"),
     ),
-    # Who listens: a publisher that knows of nobody sends one sample and then no more.
+    # Lists subscribers: a publisher without known subscribers stops after one sample.
     "know": ((), ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")),
-    # What advanced publishers keep: zenoh-ext asks by ``@adv/**``, and the answers have the events'
+    # The caches of advanced publishers: zenoh-ext queries ``@adv/**``, and replies have the events'
     # own keys.
     "recall": ((), ("query", "reply")),
     "keep": (("reply",), ()),
@@ -35,27 +35,27 @@ VERBS: Mapping[Verb, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 
 ANY = "*"
-# ``**`` passes by what begins with ``@``: our commands, and what advanced publishers keep.
+# ``**`` does not match chunks that begin with ``@``: commands, and caches of advanced publishers.
 EVERY_KEY = f"{keys.ROOT}/**"
 EVERY_COMMAND = f"{keys.ROOT}/*/@cmd/**"
-# zenoh-ext subscribes to ``KEY/@adv/pub/**`` and asks ``KEY/@adv/**``, for events alone; what it
-# publishes and keeps has exactly these chunks: zid, entity or clock, and a name or ``_``.
+# zenoh-ext subscribes to ``KEY/@adv/pub/**`` and queries ``KEY/@adv/**``, only for events. A cache
+# has exactly these chunks: zid, entity or clock, and a name or ``_``.
 KEPT = f"{keys.EVENTS.on(ANY, service=ANY)}/@adv/**"
 KEPT_KEY = "@adv/pub/*/*/*"
 RECALLED = (KEPT, keys.EVENTS.on(ANY, service=ANY))
 EVERYTHING = (EVERY_KEY, EVERY_COMMAND, KEPT)
-ROUTERS = "@/*/*/**"  # their admin space: version, sessions, who declared what
-ASKED = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
+ROUTERS = "@/*/*/**"  # their admin space: version, sessions, declarations
+QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 
-# The services that a laptop runs: a member may speak for these, and for no others. A dead recorder
-# on board must be missed, so that one on a laptop is not heard, and does without.
-SEATS = ("dashboard", "metrics")
-DRIVERS_SEATS = (*SEATS, "teleop")
-KNOWING: Rights = {"know": (EVERY_KEY, KEPT), "recall": RECALLED}
+# The services of a laptop: a member may publish as these and as no others. A recorder is not one of
+# them: a recorder on a laptop must not hide that the one on board is dead.
+LAPTOP_SERVICES = ("dashboard", "metrics")
+DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
+SUBSCRIBER_INFO: Rights = {"know": (EVERY_KEY, KEPT), "recall": RECALLED}
 
 
 class Rule(Struct, frozen=True):
-    """One rule of Zenoh's: what passes, and on which keys."""
+    """A Zenoh rule: the allowed messages, and their keys."""
 
     id: str
     flow: Literal["ingress", "egress"]
@@ -63,7 +63,7 @@ class Rule(Struct, frozen=True):
     key_exprs: Sequence[str]
 
     def as_config(self) -> dict[str, object]:
-        """Return it in Zenoh's own words."""
+        """Return the rule as Zenoh configuration."""
         return {
             "id": self.id,
             "permission": "allow",
@@ -74,39 +74,39 @@ class Rule(Struct, frozen=True):
 
 
 def access_control(members: Iterable[Member], trusted: Sequence[str]) -> dict[str, object]:
-    """Return Zenoh's ``access_control``; ``trusted`` are the link protocols of those on board."""
+    """Return Zenoh's ``access_control``; on-board clients use the ``trusted`` link protocols."""
     subjects: list[dict[str, object]] = [{"id": "onboard", "link_protocols": list(trusted)}]
     granted: dict[str, Rights] = {"onboard": ONBOARD}
     for member in members:
         name = member.common_name
         granted[name] = rights(member)
         subjects.append({"id": name, "cert_common_names": [name]})
-    if not trusted:  # an empty list would be refused, and none at all would mean everybody
+    if not trusted:  # Zenoh rejects an empty list, and a missing one means every protocol
         subjects, granted = subjects[1:], {k: v for k, v in granted.items() if k != "onboard"}
-    rules = {who: list(rules_of(who, given)) for who, given in granted.items()}
+    rules = {name: list(rules_of(name, given)) for name, given in granted.items()}
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule.as_config() for mine in rules.values() for rule in mine],
+        "rules": [rule.as_config() for own in rules.values() for rule in own],
         "subjects": subjects,
         "policies": [
-            {"rules": [rule.id for rule in mine], "subjects": [who]} for who, mine in rules.items()
+            {"rules": [rule.id for rule in own], "subjects": [name]} for name, own in rules.items()
         ],
     }
 
 
-def rules_of(who: str, given: Rights) -> Iterable[Rule]:
-    """Yield the rules that make up somebody's rights."""
+def rules_of(name: str, given: Rights) -> Iterable[Rule]:
+    """Yield the rules for the rights of a member."""
     for verb, expressions in given.items():
         incoming, outgoing = VERBS[verb]
         if incoming:
-            yield Rule(f"{who} {verb} in", "ingress", incoming, expressions)
+            yield Rule(f"{name} {verb} in", "ingress", incoming, expressions)
         if outgoing:
-            yield Rule(f"{who} {verb} out", "egress", outgoing, expressions)
+            yield Rule(f"{name} {verb} out", "egress", outgoing, expressions)
 
 
 def rights(member: Member) -> Rights:
-    """Return what a member may do, at any router of its site."""
+    """Return the rights of a member, at any router of its site."""
     if member.role == "robot":
         return robot(member.name)
     if member.role == "site":
@@ -117,67 +117,70 @@ def rights(member: Member) -> Rights:
 
 
 def viewer() -> Rights:
-    """See everything, move nothing."""
+    """Return the rights to see everything and command nothing."""
     return {
         "read": EVERYTHING,
-        **KNOWING,
-        "ask": ASKED,
-        **seats(SEATS),
+        **SUBSCRIBER_INFO,
+        "ask": QUERYABLE,
+        **publishing(LAPTOP_SERVICES),
     }
 
 
 def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
-    """See everything; drive as the sources named, stop and call the robots named."""
-    moved = tuple(robots)
-    sitting = seats(DRIVERS_SEATS)
+    """Return the rights to see everything, and to drive, stop and call the given robots."""
+    own_robots = tuple(robots)
+    own = publishing(DRIVER_SERVICES)
     return {
         "read": EVERYTHING,
-        **KNOWING,
-        "ask": (*ASKED, *(call.on(each) for each in moved for call in keys.CALLS)),
-        **sitting,
-        "write": (*sitting["write"], *(key for each in moved for key in orders(each, sources))),
+        **SUBSCRIBER_INFO,
+        "ask": (*QUERYABLE, *(call.on(each) for each in own_robots for call in keys.CALLS)),
+        **own,
+        "write": (
+            *own["write"],
+            *(key for each in own_robots for key in actuation_keys(each, sources)),
+        ),
     }
 
 
 def fleet() -> Rights:
-    """See everything; stop any robot, a site, or all."""
-    watching = viewer()
-    return {**watching, "write": (*watching["write"], keys.estop_key(ANY))}
+    """Return the rights to see everything, and to stop any robot."""
+    viewing = viewer()
+    return {**viewing, "write": (*viewing["write"], keys.estop_key(ANY))}
 
 
 def site() -> Rights:
-    """What a site's router may pass on to a robot's: whom it let in, it has judged itself."""
+    """Return the rights of a site's router at a robot's: it has checked its own members."""
     return {
         "read": EVERYTHING,
         "know": EVERYTHING,
         "recall": RECALLED,
-        "ask": (*ASKED, *(call.on(ANY) for call in keys.CALLS)),
-        "write": orders(ANY),
+        "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
+        "write": actuation_keys(ANY),
     }
 
 
 def robot(name: str) -> Rights:
-    """What a robot's router may say at its site's: everything of its own robot, nothing else."""
+    """Return the rights of a robot's router at its site's: everything for its own robot."""
     root = f"{keys.ROOT}/{name}"
     own = (f"{root}/**", f"{root}/@cmd/**", f"{keys.EVENTS.on(name, service=ANY)}/@adv/**")
     return {
         "read": (*own, keys.estop_key(ANY)),
         "know": EVERYTHING,
-        "ask": (ROUTERS,),  # its own probe, where nothing on board can dial without TLS
+        "ask": (ROUTERS,),  # for its own probe, if no on-board endpoint works without TLS
         "write": own,
         "serve": own,
         "live": own,
     }
 
 
-def orders(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
-    """Return the keys that move and stop a robot, but for what is safety's alone."""
+def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
+    """Return the keys that move and stop a robot, without those reserved for safety."""
     driven = (keys.DRIVE.on(robot, source=source) for source in sources)
     return (*driven, keys.estop_key(robot))
 
 
-def seats(services: Iterable[str]) -> dict[Verb, Sequence[str]]:
-    """Return the right to speak for services: their health, events, presence, and what is asked."""
+def publishing(services: Iterable[str]) -> dict[Verb, Sequence[str]]:
+    """Return the rights to publish as these services: health, events, presence, replies."""
     names = tuple(services)
     health = tuple(keys.HEALTH.on(ANY, service=name) for name in names)
     events = tuple(keys.EVENTS.on(ANY, service=name) for name in names)

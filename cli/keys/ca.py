@@ -1,7 +1,7 @@
 """The certificate authority: its own certificate, and those that it signs.
 
-Keys are on the curve P-256, signatures are ECDSA with SHA-256: what rustls, which is in Zenoh, and
-every other TLS library takes.
+Keys use the curve P-256 and signatures ECDSA with SHA-256. Every TLS library supports them, also
+rustls, which Zenoh uses.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,12 +25,12 @@ from cli.keys.profile import Profile, Span, is_ip
 from common.errors import RobotError
 from common.members import Member
 
-Extensions = Sequence[tuple[x509.ExtensionType, bool]]  # each with whether it is critical
+Extensions = Sequence[tuple[x509.ExtensionType, bool]]  # each with its critical flag
 
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """A new certificate, as its files hold it and as the list names it."""
+    """A new certificate: the content of its files, and its entry in the member list."""
 
     certificate: bytes  # PEM
     private_key: bytes  # PEM
@@ -38,15 +38,15 @@ class Issued:
 
 
 @dataclass(frozen=True, slots=True)
-class Authority:
+class CertificateAuthority:
     """Signs certificates."""
 
     certificate: x509.Certificate
     key: ec.EllipticCurvePrivateKey
 
     @classmethod
-    def found(cls, site: str, span: Span) -> "Authority":
-        """Make a new one, for a site."""
+    def create(cls, site: str, span: Span) -> "CertificateAuthority":
+        """Create the authority of a site."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = _name(f"T2 CA of {site}")
         extensions: Extensions = [
@@ -59,20 +59,22 @@ class Authority:
         return cls(signed, key)
 
     @classmethod
-    def load(cls, certificate: bytes, key: bytes, passphrase: Callable[[], bytes]) -> "Authority":
-        """Read it from PEM; ``passphrase`` is called when the key is encrypted.
+    def load(
+        cls, certificate: bytes, key: bytes, passphrase: Callable[[], bytes]
+    ) -> "CertificateAuthority":
+        """Read the authority from PEM; call ``passphrase`` if the key is encrypted.
 
-        Raise ``RobotError`` when the passphrase is wrong, or the two do not belong together.
+        Raise ``RobotError`` if the passphrase is wrong, or key and certificate do not match.
         """
         loaded = certificate_from(certificate)
         try:
             private = load_pem_private_key(key, passphrase() if _is_encrypted(key) else None)
         except ValueError:
-            raise RobotError("the CA's key cannot be read: a wrong passphrase, or no key") from None
+            raise RobotError("cannot read the CA's key: wrong passphrase, or not a key") from None
         if not isinstance(private, ec.EllipticCurvePrivateKey):
-            raise RobotError("the CA's key is no key of `t2 keys init`")
+            raise RobotError("the CA's key was not made by `t2 keys init`")
         if private.public_key() != loaded.public_key():
-            raise RobotError("the CA's key is another one's than the certificate in ca.pem")
+            raise RobotError("the CA's key does not match the certificate in ca.pem")
         return cls(loaded, private)
 
     def issue(self, profile: Profile, span: Span) -> Issued:
@@ -86,7 +88,7 @@ class Authority:
             (_key_usage(signs_certificates=False), True),
             (x509.ExtendedKeyUsage(_usages(profile)), False),
             (x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(authority), False),
-            *((found, False) for found in _alternative_names(profile)),
+            *((names, False) for names in _alternative_names(profile)),
         ]
         signed = _signed(
             _name(name), key.public_key(), serial, span, extensions,
@@ -101,20 +103,20 @@ class Authority:
 
 
 def certificate_from(pem: bytes) -> x509.Certificate:
-    """Read a certificate; raise ``RobotError`` for what is none."""
+    """Read a certificate; raise ``RobotError`` if it is invalid."""
     try:
         return x509.load_pem_x509_certificate(pem)
     except ValueError as error:
-        raise RobotError(f"this is no certificate: {error}") from None
+        raise RobotError(f"invalid certificate: {error}") from None
 
 
 def certificate_pem(certificate: x509.Certificate) -> bytes:
-    """Return a certificate as its file holds it."""
+    """Return a certificate as PEM."""
     return certificate.public_bytes(Encoding.PEM)
 
 
 def key_pem(key: ec.EllipticCurvePrivateKey, passphrase: bytes = b"") -> bytes:
-    """Return a private key as its file holds it, encrypted if there is a passphrase."""
+    """Return a private key as PEM, encrypted if there is a passphrase."""
     protection = BestAvailableEncryption(passphrase) if passphrase else NoEncryption()
     return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, protection)
 
@@ -150,8 +152,8 @@ def _key_usage(*, signs_certificates: bool) -> x509.KeyUsage:
 
 
 def _usages(profile: Profile) -> list[x509.ObjectIdentifier]:
-    dialling = [ExtendedKeyUsageOID.CLIENT_AUTH]
-    return [ExtendedKeyUsageOID.SERVER_AUTH, *dialling] if profile.listens else dialling
+    client = [ExtendedKeyUsageOID.CLIENT_AUTH]
+    return [ExtendedKeyUsageOID.SERVER_AUTH, *client] if profile.listens else client
 
 
 def _alternative_names(profile: Profile) -> list[x509.SubjectAlternativeName]:

@@ -1,4 +1,4 @@
-"""What ``t2 keys`` says after it has done something: what lies where, and what to do next. Pure."""
+"""Instructions that ``t2 keys`` prints: the files that it wrote, and the next steps. Pure."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,9 +6,9 @@ from cli.keys.machine_settings import MEMBERS, SETTINGS, endpoints
 from cli.keys.profile import EVERY_ROBOT, Profile
 from common.members import Member, Role
 
-PLACE = "/etc/t2/keys"  # on a machine that runs a router; the units and compose.yaml look there
-UNKNOWN = "; where it is, the list does not say"
-# A container's router starts with the rules that were made for it, so these are made anew first.
+PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
+UNKNOWN = "; its address is not in the member list"
+# A container's router starts with generated rules: they must be generated again first.
 IN_CONTAINERS = "docker compose up -d --force-recreate router-settings router"
 USED_BY: dict[Role, str] = {
     "robot": "router",
@@ -19,72 +19,74 @@ USED_BY: dict[Role, str] = {
 }
 
 
-def founded(folder: str, site: str, until: str, encrypted: bool) -> Iterator[str]:
-    """Say what a new authority is."""
+def authority_created(folder: str, site: str, until: str, encrypted: bool) -> Iterator[str]:
+    """Yield the instructions for a new authority."""
     yield f"{folder} holds the certificate authority of site {site}, until {until}."
-    protection = "with its passphrase" if encrypted else "it has no passphrase"
-    yield f"Whoever has {folder}/ca.key can make a driver of anybody ({protection}):"
-    yield "  it stays on this computer, or on a medium that is taken out (--ca-key FILE)."
+    protection = "it is encrypted" if encrypted else "it is not encrypted"
+    yield f"Keep {folder}/ca.key secret: it can grant the right to drive to anyone ({protection})."
+    yield "  Keep it on this computer, or on a removable medium (--ca-key FILE)."
     yield "Back up the folder. Next:"
     yield "  t2 keys issue robot 001"
     yield "  t2 keys issue driver NAME --robot 001"
 
 
-def issued(
+def certificate_issued(
     profile: Profile, member: Member, target: str, routers: Sequence[Profile]
 ) -> Iterator[str]:
-    """Say what was made, where it goes, and who has to learn of it."""
-    yield f"{member.common_name}, until {member.expires:%Y-%m-%d}"
+    """Yield the instructions for a new certificate: where to copy it, which routers to update."""
+    yield f"{member.common_name}, valid until {member.expires:%Y-%m-%d}"
     if profile.listens:
-        yield f"  found at {', '.join(profile.addresses)}; no other address is believed"
+        yield f"  addresses {', '.join(profile.addresses)}; valid at no other address"
     if profile.role == "driver":
         yield f"  may move {_robots(profile)}"
     if profile.sources:
         yield f"  drives as {' or '.join(profile.sources)}; no other source is allowed"
     yield ""
     if profile.listens:
-        yield f"1. Copy the folder to the {profile.role}'s computer, and to no other:"
+        yield f"1. Copy the folder to the {profile.role}'s computer only:"
         yield f"     scp -rp {target}/. {_host(profile)}:{PLACE}"
-        yield "2. There, all that is in it belongs to the user who runs the router. Start it anew:"
+        yield "2. There, give the files to the user that runs the router, and restart it:"
         yield f"     t2 router --config {PLACE}/{SETTINGS}"
     else:
-        yield f"1. Copy the folder {target} to {profile.name}'s computer, and to no other."
-        yield "2. There:"
+        yield f"1. Copy the folder {target} to {profile.name}'s computer only."
+        yield "2. On that computer:"
         yield f"     t2 {USED_BY[profile.role]} --config {_last(target)}/{SETTINGS}"
-    others = [each for each in routers if each.who != profile.who]
+    others = [each for each in routers if each.label != profile.label]
     if others or not profile.listens:  # a router's own folder holds the list
-        yield from _spread("3. ", target, others)
+        yield from _update_routers("3. ", target, others)
 
 
-def renewed(role: Role, name: str, old: Member) -> Iterator[str]:
-    """Say what becomes of the one before."""
+def certificate_renewed(role: Role, name: str, old: Member) -> Iterator[str]:
+    """Yield the instructions for the previous certificate."""
     serial = old.common_name.rpartition(".")[2]
-    yield f"The one before stays good until {old.expires:%Y-%m-%d}. Once the new one is in use:"
+    yield f"The previous one stays valid until {old.expires:%Y-%m-%d}. Once the new one is in use:"
     yield f"     t2 keys revoke {role} {name} --serial {serial}"
 
 
-def struck(members: Sequence[Member], target: str, routers: Sequence[Profile]) -> Iterator[str]:
-    """Say what was revoked, and that this takes hold with the routers."""
+def certificates_revoked(
+    members: Sequence[Member], target: str, routers: Sequence[Profile]
+) -> Iterator[str]:
+    """Yield the instructions after a revocation: it takes effect at the routers."""
     for member in members:
         yield f"{member.common_name} is revoked"
-    yield "Until every router has the new list, nothing has changed:"
-    yield from _spread("", target, routers)
+    yield "The revocation takes effect when every router has the new list:"
+    yield from _update_routers("", target, routers)
     if any(member.role in ("robot", "site") for member in members):
-        yield "A stolen router's certificate still looks good to who dials it: see SECURITY.md."
+        yield "Clients still accept the certificate of a stolen router: see SECURITY.md."
 
 
-def _spread(number: str, target: str, routers: Sequence[Profile]) -> Iterator[str]:
-    """Say how routers learn of a new list."""
+def _update_routers(number: str, target: str, routers: Sequence[Profile]) -> Iterator[str]:
+    """Yield the steps that bring the new list to the routers."""
     folder = target.rpartition("/")[0] or "."
     if not routers:
-        yield f"{number}Each router wants {folder}/{MEMBERS} anew, and a restart."
+        yield f"{number}Copy {folder}/{MEMBERS} to each router and restart it."
     else:
-        yield f"{number}Each router learns of it by {MEMBERS} and a restart:"
+        yield f"{number}Copy {MEMBERS} to each router and restart it:"
     for router in routers:
         host, unknown = (_host(router), "") if router.addresses else ("HOST", UNKNOWN)
         copy = f"scp -p {folder}/{MEMBERS} {host}:{PLACE}/{MEMBERS}"
         yield f"     {copy}  # {router.role} {router.name}{unknown}"
-    yield "   In containers no restart does; there it is:"
+    yield "   A router in a container needs this instead of a restart:"
     yield f"     {IN_CONTAINERS}"
 
 
@@ -95,7 +97,7 @@ def _robots(profile: Profile) -> str:
 
 
 def _host(router: Profile) -> str:
-    """Return how a router's computer is reached, for a copy."""
+    """Return the host of a router, for scp."""
     return endpoints([router])[0].removeprefix("tls/").rpartition(":")[0]
 
 

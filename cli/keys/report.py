@@ -1,4 +1,4 @@
-"""What ``t2 keys list`` shows: each certificate, how it stands, and what ought to be done. Pure."""
+"""Output of ``t2 keys list``: certificates with their state, and due renewals. Pure."""
 
 from collections.abc import Iterator, Sequence
 from typing import Literal
@@ -14,7 +14,7 @@ State = Literal["valid", "expires soon", "expired", "revoked"]
 
 
 def state(member: Member, now_s: float) -> State:
-    """Return how a certificate stands."""
+    """Return the state of a certificate."""
     if member.revoked:
         return "revoked"
     left_s = member.expires.timestamp() - now_s
@@ -24,7 +24,7 @@ def state(member: Member, now_s: float) -> State:
 
 
 def as_table(members: Members, now_s: float) -> str:
-    """Return a line for each certificate."""
+    """Return a table with a row for each certificate."""
     rows = [
         (
             member.role,
@@ -39,11 +39,11 @@ def as_table(members: Members, now_s: float) -> str:
     return output.table(HEAD, rows)
 
 
-def as_json(members: Members, authority_ends_s: float, now_s: float) -> dict[str, object]:
-    """Return the same for programs."""
+def as_json(members: Members, ca_ends_s: float, now_s: float) -> dict[str, object]:
+    """Return the list as JSON fields."""
     return {
         "site": members.site,
-        "authority": {"days": days(authority_ends_s, now_s)},
+        "authority": {"days": days(ca_ends_s, now_s)},
         "certificates": [
             {
                 "common_name": member.common_name,
@@ -60,31 +60,32 @@ def as_json(members: Members, authority_ends_s: float, now_s: float) -> dict[str
     }
 
 
-def advice(members: Members, authority_ends_s: float, now_s: float) -> Iterator[str]:
-    """Yield what ends, and the command against it; what was renewed already may end."""
-    left = days(authority_ends_s, now_s)
+def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
+    """Yield what expires, with the command to renew it; skip renewed certificates."""
+    left = days(ca_ends_s, now_s)
     if left < DAYS:
-        yield f"the CA {_ends(left)}: make another with `t2 keys init --folder NEW`"
+        yield f"the CA {_expiry(left)}: create another with `t2 keys init --folder NEW`"
     for member in last_of_each(members.welcome):
         if state(member, now_s) in ("expires soon", "expired"):
-            who = f"{member.role} {member.name}"
-            yield f"{who} {_ends(days(member.expires.timestamp(), now_s))}: `t2 keys renew {who}`"
+            name = f"{member.role} {member.name}"
+            left = days(member.expires.timestamp(), now_s)
+            yield f"{name} {_expiry(left)}: `t2 keys renew {name}`"
 
 
 def last_of_each(members: Sequence[Member]) -> Sequence[Member]:
-    """Return each one's newest certificate."""
+    """Return the latest certificate of each member."""
     return list({(member.role, member.name): member for member in members}.values())
 
 
 def robots(member: Member) -> str:
-    """Return which robots somebody may move, in words."""
+    """Return the robots of a member as text."""
     return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
 
 
 def days(ends_s: float, now_s: float) -> int:
-    """Return how many whole days are left; fewer than 0 once it is over."""
+    """Return the number of whole days left; negative after the expiry."""
     return int((ends_s - now_s) // DAY_S)
 
 
-def _ends(left: int) -> str:
-    return f"ends in {left} days" if left >= 0 else "has ended"
+def _expiry(left: int) -> str:
+    return f"expires in {left} days" if left >= 0 else "has expired"

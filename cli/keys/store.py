@@ -1,7 +1,7 @@
 """The authority's folder: ``ca.pem``, ``ca.key``, ``members.json``, and a folder for each machine.
 
-Every file appears whole or not at all, and only its owner can read what is secret. Who changes the
-list holds a lock meanwhile, so that of two commands at once neither loses the other's member.
+Files are replaced atomically, and only their owner can read secrets. A command that changes the
+member list locks the folder, so that concurrent commands do not lose each other's members.
 """
 
 import contextlib
@@ -14,15 +14,10 @@ from pathlib import Path
 import msgspec
 
 from cli.keys import member_list
-from cli.keys.ca import (
-    Authority,
-    Issued,
-    certificate_pem,
-    key_pem,
-)
+from cli.keys.ca import CertificateAuthority, Issued, certificate_pem, key_pem
 from cli.keys.machine_settings import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
 from cli.keys.profile import Profile
-from common import members as lists
+from common import members as member_files
 from common.errors import RobotError
 from common.members import Members
 
@@ -30,7 +25,7 @@ SECRET, PUBLIC = 0o600, 0o644
 
 
 class Folder:
-    """Reads and writes what is in it; raises ``RobotError`` that names the file."""
+    """Reads and writes the files; raises ``RobotError`` with the name of the file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -38,57 +33,61 @@ class Folder:
         self.ca_key = path / "ca.key"
         self.members = path / MEMBERS
 
-    def found(self, authority: Authority, members: Members, passphrase: bytes) -> None:
-        """Write a new authority; refuse to touch one that is there."""
+    def create_authority(
+        self, authority: CertificateAuthority, members: Members, passphrase: bytes
+    ) -> None:
+        """Write a new authority; raise ``RobotError`` if there is one already."""
         for file in (self.ca, self.ca_key, self.members):
             if file.exists():
                 raise RobotError(
-                    f"{file} is there already: another CA would lock everybody out; "
-                    "`--folder NEW` makes one beside it"
+                    f"{file} exists: another CA would invalidate all certificates; "
+                    "`--folder NEW` creates one in another folder"
                 )
         _write(self.ca_key, key_pem(authority.key, passphrase), SECRET)
         _write(self.members, _as_file(members), PUBLIC)
         _write(self.ca, certificate_pem(authority.certificate), PUBLIC)
 
-    def authority(self, key_file: Path | None, passphrase: Callable[[], bytes]) -> Authority:
-        """Return what signs; its key may lie elsewhere."""
+    def authority(
+        self, key_file: Path | None, passphrase: Callable[[], bytes]
+    ) -> CertificateAuthority:
+        """Return the authority; its key may be stored elsewhere."""
         key = key_file or self.ca_key
         if not key.exists():
             raise RobotError(
-                f"{key} is not there, and only it can sign; "
-                "if it is kept elsewhere, name it with --ca-key FILE"
+                f"{key} not found: it is needed to sign; "
+                "if it is stored elsewhere, use --ca-key FILE"
             )
-        return Authority.load(self.certificate(), _read(key), passphrase)
+        return CertificateAuthority.load(self.certificate(), _read(key), passphrase)
 
     def certificate(self) -> bytes:
-        """Return the authority's own certificate."""
+        """Return the certificate of the authority."""
         if not self.ca.exists():
-            raise RobotError(f"{self.path} has no CA; `t2 keys init` makes one")
+            raise RobotError(f"{self.path} has no CA; `t2 keys init` creates one")
         return _read(self.ca)
 
     def read(self) -> Members:
-        """Return the list."""
-        self.certificate()  # so that who has no CA is told so
-        return lists.read(self.members)
+        """Return the member list."""
+        self.certificate()  # a missing CA has its own error message
+        return member_files.read(self.members)
 
     def write(self, members: Members) -> None:
-        """Write the list, here and into each folder of a router that is let in."""
+        """Write the member list, also to the folder of each admitted router."""
         _write(self.members, _as_file(members), PUBLIC)
         for router in member_list.routers(members):
-            if (self.path / router.who / CERTIFICATE).exists():
-                _write(self.path / router.who / MEMBERS, _as_file(members), PUBLIC)
+            if (self.path / router.label / CERTIFICATE).exists():
+                _write(self.path / router.label / MEMBERS, _as_file(members), PUBLIC)
 
-    def hand_out(
+    def write_machine(
         self, profile: Profile, issued: Issued, members: Members, *, settings: bool
     ) -> Path:
-        """Write the folder that goes to a machine and return it; ``settings``: ``bus.toml`` too."""
-        target = self.path / profile.who
+        """Write the folder for a machine and return it; with ``settings``, also ``bus.toml``."""
+        target = self.path / profile.label
         others = [
             each
             for each in member_list.routers(members)
-            if each.addresses and each.who != profile.who
+            if each.addresses and each.label != profile.label
         ]
-        with _told(target):
+        with _os_errors(target):
             target.mkdir(mode=0o700, exist_ok=True)
         _write(target / PRIVATE_KEY, issued.private_key, SECRET)
         _write(target / CERTIFICATE, issued.certificate, PUBLIC)
@@ -100,12 +99,12 @@ class Folder:
 
 @contextlib.contextmanager
 def locked(path: Path, *, create: bool = False) -> Iterator[Folder]:
-    """Keep other commands out of a folder meanwhile."""
-    with _told(path):
+    """Lock a folder against other commands while the context lasts."""
+    with _os_errors(path):
         if create:
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         elif not path.is_dir():
-            raise RobotError(f"{path} has no CA; `t2 keys init` makes one")
+            raise RobotError(f"{path} has no CA; `t2 keys init` creates one")
         descriptor = os.open(path, os.O_RDONLY)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX)
@@ -119,28 +118,28 @@ def _as_file(members: Members) -> bytes:
 
 
 def _read(file: Path) -> bytes:
-    with _told(file):
+    with _os_errors(file):
         return file.read_bytes()
 
 
 def _write(file: Path, content: bytes, mode: int) -> None:
-    """Let a file appear at once: a reader finds the old one or the new one, and a crash no half."""
-    with _told(file):
-        descriptor, made = tempfile.mkstemp(prefix=".", dir=file.parent)
+    """Replace a file atomically: readers see the old or the new content, also after a crash."""
+    with _os_errors(file):
+        descriptor, temporary = tempfile.mkstemp(prefix=".", dir=file.parent)
         try:
             with os.fdopen(descriptor, "wb") as stream:
                 stream.write(content)
                 stream.flush()
                 os.fchmod(descriptor, mode)
                 os.fsync(descriptor)
-            Path(made).rename(file)
-        except BaseException:  # ctrl-c, too: it may be a private key, in a folder that is copied
-            Path(made).unlink(missing_ok=True)
+            Path(temporary).rename(file)
+        except BaseException:  # also on Ctrl-C: it may be a private key, in a folder that is copied
+            Path(temporary).unlink(missing_ok=True)
             raise
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _os_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

@@ -1,1 +1,1 @@
-"""Recordings: made, shown, played back, reported and sent to Foxglove."""
+"""Commands for recordings: info, replay, report and foxglove."""

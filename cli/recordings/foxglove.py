@@ -1,4 +1,4 @@
-"""``t2 foxglove``: the bus, live, to Foxglove or Lichtblick over a web socket."""
+"""``t2 foxglove``: a live WebSocket server for Foxglove or Lichtblick."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -9,32 +9,34 @@ from common.cli_args import sources
 from common.config import load
 from common.errors import LinkError, RobotError
 from services.recorder.config import RecorderConfig
-from services.recorder.mcap_codec import Channel, Entry, Translator
+from services.recorder.mcap_codec import Channel, Encoder, Entry
 
 if TYPE_CHECKING:
-    from foxglove import Channel as Shown
+    from foxglove import Channel as FoxgloveChannel
     from foxglove import Context
 
-PORT = 8765  # where the viewers look first
+PORT = 8765  # the viewers' default
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--host", default="127.0.0.1", help="0.0.0.0 shows it to the whole network")
-    parser.add_argument("--port", type=int, default=PORT, help=f"{PORT} unless told otherwise")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 for the whole network"
+    )
+    parser.add_argument("--port", type=int, default=PORT, help=f"port, {PORT} by default")
     add_end(parser)
     add_options(parser, every=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show until it ends; raise ``LinkError`` when the port cannot be had."""
+    """Serve until the end; raise ``LinkError`` if the port is not available."""
     try:
         import foxglove
     except ModuleNotFoundError:
         raise RobotError(
             "it needs foxglove-sdk: install the extra `foxglove` (pip install -e '.[foxglove]')"
         ) from None
-    translator = Translator(load(RecorderConfig, sources(options)).config.vehicle)
+    encoder = Encoder(load(RecorderConfig, sources(options)).config.vehicle)
     context = foxglove.Context()
     with seated(options) as seat:
         try:
@@ -46,35 +48,35 @@ def run(options: argparse.Namespace) -> int:
         print(f"connect Foxglove or Lichtblick to ws://{options.host}:{server.port}", flush=True)
         for word in EVERYTHING:
             seat.probe.listen(expression(word, seat.robot))
-        shown, stage = 0, Stage(context)
+        sent, channels = 0, Channels(context)
         try:
             with quietly():
                 for sample in seat.probe.samples(options.duration):
-                    for entry in translator.entries(sample, sample.wall_ns):
-                        stage.show(entry)
-                    shown += 1
-                    if shown == options.count:
+                    for entry in encoder.entries(sample, sample.wall_ns):
+                        channels.send(entry)
+                    sent += 1
+                    if sent == options.count:
                         break
         finally:
             server.stop()
     return 0
 
 
-class Stage:
-    """The channels that viewers see, each made when it is first needed."""
+class Channels:
+    """The channels of the server, each created on first use."""
 
     def __init__(self, context: "Context") -> None:
         self._context = context
-        self._channels: dict[Channel, Shown] = {}
+        self._channels: dict[Channel, FoxgloveChannel] = {}
 
-    def show(self, entry: Entry) -> None:
-        """Send a message to all who look at its topic."""
+    def send(self, entry: Entry) -> None:
+        """Send a message to the subscribers of its topic."""
         channel = self._channels.get(entry.channel)
         if channel is None:
-            channel = self._channels[entry.channel] = self._made(entry.channel)
+            channel = self._channels[entry.channel] = self._create(entry.channel)
         channel.log(entry.data, log_time=entry.log_ns)
 
-    def _made(self, channel: Channel) -> "Shown":
+    def _create(self, channel: Channel) -> "FoxgloveChannel":
         import foxglove
 
         schema = None

@@ -1,4 +1,4 @@
-"""``t2 info``: what is in a recording."""
+"""``t2 info``: the content of a recording."""
 
 import argparse
 import time
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
 from cli.inspect.shell import add_output, wants_json
-from cli.recordings.recorded import opened
+from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.keys import ROOT
+from services.recorder.summary import Note, Summary
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
-    from services.recorder.summary import Note, Summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,32 +23,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show them, one after the other; 1 when some of it cannot be read."""
-    whole = True
+    """Show each file; return 1 if any is truncated or damaged."""
+    complete = True
     for number, file in enumerate(options.files):
-        reader, summary = read(file)
-        whole = whole and not (reader.cut or reader.damaged)
+        reader, summary = summarize(file)
+        complete = complete and not (reader.cut or reader.damaged)
         if wants_json(options):
             output.line(as_json(reader, summary))
         else:
             print(*([""] if number else []), as_text(reader, summary), sep="\n")
-    return 0 if whole else 1
+    return 0 if complete else 1
 
 
-def read(file: Path) -> tuple["Reader", "Summary"]:
-    """Return what a recording holds; raise ``RobotError`` when it is none."""
-    from services.recorder.summary import Summary
+def open_recording(path: Path) -> "Reader":
+    """Open a recording; raise ``RobotError`` if it cannot be read or the library is missing."""
+    try:
+        from services.recorder.reader import Reader
+    except ModuleNotFoundError as error:
+        raise RobotError(
+            f"recordings need {error.name}: install the extra `record` (pip install -e '.[record]')"
+        ) from None
+    return Reader(path)
 
+
+def summarize(file: Path) -> tuple["Reader", Summary]:
+    """Return the summary of a recording; raise ``RobotError`` if it is not a recording."""
     summary = Summary()
-    with opened(file) as reader:
+    with open_recording(file) as reader:
         for each in reader:
             raw = each.sample.raw is not None
-            summary.take(each.key, each.kind, each.message, each.log_ns, raw=raw)
+            summary.add(each.key, each.kind, each.message, each.log_ns, raw=raw)
     return reader, summary
 
 
-def as_json(reader: "Reader", summary: "Summary") -> dict[str, Any]:
-    """Return it for programs."""
+def as_json(reader: "Reader", summary: Summary) -> dict[str, Any]:
+    """Return the summary as JSON fields."""
     return {
         "file": str(reader.path),
         "bytes": reader.size,
@@ -70,24 +79,24 @@ def as_json(reader: "Reader", summary: "Summary") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def as_text(reader: "Reader", summary: "Summary") -> str:
-    """Return it for people."""
+def as_text(reader: "Reader", summary: Summary) -> str:
+    """Return the summary as text."""
     about = dict(reader.about)
     began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime((summary.begin_ns or 0) / NS_PER_S))
-    state = f"cut short, {reader.readable} bytes can be read" if reader.cut else "whole"
+    state = f"truncated, {reader.readable} bytes are readable" if reader.cut else "complete"
     if reader.damaged:
-        state += f", {reader.damaged} chunks are damaged and left out"
+        state += f", {reader.damaged} damaged chunks skipped"
     lines = [
         f"{reader.path}: {reader.size} bytes, {state}",
         f"robot {about.get('robot', '?')}, recorded by T2 {about.get('version', '?')}, "
-        f"because of: {about.get('why', '?')}",
+        f"reason: {about.get('why', '?')}",
         f"{summary.messages} messages in {summary.duration_s:.1f} s, from {began}"
         if summary.messages
         else "no messages",
     ]
     if summary.versions:
-        told = ", ".join(f"{name} {version}" for name, version in sorted(summary.versions.items()))
-        lines.append(f"versions: {told}")
+        versions = (f"{name} {version}" for name, version in sorted(summary.versions.items()))
+        lines.append(f"versions: {', '.join(versions)}")
     rows = [
         [_short(key), one.kind, str(one.count), "-" if one.hz is None else f"{one.hz:.1f}"]
         for key, one in sorted(summary.streams.items())
@@ -103,9 +112,9 @@ def _short(key: str) -> str:
     return key.removeprefix(f"{ROOT}/")
 
 
-def _as_json(note: "Note") -> dict[str, Any]:
-    return {"at": round(note.at_s, 3), "who": note.who, "level": note.level, "text": note.text}
+def _as_json(note: Note) -> dict[str, Any]:
+    return {"at": round(note.at_s, 3), "who": note.service, "level": note.level, "text": note.text}
 
 
-def _as_text(note: "Note") -> str:
-    return f"{note.at_s:8.2f} s  {note.level:7}  {note.who}: {note.text}"
+def _as_text(note: Note) -> str:
+    return f"{note.at_s:8.2f} s  {note.level:7}  {note.service}: {note.text}"

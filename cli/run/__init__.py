@@ -1,1 +1,1 @@
-"""The stack and its router: started, supervised and installed."""
+"""Commands that start, supervise and install the stack and its router."""

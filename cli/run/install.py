@@ -1,7 +1,7 @@
-"""``t2 install``: have systemd run T2's services on this computer; wants root.
+"""``t2 install``: install T2's services as systemd units on this computer; needs root.
 
-Units, their user and, where there are none, settings are written; nothing is started. What an
-operator has written is never touched: the settings, and whatever `systemctl edit` makes.
+It writes the units and their user, and creates settings if there are none. It starts nothing. It
+never changes an operator's files: the settings, and drop-ins of `systemctl edit`.
 """
 
 import argparse
@@ -21,34 +21,34 @@ TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 UNITS = Path("/usr/local/lib/systemd/system")
 USER = Path("/etc/sysusers.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
-KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; the way in for laptops
+KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; lets laptops connect
 ENABLED = Path("/etc/systemd/system/multi-user.target.wants/t2.target")
-# By this line every version knows the units of every other one: it stays as it is.
+# Every version recognises the units of other versions by this line: never change it.
 MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
 SIM = "t2-sim.service"
 BACKOFF = "t2-.service.d/20-backoff.conf"
-BACKOFF_SINCE = 254  # the systemd that knows it
+BACKOFF_SINCE = 254  # the systemd that supports it
 EXTRAS = {"t2-recorder.service": "mcap", "t2-dashboard.service": "uvicorn"}
-HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the units
+HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # not visible to the units
 
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """The files of a computer, or of a folder that stands for one; says what it does."""
+    """The files of a computer, or of a folder in its place; prints each change."""
 
     root: Path
     dry: bool
 
     def has(self, path: Path) -> bool:
-        """Tell whether there is such a file, or a link of that name."""
+        """Return whether a file or link exists."""
         return os.path.lexists(self.at(path))
 
     def at(self, path: Path) -> Path:
-        """Return where a file of that computer is for us."""
+        """Return the actual path of a file of that computer."""
         return self.root / path.relative_to("/")
 
     def write(self, path: Path, text: str) -> None:
-        """Write a file that is not yet so, whole or not at all."""
+        """Write a file atomically, unless it is unchanged."""
         file = self.at(path)
         if file.exists() and file.read_text(encoding="utf-8") == text:
             print(f"same    {path}")
@@ -62,7 +62,7 @@ class Host:
             part.replace(file)
 
     def remove(self, path: Path) -> None:
-        """Remove a file, if there is one."""
+        """Remove a file, if it exists."""
         if self.has(path):
             print(f"remove  {path}")
             if not self.dry:
@@ -73,26 +73,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
         "--prefix", type=Path, default=here(), metavar="DIR",
-        help="the Python environment that has T2; this one by default",
+        help="the Python environment with T2; this one by default",
     )  # fmt: skip
     parser.add_argument(
         "--root", type=Path, default=Path("/"), metavar="DIR",
-        help="write into this folder as if it were /",
+        help="write into this folder instead of /",
     )  # fmt: skip
-    parser.add_argument("--sim", action="store_true", help="a simulated vehicle, not a real one")
-    parser.add_argument("--dry-run", action="store_true", help="say what it would do, do nothing")
-    parser.add_argument("--uninstall", action="store_true", help="remove units and user again")
+    parser.add_argument(
+        "--sim", action="store_true", help="install a simulated vehicle instead of a real one"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="print the changes without making them"
+    )
+    parser.add_argument("--uninstall", action="store_true", help="remove units and user")
 
 
 def here() -> Path:
-    """Return this environment, by the link that t2-install.sh keeps on it, if there is one."""
+    """Return this environment, or t2-install.sh's link to it, if there is one."""
     prefix = Path(sys.prefix)
     current = prefix.parent / "current"
     return current if current.is_symlink() and current.resolve() == prefix.resolve() else prefix
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write or remove the files, and say what to run next; raise ``RobotError`` before that."""
+    """Write or remove the files, and print the next commands; raise ``RobotError`` before."""
     host = Host(options.root.absolute(), options.dry_run)
     check_rights(host, options.prefix)
     if options.uninstall:
@@ -104,13 +108,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def install(host: Host, prefix: Path, sim: bool) -> None:
-    """Write what is wanted, and remove what an earlier installation had more than that."""
+    """Write all files, and remove further files of an earlier installation."""
     given = [path for path in (SETTINGS, KEYS) if host.has(path)]
-    # They must do for this version.
+    # The settings must be valid for this version.
     load(Everything, Sources(files=(DEFAULT_FILE, *map(host.at, given)), environ={}))
     start = "enable --now t2.target"
     if host.has(UNITS / "t2.target"):
-        start = "restart t2.target  # while the vehicle stands"
+        start = "restart t2.target  # while the vehicle stands still"
     wanted = {USER: template("t2.sysusers")}
     options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
     for name in names_here(sim or host.has(UNITS / SIM)):
@@ -128,20 +132,20 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
 
 
 def uninstall(host: Host) -> None:
-    """Remove all but settings and recordings; raise ``RobotError`` while T2 is enabled."""
+    """Remove all except settings and recordings; raise ``RobotError`` while T2 is enabled."""
     if host.has(ENABLED):
-        raise RobotError("t2.target is enabled: say `systemctl disable --now t2.target` first")
+        raise RobotError("t2.target is enabled: run `systemctl disable --now t2.target` first")
     for path in sorted(ours(host)):
         host.remove(path)
     print("next: systemctl daemon-reload")
-    print(f"{SETTINGS.parent} and /var/lib/t2 are yours, they stay")
+    print(f"{SETTINGS.parent} and /var/lib/t2 are kept")
 
 
-# --- what there is to write ---------------------------------------------------------------------
+# --- files --------------------------------------------------------------------------------------
 
 
 def names() -> list[str]:
-    """Return every unit and drop-in, by its place under a folder of units."""
+    """Return every unit and drop-in, relative to the folder of units."""
     found = [*TEMPLATES.glob("t2*.*"), *TEMPLATES.glob("t2-.service.d/*.conf")]
     kinds = {".service", ".target", ".conf"}
     files = (path for path in found if path.is_file() and path.suffix in kinds)
@@ -149,9 +153,9 @@ def names() -> list[str]:
 
 
 def ours(host: Host) -> set[Path]:
-    """Return every file that an installation may have, but for the settings.
+    """Return every file that an installation may have, except the settings.
 
-    A version with other units than this one's has left its mark in them.
+    Units of other versions are recognised by their mark.
     """
     folder = host.at(UNITS)
     found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
@@ -160,7 +164,7 @@ def ours(host: Host) -> set[Path]:
 
 
 def names_here(sim: bool) -> list[str]:
-    """Return those that this computer is to have, and say which it cannot."""
+    """Return the units for this computer, and print the ones that it cannot run."""
     left_out = {name for name, library in EXTRAS.items() if find_spec(library) is None}
     for name in sorted(left_out):
         print(f"without {name}: {EXTRAS[name]} is not installed")
@@ -177,42 +181,42 @@ def template(name: str) -> str:
 
 
 def systemd_version() -> int:
-    """Return the version of systemd here, 0 where there is none."""
+    """Return the version of systemd, 0 without systemd."""
     try:
-        said = subprocess.run(
+        printed = subprocess.run(
             ["systemctl", "--version"], capture_output=True, text=True, check=False
         ).stdout
     except OSError:
         return 0
-    found = re.match(r"systemd (\d+)", said)
+    found = re.match(r"systemd (\d+)", printed)
     return int(found[1]) if found else 0
 
 
 def settings(sim: bool) -> str:
-    """Return the settings of a robot that has none yet: the vehicle's, and the bus on board."""
+    """Return the initial settings of a robot: vehicle and on-board bus."""
     vehicle = "# A simulated vehicle.\n"
     if not sim:
         vehicle = (DEFAULT_FILE.parent / "vehicle.toml").read_text(encoding="utf-8")
     return vehicle + template("onboard.toml")
 
 
-# --- what must be so ----------------------------------------------------------------------------
+# --- checks -------------------------------------------------------------------------------------
 
 
 def check_rights(host: Host, prefix: Path) -> None:
-    """Raise ``RobotError`` when the files cannot be written."""
+    """Raise ``RobotError`` if the files cannot be written."""
     if host.root == Path("/") and os.geteuid() != 0 and not host.dry:
         raise RobotError(
-            f"wants root, for {UNITS} and {SETTINGS.parent}: say `sudo {prefix}/bin/t2 install`; "
-            "--dry-run or --root DIR show what it would do"
+            f"needs root for {UNITS} and {SETTINGS.parent}: run `sudo {prefix}/bin/t2 install`; "
+            "--dry-run or --root DIR shows the changes"
         )
 
 
 def check_prefix(prefix: Path) -> None:
-    """Raise ``RobotError`` when the services, which see little, would not see T2."""
+    """Raise ``RobotError`` if the sandboxed services could not access T2."""
     for place in HIDDEN:
         if prefix.is_relative_to(place):
             raise RobotError(
-                f"services do not see {place}, and T2 is in {prefix}: install it elsewhere, "
+                f"services cannot access {place}, and T2 is in {prefix}: install it elsewhere, "
                 "as deploy/t2-install.sh does"
             )

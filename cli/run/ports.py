@@ -1,7 +1,7 @@
-"""What ``t2 up`` listens on, checked before it starts anything.
+"""Ports of ``t2 up``, checked before it starts any process.
 
-A second stack on the same ports would be a second safety service on the robot's bus. Each port is
-bound once and released, and claimed while ``t2 up`` runs: of two that start at once, one continues.
+A second stack on the same ports would add a second safety service to the robot's bus. Each port is
+bound once and released, then claimed while ``t2 up`` runs: of two concurrent starts, one continues.
 """
 
 import errno
@@ -16,7 +16,7 @@ from cli.settings import Everything
 from common.errors import LinkError
 from common.settings import BusSettings, protocol
 
-PATIENCE_S = 5.0  # the children of a killed supervisor stop the vehicle meanwhile
+PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1
 
 DATAGRAMS = ("udp", "quic")
@@ -28,8 +28,8 @@ class Port(NamedTuple):
     kind: Literal["tcp", "udp", "unix"]
     host: str  # or the path of a unix socket
     number: int
-    owner: str  # the process
-    setting: str  # that names it
+    owner: str  # process that uses it
+    setting: str  # setting that defines it
 
     def __str__(self) -> str:
         where = self.host if self.kind == "unix" else f"{self.host}:{self.number}"
@@ -37,7 +37,7 @@ class Port(NamedTuple):
 
 
 def wanted(config: Everything, names: Collection[str]) -> list[Port]:
-    """Return what these processes listen on."""
+    """Return the ports of these processes."""
     found: list[Port] = []
     if "router" in names:
         found += routers(config.bus)
@@ -52,22 +52,22 @@ def wanted(config: Everything, names: Collection[str]) -> list[Port]:
 
 
 def routers(bus: BusSettings) -> Iterator[Port]:
-    """Yield what a router listens on."""
+    """Yield the ports of a router."""
     for endpoint in bus.listen:
-        spoken = protocol(endpoint)
+        scheme = protocol(endpoint)
         address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
-        if spoken == "unixsock-stream":
+        if scheme == "unixsock-stream":
             yield Port("unix", address, 0, "router", "bus.listen")
             continue
         host, _, number = address.rpartition(":")
-        kind: Literal["tcp", "udp"] = "udp" if spoken in DATAGRAMS else "tcp"
+        kind: Literal["tcp", "udp"] = "udp" if scheme in DATAGRAMS else "tcp"
         yield Port(kind, host.strip("[]"), int(number), "router", "bus.listen")
 
 
 def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
-    """Check that all are free and return the claims on them, to be closed at the end.
+    """Check that all ports are free and return the claims on them, to close at the end.
 
-    Raise ``LinkError`` naming the first that is not, once patience is over.
+    Raise ``LinkError`` with the first port that is still taken after ``patience_s``.
     """
     claims = ExitStack()
     end_s = time.monotonic() + patience_s
@@ -90,7 +90,7 @@ def _taken(port: Port, claims: ExitStack) -> str:
         _claim(port, claims)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
-            return "another program has it"
+            return "used by another program"
         return f"cannot be bound: {error.strerror}"
     return ""
 
@@ -112,7 +112,7 @@ def _connect(port: Port) -> None:
             sock.connect(port.host)
         except OSError:  # no socket, or a stale one of a killed router
             return
-    raise OSError(errno.EADDRINUSE, "another program has it")
+    raise OSError(errno.EADDRINUSE, "used by another program")
 
 
 def _claim(port: Port, claims: ExitStack) -> None:
@@ -125,7 +125,7 @@ def _claim(port: Port, claims: ExitStack) -> None:
 def _advice(port: Port) -> str:
     if port.owner == "router":
         return (
-            "is a stack running already? `t2 up --no-router` uses the router that is there, and "
-            "--set bus.listen=tcp/127.0.0.1:PORT takes another port"
+            "is a stack already running? `t2 up --no-router` uses the running router, and "
+            "--set bus.listen=tcp/127.0.0.1:PORT selects another port"
         )
-    return f"is a stack running already? --set {port.setting}=PORT takes another port"
+    return f"is a stack already running? --set {port.setting}=PORT selects another port"

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from cli.keys.access import access_control
-from cli.run.router_watch import Watch
+from cli.run.router_probe import RouterProbe
 from common import log, members, realtime
 from common.bus.session import READERS, READERS_ENV, router, router_config
 from common.cli_args import add_sources, sources
@@ -22,17 +22,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
         "--print", nargs="?", const="-", metavar="FILE",
-        help="print the configuration for `zenohd -c`, or write it to FILE, and end",
+        help="print the configuration for `zenohd -c`, or write it to FILE, and exit",
     )  # fmt: skip
     add_insecure(parser)
     add_sources(parser)
 
 
 def add_insecure(parser: argparse.ArgumentParser) -> None:
-    """Add the option that opens a robot to its network."""
+    """Add the option that disables TLS and certificates."""
     parser.add_argument(
         "--insecure", action="append_const", dest="sets", const="bus.insecure=true", default=[],
-        help="let everybody on the network in, to drive as well: no TLS, no certificates",
+        help="allow everyone on the network to connect and drive: no TLS, no certificates",
     )  # fmt: skip
 
 
@@ -42,29 +42,29 @@ def run(options: argparse.Namespace) -> int:
     access = access_of(config.bus)
     if options.print:
         printed = json.dumps(router_config(config.bus, access, config.robot.id), indent=2)
-        tell(printed, options.print)
+        write_text(printed, options.print)
         return 0
-    os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, when it is first used
+    os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, on first use
     if config.robot.realtime:
         realtime.ask(realtime.ROUTER)
     log.configure(config.log, "router")
     if config.robot.realtime and not realtime.priority():
         log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
-    watch = Watch(config.bus, config.log)
+    probe = RouterProbe(config.bus, config.log)
     for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda *_: watch.stop())
+        signal.signal(name, lambda *_: probe.stop())
     systemd = Systemd()
     with router(config.bus, access, config.robot.id):
         listen = list(config.bus.listen)
         log.Logger().info("started", listen=listen, open_to=open_to(config.bus))
-        # Routing happens in Zenoh's own threads: that this one lives says nothing about them.
-        watch.run(lambda: systemd.ready(time.monotonic_ns()))
+        # Zenoh routes in its own threads: only an answer proves that they work.
+        probe.run(lambda: systemd.ready(time.monotonic_ns()))
         systemd.stopping()
     return 0
 
 
-def tell(text: str, file: str) -> None:
-    """Print a text, or write it to a file; raise ``ConfigError`` when that cannot be written."""
+def write_text(text: str, file: str) -> None:
+    """Print a text, or write it to a file; raise ``ConfigError`` if it cannot be written."""
     if file == "-":
         print(text)
         return
@@ -75,9 +75,9 @@ def tell(text: str, file: str) -> None:
 
 
 def access_of(bus: BusSettings) -> dict[str, object] | None:
-    """Return who may do what; None where everybody who gets in may do everything.
+    """Return the access rules; None without a member list: all clients have full access.
 
-    Raise ``ConfigError`` when the list of members cannot be read.
+    Raise ``ConfigError`` if the member list cannot be read.
     """
     if not bus.members:
         return None
@@ -85,11 +85,11 @@ def access_of(bus: BusSettings) -> dict[str, object] | None:
 
 
 def open_to(bus: BusSettings) -> str:
-    """Say in words who is let in."""
+    """Describe the admitted clients."""
     if bus.insecure:
-        who = "everybody on the network, without a certificate"
+        clients = "everyone on the network, without a certificate"
     elif any(map(is_encrypted, bus.listen)):
-        who = "this machine, and members with a certificate"
+        clients = "this machine, and members with a certificate"
     else:
-        who = "every program on this machine"
-    return ", and ".join((who, *(f"whom the router {each} lets in" for each in bus.uplink)))
+        clients = "every program on this machine"
+    return ", and ".join((clients, *(f"clients of the router {each}" for each in bus.uplink)))

@@ -1,7 +1,7 @@
-"""Attempts to reach a router, and whether too many of them had no answer. Pure.
+"""Hang detection: attempts to reach a router, and how many stay without an answer. Pure.
 
 An attempt is a new session and one query. It has a deadline (``bus.probe_deadline``), and one
-begins every half of it, whatever the result of earlier ones. ``MISSES`` in a row mean a hang: a
+begins every half deadline, whatever the result of earlier ones. ``MISSES`` in a row mean a hang: a
 single one may be a stall.
 
 A hang is found a deadline and a half after the first attempt that meets it: within 2 s by default.
@@ -19,7 +19,7 @@ class Attempts:
         self._due_ns = now_ns
         self._looked_ns = now_ns
         self._number = 0
-        self._begun_ns: dict[int, int] = {}  # of those that wait for an answer, by number
+        self._begun_ns: dict[int, int] = {}  # pending attempts, by number
         self._missed = 0
         self._forgiven = False
 
@@ -33,7 +33,7 @@ class Attempts:
         return self._number
 
     def end(self, number: int, answered: bool) -> bool:
-        """Take the end of an attempt; return whether it was an answer in time."""
+        """End an attempt; return whether it was answered in time."""
         if self._begun_ns.pop(number, None) is None:
             return False
         self._missed = 0 if answered else self._missed + 1
@@ -45,7 +45,7 @@ class Attempts:
         """Return whether the router hangs; call it more often than every ``STALL_NS``."""
         stalled = now_ns - self._looked_ns > STALL_NS
         self._looked_ns = now_ns
-        if stalled and not self._forgiven:  # once: a probe that is starved still has to act
+        if stalled and not self._forgiven:  # only once: a starved probe must still act
             self._forgiven = True
             self._missed = 0
             self._begun_ns.clear()

@@ -1,29 +1,37 @@
-"""``python -m cli.run.router_probe BUS``: kills the router that started it when that hangs.
+"""The probe of a router: a process that kills the router when it hangs.
 
-A working old session is no evidence for a new one: key expressions can make Zenoh compute for
-minutes, and ``t2 estop`` then gets no session. So the probe opens a new session each time. It is a
+A working old session is no evidence for a new one: key expressions can keep Zenoh busy for minutes,
+and ``t2 estop`` then gets no session. So the probe opens a new session for each attempt. It is a
 process of its own with the next higher priority, because hung threads may use a whole processor.
 
-It writes a byte to its standard output for each answer in time, and ends with its parent.
+The router starts its probe with ``RouterProbe``: ``python -m cli.run.router_probe SETUP``. The
+probe writes a byte to its standard output for each answer in time, and ends with its parent.
 """
 
 import os
 import queue
 import signal
+import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import msgspec
 
 from cli.run.router_attempts import MISSES, Attempts
-from common import log, realtime
+from common import child_process, realtime
+from common import log as logs
+from common.backoff import Backoff
 from common.bus.answering import answers, router_at
+from common.bus.session import READERS_ENV
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Log
 
 LOOK_S = 0.1
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # they reach the group; the parent decides
+# One thread pool for the probe: further threads only cost wake-ups.
+POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
 
 
 class Setup(msgspec.Struct, frozen=True):
@@ -34,6 +42,53 @@ class Setup(msgspec.Struct, frozen=True):
     log: Log
 
 
+# --- in the router ------------------------------------------------------------------------------
+
+
+class RouterProbe:
+    """Keeps a probe of this process running until ``stop``; restarts it whenever it ends."""
+
+    def __init__(self, bus: BusSettings, log: Log) -> None:
+        setup = Setup(parent=os.getpid(), bus=bus, log=log)
+        text = msgspec.json.encode(setup).decode()
+        self._command = child_process.command("cli.run.router_probe", text)
+        self._probe: subprocess.Popen[bytes] | None = None
+        self._stopped = threading.Event()
+        self._backoff = Backoff()
+
+    def run(self, on_answer: Callable[[], None]) -> None:
+        """Probe until ``stop``; call ``on_answer`` for each answer of the router."""
+        while not self._stopped.is_set():
+            started_s = time.monotonic()
+            try:
+                self._follow(on_answer)
+            except OSError as error:  # no memory, no process: the router continues without a probe
+                logs.Logger().error("the probe cannot run", reason=error.strerror)
+            if not self._stopped.is_set():
+                wait_s = self._backoff.after(time.monotonic() - started_s)
+                logs.Logger().error("the probe ended, starts again", wait_s=wait_s)
+                self._stopped.wait(wait_s)
+
+    def stop(self) -> None:
+        """Make ``run`` return; safe in a signal handler."""
+        self._stopped.set()
+        if self._probe is not None:
+            self._probe.kill()
+
+    def _follow(self, on_answer: Callable[[], None]) -> None:
+        with subprocess.Popen(
+            self._command, stdout=subprocess.PIPE, env=child_process.environ() | {READERS_ENV: POOL}
+        ) as self._probe:
+            if self._stopped.is_set():  # stopped while the probe started
+                self._probe.kill()
+            assert self._probe.stdout is not None
+            while os.read(self._probe.stdout.fileno(), 64):
+                on_answer()
+
+
+# --- in the probe -------------------------------------------------------------------------------
+
+
 def main(text: str) -> int:
     """Probe until the parent has ended, or hangs and is killed."""
     for number in ENDS:
@@ -42,9 +97,9 @@ def main(text: str) -> int:
         realtime.ask(realtime.PROBE)
         realtime.limit()
     setup = msgspec.json.decode(text, type=Setup)
-    written = log.configure(setup.log, "router")
+    written = logs.configure(setup.log, "router")
     if watch(setup.parent, router_at(setup.bus)):
-        log.Logger().error(
+        logs.Logger().error(
             "the router hangs: killed for a restart",
             unanswered=MISSES,
             seconds=setup.bus.probe_deadline,
@@ -54,7 +109,7 @@ def main(text: str) -> int:
 
 
 def watch(parent: int, where: BusSettings) -> bool:
-    """Return whether the parent was killed; False when it ended by itself."""
+    """Return whether the parent was killed; False if it ended by itself."""
     attempts = Attempts(time.monotonic_ns(), round(where.probe_deadline * NS_PER_S))
     ended: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
     while os.getppid() == parent:

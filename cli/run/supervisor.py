@@ -1,6 +1,6 @@
-"""Processes that belong together: started, restarted when they crash, ended in order.
+"""Supervisor: starts processes, restarts them after a crash, and stops them in order.
 
-A process that says that a restart will not help (exit codes 78 and 69) ends them all.
+If a process exits with a code for which a restart does not help (78 and 69), all are stopped.
 """
 
 import ctypes
@@ -20,16 +20,16 @@ from common.backoff import Backoff
 from common.cli_args import HOPELESS
 from common.log import Logger
 
-PATIENCE_S = 5.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s for the vehicle to stand
+PATIENCE_S = 5.0  # from SIGTERM to SIGKILL; a bridge may wait 1 s until the vehicle stands still
 LOOK_S = 0.1
 PR_SET_PDEATHSIG = 1
-# Found before any fork: between fork and exec a process with other threads must not load anything.
+# Loaded before any fork: a process with threads must not load a library between fork and exec.
 _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
 
 
 @dataclass(slots=True)
 class Child:
-    """One process and when it may be started again."""
+    """A process, and the time of its next start."""
 
     name: str
     command: Sequence[str]
@@ -40,9 +40,9 @@ class Child:
 
 
 class Supervisor:
-    """Keeps processes running until ``stop``; those named first are ended last.
+    """Keeps processes running until ``stop``; stops them in reverse order.
 
-    Their output goes to ``output``, or where the supervisor's own goes.
+    Their output goes to ``output``, or to the supervisor's own output.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Supervisor:
         self._log = Logger()
 
     def run(self) -> int:
-        """Keep them running; return 0 after ``stop``, or the exit code of a hopeless one."""
+        """Keep them running; return 0 after ``stop``, or the exit code of a hopeless process."""
         code = 0
         try:
             while not self._stopped and not code:
@@ -65,16 +65,16 @@ class Supervisor:
         return code
 
     def end(self) -> None:
-        """End them all, the last one first."""
+        """Stop all processes, the last one first."""
         for child in reversed(self.children):
             _end(child)
 
     def stop(self) -> None:
-        """Let ``run`` end them all; safe in a signal handler."""
+        """Make ``run`` stop all processes and return; safe in a signal handler."""
         self._stopped = True
 
     def look(self, now_s: float) -> int:
-        """Start what is due and notice what has ended; return the code of a hopeless one, or 0."""
+        """Start due processes, handle ended ones; return the code of a hopeless process, or 0."""
         for child in self.children:
             if child.process is None and now_s >= child.due_s:
                 child.process = _start(child.command, self._output)
@@ -84,19 +84,19 @@ class Supervisor:
                 self._log.error("cannot run", process=child.name, exit_code=code)
                 return int(code or 0)
             if code is not None:
-                self._bury(child, code, now_s)
+                self._schedule_restart(child, code, now_s)
         return 0
 
-    def _bury(self, child: Child, code: int, now_s: float) -> None:
+    def _schedule_restart(self, child: Child, code: int, now_s: float) -> None:
         wait_s = child.backoff.after(now_s - child.started_s)
         child.process, child.due_s = None, now_s + wait_s
         self._log.error("ended, starts again", process=child.name, exit_code=code, wait_s=wait_s)
 
 
 def _start(command: Sequence[str], output: BinaryIO | None) -> "subprocess.Popen[bytes]":
-    # A session of its own keeps ctrl-c from reaching all at once: the bridge must find its board
-    # still there when it stops the vehicle. A kill of the supervisor's session or group leaves
-    # the bridge and its guard: they stop the vehicle by the signal that the system sends them then.
+    # In a session of its own, a child does not receive the terminal's Ctrl-C: the board must still
+    # run when the bridge stops the vehicle. If the supervisor's session or group is killed, the
+    # bridge and its guard survive and stop the vehicle on the parent-death signal.
     return subprocess.Popen(
         command,
         env=child_process.environ(),
@@ -108,10 +108,10 @@ def _start(command: Sequence[str], output: BinaryIO | None) -> "subprocess.Popen
 
 
 def _die_with_parent(parent: int) -> None:
-    """Have the system end the child when the supervisor is killed; other systems do without."""
+    """Request SIGTERM for the child when the supervisor dies (Linux only)."""
     if _prctl is not None:
         _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != parent:  # killed before that
+        if os.getppid() != parent:  # it died before the request
             os._exit(1)
 
 

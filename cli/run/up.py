@@ -1,4 +1,4 @@
-"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c."""
+"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C."""
 
 import argparse
 import signal
@@ -19,10 +19,12 @@ Commands = list[tuple[str, Sequence[str]]]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--no-sim", action="store_true", help="the board is a real one")
-    parser.add_argument("--only", metavar="NAME", help="this one alone, such as bridge")
-    parser.add_argument("--world", help="where the simulated vehicle stands; sim.world by default")
-    parser.add_argument("--no-router", action="store_true", help="one is running, such as zenohd")
+    parser.add_argument("--no-sim", action="store_true", help="use a real board")
+    parser.add_argument("--only", metavar="NAME", help="start only this process, such as bridge")
+    parser.add_argument("--world", help="world of the simulated vehicle; sim.world by default")
+    parser.add_argument(
+        "--no-router", action="store_true", help="use a running router, such as zenohd"
+    )
     add_insecure(parser)
     add_sources(parser)
 
@@ -33,13 +35,13 @@ def run(options: argparse.Namespace) -> int:
     if config.robot.realtime:
         realtime.ask(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
-    started = chosen([*commands(options), *recorder(options)], options.only)
+    started = selected([*commands(options), *recorder(options)], options.only)
     with claimed(wanted(config, [name for name, _ in started])):
         return supervised(started, config, simulated=not options.no_sim)
 
 
 def supervised(started: Commands, config: Everything, *, simulated: bool) -> int:
-    """Keep these running until a signal."""
+    """Supervise these processes until a signal."""
     supervisor = Supervisor(started)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
@@ -53,18 +55,18 @@ def supervised(started: Commands, config: Everything, *, simulated: bool) -> int
     return supervisor.run()
 
 
-def chosen(all_of_them: Commands, only: str | None) -> Commands:
-    """Return the one that is wanted, or all; raise ``ConfigError`` for one that there is not."""
-    names = [name for name, _ in all_of_them]
+def selected(available: Commands, only: str | None) -> Commands:
+    """Return the selected process, or all; raise ``ConfigError`` for an unknown name."""
+    names = [name for name, _ in available]
     if only is not None and only not in names:
-        raise ConfigError(f"--only {only}: no such process; there are {', '.join(names)}")
-    return [each for each in all_of_them if only in (None, each[0])]
+        raise ConfigError(f"--only {only}: no such process; available: {', '.join(names)}")
+    return [each for each in available if only in (None, each[0])]
 
 
 def commands(options: argparse.Namespace) -> Commands:
-    """Return what is run, by name: the later ones stand on the earlier ones."""
+    """Return the commands by name: later processes depend on earlier ones."""
     passed = passed_on(options)
-    # Demo, soak and tests make options of their own, and always want a router.
+    # Demo, soak and tests create their own options, and always need a router.
     modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
     if not options.no_sim:
         modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
@@ -73,13 +75,13 @@ def commands(options: argparse.Namespace) -> Commands:
 
 
 def recorder(options: argparse.Namespace) -> Commands:
-    """Return the black box, where its library is installed: nobody waits for it."""
+    """Return the recorder's command, if its library is installed."""
     if find_spec("mcap") is None:
         return []
     return [("recorder", child_process.command("services.recorder", *passed_on(options)))]
 
 
 def passed_on(options: argparse.Namespace) -> list[str]:
-    """Return the options that say where settings come from, as they were given."""
+    """Return the options that select the settings, as given."""
     files = [word for file in options.config or () for word in ("--config", str(file))]
     return files + [word for text in options.sets for word in ("--set", text)]

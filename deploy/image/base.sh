@@ -1,7 +1,7 @@
 #!/bin/sh
-# base.sh TAG [MIRROR]: make the image TAG to build on (`--build-arg BASE=TAG`) from Debian's own
-# packages, where no registry can be reached. Wants root, Docker and debootstrap. SUITE names
-# another release; its Python has to be the one that the wheelhouse was made for.
+# base.sh TAG [MIRROR]: create the base image TAG (`--build-arg BASE=TAG`) from Debian packages, for
+# hosts without a registry. Needs root, Docker and debootstrap. SUITE selects another release; its
+# Python version must match the wheelhouse.
 set -eu
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT

@@ -1,7 +1,7 @@
 #!/bin/sh
-# collect.sh FOLDER: copy what /opt/venv needs to run into FOLDER, but for what an earlier call has
-# copied: Python, its library, the shared libraries of both, and the venv. Byte code is made here,
-# because the images are read-only: without it each start would compile all that it imports.
+# collect.sh FOLDER: copy the runtime of /opt/venv into FOLDER, without files that an earlier call has
+# copied: Python, its library, their shared libraries, and the venv. It also compiles byte code: the
+# images are read-only, and without it each start would compile all imports.
 set -eu
 export LC_ALL=C
 to=$1
@@ -12,24 +12,24 @@ mkdir -p "$to"
 python=$(command -v python3)
 library=$(python3 -c 'import sysconfig; print(sysconfig.get_path("stdlib"))')
 
-# Nobody tests Python here, builds with it, draws with Tk or asks NIS. What ends in _cffi is for PyPy.
+# Excluded: Python's tests, build files, Tk and NIS. Files that end in _cffi are for PyPy.
 find "$library" \( -name test -o -name tests -o -name idlelib -o -name tkinter -o -name turtledemo \
     -o -name ensurepip -o -name distutils -o -name lib2to3 -o -name pydoc_data -o -name 'config-3*' \
     -o -name site-packages -o -name dist-packages -o -name __pycache__ -o -name sitecustomize.py \
     -o -name '_tkinter*' -o -name '_test*' -o -name '_ctypes_test*' -o -name 'xxlimited*' \
     -o -name 'nis.*' -o -name '_dbm.*' -o -name '_gdbm.*' \) -prune \
   -o ! -type d -print >/opt/files
-# Tests, manuals, examples and stubs of packages; fonts of PDF; AVIF, which no picture of ours is.
+# Excluded: tests, manuals, examples and stubs of packages; PDF fonts; AVIF, which T2 does not use.
 find /opt/venv \( -name __pycache__ -o -name tests -o -name '*.pyi' -o -path '*/zstandard/_cffi*' \
     -o -path '*/pygame/docs' -o -path '*/pygame/examples' -o -path '*/mpl-data/sample_data' \
     -o -path '*/mpl-data/fonts/afm' -o -path '*/mpl-data/fonts/pdfcorefonts' \
     -o -name 'libavif*' -o -name '_avif.*' \) -prune -o ! -type d -print >>/opt/files
-# Symbols are for debuggers; a base without binutils keeps them. strip breaks what auditwheel patched,
-# so only extensions without libraries of their own are stripped.
+# Remove debug symbols, if the base has binutils. strip breaks libraries that auditwheel has patched,
+# so strip only extensions without bundled libraries.
 if command -v strip >/dev/null; then
   grep -E '^/opt/venv/.*(\.abi3\.so|/zstandard/.*\.so)$' /opt/files | xargs -r strip --strip-unneeded
 fi
-# A library stands under the name that it is asked for by, whatever that is a link to.
+# Copy each library under its requested name, and follow links.
 grep '\.so' /opt/files | xargs ldd "$python" 2>/dev/null \
   | sed -n 's/^\t\(.* => \)\{0,1\}\(\/[^ ]*\) (0x.*/\2/p' | sort -u | grep -v '^/opt/venv/' >/opt/links
 echo "$python" >>/opt/links

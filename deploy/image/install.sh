@@ -1,5 +1,5 @@
 #!/bin/sh
-# install.sh LOCK | t2: have pip install a lock, or T2 itself, into /opt/venv.
+# install.sh LOCK | t2: install a lock file, or T2 itself, into /opt/venv.
 set -eu
 source=/opt/src
 wheels=$source/build/wheelhouse

@@ -12,11 +12,11 @@ from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.bus.publisher import Publisher
+from common.motion import Command
 from common.service import Node
 from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
 from services.bridge.guard_ipc import Handover, Heartbeat
-from services.bridge.lease import Order
 from services.bridge.output import Output, Send
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import Timings
@@ -137,7 +137,7 @@ class Bridge:
             answer.give()
 
     def _send(self, send: Send) -> None:
-        if send.order is Order.BRAKE:
+        if send.order is Command.BRAKE:
             self._brake(send)
             return
         self._sockets.send(send.datagram, send.port)

@@ -24,12 +24,12 @@ from typing import Any
 from common import messages as m
 from common.errors import WireError
 from common.freshness import Latest
+from common.motion import Command
 from common.wire import reports
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
 from common.wire.header import OPENING
 from services.bridge.config import BridgeConfig
-from services.bridge.lease import Order
 from services.bridge.link_report import LinkReport
 from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
@@ -248,7 +248,7 @@ class Core:
     def start(self) -> Output:
         """Return the first frame: STOP."""
         out = Output()
-        self.motions.order(Order.STOP, out)
+        self.motions.order(Command.STOP, out)
         return out
 
     def tick(self, now_ns: int, send_errors: int) -> Output:

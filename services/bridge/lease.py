@@ -43,20 +43,11 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Motion
+from common.motion import BRAKE, RUN, STOP, Command
 
 STOP_PERIOD_NS = NS_PER_S // 20
 AT_ONCE = -STOP_PERIOD_NS  # as a send time: so long ago that the next STOP is due
 SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 90 decisions a second
-STANDING_MPS = 0.02
-STANDING_RADPS = 0.05  # 3 deg/s: the board's own resolution is 0.1 deg/s, its sensor is noisier
-
-
-class Order(StrEnum):
-    """What the next frame asks of the board."""
-
-    RUN = "run"
-    STOP = "stop"
-    BRAKE = "brake"
 
 
 class Refusal(StrEnum):
@@ -110,14 +101,14 @@ class Lease(Struct, frozen=True):
 
 def on_motion(
     lease: Lease, motion: Motion, now_ns: int, lease_ns: int, own_boot: int, *, received_ns: int
-) -> tuple[Lease, Order | None, Refusal | None]:
+) -> tuple[Lease, Command | None, Refusal | None]:
     """Judge one motion message; return the order to send, if any, and what was refused."""
     if refusal := _refusal(lease, motion, now_ns, lease_ns):
         return lease, None, refusal
     if now_ns - received_ns > lease_ns:
-        brake = motion.command == "brake"
+        brake = motion.command is BRAKE
         lease = replace(lease, braked=True) if brake else lease
-        return lease, Order.BRAKE if brake else None, Refusal.LATE
+        return lease, BRAKE if brake else None, Refusal.LATE
     if motion.boot != lease.boot:
         lease = replace(lease, boot=motion.boot)  # the end of the last one's took the neutral
     lease = expire(lease, now_ns, lease_ns)
@@ -130,7 +121,7 @@ def on_motion(
     order, refusal = _order(lease, motion)
     # A RUN that moves is obeyed only when the lease is neutral already.
     neutral = lease.neutral or (lease.ready and refusal is None)
-    braked = order is Order.BRAKE
+    braked = order is BRAKE
     return replace(lease, neutral=neutral, sent_ns=now_ns, braked=braked), order, refusal
 
 
@@ -146,7 +137,7 @@ def _refusal(lease: Lease, motion: Motion, now_ns: int, lease_ns: int) -> Refusa
 
 def is_neutral(motion: Motion) -> bool:
     """Return whether a motion moves nothing."""
-    return motion.command != "run" or (motion.linear == 0 and motion.angular == 0)
+    return motion.command is not RUN or (motion.linear == 0 and motion.angular == 0)
 
 
 def _latched_by(lease: Lease, motion: Motion) -> int | None:
@@ -157,32 +148,32 @@ def _latched_by(lease: Lease, motion: Motion) -> int | None:
     return motion.boot if knows else lease.latched_by
 
 
-def _order(lease: Lease, motion: Motion) -> tuple[Order, Refusal | None]:
+def _order(lease: Lease, motion: Motion) -> tuple[Command, Refusal | None]:
     if lease.hit is not None or lease.uncommanded:
         refusal = Refusal.NOT_HEIR if lease.hit is None else Refusal.NOT_JUDGED
-        return Order.BRAKE, refusal if motion.command == "run" else None
-    if motion.command != "run":
-        return Order(motion.command), None
+        return BRAKE, refusal if motion.command is RUN else None
+    if motion.command is not RUN:
+        return motion.command, None
     if lease.latched_by not in (None, motion.boot):
-        return Order.STOP, Refusal.NOT_HEIR
+        return STOP, Refusal.NOT_HEIR
     if not lease.ready:
-        return Order.STOP, Refusal.NOT_READY
+        return STOP, Refusal.NOT_READY
     if not (lease.neutral or is_neutral(motion)):
-        return Order.STOP, Refusal.NOT_NEUTRAL
-    return Order.RUN, None
+        return STOP, Refusal.NOT_NEUTRAL
+    return RUN, None
 
 
-def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
+def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
     """Answer the first sample of a bumper hit: the reflex."""
-    return replace(lease, hit=seq, sent_ns=now_ns), Order.BRAKE
+    return replace(lease, hit=seq, sent_ns=now_ns), BRAKE
 
 
-def on_uncommanded(lease: Lease, now_ns: int, own_boot: int) -> tuple[Lease, Order | None]:
+def on_uncommanded(lease: Lease, now_ns: int, own_boot: int) -> tuple[Lease, Command | None]:
     """Latch that the vehicle moved away from where it stood while the lease is over."""
     if lease.over_since_ns is None or lease.uncommanded:
         return lease, None
     moved = replace(lease, uncommanded=True, latched_by=own_boot, sent_ns=now_ns)
-    return moved, Order.BRAKE
+    return moved, BRAKE
 
 
 def on_ready(lease: Lease, ready: bool) -> Lease:
@@ -201,7 +192,7 @@ def expire(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
 
 def on_tick(
     lease: Lease, now_ns: int, lease_ns: int, coast_ns: int, standing: bool
-) -> tuple[Lease, Order | None]:
+) -> tuple[Lease, Command | None]:
     """Return what must be sent by now although no motion message asked for it."""
     lease = expire(lease, now_ns, lease_ns)
     if lease.over_since_ns is None and lease.ready:
@@ -211,9 +202,4 @@ def on_tick(
     since_ns = lease.over_since_ns
     coasted = since_ns is not None and now_ns - since_ns > coast_ns
     brake = lease.braking or (coasted and not standing)
-    return replace(lease, sent_ns=now_ns), Order.BRAKE if brake else Order.STOP
-
-
-def standing(linear: float, angular: float) -> bool:
-    """Tell whether a measured velocity (m/s, rad/s) counts as standstill."""
-    return abs(linear) < STANDING_MPS and abs(angular) < STANDING_RADPS
+    return replace(lease, sent_ns=now_ns), BRAKE if brake else STOP

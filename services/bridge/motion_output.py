@@ -5,11 +5,12 @@ from collections import Counter
 from common.errors import MessageError
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Motion, Velocity
+from common.motion import BRAKE, STOP, Command, is_standing
 from common.wire.frame import Frame
 from common.wire.framing import Framing
 from services.bridge import lease
 from services.bridge.config import Bridge as Settings
-from services.bridge.lease import Lease, Order, Refusal
+from services.bridge.lease import Lease, Refusal
 from services.bridge.output import Output, Send
 from services.bridge.standstill import Standstill
 from services.bridge.translate import Translator, check_finite
@@ -38,7 +39,7 @@ class MotionOutput:
         self._framing = framing
         self._translator = translator
         self._counters = counters
-        self._brake = framing.pack(translator.command(Order.BRAKE))
+        self._brake = framing.pack(translator.command(BRAKE))
         self._velocity: tuple[Velocity, int] | None = None
         self._stopping_ns: int | None = None
         self._reported: set[tuple[Refusal, int]] = set()  # refused senders that had an event
@@ -66,7 +67,7 @@ class MotionOutput:
         if order is not None:
             self.order(order, out, motion)
             out.obeyed = True
-            out.judged = hit is not None and self.lease.hit is None and order is Order.BRAKE
+            out.judged = hit is not None and self.lease.hit is None and order is BRAKE
         self._report(refusal, motion, out)
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
@@ -80,7 +81,7 @@ class MotionOutput:
 
     def brake(self) -> Send:
         """Return a BRAKE frame."""
-        return Send(self._brake, self.port, Order.BRAKE)
+        return Send(self._brake, self.port, BRAKE)
 
     def on_hit(self, seq: int, now_ns: int) -> None:
         """Take in a hit, in the sample that will be published as ``seq``."""
@@ -112,7 +113,7 @@ class MotionOutput:
         if self._stopping_ns is None:
             self._stopping_ns = now_ns
             self.on_ready(False)
-            self.order(Order.BRAKE if self.lease.braking else Order.STOP, out)
+            self.order(BRAKE if self.lease.braking else STOP, out)
 
     def is_stopped(self, now_ns: int) -> bool:
         """Return whether the vehicle stands after ``stop``, or had a second to do so."""
@@ -121,7 +122,7 @@ class MotionOutput:
 
     def on_exit(self, now_ns: int, out: Output) -> None:
         """Leave no RUN behind, whatever ends the bridge; the board stops nothing by itself."""
-        self.order(Order.STOP if self._rests(now_ns) else Order.BRAKE, out)
+        self.order(STOP if self._rests(now_ns) else BRAKE, out)
 
     def _rests(self, now_ns: int) -> bool:
         """Return whether the vehicle was seen to stand since the bridge began to stop."""
@@ -133,9 +134,9 @@ class MotionOutput:
         """Send a query or a setting to the board."""
         out.sends.append(Send(self._framing.pack(frame), port))
 
-    def order(self, order: Order, out: Output, motion: Motion | None = None) -> None:
+    def order(self, order: Command, out: Output, motion: Motion | None = None) -> None:
         """Send the frame of an order."""
-        if order is Order.BRAKE:
+        if order is BRAKE:
             out.sends.append(self.brake())
             return
         datagram = self._framing.pack(self._translator.command(order, motion))
@@ -150,7 +151,7 @@ class MotionOutput:
             return True
         velocity, measured_ns = self._velocity
         fresh = now_ns - measured_ns <= self._silence_ns
-        return fresh and lease.standing(velocity.linear, velocity.angular)
+        return fresh and is_standing(velocity.linear, velocity.angular)
 
     def _report(self, refusal: Refusal | None, motion: Motion, out: Output) -> None:
         if refusal is not None:

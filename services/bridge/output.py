@@ -5,7 +5,7 @@ from typing import Any
 from msgspec import Struct, field
 
 from common.messages import Level, Message
-from services.bridge.lease import Order
+from common.motion import Command
 
 
 class Send(Struct, frozen=True):
@@ -13,7 +13,7 @@ class Send(Struct, frozen=True):
 
     datagram: bytes
     port: int
-    order: Order | None = None  # of a motion command
+    order: Command | None = None  # of a motion command
 
 
 class Event(Struct, frozen=True):

@@ -1,9 +1,9 @@
 """The reflex: BRAKE for a bumper hit, before anything else is read of its datagram. Pure."""
 
+from common.motion import Command
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport
-from services.bridge.lease import Order
 from services.bridge.output import Send
 
 
@@ -18,7 +18,7 @@ class Reflex:
 
     def answer(self, datagram: bytes, port: int) -> Send | None:
         """Return BRAKE, from this port, when a datagram holds a pressed bumper."""
-        return Send(self._brake, port, Order.BRAKE) if self._is_hit(datagram) else None
+        return Send(self._brake, port, Command.BRAKE) if self._is_hit(datagram) else None
 
     def _is_hit(self, datagram: bytes) -> bool:
         if datagram == self._hit:

@@ -27,7 +27,7 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
-from services.bridge.lease import STANDING_MPS, STANDING_RADPS, standing
+from common.motion import STANDING_MPS, STANDING_RADPS, is_standing
 
 SLACK_S = 0.5
 AWAY_M, AWAY_RAD = 0.05, 0.05
@@ -82,7 +82,7 @@ class Standstill:
             return
         travel = self._travel
         if before is None or travel is None:
-            self._travel = Travel() if standing(velocity.linear, velocity.angular) else None
+            self._travel = Travel() if is_standing(velocity.linear, velocity.angular) else None
             return
         elapsed_s = min(now_ns - before[1], self._silence_ns) / NS_PER_S
         kept = 1 - elapsed_s / LEAK_S

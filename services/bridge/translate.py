@@ -10,6 +10,7 @@ import math
 from common.codec import finite
 from common.errors import MessageError, WireError
 from common.messages import Bumper, Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
+from common.motion import BRAKE, RUN, STOP, Command, clamp
 from common.settings import Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import MAGNITUDE_MAX
@@ -20,7 +21,6 @@ from common.wire.reports import (
     UltrasonicReport,
     VelocityReport,
 )
-from services.bridge.lease import Order
 
 MM = 1000.0
 PER_RADIAN = {"decidegree": 1800.0 / math.pi, "milliradian": 1000.0}
@@ -29,7 +29,11 @@ PLAUSIBLE_MPS = 5.0
 PLAUSIBLE_RADPS = 10.0
 
 FAULT_NAMES = ("over_current", "over_voltage", "encoder", "under_voltage", "overload")
-KINDS = {Order.STOP: MotionKind.STOP, Order.RUN: MotionKind.RUN, Order.BRAKE: MotionKind.BREAK}
+KINDS = {
+    STOP: MotionKind.STOP,
+    RUN: MotionKind.RUN,
+    BRAKE: MotionKind.BREAK,
+}
 
 
 class Translator:
@@ -43,9 +47,9 @@ class Translator:
         self._max_linear = max_linear
         self._max_angular = max_angular
 
-    def command(self, order: Order, motion: Motion | None = None) -> MotionCommand:
+    def command(self, order: Command, motion: Motion | None = None) -> MotionCommand:
         """Return the frame for an order; a RUN carries the motion, clamped to the limits."""
-        if order is not Order.RUN or motion is None:
+        if order is not RUN or motion is None:
             return MotionCommand(KINDS[order])
         linear = clamp(motion.linear, self._max_linear) * MM
         angular = clamp(motion.angular, self._max_angular) * self._commanded_per_radian
@@ -83,7 +87,7 @@ class Translator:
 
 def check_finite(motion: Motion) -> None:
     """Raise ``MessageError`` for NaN and infinity in a RUN, which pass a typed decode."""
-    if motion.command == "run" and not finite(motion.linear, motion.angular):
+    if motion.command is RUN and not finite(motion.linear, motion.angular):
         raise MessageError(f"motion of {motion.linear} m/s, {motion.angular} rad/s is not finite")
 
 
@@ -95,11 +99,6 @@ def driver(frame: DriverReport) -> Driver:
         if frame.fault_bits >> bit & 1
     )
     return Driver(faults=names, bits=frame.fault_bits)
-
-
-def clamp(value: float, limit: float) -> float:
-    """Return the value, not beyond the limit either way."""
-    return max(-limit, min(limit, value))
 
 
 class BumperFilter:

@@ -26,6 +26,7 @@ from enum import Enum
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import Direction
+from common.motion import clamp
 
 SNAPSHOTS_KEPT = 64  # 3 s; an older one is too old for any setting
 
@@ -89,7 +90,7 @@ class DriverLock:
         if self.state is HoldState.HELD and sent_ns < self._answered_ns:
             return False  # reordered: a newer one was received before
         self.state, self._answered_ns, self.answered = HoldState.HELD, sent_ns, snapshot
-        self.push = Push(clamp(push.linear), clamp(push.angular), push.release)
+        self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
         return True
 
     def let_go(self, viewer: str) -> None:
@@ -114,8 +115,3 @@ class DriverLock:
         """Change the gear, as the driver."""
         if viewer == self.driver:
             self.gear = gear
-
-
-def clamp(value: float) -> float:
-    """Return the value within -1..1."""
-    return max(-1.0, min(1.0, value))

@@ -14,6 +14,7 @@ from common.bus.bus import Arrival, Bus
 from common.codec import finite
 from common.keys import Call, Topic
 from common.log import Logger
+from common.motion import Twist
 from common.operator import (
     DriveRequests,
     EstopRepetition,
@@ -21,7 +22,6 @@ from common.operator import (
     Phase,
     ReleaseCalls,
     ResetCheck,
-    Twist,
     reset_request,
 )
 from common.source import DriveSource

@@ -1,1 +1,1 @@
-"""What Prometheus is told of one robot or of many."""
+"""Prometheus exporter for one robot or many."""

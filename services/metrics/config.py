@@ -7,14 +7,14 @@ from msgspec import Meta
 
 from common import settings
 
-# One chunk of a key expression: an id, `*`, or an id with `$*` for a part of it.
+# One chunk of a key expression: an id, `*`, or an id with `$*` as a wildcard within it.
 ROBOTS = r"^(|\*|(\$\*)?[A-Za-z0-9_.-]+(\$\*[A-Za-z0-9_.-]+)*(\$\*)?)\Z"
 
 
 class Metrics(settings.Section, frozen=True, kw_only=True):
-    """Where Prometheus asks, and of which robots it is told."""
+    """Where the exporter listens, and which robots it exports."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings whose protection is disabled on purpose
     host: str = "127.0.0.1"  # Prometheus runs on the same machine; the bus crosses the network
     port: settings.Port = 9317
     robots: Annotated[str, Meta(pattern=ROBOTS)] = ""  # "berlin-$*", "*"; empty: robot.id alone
@@ -23,7 +23,7 @@ class Metrics(settings.Section, frozen=True, kw_only=True):
         unknown = set(self.unsafe_overrides) - {"host"}
         if unknown:
             raise ValueError(
-                f"unsafe_overrides names {min(unknown)!r}, which takes no protection away"
+                f"unsafe_overrides names {min(unknown)!r}, which is not a protected setting"
             )
         try:
             local = ip_address(self.host).is_loopback
@@ -31,12 +31,12 @@ class Metrics(settings.Section, frozen=True, kw_only=True):
             raise ValueError(f"host is {self.host!r}, allowed is an IP address") from None
         if not local and "host" not in self.unsafe_overrides:
             raise ValueError(
-                f"host {self.host} tells everybody who reaches it, without asking who they are; "
-                "allowed is this machine's 127.0.0.1, or name host in unsafe_overrides"
+                f"host {self.host} serves the network without authentication; "
+                "use 127.0.0.1, or name host in unsafe_overrides"
             )
 
 
 class MetricsConfig(settings.Shared, frozen=True, kw_only=True):
-    """All sections that the exporter reads."""
+    """All sections that the exporter uses."""
 
     metrics: Metrics = Metrics()

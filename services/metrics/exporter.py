@@ -1,7 +1,7 @@
-"""The exporter on the bus: hears the robots, says nothing of them, and answers Prometheus.
+"""The exporter's shell: subscribes to the robots and answers Prometheus.
 
-Prometheus asks in a thread of the web server's. What it is told is made in the node's loop: a loop
-that hangs gives no answer, and so never an old one.
+The web server handles a scrape in its own thread and lets the node's loop make the samples. If the
+loop hangs, the scrape fails; it never returns old values.
 """
 
 import time
@@ -21,39 +21,38 @@ from common.bus.bus import Arrival, Bus
 from common.errors import ConfigError, LinkError
 from common.freshness import Latest
 from common.service import Node
-from services.metrics.certificates import ends
 from services.metrics.config import Metrics, MetricsConfig
-from services.metrics.robot import Robot, prune
-from services.metrics.samples import sheet
+from services.metrics.robot import RobotState, prune
+from services.metrics.samples import certificate_expiry, metric_families
 
-DEPTH = 2000  # samples of all robots that may wait, of one stream
-PATIENCE_S = 2.0  # for the loop's answer; Prometheus waits for 10 s
-LOOK_S = 60.0  # between two looks for who is long gone, and at the list of members
+DEPTH = 2000  # pending samples of one stream, for all robots
+PATIENCE_S = 2.0  # for the loop; Prometheus waits 10 s
+CHECK_S = 60.0  # between two checks for expired robots, and of the member list
 
 
 class Exporter(Collector):
-    """The shell around what was heard."""
+    """Connects the bus, the states of the robots and the web server."""
 
     def __init__(self, node: Node[MetricsConfig]) -> None:
         settings, own = node.config.metrics, node.config.robot.id
         self._node = node
-        self._robots: dict[str, Robot] = {}
+        self._robots: dict[str, RobotState] = {}
         if settings.robots in ("", own):
             self._own, self._bus = own, node.bus
-            self._robots[own] = Robot()  # told of although it was never heard
+            self._robots[own] = RobotState()  # exported even if never seen
         else:
             self._own = ""
             self._bus = Bus(node.config.bus, settings.robots, node.loop.post)
             self._bus.open()
         self._certificates: dict[tuple[str, str], float] = {}
-        self._listen()
-        node.loop.every(LOOK_S, self._forget)
+        self._subscribe()
+        node.loop.every(CHECK_S, self._prune)
         if node.config.bus.members:
-            node.loop.every(LOOK_S, lambda _: self._read(Path(node.config.bus.members)))
-        self._server = served(settings, self)
+            node.loop.every(CHECK_S, lambda _: self._read_members(Path(node.config.bus.members)))
+        self._server = start_server(settings, self)
         node.on_exit = self._close
 
-    def _listen(self) -> None:
+    def _subscribe(self) -> None:
         bus = self._bus
         bus.subscribe(keys.SAFETY, self._on_safety, depth=DEPTH)
         bus.subscribe(keys.LINK, self._on_link, depth=DEPTH)
@@ -82,23 +81,23 @@ class Exporter(Collector):
         service, instance = key.split("/")[-2:]
         self._robot(key).on_live(service, instance, alive, time.monotonic_ns())
 
-    def _robot(self, key: str) -> Robot:
-        return self._robots.setdefault(key.split("/")[2], Robot())
+    def _robot(self, key: str) -> RobotState:
+        return self._robots.setdefault(key.split("/")[2], RobotState())
 
-    def _forget(self, now_ns: int) -> None:
+    def _prune(self, now_ns: int) -> None:
         prune(self._robots, self._own, now_ns)
 
-    def _read(self, file: Path) -> None:
-        """Look when certificates end; a list that cannot be read tells nothing of them."""
+    def _read_members(self, file: Path) -> None:
+        """Read the expiry of the certificates; none if the list cannot be read."""
         try:
-            self._certificates = ends(members.read(file))
+            self._certificates = certificate_expiry(members.read(file))
         except ConfigError as error:
             self._certificates = {}
             self._node.counters["members_unreadable"] += 1
-            self._node.log.warning("no list of members", reason=str(error))
+            self._node.log.warning("cannot read the member list", reason=str(error))
 
-    def _sheet(self) -> list[Metric]:
-        return sheet(
+    def _families(self) -> list[Metric]:
+        return metric_families(
             {n: robot for n, robot in self._robots.items() if n == self._own or robot.is_robot},
             time.monotonic_ns(),
             connected=self._bus.connected,
@@ -106,8 +105,8 @@ class Exporter(Collector):
         )
 
     def collect(self) -> Iterable[Metric]:
-        """Return what is known, in the web server's thread; raise ``TimeoutError``."""
-        return asked(self._node.loop.post, self._sheet)
+        """Return the families, in the web server's thread; raise ``TimeoutError``."""
+        return call_in_loop(self._node.loop.post, self._families)
 
     def _close(self) -> None:
         self._server.shutdown()
@@ -115,18 +114,20 @@ class Exporter(Collector):
             self._bus.close()
 
 
-A = TypeVar("A")
+ResultT = TypeVar("ResultT")
 
 
-def asked(post: Callable[[Callable[[], None]], None], make: Callable[[], A]) -> A:
-    """Let the loop make it, and wait for that; raise ``TimeoutError`` when it does not."""
-    answer: Future[A] = Future()
-    post(lambda: answer.set_result(make()))
+def call_in_loop(
+    post: Callable[[Callable[[], None]], None], call: Callable[[], ResultT]
+) -> ResultT:
+    """Call a function in the loop and return its result; raise ``TimeoutError`` if it hangs."""
+    answer: Future[ResultT] = Future()
+    post(lambda: answer.set_result(call()))
     return answer.result(PATIENCE_S)
 
 
-def served(settings: Metrics, collector: Collector) -> WSGIServer:
-    """Begin to answer; raise ``LinkError`` when the port is taken."""
+def start_server(settings: Metrics, collector: Collector) -> WSGIServer:
+    """Start the web server; raise ``LinkError`` if the port is taken."""
     registry = CollectorRegistry()
     registry.register(collector)
     try:

@@ -33,7 +33,7 @@ from common.freshness import NS_PER_S, Latest, fresh
 from services.odom.arc_segments import Leg, fitted, halved, total
 from services.odom.config import Odom
 from services.odom.pose import Covariance, Pose, PoseEstimate, ProcessNoise
-from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD, Comparison, Twist
+from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD, Comparison, TwistEstimate
 from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 
 LEGS_MAX = 512  # about ten seconds of velocities; then the oldest shape gets coarser
@@ -186,12 +186,12 @@ class Estimator:
         legs.append(Leg(0.0, 0.0, (now_ns - held_ns) / NS_PER_S, seen=False))
         return [leg for leg in legs if leg.time_s > 0]
 
-    def _twist(self, now_ns: int) -> Twist | None:
+    def _twist(self, now_ns: int) -> TwistEstimate | None:
         settings = self._settings
         if self._velocity is not None and fresh(self._velocity, now_ns, settings.hold):
             velocity = self._velocity.value
             variances = settings.velocity_noise**2, settings.angular_noise**2
-            return Twist(velocity.linear, velocity.angular, *variances)
+            return TwistEstimate(velocity.linear, velocity.angular, *variances)
         return self._comparison.twist(now_ns) if self._news else None
 
     def _spread(self, leg: Leg) -> ProcessNoise:

@@ -18,7 +18,7 @@ COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)
 
 
-class Twist(Struct, frozen=True):
+class TwistEstimate(Struct, frozen=True):
     """A velocity in ``base_link``, m/s and rad/s, with its two variances."""
 
     linear: float
@@ -73,13 +73,13 @@ class Comparison:
         self.slip = abs(distance) > limits[0] or abs(turn) > limits[1]
         self.residual = distance if compared else None
 
-    def twist(self, now_ns: int) -> Twist | None:
+    def twist(self, now_ns: int) -> TwistEstimate | None:
         """Return the velocity that the counters make, if they came often enough."""
         recent = [e.counted for e in self._entries if now_ns - e.end_ns <= TWIST_NS]
         time_s = sum(leg.time_s for leg in recent)
         if time_s < TWIST_MIN_S:
             return None
-        return Twist(
+        return TwistEstimate(
             sum(leg.distance for leg in recent) / time_s,
             sum(leg.turn for leg in recent) / time_s,
             (COUNTER_STEP_M / time_s) ** 2,

@@ -1,1 +1,1 @@
-"""Recorder: every key to an MCAP file, and a black box of the last minutes."""
+"""Recorder: writes every key to MCAP files and keeps a black box of the last minutes."""

@@ -1,11 +1,11 @@
-"""Samples to what stands in a file, and back to the very bytes.
+"""Codec between samples of the bus and messages of an MCAP file; lossless to the byte. Pure.
 
-A message is kept as JSON, so that every viewer shows it. Three names that no message of ours has
-stand beside its fields:
+A message is stored as JSON, so that every viewer can show it. Three reserved names may stand beside
+its fields; no message of T2 uses them:
 
-- ``_raw``: what was attached, the board's raw frame, in base64;
-- ``_payload``: the payload in base64, where the JSON alone would not give it back to the byte: a
-  NaN, a payload that is no map, one that is no MessagePack at all;
+- ``_raw``: the attachment (the board's raw frame) in base64;
+- ``_payload``: the payload in base64, if the JSON alone does not restore it: a NaN, a payload that
+  is not a map, or one that is not MessagePack;
 - ``_deleted``: the sample was a DELETE.
 """
 
@@ -22,28 +22,30 @@ from common.messages import Message
 from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder import schema
-from services.recorder.foxglove_views import Views
+from services.recorder.foxglove_views import FoxgloveViews
 from services.recorder.schema import Schema
 
-RAW, PAYLOAD, DELETED = OURS = ("_raw", "_payload", "_deleted")
+RAW, PAYLOAD, DELETED = RESERVED = ("_raw", "_payload", "_deleted")
 JSON = "application/json"
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeError, ValueError, TypeError)
-KINDS: dict[str, type[Message]] = {topic.message.__name__: topic.message for topic in keys.TOPICS}
+MESSAGE_TYPES: dict[str, type[Message]] = {
+    topic.message.__name__: topic.message for topic in keys.TOPICS
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Where a message stands in a file: its key on the bus, or a topic that is drawn."""
+    """A channel of a file: a key of the bus, or the topic of a derived view."""
 
     topic: str
-    schema: Schema | None  # None for what is no message of ours: viewers look into the JSON
-    encoding: str = ""  # on the bus; drawn ones were never on it
-    drawn: bool = False
+    schema: Schema | None  # None for messages of other programs: viewers inspect the JSON
+    encoding: str = ""  # on the bus; empty for a view
+    is_view: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A message of a file, as JSON; times on the wall clock of the recorder and of the sender."""
+    """A message of a file, as JSON; times on the wall clocks of recorder and sender."""
 
     channel: Channel
     data: bytes
@@ -52,60 +54,62 @@ class Entry:
     sequence: int = 0
 
 
-class Translator:
-    """Translates for the viewers of one vehicle."""
+class Encoder:
+    """Encodes samples, with views for one vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self._views = Views(vehicle)
+        self._views = FoxgloveViews(vehicle)
 
     def entries(self, sample: Sample, log_ns: int) -> Iterator[Entry]:
-        """Yield the message, and what is drawn of it."""
-        value = readable(sample)
-        kind = KINDS.get(codec.kind_of(sample.encoding))
+        """Yield the message, then the views derived from it."""
+        fields = decode_fields(sample)
+        kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
         channel = Channel(sample.key, schema.of_message(kind) if kind else None, sample.encoding)
-        sent_ns, number = _whole(value, "t_ns") or log_ns, _whole(value, "seq") & 0xFFFFFFFF
-        yield Entry(channel, to_json(sample, value), log_ns, sent_ns, number)
+        sent_ns, number = _header(fields, "t_ns") or log_ns, _header(fields, "seq") & 0xFFFFFFFF
+        yield Entry(channel, encode_json(sample, fields), log_ns, sent_ns, number)
         message = _message(sample, kind)
         if message is not None:
             service = sample.key.rpartition("/")[2]
-            for topic, drawn, fields in self._views.of(message, service, log_ns):
-                data = msgspec.json.encode(fields)
-                yield Entry(Channel(topic, drawn, drawn=True), data, log_ns, sent_ns, number)
+            for topic, view_schema, view in self._views.of(message, service, log_ns):
+                data = msgspec.json.encode(view)
+                yield Entry(
+                    Channel(topic, view_schema, is_view=True), data, log_ns, sent_ns, number
+                )
 
 
-def readable(sample: Sample) -> dict[str, Any]:
-    """Return the fields of a payload; none when it has no such thing."""
+def decode_fields(sample: Sample) -> dict[str, Any]:
+    """Return the fields of a payload; empty if it is not a map."""
     try:
         value = _codec(sample.encoding).decode(sample.payload)
     except UNREADABLE:
         return {}
-    return value if isinstance(value, dict) and not set(OURS) & value.keys() else {}
+    return value if isinstance(value, dict) and not set(RESERVED) & value.keys() else {}
 
 
-def to_json(sample: Sample, value: dict[str, Any]) -> bytes:
-    """Return a sample with these fields as it stands in a file."""
+def encode_json(sample: Sample, fields: dict[str, Any]) -> bytes:
+    """Return the JSON of a sample with these fields."""
     extra: dict[str, Any] = {} if sample.raw is None else {RAW: b64encode(sample.raw).decode()}
     if sample.deleted:
         extra[DELETED] = True
     try:
-        text = msgspec.json.encode(value)
+        text = msgspec.json.encode(fields)
         same = _codec(sample.encoding).encode(msgspec.json.decode(text)) == sample.payload
-    except UNREADABLE:  # an extension of MessagePack, a key that JSON has not
-        value, same = {}, False
+    except UNREADABLE:  # a MessagePack extension, or a key that JSON does not support
+        fields, same = {}, False
     if not same:
         extra[PAYLOAD] = b64encode(sample.payload).decode()
-    return msgspec.json.encode(value | extra) if extra else text
+    return msgspec.json.encode(fields | extra) if extra else text
 
 
-def to_sample(entry: Entry) -> Sample:
-    """Return what was on the bus; raise ``MessageError`` when the entry was not made by us."""
+def decode_sample(entry: Entry) -> Sample:
+    """Return the sample as it was on the bus; raise ``MessageError`` for a foreign entry."""
     try:
-        value: dict[str, Any] = msgspec.json.decode(entry.data, type=dict[str, Any])
-        raw, payload = value.pop(RAW, None), value.pop(PAYLOAD, None)
-        deleted = bool(value.pop(DELETED, False))
+        fields: dict[str, Any] = msgspec.json.decode(entry.data, type=dict[str, Any])
+        raw, payload = fields.pop(RAW, None), fields.pop(PAYLOAD, None)
+        deleted = bool(fields.pop(DELETED, False))
         return Sample(
             key=entry.channel.topic,
-            payload=_codec(entry.channel.encoding).encode(value)
+            payload=_codec(entry.channel.encoding).encode(fields)
             if payload is None
             else b64decode(payload, validate=True),
             encoding=entry.channel.encoding,
@@ -115,11 +119,11 @@ def to_sample(entry: Entry) -> Sample:
             wall_ns=entry.log_ns,
         )
     except UNREADABLE as error:
-        raise MessageError(f"{entry.channel.topic}: no message of the recorder: {error}") from None
+        raise MessageError(f"{entry.channel.topic}: not written by the recorder: {error}") from None
 
 
 def _codec(encoding: str) -> Any:
-    """Return what reads and writes payloads of an encoding; MessagePack unless it says JSON."""
+    """Return the module that encodes and decodes payloads: MessagePack unless it is JSON."""
     return msgspec.json if encoding.startswith(JSON) else msgspec.msgpack
 
 
@@ -130,7 +134,7 @@ def _message(sample: Sample, kind: type[Message] | None) -> Message | None:
         return None
 
 
-def _whole(value: dict[str, Any], name: str) -> int:
-    """Return a number of the header, 0 when it has none that a file can hold."""
-    found = value.get(name)
+def _header(fields: dict[str, Any], name: str) -> int:
+    """Return an integer of the message header; 0 if it is missing or does not fit into a file."""
+    found = fields.get(name)
     return found if isinstance(found, int) and 0 <= found < 2**63 else 0

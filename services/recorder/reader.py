@@ -1,11 +1,11 @@
-"""A recording to read, whole or cut short.
+"""Reader for recordings, complete or truncated.
 
     with Reader(path) as reader:
         for entry in reader:
             entry.key, entry.kind, entry.message, entry.log_ns
 
-A file whose writer was killed ends in the middle of a chunk: all before it is read, and ``cut``
-says so. A chunk that was damaged is left out, and counted.
+If the writer was killed, the file ends inside a chunk: the reader yields everything before it and
+sets ``cut``. It skips a damaged chunk and counts it.
 """
 
 import struct
@@ -27,37 +27,37 @@ from common.sample import Sample
 from services.recorder import mcap_codec
 from services.recorder.writer import ABOUT
 
-# What reading raises where bytes are missing or wrong.
-TORN = (McapError, struct.error, ValueError, RuntimeError, EOFError, OverflowError, MemoryError)
-RECORD_MAX = 1 << 28  # bytes; a larger one is no record but damage
+# Raised by the MCAP library for missing or wrong bytes.
+DAMAGE = (McapError, struct.error, ValueError, RuntimeError, EOFError, OverflowError, MemoryError)
+RECORD_MAX = 1 << 28  # bytes; a larger record is damage
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
-    """A message of the bus as it was recorded."""
+class RecordedMessage:
+    """A message of the bus in a recording."""
 
     entry: mcap_codec.Entry
 
     @property
     def key(self) -> str:
-        """Return the whole key, ``t2/v1/001/tel/odom/odometry``."""
+        """Return the full key, ``t2/v1/001/tel/odom/odometry``."""
         return self.entry.channel.topic
 
     @property
     def kind(self) -> str:
-        """Return the name of its type, ``Odometry``; empty when it is none of ours."""
+        """Return the name of its type, ``Odometry``; empty for a type unknown to T2."""
         name = codec.kind_of(self.entry.channel.encoding)
-        return name if name in mcap_codec.KINDS else ""
+        return name if name in mcap_codec.MESSAGE_TYPES else ""
 
     @property
     def log_ns(self) -> int:
-        """Return when the recorder received it, on its wall clock."""
+        """Return the time of reception on the recorder's wall clock."""
         return self.entry.log_ns
 
     @property
     def message(self) -> Message | None:
-        """Return it decoded; None when it is none of ours, or not as it should be."""
-        kind = mcap_codec.KINDS.get(self.kind)
+        """Return the decoded message; None if its type is unknown or it is invalid."""
+        kind = mcap_codec.MESSAGE_TYPES.get(self.kind)
         if kind is None:
             return None
         try:
@@ -67,25 +67,25 @@ class Recorded:
 
     @property
     def sample(self) -> Sample:
-        """Return the very bytes that were on the bus."""
-        return mcap_codec.to_sample(self.entry)
+        """Return the original bytes of the bus."""
+        return mcap_codec.decode_sample(self.entry)
 
 
 class Reader:
-    """Yields the messages of the bus in the order in which they came, once."""
+    """Yields the messages of the bus in the order of their arrival, once."""
 
     def __init__(self, path: Path) -> None:
-        """Open a file; raise ``RobotError`` when that cannot be."""
+        """Open a file; raise ``RobotError`` if it cannot be read."""
         try:
             self._file = path.open("rb")
         except OSError as error:
             raise RobotError(f"{path}: cannot be read: {error.strerror}") from None
         self.path = path
         self.size = path.stat().st_size
-        self.about: dict[str, str] = {}  # robot, version, why; known once iteration has begun
-        self.cut = False  # it has no end: the writer was killed, or is still at it
-        self.damaged = 0  # chunks that could not be read, and are left out
-        self.readable = 0  # bytes, up to the end of the last whole record
+        self.about: dict[str, str] = {}  # robot, version, why; set while iterating
+        self.cut = False  # truncated: the writer was killed, or is still writing
+        self.damaged = 0  # chunks that were skipped
+        self.readable = 0  # bytes, up to the end of the last complete record
         self._channels: dict[int, mcap_codec.Channel | None] = {}
 
     def __enter__(self) -> Self:
@@ -99,8 +99,8 @@ class Reader:
     ) -> None:
         self._file.close()
 
-    def __iter__(self) -> Iterator[Recorded]:
-        """Yield them; raise ``RobotError`` for what is no MCAP file at all."""
+    def __iter__(self) -> Iterator[RecordedMessage]:
+        """Yield all messages; raise ``RobotError`` if the file is not an MCAP file."""
         for record in self._records():
             if isinstance(record, records.Metadata) and record.name == ABOUT:
                 self.about = record.metadata
@@ -109,10 +109,10 @@ class Reader:
             elif isinstance(record, records.Message):
                 channel = self._channels.get(record.channel_id)
                 if channel is not None:
-                    yield Recorded(_entry(channel, record))
+                    yield RecordedMessage(_entry(channel, record))
 
     def _records(self) -> Iterator[records.McapRecord]:
-        """Yield what the file's records hold, chunks taken apart, up to where it is torn."""
+        """Yield the records of the file and of its chunks, up to the truncation."""
         reader = StreamReader(self._file, emit_chunks=True, record_size_limit=RECORD_MAX)
         stream = iter(reader.records)
         while True:
@@ -121,26 +121,26 @@ class Reader:
             except StopIteration:
                 self.readable = self._file.tell()
                 return
-            except TORN:
+            except DAMAGE:
                 if self.readable == 0:
-                    raise RobotError(f"{self.path}: is no MCAP file") from None
+                    raise RobotError(f"{self.path}: is not an MCAP file") from None
                 self.cut = True
                 return
-            yield from self._parts(record)
+            yield from self._unpacked(record)
             self.readable = self._file.tell()
 
-    def _parts(self, record: records.McapRecord) -> list[records.McapRecord]:
+    def _unpacked(self, record: records.McapRecord) -> list[records.McapRecord]:
         if not isinstance(record, records.Chunk):
             return [record]
         try:
             return breakup_chunk(record, validate_crc=True)
-        except (*TORN, ZstdError):
+        except (*DAMAGE, ZstdError):
             self.damaged += 1
             return []
 
 
 def _channel(record: records.Channel) -> mcap_codec.Channel | None:
-    """Return a channel of the bus, None for what was drawn."""
+    """Return a channel of the bus; None for a view."""
     if "drawn" in record.metadata:
         return None
     return mcap_codec.Channel(record.topic, None, record.metadata.get("encoding", ""))

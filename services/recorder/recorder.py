@@ -1,4 +1,4 @@
-"""The recorder on the bus: hears every key, says nothing that moves, and stops before the disk."""
+"""The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
 import time
 from collections.abc import Callable
@@ -10,131 +10,132 @@ from common.messages import SafetyState
 from common.sample import Sample
 from common.service import Node
 from common.version import VERSION
-from services.recorder.blackbox import BlackBox
+from services.recorder.blackbox import BlackBox, LatchDetector
 from services.recorder.config import MB, RecorderConfig
-from services.recorder.latches import Latches
-from services.recorder.mcap_codec import Translator
-from services.recorder.retention import Stored
-from services.recorder.rolling_writer import Tape
-from services.recorder.storage import Shelf
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.retention import StoredFile
+from services.recorder.storage import Storage
+from services.recorder.writer import RecordingWriter, RollingWriter
 
-# `**` passes by what begins with "@", on purpose: both are needed for all.
+# `**` does not match chunks that begin with "@": two expressions cover all keys.
 EVERYTHING = ("**", "@cmd/**")
-DEPTH = 10_000  # samples that may wait while the disk is slow: some 20 s of a whole stack
-SLICE_S, FLUSH_S, LOOK_S = 0.05, 0.5, 1.0
+DEPTH = 10_000  # samples that may wait for a slow disk: about 20 s of a whole stack
+SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
 
 
 class Recorder:
-    """The shell around the tape and the black box."""
+    """Connects bus, rolling writer, black box and storage."""
 
     def __init__(self, node: Node[RecorderConfig]) -> None:
         settings = node.config.recorder
         self._node = node
-        self._translator = Translator(node.config.vehicle)
-        self._latches = Latches()
-        self._safety = keys.SAFETY.on(node.bus.robot)
+        self._encoder = Encoder(node.config.vehicle)
+        self._latches = LatchDetector()
+        self._safety_key = keys.SAFETY.on(node.bus.robot)
         robot = node.bus.robot if settings.make_room else None
-        self._shelf = Shelf(Path(settings.folder), settings.free * MB, robot=robot)
-        self._tape = Tape(settings, self._begin, self._end) if settings.everything else None
-        self._box = BlackBox(settings, self._begin, self._end)
+        self._storage = Storage(Path(settings.folder), settings.free * MB, robot=robot)
+        files = (self._open_recording, self._close_recording)
+        self._rolling = RollingWriter(settings, *files) if settings.everything else None
+        self._black_box = BlackBox(settings, *files)
         node.counters.update(recorded=0, not_recorded=0, removed=0)
-        self._look(time.monotonic_ns())
+        self._check_storage(time.monotonic_ns())
         for each in EVERYTHING:
             node.bus.tap(f"{keys.ROOT}/{node.bus.robot}/{each}", self._on_sample, depth=DEPTH)
-        node.loop.every(SLICE_S, lambda now_ns: self._safely(lambda: self._box.write(now_ns)))
+        node.loop.every(
+            SLICE_S, lambda now_ns: self._on_disk(lambda: self._black_box.write(now_ns))
+        )
         node.loop.every(FLUSH_S, self._flush)
-        node.loop.every(LOOK_S, self._look)
+        node.loop.every(CHECK_S, self._check_storage)
         node.on_exit = self._close
 
     def _on_sample(self, sample: Sample) -> None:
-        self._box.keep(sample)
-        if self._tape is not None:
-            self._safely(lambda: self._to_tape(sample))
-        if sample.key == self._safety:
+        self._black_box.add(sample)
+        if self._rolling is not None:
+            self._on_disk(lambda: self._record(sample))
+        if sample.key == self._safety_key:
             self._on_safety(sample)
 
-    def _to_tape(self, sample: Sample) -> None:
-        if self._tape is None or not self._shelf.has_room:
+    def _record(self, sample: Sample) -> None:
+        if self._rolling is None or not self._storage.has_room:
             self._node.counters["not_recorded"] += 1
             return
-        self._tape.write(sample)
+        self._rolling.write(sample)
         self._node.counters["recorded"] += 1
 
     def _on_safety(self, sample: Sample) -> None:
         try:
             state = codec.decode(sample.payload, SafetyState)
         except MessageError:
-            return  # it is recorded as it came
-        names = self._latches.take(state)
-        if names and self._shelf.has_room:
-            self._box.latched(names, sample.received_ns)
-        elif names:
-            text = f"{', '.join(names)} latched, and the black box is not written"
-            self._node.event("black_box_lost", "error", f"{text}: {self._shelf.trouble}")
+            return  # it is recorded unchanged
+        causes = self._latches.update(state)
+        if causes and self._storage.has_room:
+            self._black_box.trigger(causes, sample.received_ns)
+        elif causes:
+            text = f"{', '.join(causes)} latched, and the black box is not written"
+            self._node.event("black_box_lost", "error", f"{text}: {self._storage.problem}")
 
     def _flush(self, now_ns: int) -> None:
-        self._safely(self._box.flush)
-        if self._tape is not None:
-            tape = self._tape
-            self._safely(lambda: tape.flush(now_ns))
+        self._on_disk(self._black_box.flush)
+        if self._rolling is not None:
+            rolling = self._rolling
+            self._on_disk(lambda: rolling.flush(now_ns))
 
-    def _look(self, now_ns: int) -> None:
+    def _check_storage(self, now_ns: int) -> None:
         """Make room, stop before the disk is full, continue when there is room again."""
-        had_room = self._shelf.has_room
-        removed = self._shelf.look(now_ns)
+        had_room = self._storage.has_room
+        removed = self._storage.check(now_ns)
         if removed:
             self._report_removed(removed)
-        if had_room and not self._shelf.has_room:
+        if had_room and not self._storage.has_room:
             self._stop()
-        elif not had_room and self._shelf.has_room:
-            self._node.event("disk_room", "info", "there is room again: recording goes on")
+        elif not had_room and self._storage.has_room:
+            self._node.event("disk_room", "info", "the disk has room again: recording continues")
 
-    def _report_removed(self, removed: list[Stored]) -> None:
+    def _report_removed(self, removed: list[StoredFile]) -> None:
         self._node.counters["removed"] += len(removed)
         freed = sum(each.size for each in removed) / MB
-        text = f"{len(removed)} of the oldest recordings removed for {freed:.0f} MB of room"
+        text = f"{len(removed)} of the oldest recordings removed to free {freed:.0f} MB"
         self._node.event("recordings_removed", "warning", text, first=removed[0].name)
 
     def _stop(self) -> None:
-        text = f"no room for recordings: {self._shelf.trouble}"
-        self._node.event("disk_full", "error", text, folder=str(self._shelf.folder))
-        for close in (self._box.drop, self._tape.close if self._tape else None):
+        text = f"no room for recordings: {self._storage.problem}"
+        self._node.event("disk_full", "error", text, folder=str(self._storage.folder))
+        for close in (self._black_box.abort, self._rolling.close if self._rolling else None):
             try:
                 if close is not None:
                     close()
             except OSError as error:
-                self._node.log.error("a recording has no end", reason=str(error))
+                self._node.log.error("cannot complete a recording", reason=str(error))
 
-    def _safely(self, work: Callable[[], None]) -> None:
-        """Do what the disk may refuse."""
+    def _on_disk(self, write: Callable[[], None]) -> None:
+        """Call what writes to the disk; stop recording after an error."""
         try:
-            work()
+            write()
         except OSError as error:
-            self._shelf.refused(error, time.monotonic_ns())
+            self._storage.on_error(error, time.monotonic_ns())
             self._stop()
 
-    def _begin(self, first: Sample, why: str) -> Recording:
-        path = self._shelf.path(self._node.bus.robot, first.wall_ns, why)
+    def _open_recording(self, first: Sample, reason: str) -> RecordingWriter:
+        path = self._storage.new_path(self._node.bus.robot, first.wall_ns, reason)
         about = {
             "robot": self._node.bus.robot,
             "version": VERSION,
-            "why": why or "everything",
+            "why": reason or "everything",
         }
-        recording = Recording(path, self._translator, about)
+        recording = RecordingWriter(path, self._encoder, about)
         self._node.log.info("recording", file=str(path))
         return recording
 
-    def _end(self, recording: Recording) -> None:
+    def _close_recording(self, recording: RecordingWriter) -> None:
         recording.close()
         path, messages = str(recording.path), recording.messages
         if "-latch-" in recording.path.name:
-            text = f"the black box is written: {path}"
+            text = f"black box written to {path}"
             self._node.event("black_box", "info", text, file=path, messages=messages)
         else:
             self._node.log.info("recorded", file=path, messages=messages)
 
     def _close(self) -> None:
-        self._safely(self._box.close)
-        if self._tape is not None:
-            self._safely(self._tape.close)
+        self._on_disk(self._black_box.close)
+        if self._rolling is not None:
+            self._on_disk(self._rolling.close)

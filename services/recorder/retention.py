@@ -1,8 +1,8 @@
-"""Which recordings are removed to make room for new ones. Pure.
+"""Retention policy: selects the recordings to remove when the disk runs full. Pure.
 
-Continuous recordings go first, then incidents, the oldest of each first. The newest of each kind
-stays, and so does what is marked as kept or still being written. A file whose name the recorder
-did not give is never touched.
+Continuous recordings are removed first, then incidents, the oldest of each first. The newest
+recording of each kind is kept, and so are files that are marked or still being written. Files that
+the recorder did not name itself are never removed.
 """
 
 import re
@@ -15,7 +15,7 @@ NAME = re.compile(r"(\d{8}-\d{6})(-latch-.+?)?(?:-(\d+))?\.mcap")
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
+class StoredFile:
     """A recording on the disk."""
 
     name: str
@@ -23,8 +23,8 @@ class Stored:
     kept: bool = False  # marked, or still being written
 
 
-def removable(files: Iterable[Stored], robot: str) -> list[Stored]:
-    """Return what may go, in the order in which it goes."""
+def removable(files: Iterable[StoredFile], robot: str) -> list[StoredFile]:
+    """Return the files that may be removed, in the order of their removal."""
     dated = []
     for file in files:
         prefix, name = file.name[: len(robot) + 1], file.name[len(robot) + 1 :]
@@ -37,10 +37,13 @@ def removable(files: Iterable[Stored], robot: str) -> list[Stored]:
     return [file for kind in kinds for file in kind[:-1] if not file.kept]
 
 
-def to_remove(files: Iterable[Stored], robot: str, needed: float, wanted: float) -> list[Stored]:
-    """Return what to remove for so many bytes: ``wanted`` if there is as much, else ``needed``.
+def to_remove(
+    files: Iterable[StoredFile], robot: str, needed: float, wanted: float
+) -> list[StoredFile]:
+    """Return the files to remove, to free ``wanted`` bytes if possible, else ``needed``.
 
-    Nothing when all of it is less than ``needed``: it would be lost and no room gained.
+    Return nothing if all candidates together are smaller than ``needed``: removing them would not
+    make enough room.
     """
     candidates = removable(files, robot)
     sums = list(accumulate(file.size for file in candidates))

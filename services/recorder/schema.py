@@ -1,7 +1,7 @@
-"""JSON schemas that viewers can read: ours made plain, and those of Foxglove that we draw with.
+"""JSON schemas for viewers: simplified schemas of our messages, and Foxglove's own. Pure.
 
-Foxglove's reader refuses a schema with ``$ref``, ``anyOf`` or a ``null``, and knows a message that
-it can draw by the schema's name. What may be null is said to be what it is when it is there.
+Foxglove rejects a schema with ``$ref``, ``anyOf`` or ``null``, and recognises the messages of its
+panels by the schema's name. An optional field has the type of its non-null value.
 """
 
 from dataclasses import dataclass
@@ -23,26 +23,26 @@ class Schema:
 
 @cache
 def of_message(kind: type[Message]) -> Schema:
-    """Return the plain schema of one of our messages, ``t2.v1.Odometry``."""
+    """Return the simplified schema of a message type, ``t2.v1.Odometry``."""
     whole = msgspec.json.schema(kind)
-    made = plain(whole, whole.get("$defs", {}))
+    made = simplified(whole, whole.get("$defs", {}))
     return Schema(f"t2.v1.{kind.__name__}", msgspec.json.encode(made))
 
 
-def plain(schema: dict[str, Any], named: dict[str, Any]) -> dict[str, Any]:
-    """Return a schema without references and alternatives; ``named`` is what it refers to."""
+def simplified(schema: dict[str, Any], named: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema without references and alternatives; ``named`` holds the definitions."""
     if "$ref" in schema:
-        return plain(named[schema["$ref"].rpartition("/")[2]], named)
+        return simplified(named[schema["$ref"].rpartition("/")[2]], named)
     if "anyOf" in schema:
-        return plain(next(s for s in schema["anyOf"] if s.get("type") != "null"), named)
-    if "enum" in schema:  # all of ours are of words
+        return simplified(next(s for s in schema["anyOf"] if s.get("type") != "null"), named)
+    if "enum" in schema:  # all enums of ours are strings
         return {"type": "string"}
     made: dict[str, Any] = {"type": schema["type"]}
     if schema["type"] == "array":
-        made["items"] = plain(schema["items"], named)
+        made["items"] = simplified(schema["items"], named)
     if schema["type"] == "object":
         parts = schema.get("properties", {})
-        made["properties"] = {name: plain(part, named) for name, part in parts.items()}
+        made["properties"] = {name: simplified(part, named) for name, part in parts.items()}
     if "description" in schema:
         made["description"] = schema["description"]
     return made

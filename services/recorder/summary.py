@@ -1,43 +1,43 @@
-"""What is in a recording, in short. Pure."""
+"""Summary of a recording, for ``t2 info``. Pure."""
 
 from collections import Counter
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
 from common.messages import Event, Health, Message, SafetyState
-from services.recorder.latches import Latches
+from services.recorder.blackbox import LatchDetector
 
 
 @dataclass(slots=True)
 class Stream:
-    """What was heard on one key."""
+    """Statistics of one key."""
 
     kind: str
     count: int = 0
     first_ns: int = 0
     last_ns: int = 0
-    raw: int = 0  # messages with a raw frame beside them
+    raw: int = 0  # messages with a raw frame attached
 
     @property
     def hz(self) -> float | None:
-        """Return how often it came; None for a single one."""
-        past_ns = self.last_ns - self.first_ns
-        return (self.count - 1) * NS_PER_S / past_ns if past_ns > 0 else None
+        """Return the mean rate; None for a single message."""
+        span_ns = self.last_ns - self.first_ns
+        return (self.count - 1) * NS_PER_S / span_ns if span_ns > 0 else None
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something that happened, so many seconds after the beginning."""
+    """An event or a latch."""
 
-    at_s: float
-    who: str
+    at_s: float  # since the first message
+    service: str
     level: str
     text: str
 
 
 @dataclass(slots=True)
 class Summary:
-    """Fed with message after message."""
+    """Totals of a recording, updated message by message."""
 
     begin_ns: int | None = None  # on the recorder's wall clock
     end_ns: int = 0
@@ -45,8 +45,8 @@ class Summary:
     events: list[Note] = field(default_factory=list)
     latched: list[Note] = field(default_factory=list)
     versions: dict[str, str] = field(default_factory=dict)  # by service
-    faulty: Counter[str] = field(default_factory=Counter)  # not as they should be, by key
-    _latches: Latches = field(default_factory=Latches)
+    faulty: Counter[str] = field(default_factory=Counter)  # invalid messages, by key
+    _latches: LatchDetector = field(default_factory=LatchDetector)
 
     @property
     def duration_s(self) -> float:
@@ -55,11 +55,11 @@ class Summary:
 
     @property
     def messages(self) -> int:
-        """Return how many messages of the bus there are."""
+        """Return the number of messages."""
         return sum(stream.count for stream in self.streams.values())
 
-    def take(self, key: str, kind: str, message: Message | None, log_ns: int, *, raw: bool) -> None:
-        """Take the next message; None for one that is none of ours, or damaged."""
+    def add(self, key: str, kind: str, message: Message | None, log_ns: int, *, raw: bool) -> None:
+        """Add the next message; None for an unknown type or an invalid message."""
         if self.begin_ns is None:
             self.begin_ns = log_ns
         self.end_ns = max(self.end_ns, log_ns)
@@ -78,5 +78,5 @@ class Summary:
             case Health():
                 self.versions[key.split("/")[-2]] = message.version
             case SafetyState():
-                for name in self._latches.take(message):
+                for name in self._latches.update(message):
                     self.latched.append(Note(at_s, "safety", "error", name))

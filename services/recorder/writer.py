@@ -1,7 +1,7 @@
-"""An MCAP file that is being written.
+"""MCAP files: one recording, and a series of recordings of limited size and duration.
 
-Messages go into compressed chunks. ``flush`` ends a chunk and hands it to the system: whatever
-happens to this process afterwards, all up to there can be read.
+Messages go into compressed chunks. ``flush`` ends a chunk and hands it to the operating system.
+Everything up to the last flush stays readable, even after ``kill -9``.
 """
 
 import contextlib
@@ -11,26 +11,29 @@ from pathlib import Path
 
 from mcap.writer import Writer
 
+from common.freshness import NS_PER_S
 from common.sample import Sample
-from services.recorder.mcap_codec import Channel, Entry, Translator
+from services.recorder.blackbox import CloseRecording, OpenRecording
+from services.recorder.config import MB, Recorder
+from services.recorder.mcap_codec import Channel, Encoder, Entry
 
-ABOUT = "t2"  # the metadata record that says whose recording it is
+ABOUT = "t2"  # name of the metadata record: robot, version and reason of the recording
 
 
-class Recording:
-    """One file, open for writing; raises ``OSError`` when the disk does not take it."""
+class RecordingWriter:
+    """One file, open for writing; raises ``OSError`` when the disk refuses a write."""
 
-    def __init__(self, path: Path, translator: Translator, about: Mapping[str, str]) -> None:
-        """Begin a new file; one that is there already is not touched."""
+    def __init__(self, path: Path, encoder: Encoder, about: Mapping[str, str]) -> None:
+        """Create a new file; raise ``FileExistsError`` instead of overwriting one."""
         self.path = path
-        self.messages = 0  # from the bus; what is drawn of them is not counted
-        self._translator = translator
+        self.messages = 0  # from the bus, without the derived views
+        self._encoder = encoder
         self._clock_ns: int | None = None
         self._ids: dict[Channel, int] = {}
         self._schemas: dict[str, int] = {}
         self._file = path.open("xb")
         with contextlib.suppress(OSError):  # a file system without locks
-            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # see ``shelf.in_use``
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # see ``storage.in_use``
         self._writer = Writer(self._file)
         self._writer.start(library="t2")
         self._writer.add_metadata(ABOUT, dict(about))
@@ -38,27 +41,27 @@ class Recording:
 
     @property
     def size(self) -> int:
-        """Return the bytes that the file has by now, without the chunk in progress."""
+        """Return the size of the file in bytes, without the chunk in progress."""
         return self._file.tell()
 
     def write(self, sample: Sample) -> None:
-        """Add a sample and what is drawn of it.
+        """Add a sample and its views.
 
-        The file's time is the wall clock at its first sample and goes on by the monotonic one: it
-        does not jump with the time of day.
+        Log times start at the wall clock of the first sample and advance with the monotonic clock:
+        they do not jump when the time of day is set.
         """
         if self._clock_ns is None:
             self._clock_ns = sample.wall_ns - sample.received_ns
-        for entry in self._translator.entries(sample, sample.received_ns + self._clock_ns):
+        for entry in self._encoder.entries(sample, sample.received_ns + self._clock_ns):
             self._add(entry)
         self.messages += 1
 
     def flush(self) -> None:
-        """Let all that was written survive this process."""
+        """End the chunk: its content survives a crash of this process."""
         self._writer.flush()
 
     def close(self) -> None:
-        """Write the index and end the file; it is closed even if the disk takes no more."""
+        """Write the index and close the file, even if the disk refuses the index."""
         try:
             self._writer.finish()
         finally:
@@ -79,6 +82,43 @@ class Recording:
                     name, "jsonschema", channel.schema.data
                 )
             schema_id = self._schemas[name]
-        about = {"drawn": "yes"} if channel.drawn else {"encoding": channel.encoding}
+        # The key "drawn" is part of the file format.
+        about = {"drawn": "yes"} if channel.is_view else {"encoding": channel.encoding}
         self._ids[channel] = self._writer.register_channel(channel.topic, "json", schema_id, about)
         return self._ids[channel]
+
+
+class RollingWriter:
+    """Continuous recording, one file after another; the caller handles ``OSError``."""
+
+    def __init__(
+        self, settings: Recorder, open_recording: OpenRecording, close_recording: CloseRecording
+    ) -> None:
+        self._size_max = settings.roll_size * MB
+        self._time_max_ns = round(settings.roll_time * NS_PER_S)
+        self._open_recording = open_recording
+        self._close_recording = close_recording
+        self._recording: RecordingWriter | None = None
+        self._opened_ns = 0
+
+    def write(self, sample: Sample) -> None:
+        """Add a sample; open a new file if none is open."""
+        if self._recording is None:
+            self._recording = self._open_recording(sample, "")
+            self._opened_ns = sample.received_ns
+        self._recording.write(sample)
+
+    def flush(self, now_ns: int) -> None:
+        """Flush the file; close it when it is large or old enough."""
+        if self._recording is None:
+            return
+        self._recording.flush()
+        too_old = now_ns - self._opened_ns > self._time_max_ns
+        if too_old or self._recording.size > self._size_max:
+            self.close()
+
+    def close(self) -> None:
+        """Close the file, if one is open."""
+        recording, self._recording = self._recording, None
+        if recording is not None:
+            self._close_recording(recording)

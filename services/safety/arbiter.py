@@ -1,22 +1,22 @@
-"""Who drives: requests are judged one by one, and the best source with a fresh one drives.
+"""Arbiter: accepts or refuses drive requests, and selects the source in control.
 
-A request that is refused leaves everything as it was, and is counted by its reason:
+A refused request changes nothing except where noted. It is counted by its reason:
 
 ================ =============================================================================
-unknown_source   no such source in the settings
+unknown_source   the settings contain no such source
 not_a_request    payload of the wrong type
 not_finite       NaN or infinity
-late             the echo is unknown or too old, see ``heartbeat.py``
-second_publisher another ``boot`` while the lease of the first one lives; stops the vehicle too
-seq_not_rising   a repetition, or older than the one before
+late             the echo is unknown or too old, see ``common/heartbeat.py``
+second_publisher another ``boot`` while the lease of the first one lives; also stops the vehicle
+seq_not_rising   a repeated or an older sequence number
 ================ =============================================================================
 
-A source holds the wheel as long as its last request is younger than its lease; letting go is
-silence. A source may move the vehicle only after a *neutral* request, one of zero: after its
-own start, after every cause that asks for it, and after a source of higher priority has held the
-wheel.
+The fresh source of the highest priority is in control. A source is fresh while its last request is
+younger than its lease; it gives up control by silence. A source may move the vehicle only after a
+*neutral* request (zero): after its own start, after every cause that requires it, and after a
+source of higher priority was in control.
 
-A lease counts from when a request was received; time in the queue is part of it.
+A lease counts from the reception of a request, so time in the queue is part of it.
 """
 
 from collections.abc import Mapping
@@ -28,91 +28,91 @@ from common import codec
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
+from common.motion import STILL, Twist
 from services.safety.config import Source
-from services.safety.inputs import Ask
-from services.safety.twist import STILL, Twist
+from services.safety.inputs import DriveRequest
 
-RIVAL_NS = NS_PER_S // 2  # only one publisher must be left for this long
+CONFLICT_NS = NS_PER_S // 2  # one publisher must remain alone for this long
 
 
 class Channel(Struct, frozen=True):
-    """One source as safety knows it."""
+    """State of one source."""
 
     boot: int | None = None
     seq: int = 0
-    wish: Twist = STILL
+    requested: Twist = STILL
     received_ns: int | None = None  # of the last accepted request
-    rival_ns: int | None = None  # when a second publisher was last heard
+    conflict_ns: int | None = None  # when a second publisher last sent a request
     neutral: bool = False
-    overruled_by: str = ""  # the source that held the wheel since this one was neutral
+    overruled_by: str = ""  # the source that was in control since this one was neutral
 
     def is_fresh(self, now_ns: int, lease_s: float) -> bool:
-        """Tell whether the last request still holds."""
+        """Return whether the lease of the last request still lives."""
         return self.received_ns is not None and now_ns - self.received_ns <= lease_s * NS_PER_S
 
-    def has_rival(self, now_ns: int) -> bool:
-        """Tell whether two publishers have been heard of late."""
-        return self.rival_ns is not None and now_ns - self.rival_ns < RIVAL_NS
+    def in_conflict(self, now_ns: int) -> bool:
+        """Return whether two publishers were active within ``CONFLICT_NS``."""
+        return self.conflict_ns is not None and now_ns - self.conflict_ns < CONFLICT_NS
 
 
 class Arbiter(Struct, frozen=True):
-    """All sources of the settings."""
+    """State of all sources in the settings."""
 
     sources: Mapping[str, Source]
     channels: Mapping[str, Channel] = {}
 
-    def take(
-        self, ask: Ask, heartbeat: Heartbeat, max_age_ns: int, now_ns: int
+    def accept(
+        self, request: DriveRequest, heartbeat: Heartbeat, max_age_ns: int, now_ns: int
     ) -> tuple["Arbiter", str]:
-        """Judge a request; return why it was refused, or an empty reason."""
-        if ask.source not in self.sources:
+        """Check a request; return the reason of its refusal, empty when accepted."""
+        if request.source not in self.sources:
             return self, "unknown_source"
-        drive = ask.drive
+        drive = request.drive
         if drive is None:
             return self, "not_a_request"
         if not codec.finite(drive.linear, drive.angular):
             return self, "not_finite"
         if heartbeat.is_late(drive.echo, now_ns, max_age_ns):
             return self, "late"
-        channel, refused = self._accept(ask.source, drive, ask.received_ns)
-        return replace(self, channels={**self.channels, ask.source: channel}), refused
+        channel, refused = self._accept(request.source, drive, request.received_ns)
+        return replace(self, channels={**self.channels, request.source: channel}), refused
 
     def _accept(self, name: str, drive: Drive, received_ns: int) -> tuple[Channel, str]:
         channel = self.channels.get(name, Channel())
         if drive.boot != channel.boot:
             if channel.is_fresh(received_ns, self.sources[name].lease):
-                return replace(channel, rival_ns=received_ns), "second_publisher"
-            channel = Channel(boot=drive.boot, rival_ns=channel.rival_ns)
+                return replace(channel, conflict_ns=received_ns), "second_publisher"
+            channel = Channel(boot=drive.boot, conflict_ns=channel.conflict_ns)
         elif drive.seq <= channel.seq:
             return channel, "seq_not_rising"
-        wish = Twist(drive.linear, drive.angular)
-        return replace(channel, seq=drive.seq, wish=wish, received_ns=received_ns), ""
+        twist = Twist(drive.linear, drive.angular)
+        return replace(channel, seq=drive.seq, requested=twist, received_ns=received_ns), ""
 
-    def driver(self, now_ns: int) -> str | None:
-        """Return the source that holds the wheel."""
+    def in_control(self, now_ns: int) -> str | None:
+        """Return the fresh source of the highest priority."""
         fresh = self._fresh(now_ns)
         return max(fresh, key=lambda name: self.sources[name].priority, default=None)
 
-    def asks_to_move(self, now_ns: int) -> bool:
-        """Tell whether any source asks for motion."""
-        return any(not self.channels[name].wish.is_zero for name in self._fresh(now_ns))
+    def requests_motion(self, now_ns: int) -> bool:
+        """Return whether any source requests motion."""
+        return any(not self.channels[name].requested.is_zero for name in self._fresh(now_ns))
 
-    def rivals(self, now_ns: int) -> str:
-        """Name the sources that two publishers ask on; empty when there are none."""
-        return ", ".join(name for name, one in self.channels.items() if one.has_rival(now_ns))
+    def conflicts(self, now_ns: int) -> str:
+        """Return the names of sources with two publishers, joined by commas."""
+        return ", ".join(name for name, one in self.channels.items() if one.in_conflict(now_ns))
 
     def disarmed(self) -> "Arbiter":
-        """Return it with a neutral request due on every source."""
+        """Return the arbiter with a neutral request due on every source."""
         channels = {name: replace(one, neutral=False) for name, one in self.channels.items()}
         return replace(self, channels=channels)
 
-    def asking_for_zero(self, now_ns: int) -> set[str]:
+    def requesting_zero(self, now_ns: int) -> set[str]:
         """Return the sources that request zero now."""
-        return {name for name in self._fresh(now_ns) if self.channels[name].wish.is_zero}
+        return {name for name in self._fresh(now_ns) if self.channels[name].requested.is_zero}
 
     def armed(self, now_ns: int) -> "Arbiter":
-        """Return it with the sources armed that ask for zero now."""
-        neutral = self.asking_for_zero(now_ns)
+        """Return the arbiter with the sources armed that request zero now."""
+        neutral = self.requesting_zero(now_ns)
         channels = {
             name: replace(one, neutral=True, overruled_by="") if name in neutral else one
             for name, one in self.channels.items()
@@ -120,13 +120,13 @@ class Arbiter(Struct, frozen=True):
         return replace(self, channels=channels)
 
     def overruled(self, now_ns: int) -> "Arbiter":
-        """Return it with a neutral request due on every source below the one at the wheel."""
-        driver = self.driver(now_ns)
-        if driver is None:
+        """Return the arbiter with a neutral request due on sources below the one in control."""
+        leader = self.in_control(now_ns)
+        if leader is None:
             return self
-        priority = self.sources[driver].priority
+        priority = self.sources[leader].priority
         below = {
-            name: replace(one, neutral=False, overruled_by=driver)
+            name: replace(one, neutral=False, overruled_by=leader)
             for name, one in self.channels.items()
             if self.sources[name].priority < priority
         }

@@ -1,19 +1,19 @@
-"""Why the vehicle may not move as asked: the table, which is the specification.
+"""Table of causes that stop or slow the vehicle; this table is the specification.
 
-Every decision observes every cause anew. The worst action of those that are held wins. A cause is
-held from the observation that raises it until it clears in its own way:
+Every decision observes every cause again. The worst action of the held causes applies. A cause is
+held from the observation that raises it until it clears by its own rule:
 
 ========== ===================================================================================
 clears     when
 ========== ===================================================================================
-RESET      an operator's reset, once the cause is gone for 3 samples, the vehicle stands and
-           nobody asks to move; then a neutral request (one exception, see ``operator_requests.py``)
-SETTLED    by itself after it was gone for 0.5 s; then a neutral request
-AT_ONCE    by itself with the observation that no longer shows it (hysteresis is in the observer)
+RESET      an operator's reset, once 3 samples do not show the cause, the vehicle stands and no
+           source requests motion; then a neutral request (one exception: ``operator_requests.py``)
+SETTLED    by itself 0.5 s after the last observation; then a neutral request
+AT_ONCE    by itself with the first observation without it (the observer has the hysteresis)
 ========== ===================================================================================
 
-Two things are no causes: a request that is refused is counted and changes nothing, and a limit of
-speed or acceleration bends a request without a word.
+Two things are not causes. A refused request is counted and changes nothing. Limits of speed and
+acceleration change a request without being reported.
 """
 
 from enum import Enum
@@ -26,7 +26,7 @@ SEVERITY: dict[Action, int] = {"slow": 1, "stop": 2, "brake": 3}
 
 
 class Clears(Enum):
-    """How a cause goes away."""
+    """Rule by which a cause clears."""
 
     RESET = "reset"
     SETTLED = "settled"
@@ -34,7 +34,7 @@ class Clears(Enum):
 
 
 class Rule(Struct, frozen=True):
-    """One row: what a cause does and how it clears; ``text`` tells the operator."""
+    """One row: the action of a cause, how it clears, and its text for the operator."""
 
     name: str
     action: Action
@@ -46,19 +46,19 @@ RULES = (
     # latched
     Rule("contact", "brake", Clears.RESET, "The bumper was hit."),
     Rule("estop", "brake", Clears.RESET, "Emergency stop."),
-    Rule("estop_reader", "brake", Clears.RESET, "The emergency stop could not be heard."),
-    Rule("predecessor", "brake", Clears.RESET, "Safety started anew with a reset still due."),
+    Rule("estop_reader", "brake", Clears.RESET, "The emergency stop cannot be received."),
+    Rule("predecessor", "brake", Clears.RESET, "Safety restarted while a reset was due."),
     Rule("runaway", "brake", Clears.RESET, "The vehicle did not move as commanded."),
     Rule(
         "uncommanded_motion", "brake", Clears.RESET,
         "The vehicle moved while standstill was commanded.",
     ),
-    # the only brake that clears by itself
+    # the only BRAKE that clears by itself
     Rule("not_stopping", "brake", Clears.SETTLED, "The vehicle does not stop."),
     # latched
     Rule("driver_left", "stop", Clears.RESET, "The left motor driver reported a fault."),
     Rule("driver_right", "stop", Clears.RESET, "The right motor driver reported a fault."),
-    Rule("flapping", "stop", Clears.RESET, "Inputs failed again and again."),
+    Rule("flapping", "stop", Clears.RESET, "Inputs failed repeatedly."),
     # inhibiting
     Rule("leaving", "stop", Clears.SETTLED, "The safety service is shutting down."),
     Rule("starting", "stop", Clears.SETTLED, "Waiting for the first samples."),
@@ -66,15 +66,15 @@ RULES = (
     Rule("switches", "stop", Clears.SETTLED, "The board's emergency brakes are not verified."),
     Rule("bumper", "stop", Clears.SETTLED, "The bumper is not being read."),
     Rule("silent", "stop", Clears.SETTLED, "An input is too old."),
-    Rule("unarmed", "stop", Clears.SETTLED, "The bridge does not obey yet."),
-    # passing
-    Rule("two_publishers", "stop", Clears.AT_ONCE, "Two publishers ask on one source."),
+    Rule("unarmed", "stop", Clears.SETTLED, "The bridge is not armed yet."),
+    # transient
+    Rule("two_publishers", "stop", Clears.AT_ONCE, "Two publishers use one source."),
     Rule(
         "neutral", "stop", Clears.AT_ONCE,
         "Waiting for a neutral request: release the controls, then drive.",
     ),
-    Rule("blocked", "stop", Clears.AT_ONCE, "There is no room that way."),
-    Rule("no_request", "stop", Clears.AT_ONCE, "Nobody asks to move."),
+    Rule("blocked", "stop", Clears.AT_ONCE, "No room in that direction."),
+    Rule("no_request", "stop", Clears.AT_ONCE, "No source requests motion."),
     Rule("release", "slow", Clears.AT_ONCE, "Creeping off the bumper."),
     Rule("bumper_lossy", "slow", Clears.AT_ONCE, "Creeping: bumper polls were lost."),
     Rule("obstacle", "slow", Clears.AT_ONCE, "Slowed by an obstacle."),
@@ -86,20 +86,20 @@ _ORDER = {rule.name: (-SEVERITY[rule.action], row) for row, rule in enumerate(RU
 
 
 def severity(name: str) -> tuple[int, int]:
-    """Return a sort key: the worst first, ties in the order of the table."""
+    """Return a sort key: worst first, ties in table order."""
     return _ORDER[name]
 
 
 def clears(name: str) -> Clears:
-    """Return how a cause goes away."""
+    """Return how a cause clears."""
     return BY_NAME[name].clears
 
 
 def wants_neutral(name: str) -> bool:
-    """Tell whether a neutral request must follow once the cause is gone."""
+    """Return whether a neutral request is required once the cause has cleared."""
     return clears(name) is not Clears.AT_ONCE
 
 
 def bars_motion(name: str) -> bool:
-    """Return whether it bars motion, whatever is requested."""
+    """Return whether the cause forbids every motion."""
     return wants_neutral(name) or name == "two_publishers"

@@ -1,4 +1,4 @@
-"""The safety service's settings; a value that takes a protection away must be owned up to."""
+"""Settings of the safety service; unsafe values need an explicit override."""
 
 from typing import Annotated
 
@@ -10,8 +10,8 @@ from common import settings
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
-# Outside of these a protection is as good as gone. A setting there is refused unless
-# ``unsafe_overrides`` names it. Zero never means "off".
+# A setting outside these limits removes a protection. It is refused unless ``unsafe_overrides``
+# names it. Zero never means "off".
 PROTECTIVE: dict[str, tuple[float, float]] = {
     "margin": (0.05, 10.0),
     "react": (0.1, 10.0),
@@ -42,18 +42,18 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "creep_speed": (0.0, 0.25),
     "require_switches": (True, True),
 }
-# Our programs that stop requesting when a person lets go; ``sources.NAME.operator`` of any other is
-# subject to the same rule.
+# Programs that stop requesting when the operator releases the controls. For any other source,
+# ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
-MAX_LEASE_S = 0.5  # longer leases are subject to the same rule, as ``sources.NAME.lease``
+MAX_LEASE_S = 0.5  # a longer ``sources.NAME.lease`` needs an override
 
 
 class Source(settings.Section, frozen=True, kw_only=True):
-    """Who may ask to drive; the highest priority among those with a fresh request drives."""
+    """A source of drive requests; the fresh one of the highest priority is in control."""
 
     priority: Annotated[int, Meta(ge=0, le=1000)]
     lease: Seconds  # s that a request holds
-    operator: bool = False  # a person drives with it, and may creep past a faulty sonar
+    operator: bool = False  # a person holds it, and may creep past a faulty sonar
 
 
 def _sources() -> dict[str, Source]:
@@ -69,22 +69,24 @@ def _sources() -> dict[str, Source]:
 class Safety(settings.Section, frozen=True, kw_only=True):
     """When and how fast the vehicle may move; SI units."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
     sources: dict[str, Source] = msgspec.field(default_factory=_sources)
 
     max_linear: Positive = 1.0  # m/s
     max_angular: Positive = 1.0  # rad/s
     linear_acceleration: Positive = 0.5  # m/s^2
     angular_acceleration: Positive = 1.5  # rad/s^2
-    deceleration: Positive = 0.6  # m/s^2 that the vehicle surely reaches when it slows down
+    deceleration: Positive = 0.6  # m/s^2, guaranteed when slowing down
     angular_deceleration: Positive = 1.0  # rad/s^2, likewise
 
-    margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m that stay free
+    margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m kept free around the vehicle
     react: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25  # s from reading to slowing down
-    hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.05  # m until a farther reading counts
-    # m along a sonar's axis without a changed reading, until it is suspect
+    hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = (
+        0.05  # m; a farther reading counts beyond this
+    )
+    # m along a sonar's axis with a constant reading, until the sonar is suspect
     stuck_travel: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.5
-    creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is in doubt
+    creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is doubtful
 
     bumper_age: Seconds = 0.15
     ultrasonic_age: Seconds = 0.3
@@ -92,11 +94,11 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     link_age: Seconds = 0.6
     switches_age: Seconds = 3.0
     driver_age: Seconds = 2.0
-    estop_path_age: Seconds = 0.2  # of our own state, received through the router
-    settle: Seconds = 0.5  # s that inputs must be good again
+    estop_path_age: Seconds = 0.2  # of the own state, received back through the router
+    settle: Seconds = 0.5  # s of good inputs until a cause clears
     max_echo_age: Seconds = 0.4  # s, of a request to move and of a held release
     max_call_age: Seconds = 1.0  # s, of a reset
-    require_switches: bool = True  # the board's own emergency brakes must be on
+    require_switches: bool = True  # requires the board's own emergency brakes
 
     runaway_linear: Positive = 0.3  # m/s over the commanded speed
     runaway_angular: Positive = 0.5  # rad/s
@@ -108,7 +110,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     @property
     def operators(self) -> frozenset[str]:
-        """The sources that a person drives with."""
+        """The sources that an operator holds."""
         return frozenset(name for name, source in self.sources.items() if source.operator)
 
     def __post_init__(self) -> None:
@@ -126,17 +128,17 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
 
 class SafetyConfig(settings.Shared, frozen=True, kw_only=True):
-    """All sections that the safety service reads."""
+    """Sections that the safety service reads."""
 
     vehicle: settings.Vehicle = settings.Vehicle()
     safety: Safety = Safety()
 
     def __post_init__(self) -> None:
-        # What is farther than ``sonar_max`` counts as free: the vehicle must be able to stop in it.
-        one, sight = self.safety, self.vehicle.sonar_max
+        # Space beyond ``sonar_max`` counts as free, so the vehicle must be able to stop within it.
+        one, range_m = self.safety, self.vehicle.sonar_max
         needed = one.margin + one.react * one.max_linear + one.max_linear**2 / one.deceleration / 2
-        if sight < needed:
+        if range_m < needed:
             raise ValueError(
-                f"sonar_max {sight:g} m is too near: from max_linear {one.max_linear:g} m/s "
+                f"sonar_max {range_m:g} m is too near: from max_linear {one.max_linear:g} m/s "
                 f"the vehicle stops in {needed:.2f} m"
             )

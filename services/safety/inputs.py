@@ -1,4 +1,4 @@
-"""What a decision is made from: the newest sample of each stream, and at most one event."""
+"""Inputs of a decision: the newest sample of each stream, and at most one event."""
 
 from msgspec import Struct
 
@@ -16,43 +16,43 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
+from common.motion import Twist
 from services.safety.trajectory import Counter
-from services.safety.twist import Twist
 
 
-class Ask(Struct, frozen=True):
-    """A request on a source; None where the payload was none."""
+class DriveRequest(Struct, frozen=True):
+    """A drive request of a source; ``drive`` is None for an invalid payload."""
 
     source: str
     drive: Drive | None
     received_ns: int = 0
-    shares_clock: bool = False  # whether its own stamp is of this host's clock
+    shares_clock: bool = False  # whether its timestamp is of this host's clock
 
 
 class Estop(Struct, frozen=True):
-    """Someone put or deleted on the estop key."""
+    """A PUT or DELETE on the estop key."""
 
 
 class Reset(Struct, frozen=True):
-    """An operator's request to clear the causes with these identities."""
+    """An operator's call to clear the causes with these identities."""
 
     echo: int | None = None
     causes: tuple[int, ...] = ()
 
 
 class Hold(Struct, frozen=True):
-    """An operator holds the release, or lets go of it."""
+    """An operator's call to hold or end the release."""
 
     held: bool
     direction: Direction | None = None
     echo: int | None = None
 
 
-Event = Ask | Estop | Reset | Hold
+Event = DriveRequest | Estop | Reset | Hold
 
 
 class Inputs(Struct, frozen=True):
-    """A snapshot; None for a stream of which nothing has come yet."""
+    """A snapshot; a stream is None until its first sample."""
 
     velocity: Latest[Velocity] | None = None
     mileage: Latest[Mileage] | None = None
@@ -62,20 +62,20 @@ class Inputs(Struct, frozen=True):
     right: Latest[Driver] | None = None
     switches: Latest[Switches] | None = None
     link: Latest[Link] | None = None
-    reader: bool = False  # whether the emergency stop's own session has a router
+    estop_session_up: bool = False  # whether the emergency stop's own session has a router
     # This service's own state, received back through the router on that session.
     estop_path: Latest[SafetyState] | None = None
-    leaving: bool = False  # whether this service is on its way out
+    leaving: bool = False  # whether this service is shutting down
     event: Event | None = None
     boot: int = 0  # this service's own
 
     def known_velocity(self, now_ns: int, age_s: float) -> Twist | None:
-        """Return the measured velocity; None when it is no number or older than ``age_s``."""
+        """Return the measured velocity; None when not finite or older than ``age_s``."""
         return self.measured if fresh(self.velocity, now_ns, age_s) else None
 
     @property
     def measured(self) -> Twist | None:
-        """The newest measured velocity, however old; None when it is no number."""
+        """The newest measured velocity of any age; None when not finite."""
         if self.velocity is None:
             return None
         velocity = self.velocity.value
@@ -85,7 +85,7 @@ class Inputs(Struct, frozen=True):
 
     @property
     def counter(self) -> Counter | None:
-        """The newest reading of the board's counters; None when it is not finite."""
+        """The newest reading of the board's counters; None when not finite."""
         if self.mileage is None:
             return None
         mileage = self.mileage.value

@@ -1,4 +1,4 @@
-"""From a wish to a twist: limits, zones, ramp, and what of that the operator should know."""
+"""Motion planning: limits, zones and ramp turn a requested twist into the twist to command."""
 
 import math
 from collections.abc import Iterator
@@ -6,34 +6,33 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from common.messages import SONAR_NAMES
+from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
 from services.safety.causes import wants_neutral
 from services.safety.config import Safety
 from services.safety.latches import Latches, Observation
-from services.safety.ramp import ramp, start
 from services.safety.release import sweep
 from services.safety.state import RELEASE, State
-from services.safety.twist import STILL, Twist
 from services.safety.zones import zones
 
 
-class Wish(Struct, frozen=True):
-    """Who asks for which motion, within the limits."""
+class RequestedTwist(Struct, frozen=True):
+    """A source and its requested motion, within the limits."""
 
     source: str
     twist: Twist
 
 
 class Plan(Struct, frozen=True):
-    """What the wish comes down to."""
+    """The planned twist, and what limits it."""
 
     twist: Twist = STILL
-    slowed_by: int | None = None  # the sonar that limits the wish
-    blocked_by: int | None = None  # the sonar that leaves no room
+    slowed_by: int | None = None  # the sonar that limits the requested twist
+    blocked_by: int | None = None  # the sonar without room for any motion
 
 
 class Planner:
-    """Turns wishes into twists; holds no state."""
+    """Plans twists for one vehicle; holds no state."""
 
     def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
         self.zones = zones(vehicle, settings)
@@ -43,89 +42,128 @@ class Planner:
         self._up = Twist(settings.linear_acceleration, settings.angular_acceleration)
         self._down = Twist(settings.deceleration, settings.angular_deceleration)
 
-    def wish(self, state: State, creeping: bool, now_ns: int) -> Wish | None:
-        """Return the motion that is asked for: the held release before any source."""
+    def requested(self, state: State, creeping: bool, now_ns: int) -> RequestedTwist | None:
+        """Return the requested motion; a held release has priority over all sources."""
         settings = self._settings
         if creeping:
-            return Wish(RELEASE, state.release.away(settings.release_speed))
-        source = state.arbiter.driver(now_ns)
+            return RequestedTwist(RELEASE, state.release.away(settings.release_speed))
+        source = state.arbiter.in_control(now_ns)
         if source is None:
             return None
-        asked = state.arbiter.channels[source].wish
-        return Wish(source, self.bounded(asked, state.latches))
+        asked = state.arbiter.channels[source].requested
+        return RequestedTwist(source, self.limited(asked, state.latches))
 
-    def bounded(self, asked: Twist, held: Latches) -> Twist:
-        """Return the twist within the limits; at the creep speed while bumper polls are lost."""
+    def limited(self, asked: Twist, held: Latches) -> Twist:
+        """Return the twist within the limits; at creep speed while bumper polls are lost."""
         twist = asked.within(self._settings.max_linear, self._settings.max_angular)
         if "bumper_lossy" not in held:
             return twist
         fastest = sweep(twist, self.reach)
         return twist.scaled(min(1.0, self._settings.creep_speed / fastest)) if fastest else twist
 
-    def past(
+    def with_overrides(
         self, distances: tuple[float, ...], state: State, source: str | None
     ) -> tuple[float, ...]:
-        """Return the distances, with room for the creep where its operator acknowledged a fault."""
-        known = state.blind.known_to(source)
-        if not known:
+        """Return the distances, with creep room toward faulty sonars that the source overrides."""
+        overridden = state.overrides.acknowledged_by(source)
+        if not overridden:
             return distances
         return tuple(
-            self.creep_room if n in known else distance for n, distance in enumerate(distances)
+            self.creep_room if n in overridden else distance for n, distance in enumerate(distances)
         )
 
-    def plan(self, state: State, measured: Twist, wish: Wish, step_s: float) -> Plan:
-        """Return the twist for the next moment; still when the way is blocked."""
-        distances = self.past(state.heard.cautious, state, wish.source)
-        limit = self.zones.limit(wish.twist, distances)
-        target = wish.twist.scaled(limit.factor)
+    def plan(self, state: State, measured: Twist, requested: RequestedTwist, step_s: float) -> Plan:
+        """Return the twist for the next step; zero when the way is blocked."""
+        distances = self.with_overrides(state.sonar_array.cautious, state, requested.source)
+        limit = self.zones.limit(requested.twist, distances)
+        target = requested.twist.scaled(limit.factor)
         sent = state.verdict
-        current = sent.twist if sent.command == "run" else start(measured, target)
+        current = sent.twist if sent.command is RUN else ramp_start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
         here = self.zones.limit(ramped, distances)
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
-        shown = self.past(state.heard.distances, state, wish.source)
+        shown = self.with_overrides(state.sonar_array.distances, state, requested.source)
         blocked_by = self.zones.too_fast(measured, shown)
         if blocked_by is not None:
             return Plan(blocked_by=blocked_by)
         return Plan(ramped.scaled(here.factor), limit.sonar)
 
 
-def observations(state: State, wish: Wish | None, plan: Plan, now_ns: int) -> Iterator[Observation]:
-    """Yield the causes that depend on a wish, present or not."""
+def ramp(current: Twist, target: Twist, up: Twist, down: Twist, dt_s: float) -> Twist:
+    """Return the velocity after ``dt_s`` seconds on the ramp from current to target.
+
+    ``up`` limits growing and ``down`` shrinking magnitudes, in m/s^2 and rad/s^2. Only requests
+    are ramped: a stop of safety takes effect at once.
+    """
+    return Twist(
+        _step(current.linear, target.linear, up.linear * dt_s, down.linear * dt_s),
+        _step(current.angular, target.angular, up.angular * dt_s, down.angular * dt_s),
+    )
+
+
+def _step(current: float, target: float, up: float, down: float) -> float:
+    """Return one component after a step; a change of direction stops at zero first."""
+    if current * target < 0:
+        target = 0.0
+    return current + clamp(target - current, up if abs(target) > abs(current) else down)
+
+
+def ramp_start(measured: Twist, target: Twist) -> Twist:
+    """Return the start of a ramp after a stop: the remaining motion toward the target."""
+    return Twist(
+        _overlap(measured.linear, target.linear), _overlap(measured.angular, target.angular)
+    )
+
+
+def _overlap(measured: float, target: float) -> float:
+    if measured * target <= 0:
+        return 0.0
+    return measured if abs(measured) < abs(target) else target
+
+
+def observations(
+    state: State, requested: RequestedTwist | None, plan: Plan, now_ns: int
+) -> Iterator[Observation]:
+    """Yield the causes that depend on a request, present or not."""
     tick = (0, now_ns)
-    faults = state.heard.faults
-    creeping = wish is not None and wish.source == RELEASE
-    yield Observation("no_request", wish is None, tick)
-    yield Observation("neutral", _wants_neutral(state, wish), tick, _overruled(state, wish))
+    faults = state.sonar_array.faults
+    creeping = requested is not None and requested.source == RELEASE
+    overruled = _overruled_text(state, requested)
+    yield Observation("no_request", requested is None, tick)
+    yield Observation("neutral", _neutral_is_due(state, requested), tick, overruled)
     yield Observation("release", creeping, tick)
     blocked, slowed = plan.blocked_by, plan.slowed_by
-    yield Observation("blocked", blocked is not None, tick, _blocked(state, blocked, creeping))
-    yield Observation("obstacle", slowed is not None, tick, _slowed(state, slowed))
+    yield Observation("blocked", blocked is not None, tick, _blocked_text(state, blocked, creeping))
+    yield Observation("obstacle", slowed is not None, tick, _slowed_text(state, slowed))
     yield Observation("sonar", bool(faults), tick, f"Sonar not trusted: {faults}.")
 
 
-def _wants_neutral(state: State, wish: Wish | None) -> bool:
-    """Tell whether the driver has yet to let go; other causes are to be cured first."""
-    if wish is None or wish.source == RELEASE or any(wants_neutral(n) for n in state.latches):
+def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
+    """Return whether a neutral request is due; other causes must clear first."""
+    if requested is None or requested.source == RELEASE:
         return False
-    return not state.arbiter.channels[wish.source].neutral
+    if any(wants_neutral(name) for name in state.latches):
+        return False
+    return not state.arbiter.channels[requested.source].neutral
 
 
-def _overruled(state: State, wish: Wish | None) -> str:
-    """Return which source overruled the requesting one; empty when none did."""
-    channel = state.arbiter.channels.get(wish.source) if wish else None
-    if wish is None or channel is None or not channel.overruled_by:
+def _overruled_text(state: State, requested: RequestedTwist | None) -> str:
+    """Return a text when another source overruled the requesting one; otherwise empty."""
+    channel = state.arbiter.channels.get(requested.source) if requested else None
+    if requested is None or channel is None or not channel.overruled_by:
         return ""
-    return f"{channel.overruled_by} has driven: {wish.source} needs a neutral request first."
+    return (
+        f"{channel.overruled_by} was in control: {requested.source} needs a neutral request first."
+    )
 
 
-def _blocked(state: State, sonar: int | None, creeping: bool) -> str:
+def _blocked_text(state: State, sonar: int | None, creeping: bool) -> str:
     if sonar is None:
         return ""
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.heard.sonars[sonar]
-    if sonar in state.heard.unseen and not creeping:
+    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
+    if sonar in state.sonar_array.unseen and not creeping:
         past = "An operator can creep past: release the controls, then drive."
         return f"No motion toward the {name}: that sonar is {one.fault}. {past}"
     if one.fault:
@@ -133,15 +171,15 @@ def _blocked(state: State, sonar: int | None, creeping: bool) -> str:
     return f"No room toward the {name}: {one.distance:.2f} m."
 
 
-def _slowed(state: State, sonar: int | None) -> str:
+def _slowed_text(state: State, sonar: int | None) -> str:
     if sonar is None:
         return ""
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.heard.sonars[sonar]
+    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
     if one.fault:
-        return f"Creeping toward the {name}: that sonar is {one.fault}, nothing is seen there."
+        return f"Creeping toward the {name}: that sonar is {one.fault} and sees nothing there."
     if one.suspect:
         return (
-            f"Creeping toward the {name}: that sonar shows {one.same:.2f} m, whatever the vehicle "
-            "does."
+            f"Creeping toward the {name}: that sonar still shows {one.same:.2f} m although the "
+            "vehicle moved."
         )
     return f"Slowed by an obstacle at {one.distance:.2f} m ({name})."

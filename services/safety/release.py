@@ -1,14 +1,14 @@
-"""Motion off a pressed bumper, held by an operator who chose its direction; never by itself.
+"""Release: motion off a pressed bumper while an operator holds it, in the operator's direction.
 
-One bumper bit has no direction, so safety does not choose one. The memory here lasts as long as
-``contact`` is latched, over every press: the way that may be travelled in total, and the
-directions in which the bumper was pressed anew. The way counts by the largest of the commanded
-speed, the measured speed and the board's counter, so that neither slipping nor locked wheels hide
-it. What the vehicle travels while it comes to rest counts too. A contact that is latched beside
-``predecessor`` may be an old one, and a restart of safety loses this memory: it gets no release.
+The single bumper bit has no direction, so safety does not choose one. This state lasts as long as
+``contact`` is latched, over every press: the total travel, and the directions in which the bumper
+was pressed again. Travel is the largest of commanded speed, measured speed and the board's counter,
+so neither slipping nor locked wheels hide it. Travel while the vehicle slows to standstill counts
+too. A restart of safety loses this state, so a contact that is latched beside ``predecessor`` gets
+no release: it may be an old one.
 
-"Anew" is the first pressed sample after a clear one. The bridge reports a bumper as clear only
-after three clear answers of the board, so that a short gap in one press is no second press.
+"Again" means the first pressed sample after a clear one. The bridge reports a clear bumper only
+after three clear answers of the board, so a short gap within one press is not a second press.
 """
 
 from msgspec import Struct
@@ -16,16 +16,18 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction
+from common.motion import STILL, Twist
 from services.safety.latches import Held
 from services.safety.trajectory import Counter, Trajectory
-from services.safety.twist import STILL, Twist
 
-COAST_NS = NS_PER_S // 2  # after the last motion, a press and the counter still belong to a release
+COAST_NS = (
+    NS_PER_S // 2
+)  # after the last motion; a press and counted travel still belong to the release
 SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
 
 
 class Release(Struct, frozen=True):
-    """One latched contact: how the vehicle came to it, and how far it was moved since."""
+    """One latched contact: the trajectory before it, and the travel of its releases."""
 
     before: Trajectory = Trajectory()  # at the newest contact
     integrated: float = 0.0  # m, by the larger of commanded and measured speed
@@ -35,21 +37,21 @@ class Release(Struct, frozen=True):
     moved: Direction | None = None  # in which a release last moved the vehicle
     moved_ns: int | None = None  # when
     forbidden: frozenset[Direction] = frozenset()
-    unknown: bool = False  # whether releases before a restart of safety may have moved it
-    held_ns: int | None = None  # when the operator last called; None when ended
-    let_go: int = 0  # heartbeat number that a later hold must exceed
+    unknown: bool = False  # whether releases before a restart of safety may have moved the vehicle
+    held_ns: int | None = None  # newest call of the operator; None when ended
+    ended_echo: int = 0  # heartbeat that a later hold must exceed
 
     @property
     def travelled(self) -> float:
-        """The travel of all releases of this contact, in metres."""
+        """Travel of all releases of this contact, in metres."""
         return max(self.integrated, self.counted)
 
     def is_held(self, now_ns: int, lease_s: float) -> bool:
-        """Return whether the operator still holds."""
+        """Return whether the operator's lease still lives."""
         return self.held_ns is not None and now_ns - self.held_ns <= lease_s * NS_PER_S
 
     def left(self, distance: float) -> float:
-        """Return how many metres may still be travelled, of ``distance`` for each contact."""
+        """Return the remaining travel in metres, of ``distance`` for each contact."""
         return 0.0 if self.unknown else max(0.0, distance - self.travelled)
 
     def away(self, speed: float) -> Twist:
@@ -61,8 +63,8 @@ class Release(Struct, frozen=True):
         return replace(self, direction=direction, held_ns=now_ns)
 
     def end(self, echo: int) -> "Release":
-        """Return the release ended; only a call with a newer echo than this holds it again."""
-        return replace(self, held_ns=None, let_go=max(self.let_go, echo))
+        """Return the release ended; a new hold needs a newer echo than this."""
+        return replace(self, held_ns=None, ended_echo=max(self.ended_echo, echo))
 
     def moving(
         self, sent: Twist | None, known: Twist | None, counter: Counter | None,
@@ -70,8 +72,8 @@ class Release(Struct, frozen=True):
     ) -> "Release":  # fmt: skip
         """Return the release ``dt_s`` seconds later.
 
-        ``sent`` is what a release commanded in that time, ``known`` the measured velocity; None
-        where there is none.
+        ``sent`` is the twist that a release commanded in that time, ``known`` the measured
+        velocity; both may be None.
         """
         if sent is None and not self._is_coasting(now_ns):
             return replace(self, counter=counter)
@@ -86,15 +88,17 @@ class Release(Struct, frozen=True):
             moved_ns=now_ns if moves else self.moved_ns,
         )
 
-    def after(self, old: Held | None, contact: Held, came: Trajectory, now_ns: int) -> "Release":
+    def after(
+        self, old: Held | None, contact: Held, trajectory: Trajectory, now_ns: int
+    ) -> "Release":
         """Return the release after a bumper sample: ``contact`` as held now, ``old`` before."""
         if old is None:
-            return Release(before=came, let_go=self.let_go)
+            return Release(before=trajectory, ended_echo=self.ended_echo)
         if contact.good:
             return replace(self, held_ns=None)  # ends when the bumper is clear
         if not old.good:
             return self  # the same press
-        before = self.before if contact.id == old.id else came
+        before = self.before if contact.id == old.id else trajectory
         forbidden = self.forbidden
         if self.moved is not None and self._is_coasting(now_ns):
             forbidden = forbidden | {self.moved}
@@ -110,7 +114,7 @@ def sweep(twist: Twist, reach: float) -> float:
 
 
 def _between(old: Counter | None, new: Counter | None) -> float:
-    """Return the travel (m) between two readings; 0 where they cannot be compared."""
+    """Return the travel (m) between two readings; 0 when they are not comparable."""
     if old is None or new is None or old.origin != new.origin:
         return 0.0
     return abs(new.distance - old.distance)

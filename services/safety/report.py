@@ -1,4 +1,4 @@
-"""What is told: the state for everybody, in words too, and the transitions as events."""
+"""Reports: the motion message, the published state with its text, and transitions as events."""
 
 from collections.abc import Iterator
 
@@ -7,23 +7,23 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
+from common.motion import RUN, Twist
 from services.safety.causes import BY_NAME
-from services.safety.inputs import Ask, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
 from services.safety.operator_requests import room
 from services.safety.policy import Policy
 from services.safety.state import State
 from services.safety.trajectory import OPPOSITE
-from services.safety.twist import Twist
 
 MOVING = ("run", "slow")
-# What operators know a cause by, where its own name is too fine.
+# Event names that differ from the cause's name.
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
 
 
-class Note(Struct, frozen=True):
-    """One transition, worth an event."""
+class Transition(Struct, frozen=True):
+    """One transition, published as an event."""
 
     name: str
     level: Level
@@ -32,36 +32,41 @@ class Note(Struct, frozen=True):
 
 
 def motion_message(state: State, inputs: Inputs) -> Motion:
-    """Return what the bridge is told of a decision on these inputs."""
+    """Return the motion message of a decision on these inputs."""
     verdict = state.verdict
     return Motion(
         command=verdict.command,
         linear=verdict.twist.linear,
         angular=verdict.twist.angular,
         source=verdict.source,
-        judged=verdict.judged[1],
-        judged_boot=verdict.judged[0],
+        judged=verdict.acked[1],
+        judged_boot=verdict.acked[0],
         latched=bool(latched(state.latches)),
         predecessor=inputs.link.value.latched_by if inputs.link else None,
     )
 
 
-def timed(motion: Motion, state: State, inputs: Inputs) -> Motion:
-    """Return it with the times of what it answers, for whoever measures.
+def with_times(motion: Motion, state: State, inputs: Inputs) -> Motion:
+    """Return the motion message with the times of what it answers, for measurements.
 
-    A request is answered when it was taken and its source drives.
+    It answers a request that was accepted and whose source is in control.
     """
     asked_ns = heard_ns = 0
-    ask, verdict = inputs.event, state.verdict
-    if isinstance(ask, Ask) and ask.drive and not verdict.refused and verdict.source == ask.source:
-        heard_ns = ask.received_ns
-        asked_ns = ask.drive.mono_ns if ask.shares_clock else 0
+    request, verdict = inputs.event, state.verdict
+    if (
+        isinstance(request, DriveRequest)
+        and request.drive
+        and not verdict.refused
+        and verdict.source == request.source
+    ):
+        heard_ns = request.received_ns
+        asked_ns = request.drive.mono_ns if request.shares_clock else 0
     judged_ns = inputs.bumper.received_ns if inputs.bumper else 0
     return replace(motion, asked_ns=asked_ns, heard_ns=heard_ns, judged_ns=judged_ns)
 
 
 def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
-    """Return what everybody is told; the heartbeat is the one that the state has."""
+    """Return the published state, with the heartbeat of ``state``."""
     causes = tuple(
         Cause(
             name=name,
@@ -85,68 +90,70 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
 
 
 def sentence(state: State) -> str:
-    """Say why the vehicle does or does not move."""
+    """Return one sentence: why the vehicle does or does not move."""
     names = ordered(state.latches)
-    if state.verdict.command == "run":
-        who = f"Driving as {state.verdict.source} asks."
+    if state.verdict.command is RUN:
+        control = _source_text(state.verdict.source)
         slowing = [state.latches[n].text for n in names if BY_NAME[n].action == "slow"]
-        return " ".join([*slowing[:1], who])
+        return " ".join([*slowing[:1], control])
     worst = names[0]
     text = state.latches[worst].text
     if worst not in latched(state.latches):
         return text
     gone = state.latches[worst].good >= GOOD_SAMPLES
-    return f"{text} {'Reset to go on.' if gone else 'It is not gone yet.'}"
+    return f"{text} {'Reset to go on.' if gone else 'It is still present.'}"
 
 
 def signature(state: State) -> tuple[object, ...]:
-    """Return what must be told at once when it changes."""
+    """Return the part of the state whose change is published at once."""
     ids = tuple(state.latches[name].id for name in latched(state.latches))
     forbidden = state.release.forbidden
     return state.verdict.name, ordered(state.latches), ids, state.verdict.source, forbidden
 
 
-def notes(before: State, after: State, trigger: Trigger | None) -> Iterator[Note]:
+def transitions(before: State, after: State, trigger: Trigger | None) -> Iterator[Transition]:
     """Yield the transitions of one decision."""
     old, new = before.verdict, after.verdict
     for name in latched(after.latches):
         known, one = before.latches.get(name), after.latches[name]
         if known is None or known.id != one.id:
-            yield Note(EVENT_NAMES.get(name, name), "error", one.text, {"cause": name})
+            yield Transition(EVENT_NAMES.get(name, name), "error", one.text, {"cause": name})
     if old.name in MOVING and new.name not in MOVING:
         worst = ordered(after.latches)[0]
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
-        yield Note("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
+        yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
     if old.source != new.source:
-        yield Note("source", "info", _handover(new.source), {"from": old.source, "to": new.source})
+        yield Transition(
+            "source", "info", _source_text(new.source), {"from": old.source, "to": new.source}
+        )
     if ("release" in before.latches) != ("release" in after.latches):
         began = "release" in after.latches
         text = "Creeping off the bumper." if began else "No longer creeping off the bumper."
-        yield Note("release" if began else "release_end", "warning", text, {})
-    yield from _answered(after, trigger)
+        yield Transition("release" if began else "release_end", "warning", text, {})
+    yield from _reply_events(after, trigger)
 
 
-def _answered(after: State, trigger: Trigger | None) -> Iterator[Note]:
+def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]:
     reply = after.verdict.reply
     if reply is None:
         return
     if isinstance(trigger, Reset):
-        yield Note(
+        yield Transition(
             "reset" if reply.done else "reset_refused",
             "info" if reply.done else "warning",
             reply.text,
             {},
         )
     elif isinstance(trigger, Hold) and not reply.done:
-        yield Note("release_refused", "warning", reply.text, {})
+        yield Transition("release_refused", "warning", reply.text, {})
 
 
-def _handover(source: str | None) -> str:
-    return f"{source} drives." if source else "Nobody drives."
+def _source_text(source: str | None) -> str:
+    return f"{source} is in control." if source else "No source is in control."
 
 
 def _release(policy: Policy, state: State, now_ns: int) -> Release:
-    """Return what is known about moving off the bumper."""
+    """Return the published state of the release."""
     release = state.release
     came, free = release.before, None
     if came.direction is not None and OPPOSITE[came.direction] not in release.forbidden:
@@ -162,10 +169,10 @@ def _release(policy: Policy, state: State, now_ns: int) -> Release:
 
 def _limits(policy: Policy, state: State) -> Limits:
     planner, settings = policy.planner, policy.settings
-    distances = planner.past(state.heard.cautious, state, state.verdict.source)
+    distances = planner.with_overrides(state.sonar_array.cautious, state, state.verdict.source)
 
     def most(asked: Twist) -> Twist:
-        twist = planner.bounded(asked, state.latches)
+        twist = planner.limited(asked, state.latches)
         return twist.scaled(planner.zones.limit(twist, distances).factor)
 
     return Limits(

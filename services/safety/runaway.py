@@ -1,29 +1,29 @@
-"""Whether the vehicle moves as it was commanded; judged for each axis on its own.
+"""Runaway detection: compares measured with commanded motion, separately for each axis.
 
-After a slower command the vehicle needs time. So the command is followed by an *envelope* for each
-direction: it rises with the command at once, and falls no faster than the vehicle surely slows
-down.
+After a slower command the vehicle needs time to slow down. So each direction has an *envelope*: it
+rises with the command at once, and falls at the guaranteed deceleration.
 
-Bad is: over the envelope by the tolerance, or moving against a command whose opposite
-envelope is used up. Bad time adds up; good time takes away half as fast, so that flapping trips.
+A sample is bad when it exceeds the envelope by the tolerance, or when it moves against a command
+whose opposite envelope is zero. Bad time adds up; good time subtracts at half the rate, so
+alternating samples trip too.
 """
 
 from msgspec import Struct
 
-GOOD_PER_BAD = 0.5  # a second of good takes away half a second of bad
+GOOD_PER_BAD = 0.5  # a good second subtracts half a bad second
 
 
 class Bounds(Struct, frozen=True):
-    """What one axis may do, in m and s or rad and s."""
+    """Limits of one axis, in m and s or rad and s."""
 
-    deceleration: float  # what the vehicle surely reaches
+    deceleration: float  # guaranteed
     tolerance: float  # over the envelope
-    against: float  # speed against the command that is more than noise
+    against: float  # speed against the command, above noise
     patience_s: float  # bad time that trips
 
 
 class Axis(Struct, frozen=True):
-    """One axis: the envelope both ways, as magnitudes, and for how long it has been bad."""
+    """State of one axis: envelopes as magnitudes, and the accumulated bad time."""
 
     ahead: float = 0.0
     back: float = 0.0
@@ -41,5 +41,5 @@ class Axis(Struct, frozen=True):
             or (commanded > 0 and back == 0 and -measured > bounds.against)
         )
         bad_s = self.bad_s + (dt_s if bad else -dt_s * GOOD_PER_BAD)
-        # No more than trips, so that it is gone as soon as the vehicle obeys again.
+        # Capped at the limit, so that the cause clears as soon as the vehicle obeys again.
         return Axis(ahead, back, min(max(0.0, bad_s), bounds.patience_s))

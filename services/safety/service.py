@@ -1,4 +1,7 @@
-"""The safety service on the bus: streams in, verdicts out; decides nothing itself."""
+"""Bus shell of the safety service: subscribes to inputs and publishes verdicts.
+
+All decisions are made by ``Policy``.
+"""
 
 import time
 from collections.abc import Callable
@@ -15,97 +18,98 @@ from common.heartbeat import Heartbeat
 from common.messages import Done, Drive, Message, ReleaseRequest, ResetDone, ResetRequest
 from common.service import Node
 from services.safety.config import SafetyConfig
-from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
 from services.safety.policy import Policy
-from services.safety.report import motion_message, notes, signature, state_message, timed
+from services.safety.report import motion_message, signature, state_message, transitions, with_times
 from services.safety.state import Reply
 
 M = TypeVar("M", bound=Message)
 
-DECIDE_S = 1 / 50  # from one decision to the next, at most
-TELL_S = 1 / 20
-# One sample latches, a hit or a driver's fault, and the next one may say that it is over: none must
-# be pushed out or left undecided, even after a second's stall.
+DECISION_PERIOD_S = 1 / 50  # at most, from one decision to the next
+STATE_PERIOD_S = 1 / 20
+# A single sample latches a hit or a driver fault, and the next one may already be clear. So no
+# sample may be dropped or skipped, even after a stall of a second.
 LATCHING_DEPTH = 64
 DRIVE_DEPTH = 64
 
 
-class Ports:
-    """Keeps the newest samples, decides on each event, and publishes what comes out."""
+class SafetyService:
+    """Stores the newest samples, decides on each event, and publishes the results."""
 
-    def __init__(self, node: Node[SafetyConfig], reader: Bus) -> None:
+    def __init__(self, node: Node[SafetyConfig], estop_bus: Bus) -> None:
         self._node = node
-        self._reader = reader
+        self._estop_bus = estop_bus
         self._policy = Policy(node.config.safety, node.config.vehicle)
-        # Echoes and identities of an earlier start must be unknown to this one.
+        # Random start, so that echoes and identities of an earlier start are unknown.
         start = node.bus.boot % 2**31
         self._state = replace(self._policy.start(), heartbeat=Heartbeat(start), decision=start)
         self._inputs = Inputs(boot=node.bus.boot)
-        self._motion = node.open_drive(listens=False).publisher(keys.MOTION)
-        self._safety = node.bus.publisher(keys.SAFETY)
-        self._listen()
-        node.is_stopped = self._come_to_rest
-        self._due = node.loop.every(DECIDE_S, lambda _: self._decide())
-        node.loop.every(TELL_S, self._tell)
+        self._motion_publisher = node.open_drive(listens=False).publisher(keys.MOTION)
+        self._state_publisher = node.bus.publisher(keys.SAFETY)
+        self._subscribe()
+        node.is_stopped = self._is_stopped
+        self._decision_timer = node.loop.every(DECISION_PERIOD_S, lambda _: self._decide())
+        node.loop.every(STATE_PERIOD_S, self._publish_state)
 
-    def _listen(self) -> None:
-        self._measure()
+    def _subscribe(self) -> None:
+        self._subscribe_measurements()
         bus, robot = self._node.bus, self._node.config.robot.id
         bus.subscribe(
             keys.DRIVE,
-            self._ask,
+            self._on_drive,
             depth=DRIVE_DEPTH,
-            refused=self._no_request,
+            refused=self._on_bad_drive,
             known=self._node.config.safety.sources,
             source="*",
         )
         for source in self._node.config.safety.sources:
-            # To a driver bound to this source a router announces only readers of exactly this key.
+            # For a client whose rights cover only this source, the router announces only
+            # subscribers of exactly this key.
             bus.announce(keys.DRIVE.on(robot, source=source))
-        bus.serve(keys.RESET, self._reset)
-        bus.serve(keys.RELEASE, self._hold)
-        self._reader.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
-        self._reader.subscribe(keys.SAFETY, self._keep("estop_path"))
+        bus.serve(keys.RESET, self._on_reset)
+        bus.serve(keys.RELEASE, self._on_release)
+        self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
+        self._estop_bus.subscribe(keys.SAFETY, self._store("estop_path"))
 
-    def _measure(self) -> None:
-        """Subscribe the bridge's measurements, on the drive link alone."""
+    def _subscribe_measurements(self) -> None:
+        """Subscribe to the bridge's measurements, on the drive link only."""
         drive = self._node.drive
-        drive.subscribe(keys.VELOCITY, self._keep("velocity"))
-        drive.subscribe(keys.MILEAGE, self._keep("mileage"))
-        drive.subscribe(keys.ULTRASONIC, self._keep("ultrasonic", at_once=True))
-        drive.subscribe(keys.BUMPER, self._keep("bumper", at_once=True), depth=LATCHING_DEPTH)
+        drive.subscribe(keys.VELOCITY, self._store("velocity"))
+        drive.subscribe(keys.MILEAGE, self._store("mileage"))
+        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic", at_once=True))
+        drive.subscribe(keys.BUMPER, self._store("bumper", at_once=True), depth=LATCHING_DEPTH)
         for side in ("left", "right"):
             drive.subscribe(
-                keys.DRIVER, self._keep(side, at_once=True), depth=LATCHING_DEPTH, side=side
+                keys.DRIVER, self._store(side, at_once=True), depth=LATCHING_DEPTH, side=side
             )
-        drive.subscribe(keys.SWITCHES, self._keep("switches"))
-        drive.subscribe(keys.LINK, self._keep("link"))
+        drive.subscribe(keys.SWITCHES, self._store("switches"))
+        drive.subscribe(keys.LINK, self._store("link"))
 
-    def _keep(self, field: str, *, at_once: bool = False) -> Callable[[Arrival[M]], None]:
-        """Return a handler that keeps the newest sample in the inputs' field of that name."""
+    def _store(self, field: str, *, at_once: bool = False) -> Callable[[Arrival[M]], None]:
+        """Return a handler that stores the newest sample in this field of the inputs."""
 
-        def take(arrival: Arrival[M]) -> None:
+        def store(arrival: Arrival[M]) -> None:
             latest = Latest(arrival.message, arrival.received_ns)
             self._inputs = replace(self._inputs, **{field: latest})
             if at_once:
                 self._decide()
 
-        return take
+        return store
 
-    def _ask(self, arrival: Arrival[Drive]) -> None:
+    def _on_drive(self, arrival: Arrival[Drive]) -> None:
         source, drive = source_of(arrival.key), arrival.message
         shared = self._node.bus.shares_clock(drive)
-        self._decide(Ask(source, drive, arrival.received_ns, shared))
+        self._decide(DriveRequest(source, drive, arrival.received_ns, shared))
 
-    def _no_request(self, key: str, _: MessageError) -> None:
-        self._decide(Ask(source_of(key), None))
+    def _on_bad_drive(self, key: str, _: MessageError) -> None:
+        self._decide(DriveRequest(source_of(key), None))
 
-    def _reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
+    def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         def answer(reply: Reply) -> None:
             if not reply.done:
                 caller.refuse(reply.text)
                 return
-            # The state that follows at once is the first one that shows the effect.
+            # The state published right after this is the first one that shows the effect.
             heartbeat = self._state.heartbeat.number + 1
             boot = self._node.bus.boot
             caller.reply(
@@ -114,7 +118,7 @@ class Ports:
 
         self._decide(Reset(request.echo, request.causes), answer)
 
-    def _hold(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
+    def _on_release(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
         def answer(reply: Reply) -> None:
             if reply.done:
                 caller.reply(Done(text=reply.text, boot=self._node.bus.boot))
@@ -127,26 +131,27 @@ class Ports:
         self, event: Event | None = None, answer: Callable[[Reply], None] | None = None
     ) -> None:
         now_ns = time.monotonic_ns()
-        self._due.put_off(now_ns)
-        inputs = replace(self._inputs, reader=self._reader.connected, event=event)
+        self._decision_timer.put_off(now_ns)
+        inputs = replace(self._inputs, estop_session_up=self._estop_bus.connected, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)
-        self._motion.put(timed(motion_message(self._state, inputs), self._state, inputs))
+        motion = motion_message(self._state, inputs)
+        self._motion_publisher.put(with_times(motion, self._state, inputs))
         if verdict.refused:
             self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:
             answer(verdict.reply)
         if signature(before) != signature(self._state):
-            self._tell(now_ns)
-        for note in notes(before, self._state, event):
-            self._node.event(note.name, note.level, note.text, **note.about)
+            self._publish_state(now_ns)
+        for transition in transitions(before, self._state, event):
+            self._node.event(transition.name, transition.level, transition.text, **transition.about)
 
-    def _tell(self, now_ns: int) -> None:
+    def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))
-        self._safety.put(state_message(self._policy, self._state, now_ns))
+        self._state_publisher.put(state_message(self._policy, self._state, now_ns))
 
-    def _come_to_rest(self) -> bool:
-        """Stop the vehicle before the service ends; an unknown speed is not waited for."""
+    def _is_stopped(self) -> bool:
+        """Stop the vehicle before shutdown; do not wait for an unknown velocity."""
         if not self._inputs.leaving:
             self._inputs = replace(self._inputs, leaving=True)
             self._decide()

@@ -1,19 +1,19 @@
-"""Plausibility of each sonar: a distance, a distance in doubt, or no reading.
+"""Plausibility of one sonar: a distance, a doubtful distance, or no reading.
 
-A nearer reading counts at once. A farther one counts after three samples in a row that are farther
-by the hysteresis, and then the nearest of the three. A sample that is faulty, too near to measure
-or not a number counts as distance zero, so the same rule accepts a sonar again after three
+A nearer reading counts at once. A farther one counts after three consecutive samples that are
+farther by the hysteresis; then the nearest of the three counts. A sample that is faulty, too near
+to measure or not finite counts as distance zero, so the same rule accepts a sonar again after three
 good samples. ``no_echo`` is free space, at infinity.
 
-A reading that stays the same to the millimetre is not a fault by itself: a wall alongside, or a
-surface beyond the sensor's range, gives just that. It disagrees with odometry where the vehicle
-moved along the sonar's axis, or turned, and nothing else explains it (``sonar_array.py``):
+A reading that is constant to the millimetre is not a fault by itself: a wall alongside, or a
+surface beyond the sensor's range, gives the same. It contradicts odometry when the vehicle moved
+along the sonar's axis or turned, and nothing else explains it (``sonar_array.py``):
 
-- from the first metre on, the reading is shortened by the way that the vehicle came nearer
+- from the start, the reading is reduced by the distance that the vehicle came nearer
 - after ``stuck_travel`` along the axis, or half a radian of turning, the sonar is *suspect*
-- three samples in a row with another reading end the suspicion
+- three consecutive samples with another reading end the suspicion
 
-Suspicion never blocks. It limits the speed toward what the sonar sees (``Sonar.cautious``).
+Suspicion never blocks. It limits the speed toward the sonar's sector (``Sonar.cautious``).
 """
 
 import math
@@ -26,19 +26,19 @@ from common.messages import RangeStatus
 FARTHER_SAMPLES = 3
 CHANGED_SAMPLES = 3
 SAME_M = 0.0015  # the board counts millimetres
-STUCK_TURN = 0.5  # rad; over a turn like this no flat surface keeps its distance
-UNSEEN = ("faulty", "silent")  # faults of the sonar; too near to measure is an obstacle
+STUCK_TURN = 0.5  # rad; a flat surface does not keep its distance over such a turn
+UNSEEN = ("faulty", "silent")  # faults without a reading; "too near" is an obstacle
 
 
 class Sonar(Struct, frozen=True):
-    """One sonar; ``fault`` is empty when it shows a distance."""
+    """State of one sonar; ``fault`` is empty when it gives a distance."""
 
     distance: float = 0.0  # m; 0 while it has a fault, infinity for no echo
     fault: str = "silent"
-    farther: tuple[float, ...] = ()  # readings that wait to count
-    same: float = math.inf  # m, the reading that has not changed
-    nearer: float = 0.0  # m that the vehicle came nearer since, from where it was farthest
-    travel: float = 0.0  # m along the axis since, between the two ends of the way
+    farther: tuple[float, ...] = ()  # farther readings, not yet accepted
+    same: float = math.inf  # m, the constant reading
+    nearer: float = 0.0  # m that the vehicle came nearer since, from the farthest place
+    travel: float = 0.0  # m along the axis since, between the extremes
     turned: float = 0.0  # rad since
     suspect: bool = False
     changed: int = 0  # samples in a row that contradict the suspicion
@@ -49,22 +49,22 @@ class Sonar(Struct, frozen=True):
         return self.fault in UNSEEN
 
     def cautious(self, creep_room: float) -> float:
-        """Return the distance to plan with; ``creep_room`` is what the creep speed needs."""
+        """Return the distance to plan with; ``creep_room`` is the distance for the creep speed."""
         doubted = 0.0 if self.suspect else self.same - self.nearer
         return min(self.distance, max(doubted, creep_room))
 
 
 class Moved(Struct, frozen=True):
-    """How the vehicle moved since the last sample, and what constancy proves."""
+    """Motion since the last sample, and what explains a constant reading."""
 
-    along: float = 0.0  # m along the axis, toward what the sonar sees
+    along: float = 0.0  # m along the axis, toward the sector
     turn: float = 0.0  # rad
-    beyond: bool = False  # whether the reading is the sensor's greatest
+    beyond: bool = False  # whether the reading is the sensor's greatest range
     alongside: bool = False  # whether a surface alongside explains it
 
 
 class Rules(Struct, frozen=True):
-    """When a reading is believed; metres."""
+    """Thresholds in metres."""
 
     hysteresis: float
     stuck_travel: float  # along the axis without a change, until the sonar is suspect
@@ -73,7 +73,7 @@ class Rules(Struct, frozen=True):
 def read(
     sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved, rules: Rules
 ) -> Sonar:
-    """Take one sample."""
+    """Return the sonar after one sample."""
     distance, fault = _trust(reading, status)
     if fault:
         return Sonar(fault=fault)
@@ -81,7 +81,7 @@ def read(
 
 
 def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
-    """Return the distance that one sample shows, or why it shows none."""
+    """Return the distance of one sample, or the reason why it has none."""
     if status == "no_echo":
         return math.inf, ""
     if status != "ok":
@@ -103,7 +103,7 @@ def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
 
 
 def _watch(sonar: Sonar, distance: float, moved: Moved, stuck_travel: float) -> Sonar:
-    """Compare the reading with the one before and with the motion."""
+    """Compare the reading with the previous one and with the motion."""
     if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
         changed = sonar.changed + 1
         if sonar.suspect and changed < CHANGED_SAMPLES:
@@ -123,7 +123,7 @@ def _begin(sonar: Sonar, same: float) -> Sonar:
 
 
 def _span(sonar: Sonar, along: float) -> tuple[float, float]:
-    """Return how near the vehicle came, and how long its way along the axis was."""
+    """Return how much nearer the vehicle came, and its travel along the axis."""
     nearer = sonar.nearer + along
-    farther = max(0.0, -nearer)  # beyond the farther end of the way so far
+    farther = max(0.0, -nearer)  # beyond the farthest place so far
     return nearer + farther, max(sonar.travel + farther, nearer + farther)

@@ -1,4 +1,4 @@
-"""Standstill supervision: the vehicle stops on command, and stays where it stopped.
+"""Standstill supervision: the vehicle stops on command and stays at that place.
 
 Standstill is commanded by STOP, by BRAKE and by a RUN that the motion frame rounds to zero. Three
 phases:
@@ -6,26 +6,26 @@ phases:
 ======== ============================================================= ===========================
 phase    entered                                                       supervised
 ======== ============================================================= ===========================
-MOVING   motion is commanded                                           by ``runaway.py``
+MOVING   motion is commanded                                           ``runaway.py``
 STOPPING standstill is commanded, or safety has just started           it stands within
                                                                        v / a + 0.5 s, at most 3 s
-STANDING it was measured to stand for 0.2 s                            it stays within 0.05 m and
+STANDING 0.2 s of measured standstill                                  it stays within 0.05 m and
                                                                        0.05 rad of that place
 ======== ============================================================= ===========================
 
 A vehicle in a curve slows down on both axes together, so the longer of the two times counts. An
-unknown velocity is not standstill. A motion of less than 0.5 s adds its own duration to the time
-to stop and does not renew it, unless the vehicle stood meanwhile: otherwise short motions repeated
-would postpone it for ever.
+unknown velocity is not standstill. A motion of less than 0.5 s adds its duration to the time limit
+and does not renew the limit, unless the vehicle stood meanwhile. Otherwise repeated short motions
+would postpone the limit without end.
 
-The way from that place is measured twice. The board's counters find a slow creep. The velocities
-find a fast motion, also while the counters are not answered. Neither may trip by noise, drift or
-a restart of the board:
+The distance from that place is measured twice. The board's counters show a slow creep. The
+velocities show a fast motion, even while the counters are not answered. Neither may trip by noise,
+drift or a restart of the board:
 
-- of two velocities in a row the smaller counts, and none below the standstill threshold
+- of two consecutive velocities the smaller counts, and none below the standstill threshold
 - the integral of the velocities leaks
-- a counter step that the vehicle cannot make in the time is a damaged frame: it does not count
-- the heading counter may drift, as gyroscopes do
+- an implausibly large counter step is a damaged frame and does not count
+- the heading counter may drift like a gyroscope
 """
 
 import math
@@ -36,23 +36,23 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
+from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
 from services.safety.config import Safety
-from services.safety.twist import STANDING_MPS, STANDING_RADPS, STILL, Twist
 
 GRACE_NS = NS_PER_S // 2  # on top of v / a
-LONGEST_STOP_NS = 3 * NS_PER_S  # both together, whatever the settings
-BRIEF_NS = NS_PER_S // 2  # a shorter motion does not renew the time to stop
-CONFIRM_NS = NS_PER_S // 5  # of standstill until the place counts
+LONGEST_STOP_NS = 3 * NS_PER_S  # limit of v / a + grace for any settings
+BRIEF_NS = NS_PER_S // 2  # a shorter motion does not renew the time limit
+CONFIRM_NS = NS_PER_S // 5  # of standstill until the place is recorded
 AWAY = 0.05  # m and rad
 LEAK_S = 5.0  # time constant of the integrated velocities
 DRIFT_RADPS = 0.001  # of the heading counter
 LONGEST_GAP_S = 0.1  # between two velocities; over longer gaps the motion is unknown
-FASTEST_MPS = 1.5  # that a counter step may show; at least ``AWAY`` in any time
+FASTEST_MPS = 1.5  # plausible for a counter step, which may be ``AWAY`` in any time
 FASTEST_RADPS = 2.0
 
 
 class Phase(Enum):
-    """What is supervised."""
+    """Phase of the supervision."""
 
     MOVING = "moving"
     STOPPING = "stopping"
@@ -60,14 +60,14 @@ class Phase(Enum):
 
 
 class Measured(Struct, frozen=True):
-    """What the board reports: the newest of both, None while unknown."""
+    """Newest velocity and counters of the board; None while unknown."""
 
     velocity: Latest[Twist] | None
     counters: Latest[Mileage] | None
 
 
 class Velocities(Struct, frozen=True):
-    """The newest measured velocity, and what it and the one before agree on."""
+    """The newest measured velocity, and the common part of the last two."""
 
     newest: Twist | None = None  # None while unknown
     received_ns: int = 0
@@ -80,26 +80,26 @@ class Velocities(Struct, frozen=True):
 
 
 class Standstill(Struct, frozen=True):
-    """The phase, and the way from the place of the standstill."""
+    """Phase, and the distance from the place of the standstill."""
 
     phase: Phase = Phase.STOPPING
-    due_ns: int | None = None  # when it must be at standstill; None until a velocity was measured
-    began_ns: int = 0  # when the newest motion was commanded
-    still_ns: int | None = None  # since when standstill is measured
+    due_ns: int | None = None  # time limit of the standstill; None until a velocity was measured
+    began_ns: int = 0  # start of the newest commanded motion
+    still_ns: int | None = None  # start of the measured standstill
     velocities: Velocities = Velocities()
     counters: Latest[Mileage] | None = None
     integrated: Twist = STILL  # m and rad, from the velocities
     counted: Twist = STILL  # m and rad, from the counters
-    left: bool = False  # whether it has just left the place of its standstill
+    left: bool = False  # whether the vehicle has just left the place of its standstill
 
     def is_late(self, now_ns: int) -> bool:
-        """Return whether it should be at standstill by now and is not known to be."""
+        """Return whether the time limit has passed without a known standstill."""
         overdue = self.due_ns is not None and now_ns > self.due_ns
         return self.phase is Phase.STOPPING and overdue and not self.velocities.standing
 
     @property
     def text(self) -> str:
-        """Describe, for the operator, a vehicle that does not stop."""
+        """Text for the operator about a vehicle that does not stop."""
         twist = self.velocities.steady
         if twist is None:
             return "Standstill is not confirmed: no velocity is received."
@@ -107,16 +107,16 @@ class Standstill(Struct, frozen=True):
 
 
 class Supervisor(Struct, frozen=True):
-    """Follows one vehicle; holds no state."""
+    """Supervises one vehicle; holds no state."""
 
-    deceleration: float  # m/s^2 that the vehicle surely reaches
+    deceleration: float  # m/s^2, guaranteed
     angular_deceleration: float  # rad/s^2
     fastest: Twist  # assumed while the velocity is unknown
 
     def follow(
         self, before: Standstill, commanded: bool, seen: Measured, now_ns: int
     ) -> Standstill:
-        """Return the supervision now; ``commanded``: whether standstill is commanded."""
+        """Return the state now; ``commanded``: whether standstill is commanded."""
         known = seen.velocity
         if not commanded and _knows(before, seen):
             return before
@@ -176,14 +176,14 @@ def _begin(standstill: Standstill, phase: Phase, due_ns: int | None) -> Standsti
 
 
 def _move(standstill: Standstill, now_ns: int) -> Standstill:
-    """Return the supervision of a motion; the time to stop is kept until the vehicle stands."""
+    """Return the state of a motion; the time limit is kept until the vehicle stands."""
     began_ns = standstill.began_ns if standstill.phase is Phase.MOVING else now_ns
     due_ns = None if standstill.velocities.standing else standstill.due_ns
     return replace(_begin(standstill, Phase.MOVING, due_ns), began_ns=began_ns)
 
 
 def _settle(standstill: Standstill, now_ns: int) -> Standstill:
-    """Take the place for that of the standstill once it is confirmed."""
+    """Record the place once the standstill is confirmed."""
     if not standstill.velocities.standing:
         return replace(standstill, still_ns=None)
     still_ns = now_ns if standstill.still_ns is None else standstill.still_ns
@@ -193,7 +193,7 @@ def _settle(standstill: Standstill, now_ns: int) -> Standstill:
 
 
 def _integrate(standstill: Standstill, known: Latest[Twist] | None) -> Standstill:
-    """Take in the newest velocity, once."""
+    """Integrate the newest velocity, once."""
     before = standstill.velocities
     if known is None:
         return replace(standstill, velocities=Velocities())
@@ -217,7 +217,7 @@ def _integrate(standstill: Standstill, known: Latest[Twist] | None) -> Standstil
 
 
 def _steady(before: Twist, after: Twist) -> Twist:
-    """Return what two velocities agree on, so that a single wrong one does not count."""
+    """Return the common part of two velocities, so that a single wrong one does not count."""
     return Twist(_common(before.linear, after.linear), _common(before.angular, after.angular))
 
 
@@ -230,7 +230,7 @@ def _over(value: float, threshold: float) -> float:
 
 
 def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill:
-    """Take in the newest counters, once."""
+    """Add the newest counters, once."""
     before = standstill.counters
     if newest is None or (before is not None and newest.received_ns == before.received_ns):
         return standstill
@@ -250,16 +250,16 @@ def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill
 
 
 def _gap_s(before: Latest[Mileage], newest: Latest[Mileage]) -> float:
-    """Return the time between two readings of one bridge; after a stall they arrive together."""
+    """Return the time between two readings; by send time, as a stall delivers both at once."""
     sent_ns = newest.value.mono_ns - before.value.mono_ns
     return max(newest.received_ns - before.received_ns, sent_ns) / NS_PER_S
 
 
 def _identity(counters: Mileage) -> tuple[int, int]:
-    """Return whose counters these are, and since which start of the board."""
+    """Return the bridge's boot and the board's epoch, within which counters are comparable."""
     return counters.boot, counters.epoch
 
 
 def _credible(step: float, bound: float) -> float:
-    """Return a step of a counter, 0 for one that is not credible (too large, NaN)."""
+    """Return a step of a counter; 0 for an implausible one (too large, NaN)."""
     return step if abs(step) <= max(AWAY, bound) else 0.0

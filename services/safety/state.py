@@ -1,26 +1,23 @@
-"""What safety remembers from one decision to the next, and what a decision is."""
+"""State carried from one decision to the next, and the verdict of a decision."""
 
 from msgspec import Struct
 
 from common.heartbeat import Heartbeat
-from common.messages import Command
 from common.messages import Verdict as VerdictName
+from common.motion import STILL, STOP, Command, Twist
 from services.safety.arbiter import Arbiter
-from services.safety.blind import Blind
-from services.safety.fault_budget import FaultBudget
-from services.safety.latches import Latches, Token
+from services.safety.latches import FaultBudget, Latches, Token
 from services.safety.release import Release
 from services.safety.runaway import Axis
-from services.safety.sonar_array import Heard
+from services.safety.sonar_array import SonarArray, SonarOverrides
 from services.safety.standstill import Standstill
 from services.safety.trajectory import Trajectory
-from services.safety.twist import STILL, Twist
 
-RELEASE = "release"  # stands where a source stands while the vehicle creeps off its bumper
+RELEASE = "release"  # in place of the source's name while a release moves the vehicle
 
 
 class Reply(Struct, frozen=True):
-    """What a reset or a release is answered."""
+    """Answer to a reset or a release call."""
 
     done: bool
     text: str
@@ -28,32 +25,32 @@ class Reply(Struct, frozen=True):
 
 
 class Verdict(Struct, frozen=True):
-    """What the bridge is told, and what became of the event that came with the inputs."""
+    """Command for the bridge, and the result of the event that came with the inputs."""
 
     name: VerdictName = "inhibited"
-    command: Command = "stop"
-    twist: Twist = STILL  # still unless the command is to run
-    source: str | None = None  # who drives, or would if safety let it
-    judged: Token = (0, 0)  # boot and seq of the newest bumper sample that was judged
+    command: Command = STOP
+    twist: Twist = STILL  # zero unless the command is RUN
+    source: str | None = None  # the source in control, also while safety stops it
+    acked: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
     reply: Reply | None = None  # to a reset or a hold
-    refused: str = ""  # why the request was refused, by the names in ``arbiter.py``
+    refused: str = ""  # reason of a refused request, by the names in ``arbiter.py``
 
 
 class State(Struct, frozen=True):
-    """Everything that decisions depend on besides the inputs."""
+    """Everything besides the inputs that a decision depends on."""
 
     arbiter: Arbiter
     heartbeat: Heartbeat = Heartbeat()
     latches: Latches = {}
-    heard: Heard = Heard()
-    blind: Blind = Blind()
+    sonar_array: SonarArray = SonarArray()
+    overrides: SonarOverrides = SonarOverrides()
     linear: Axis = Axis()
     angular: Axis = Axis()
     standstill: Standstill = Standstill()
-    credit: FaultBudget = FaultBudget()
+    fault_budget: FaultBudget = FaultBudget()
     release: Release = Release()
     trajectory: Trajectory = Trajectory()
-    decision: int = 0  # the number of the newest one; starts at random, see ``Held.id``
-    reader_was_up: bool = False
+    decision: int = 0  # number of the newest decision; starts at random, see ``Held.id``
+    estop_session_was_up: bool = False
     decided_ns: int | None = None
     verdict: Verdict = Verdict()

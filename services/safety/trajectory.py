@@ -1,8 +1,8 @@
-"""Signed travel by the board's counter over the last metre: which way the vehicle came.
+"""Trajectory: signed travel over the last metre by the board's counter, and its direction.
 
-One velocity sample is not evidence of a direction: a vehicle that hits something rebounds. The
-counter is read in steps that are larger than its noise, and a short run the other way does not
-change the answer. Travel before a turn on the spot, a restart or an unlikely jump is forgotten.
+One velocity sample is not evidence of a direction, because a vehicle rebounds from a hit. The
+counter is read in steps larger than its noise, and a short run in the other direction does not
+change the result. A turn on the spot, a restart or an implausible jump discards earlier travel.
 """
 
 import math
@@ -11,10 +11,10 @@ from msgspec import Struct
 
 from common.messages import Direction
 
-REACH_M = 1.0  # of travel is kept
-STEP_M = 0.005  # a smaller change is resolution or noise of the counter
-RUN_M = 0.05  # a shorter run may be a rebound
-TURN_RAD = 0.35  # a larger turn on the spot gives earlier travel another direction
+REACH_M = 1.0  # of travel is stored
+STEP_M = 0.005  # smaller changes are resolution or noise of the counter
+RUN_M = 0.05  # shorter runs may be a rebound
+TURN_RAD = 0.35  # a larger turn on the spot invalidates earlier travel
 
 OPPOSITE: dict[Direction, Direction] = {"forward": "backward", "backward": "forward"}
 
@@ -22,20 +22,22 @@ OPPOSITE: dict[Direction, Direction] = {"forward": "backward", "backward": "forw
 class Counter(Struct, frozen=True):
     """One reading of the board's counters."""
 
-    origin: tuple[int, int]  # boot of the bridge, epoch of the board: comparable only within one
+    origin: tuple[
+        int, int
+    ]  # boot of the bridge, epoch of the board; readings of different origins are not comparable
     distance: float  # m
     heading: float  # rad
 
 
 class Trajectory(Struct, frozen=True):
-    """The last metre as runs of one sign each."""
+    """The last metre as runs, each of one sign."""
 
     runs: tuple[float, ...] = ()  # m, forward positive, the oldest first
-    at: Counter | None = None  # where the last run ended
-    ended_ns: int | None = None  # when
+    at: Counter | None = None  # end of the last run
+    ended_ns: int | None = None  # time of that
 
     def follow(self, counter: Counter, received_ns: int) -> "Trajectory":
-        """Return the trajectory with a reading of the counters."""
+        """Return the trajectory after a reading of the counters."""
         if self.at is None or self.at.origin != counter.origin:
             return Trajectory(at=counter)
         run = counter.distance - self.at.distance
@@ -53,7 +55,7 @@ class Trajectory(Struct, frozen=True):
 
     @property
     def direction(self) -> Direction | None:
-        """The way it came; None unless its net travel and its last longer run agree."""
+        """Direction of travel; None unless net travel and the last longer run agree."""
         last = next((run for run in reversed(self.runs) if abs(run) >= RUN_M), 0.0)
         if last * self.net <= 0:
             return None
@@ -61,7 +63,7 @@ class Trajectory(Struct, frozen=True):
 
 
 def _joined(runs: tuple[float, ...], run: float) -> tuple[float, ...]:
-    """Return the runs with one more, without what lies farther back than the reach."""
+    """Return the runs with one more, cut to the reach."""
     if runs and math.copysign(run, runs[-1]) == run:
         run += runs[-1]
         runs = runs[:-1]

@@ -1,14 +1,15 @@
-"""How fast the vehicle may move, by what its sonars see.
+"""Zones: speed limits from the sonar distances.
 
-Toward a reading d the vehicle may do the v for which reacting and stopping takes the room there is:
+Toward a reading d the vehicle may move at the v whose reaction and stopping distance fits:
 
     v * t_react + v^2 / (2 a) = d - margin
 
 A sonar sits at (x, y) and looks along its yaw. Under a twist (v, w) that point moves with
-(v - w*y, w*x); the part along the axis is the speed of approach. The sonars on the flanks move
-across their axis, but the corners swing out to both sides when the vehicle turns, so these
-sonars limit |w| * length / 2 as well. A twist that is too fast anywhere is scaled down as a whole:
-the curve stays. No approach, no limit: the way out stays open.
+(v - w*y, w*x); the component along the axis is the speed of approach. The sonars on the flanks
+move across their axis, but the corners swing out to both sides when the vehicle turns. So these
+sonars also limit |w| * length / 2. A twist that is too fast for one sonar is scaled as a whole,
+which keeps its curve. A sonar without approach sets no limit, so motion away from an obstacle stays
+possible.
 """
 
 import math
@@ -16,33 +17,33 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from common.motion import Twist
 from common.settings import Vehicle
 from common.vehicle import Mount, sonar_mounts
 from services.safety.config import Safety
-from services.safety.twist import Twist
 
-GRAZING_MPS = 1e-6  # less is rounding: cos(90 deg) is no zero in floating point
-MEASURED_EXCESS_MPS = 0.2  # what lag and noise may put on top of the allowed speed
+GRAZING_MPS = 1e-6  # below this is rounding: cos(90 deg) is not exactly 0
+MEASURED_EXCESS_MPS = 0.2  # tolerance over the allowed speed, for lag and noise
 MEASURED_CREEP_MPS = 0.05  # inside the margin
 
 
 class Limit(Struct, frozen=True):
-    """The tightest limit on a twist, and the sonar that sets it (None for no limit)."""
+    """Tightest limit on a twist, and the sonar that sets it (None without a limit)."""
 
-    factor: float  # 0..1, to scale the twist with
+    factor: float  # 0..1, to scale the twist by
     sonar: int | None = None
 
 
 class Axis(Struct, frozen=True):
-    """How fast a sonar closes in along its axis (m/s), for each m/s and each rad/s of a twist."""
+    """Speed of approach along a sonar's axis (m/s), for each m/s and each rad/s of a twist."""
 
     linear: float
     angular: float
-    swing: float = 0.0  # m from the middle to the corner that swings out to its side, if any
+    swing: float = 0.0  # m from the middle to the corner that swings out to its side; 0 without one
 
 
 class Zones(Struct, frozen=True):
-    """The field around one vehicle; distances are in the manual's order of sonars."""
+    """Zones of one vehicle; distances are in the manual's order of sonars."""
 
     axes: tuple[Axis, ...]
     margin: float  # m
@@ -50,7 +51,7 @@ class Zones(Struct, frozen=True):
     deceleration: float  # m/s^2
 
     def allowed(self, distance: float) -> float:
-        """Return the speed (m/s) at which it can still stop short of the margin."""
+        """Return the speed (m/s) at which the vehicle can stop before the margin."""
         room = max(0.0, distance - self.margin)
         lag = self.deceleration * self.react
         return math.sqrt(lag * lag + 2 * self.deceleration * room) - lag
@@ -60,17 +61,17 @@ class Zones(Struct, frozen=True):
         return self.margin + speed * self.react + speed * speed / (2 * self.deceleration)
 
     def along(self, sonar: int, twist: Twist) -> float:
-        """Return how fast (m/s) this sonar itself moves along its axis."""
+        """Return the speed (m/s) of this sonar along its axis."""
         axis = self.axes[sonar]
         return twist.linear * axis.linear + twist.angular * axis.angular
 
     def approach(self, sonar: int, twist: Twist) -> float:
-        """Return how fast (m/s) the vehicle closes in on what this sonar sees."""
+        """Return the speed (m/s) of approach to what this sonar sees."""
         along, swing = self.along(sonar, twist), self.axes[sonar].swing
         return max(along, abs(twist.angular) * swing) if swing else along
 
     def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
-        """Return how far the twist must be slowed; a factor of 0 is a blocked way."""
+        """Return the limit on a twist; a factor of 0 means blocked."""
         tightest = Limit(1.0)
         for sonar, distance in enumerate(distances):
             speed = self.approach(sonar, twist)
@@ -82,7 +83,7 @@ class Zones(Struct, frozen=True):
         return tightest
 
     def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
-        """Return the sonar toward which the vehicle really moves too fast, if any."""
+        """Return the sonar toward which the measured speed is too high, if any."""
         for sonar, distance in enumerate(distances):
             allowed = self.allowed(distance)
             bound = allowed + MEASURED_EXCESS_MPS if allowed else MEASURED_CREEP_MPS

@@ -10,7 +10,8 @@ from common import keys
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.messages import Event
-from common.operator import EstopRepetition, EstopStep, Twist
+from common.motion import Twist
+from common.operator import EstopRepetition, EstopStep
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig

@@ -6,7 +6,8 @@ old key press never causes a fast start. CapsLock makes no difference.
 """
 
 from common.messages import Direction
-from common.operator import DriveRequests, Phase, Twist
+from common.motion import Twist
+from common.operator import DriveRequests, Phase
 from services.teleop.config import Teleop
 from services.teleop.hold import Deadman, GamepadWatchdog, Keys
 from services.teleop.mapping import DIRECTIONS, Deflection, Stick, deflection, shaped, twist

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from common import codec
-from common.operator import Twist
+from common.motion import Twist, clamp
 from services.teleop.config import Teleop
 
 
@@ -47,7 +47,8 @@ def deflection(held: Iterable[str]) -> Deflection:
     """Return the deflection of all held keys; opposite keys cancel out."""
     pushes = [DIRECTIONS[key] for key in held]
     return Deflection(
-        _clamp(sum(push.linear for push in pushes)), _clamp(sum(push.angular for push in pushes))
+        clamp(sum(push.linear for push in pushes), 1.0),
+        clamp(sum(push.angular for push in pushes), 1.0),
     )
 
 
@@ -69,7 +70,3 @@ def _shape(raw: float, deadzone: float, expo: float) -> float:
     linear = min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone))
     curved = expo * linear**3 + (1.0 - expo) * linear
     return curved if raw > 0 else -curved
-
-
-def _clamp(value: float) -> float:
-    return max(-1.0, min(1.0, value))

@@ -18,7 +18,7 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.operator import Twist
+from common.motion import Twist
 
 M = TypeVar("M", bound=Message)
 

@@ -13,6 +13,7 @@ from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
 from common.loop import Loop
+from common.motion import Command
 from common.wire.commands import MotionKind
 from verification.harness.fake_board import Board
 from verification.harness.support import safety_state, wait_until
@@ -60,12 +61,12 @@ class Rig:
             judged = {"judged": bumpers[-1].seq, "judged_boot": bumpers[-1].boot}
             link = self.link()
             waits = self.rearms and link is not None and not link.armed
-            fields = {"command": "stop"} if waits else _fields(self.driving)
+            fields = {"command": Command.STOP} if waits else _fields(self.driving)
             if waits and link is not None and link.latched_by == link.boot:
-                fields = {"command": "brake", "latched": True, "predecessor": link.boot}
+                fields = {"command": Command.BRAKE, "latched": True, "predecessor": link.boot}
             self.motion.put(m.Motion(**{**fields, **judged}))
 
-    def command(self, command: m.Command, linear: float = 0.0) -> None:
+    def command(self, command: Command, linear: float = 0.0) -> None:
         """Say this at 20 Hz from now on, as safety would."""
         self.driving = m.Motion(command=command, linear=linear, source="test")
 
@@ -85,9 +86,9 @@ class Rig:
 
     def drive(self) -> None:
         """Bring it to half a metre a second."""
-        self.command("stop")
+        self.command(Command.STOP)
         wait_until(lambda: (link := self.link()) and link.armed, "an armed bridge")
-        self.command("run", 0.5)
+        self.command(Command.RUN, 0.5)
         self.board.wait_for(MotionKind.RUN, 500)
 
 

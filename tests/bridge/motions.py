@@ -5,7 +5,8 @@ from msgspec.structs import replace as replace_message
 
 from common.freshness import NS_PER_S
 from common.messages import Motion
-from services.bridge.lease import Lease, Order, on_motion
+from common.motion import Command
+from services.bridge.lease import Lease, on_motion
 
 MS = NS_PER_S // 1000
 LEASE = 200 * MS
@@ -29,7 +30,7 @@ def run(
     judged_boot: int = 0,
 ) -> Motion:
     return Motion(
-        command="run",
+        command=Command.RUN,
         linear=linear,
         angular=angular,
         seq=seq,
@@ -40,11 +41,11 @@ def run(
 
 
 def stop(seq: int = 11, boot: int = 1) -> Motion:
-    return Motion(command="stop", seq=seq, boot=boot)
+    return Motion(command=Command.STOP, seq=seq, boot=boot)
 
 
 def brake(seq: int = 11, boot: int = 1) -> Motion:
-    return Motion(command="brake", seq=seq, boot=boot)
+    return Motion(command=Command.BRAKE, seq=seq, boot=boot)
 
 
 def taking_on(motion: Motion, predecessor: int | None) -> Motion:
@@ -52,5 +53,5 @@ def taking_on(motion: Motion, predecessor: int | None) -> Motion:
     return replace_message(motion, latched=True, predecessor=predecessor)
 
 
-def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Order | None, object]:
+def obey(lease: Lease, motion: Motion, now_ns: int = NOW) -> tuple[Lease, Command | None, object]:
     return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT, received_ns=now_ns)

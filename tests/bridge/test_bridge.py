@@ -12,6 +12,7 @@ from common.bus.bus import Bus
 from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
 from common.loop import Loop
+from common.motion import Command
 from common.wire import reports
 from common.wire.commands import MotionKind
 from common.wire.frame import Side
@@ -62,14 +63,14 @@ def test_begins_with_stop_even_without_a_router() -> None:
 
 def test_a_run_needs_a_neutral_first_and_silence_ends_it(rig: Rig) -> None:
     rig.rearms = False
-    rig.command("run", 0.5)
+    rig.command(Command.RUN, 0.5)
     wait_until(lambda: (link := rig.link()) and "neutral" in link.waiting, "asks for a neutral")
     rig.rearms = True
     rig.drive()
     rig.silence()
     rig.board.wait_for(MotionKind.STOP)
     rig.rearms = False
-    rig.command("run", 0.5)
+    rig.command(Command.RUN, 0.5)
     wait_until(lambda: (link := rig.link()) and not link.armed, "disarmed")
     assert rig.board.last().kind is MotionKind.STOP  # type: ignore[union-attr]
 
@@ -105,10 +106,10 @@ def test_leaving_a_standstill_without_a_command_breaks_until_safety_latches_it(
     wait_until(lambda: "uncommanded_motion" in rig.events(), "the event")
     wait_until(lambda: breaks(rig) == 20, "BREAK for a second")
     rig.rearms = False
-    rig.command("run", 0.5)
+    rig.command(Command.RUN, 0.5)
     wait_until(lambda: (link := rig.link()) and "without a command" in link.waiting, "waits")
     wait_until(lambda: breaks(rig) == 20, "BREAK although a RUN is asked for")
-    rig.command("stop")
+    rig.command(Command.STOP)
     seen = len(rig.board.motions)
     wait_until(lambda: len(rig.board.motions) > seen + 40, "two seconds of STOP asked for")
     assert breaks(rig) == 20
@@ -127,9 +128,9 @@ def test_the_reflex_breaks_and_only_a_judging_motion_ends_it(rig: Rig) -> None:
     rig.board.pressed = True
     rig.board.wait_for(MotionKind.BREAK)
     wait_until(lambda: "contact" in rig.events(), "the event")
-    rig.motion.put(m.Motion(command="run", linear=0.3))
+    rig.motion.put(m.Motion(command=Command.RUN, linear=0.3))
     wait_until(lambda: rig.newest("tel/bridge/bumper").pressed, "the bumper message")
-    rig.command("stop")
+    rig.command(Command.STOP)
     wait_until(lambda: (link := rig.link()) and link.armed, "judged and neutral")
     runs = [motion for motion in rig.board.motions if motion.linear_mmps == 300]
     assert runs == []
@@ -144,7 +145,7 @@ def test_a_second_authority_is_refused_and_reported(rig: Rig) -> None:
             other.append(DriveLink(bus, listens=False).publisher(keys.MOTION))
 
         with bus_on(rig.endpoint, loop, declare):
-            motion = m.Motion(command="run", linear=0.9)
+            motion = m.Motion(command=Command.RUN, linear=0.9)
 
             def beat(_: int) -> None:
                 other[0].put(motion)
@@ -157,7 +158,7 @@ def test_a_second_authority_is_refused_and_reported(rig: Rig) -> None:
 @pytest.mark.parametrize("hostile", [float("nan"), float("inf")])
 def test_what_is_not_finite_never_reaches_the_board(rig: Rig, hostile: float) -> None:
     rig.drive()
-    rig.command("run", hostile)
+    rig.command(Command.RUN, hostile)
     rig.board.wait_for(MotionKind.STOP)
 
 
@@ -167,7 +168,7 @@ def test_wrong_types_and_garbage_on_motion_are_dropped(rig: Rig) -> None:
     assert session is not None
     for payload in (b"", b"\xc1", msgpack.packb({"command": "fly"}), msgpack.packb([1] * 1000)):
         session.put("t2/v1/001/@cmd/motion", payload)
-    rig.command("stop")
+    rig.command(Command.STOP)
     rig.board.wait_for(MotionKind.STOP)
     assert rig.process.poll() is None
 
@@ -195,7 +196,7 @@ def test_a_board_that_does_not_echo_is_not_driven(rig: Rig) -> None:
     wait_until(lambda: (link := rig.link()) and link.state == "lost", "link lost")
     rig.board.silent = False
     wait_until(lambda: "switches_unverified" in rig.events(), "the event")
-    rig.command("stop")
+    rig.command(Command.STOP)
     hint = "both on and echoed; a firmware without echoes needs bridge.require_switches = false"
     wait_until(lambda: (link := rig.link()) and hint in link.waiting, "says what it waits for")
     rig.board.echo = True
@@ -269,7 +270,7 @@ def test_bad_settings_end_it_before_anything_opens() -> None:
 
 def test_a_motion_from_the_router_is_not_even_read(rig: Rig) -> None:
     rig.drive()
-    rejected = m.Motion(command="run", linear=0.9, boot=rig.bus.boot, seq=2**62)
+    rejected = m.Motion(command=Command.RUN, linear=0.9, boot=rig.bus.boot, seq=2**62)
     with running(Loop()) as loop, bus_on(rig.endpoint, loop, lambda _: None) as stranger:
         session = stranger._session
         assert session is not None

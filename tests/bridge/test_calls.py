@@ -7,6 +7,7 @@ from typing import Any
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.motion import Command
 from tests.bridge.bridge_fixture import Rig
 from verification.harness.support import wait_until
 
@@ -42,7 +43,7 @@ def test_switches_and_lamps_answer_with_the_boards_own_echo(rig: Rig) -> None:
     ready(rig)
     answer = ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=False))
     assert answer.bumper_brake is False
-    rig.command("stop")
+    rig.command(Command.STOP)
     wait_until(lambda: (link := rig.link()) and "brakes" in link.waiting, "not ready")
     assert ask(rig, keys.SET_SWITCHES, switches(rig, bumper_brake=True)).bumper_brake is True
     lamp = m.LedRequest(channel=3, mode=1)

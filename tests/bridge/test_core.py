@@ -8,6 +8,7 @@ import pytest
 from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
+from common.motion import Command
 from common.wire import commands, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame, Side
@@ -65,7 +66,7 @@ class Bench:
         self.outs.append(out)
         return out
 
-    def move(self, command: m.Command = "run", linear: float = 0.0, **fields: Any) -> Output:
+    def move(self, command: Command = Command.RUN, linear: float = 0.0, **fields: Any) -> Output:
         """Let safety command a motion."""
         self.seq += 1
         told = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
@@ -79,7 +80,7 @@ class Bench:
         self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *echoes)
         self.receive(CLEAR, CLEAR, CLEAR)
         self.tick()
-        self.move("stop")
+        self.move(Command.STOP)
         assert self.link().waiting == ""
 
     def link(self) -> m.Link:
@@ -176,18 +177,18 @@ def test_while_one_port_shows_a_hit_clear_samples_of_the_other_do_not_count(benc
     for _ in range(5):
         bench.receive(CLEAR)
         bench.receive(HIT, port=1)
-    bench.move("brake", judged=99, judged_boot=BOOT)
+    bench.move(Command.BRAKE, judged=99, judged_boot=BOOT)
     assert pressed(bench.receive(CLEAR)) == [True]
 
 
 def test_a_short_hit_is_reported_until_safety_has_judged_it(bench: Bench) -> None:
     assert pressed(bench.receive(HIT, *[CLEAR] * 5)) == [True] * 6
-    bench.move("brake", judged=1, judged_boot=BOOT)
+    bench.move(Command.BRAKE, judged=1, judged_boot=BOOT)
     assert pressed(bench.receive(CLEAR)) == [False]
 
 
-@pytest.mark.parametrize(("command", "is_judged"), [("stop", False), ("brake", True)])
-def test_only_a_brake_is_the_judged_stop(bench: Bench, command: m.Command, is_judged: bool) -> None:
+@pytest.mark.parametrize(("command", "is_judged"), [(Command.STOP, False), (Command.BRAKE, True)])
+def test_only_a_brake_is_the_judged_stop(bench: Bench, command: Command, is_judged: bool) -> None:
     hit = bench.receive(HIT).hit
     assert hit is not None
     outs = [bench.move(command, judged=seq, judged_boot=BOOT) for seq in (hit - 1, hit, hit)]
@@ -237,7 +238,7 @@ def test_a_row_of_clear_samples_begins_anew_after_a_gap(
     bench: Bench, gap: Any, first: bool
 ) -> None:
     bench.receive(HIT if first else CLEAR, CLEAR, CLEAR, *[CLEAR] * (not first))
-    bench.move("brake", judged=99, judged_boot=BOOT)
+    bench.move(Command.BRAKE, judged=99, judged_boot=BOOT)
     gap(bench)
     assert pressed(bench.receive(CLEAR, CLEAR)) == []
     assert pressed(bench.receive(CLEAR)) == [False]
@@ -316,7 +317,7 @@ def test_only_the_first_jump_of_a_sender_is_an_event(bench: Bench) -> None:
     told = [
         event
         for boot in (SAFETY, SAFETY, 2, 2)
-        for event in events(bench.move("stop", seq=2**40, boot=boot))
+        for event in events(bench.move(Command.STOP, seq=2**40, boot=boot))
     ]
     assert told == ["seq_jump", "second_authority"]
     assert bench.counters["motion_seq_jumps"] == 2
@@ -330,11 +331,11 @@ def test_a_number_that_is_not_finite_is_dropped_and_logged(bench: Bench) -> None
     assert bench.counters["motion_not_finite"] == 1
 
 
-@pytest.mark.parametrize("command", ["stop", "brake"])
-def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: m.Command) -> None:
+@pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])
+def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: Command) -> None:
     bench.arm()
     bench.move(command)
-    kind = MotionKind.BREAK if command == "brake" else MotionKind.STOP
+    kind = MotionKind.BREAK if command is Command.BRAKE else MotionKind.STOP
     assert motions(bench.core.stop(bench.now_ns)) == [kind]
     assert motions(bench.core.stop(bench.now_ns)) == [], "said once"
 

@@ -5,7 +5,8 @@ from msgspec.structs import replace
 from msgspec.structs import replace as replace_message
 
 from common.messages import Motion
-from services.bridge.lease import Lease, Order, Refusal
+from common.motion import Command
+from services.bridge.lease import Lease, Refusal
 from tests.bridge.motions import ARMED, LEASE, NOW, OWED, brake, obey, run, stop, taking_on
 
 
@@ -13,17 +14,17 @@ from tests.bridge.motions import ARMED, LEASE, NOW, OWED, brake, obey, run, stop
     ("state", "motion", "order", "refusal"),
     [
         # its own authority may creep, another must take it on
-        (replace(ARMED, latched_by=1), run(), Order.RUN, None),
-        (OWED, run(), Order.STOP, Refusal.NOT_HEIR),
-        (OWED, run(0.0), Order.STOP, Refusal.NOT_HEIR),
-        (OWED, stop(), Order.STOP, None),
-        (OWED, brake(), Order.BRAKE, None),
-        (OWED, taking_on(run(), 3), Order.RUN, None),
-        (OWED, taking_on(run(), None), Order.STOP, Refusal.NOT_HEIR),
-        (OWED, taking_on(run(), 4), Order.STOP, Refusal.NOT_HEIR),
+        (replace(ARMED, latched_by=1), run(), Command.RUN, None),
+        (OWED, run(), Command.STOP, Refusal.NOT_HEIR),
+        (OWED, run(0.0), Command.STOP, Refusal.NOT_HEIR),
+        (OWED, stop(), Command.STOP, None),
+        (OWED, brake(), Command.BRAKE, None),
+        (OWED, taking_on(run(), 3), Command.RUN, None),
+        (OWED, taking_on(run(), None), Command.STOP, Refusal.NOT_HEIR),
+        (OWED, taking_on(run(), 4), Command.STOP, Refusal.NOT_HEIR),
     ],
 )
-def test_order(state: Lease, motion: Motion, order: Order, refusal: Refusal | None) -> None:
+def test_order(state: Lease, motion: Motion, order: Command, refusal: Refusal | None) -> None:
     assert obey(state, motion)[1:] == (order, refusal)
 
 

@@ -8,11 +8,11 @@ from msgspec.structs import replace as replace_message
 
 from common.freshness import NS_PER_S
 from common.messages import Motion
+from common.motion import Command
 from services.bridge import lease as leases
 from services.bridge.lease import (
     SEQ_STEP_MAX,
     Lease,
-    Order,
     Refusal,
     on_hit,
     on_motion,
@@ -56,71 +56,73 @@ def test_at_first_nobody_may_drive() -> None:
 
 def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
     lost = on_ready(replace(ARMED, renewed_ns=0), False)
-    assert on_tick(lost, 0, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(lost, 0, LEASE, COAST, True)[1] is Command.STOP
 
 
 @pytest.mark.parametrize(
     ("state", "motion", "order", "refusal"),
     [
         # armed: everything goes
-        (ARMED, run(), Order.RUN, None),
-        (ARMED, run(0.0, 0.0), Order.RUN, None),
-        (ARMED, run(0.0, 0.1), Order.RUN, None),
-        (ARMED, stop(), Order.STOP, None),
-        (ARMED, brake(), Order.BRAKE, None),
+        (ARMED, run(), Command.RUN, None),
+        (ARMED, run(0.0, 0.0), Command.RUN, None),
+        (ARMED, run(0.0, 0.1), Command.RUN, None),
+        (ARMED, stop(), Command.STOP, None),
+        (ARMED, brake(), Command.BRAKE, None),
         # the board is not ready: no RUN, not even of zero
-        (replace(ARMED, ready=False), run(), Order.STOP, Refusal.NOT_READY),
-        (replace(ARMED, ready=False), run(0.0), Order.STOP, Refusal.NOT_READY),
-        (replace(ARMED, ready=False), stop(), Order.STOP, None),
-        (replace(ARMED, ready=False), brake(), Order.BRAKE, None),
+        (replace(ARMED, ready=False), run(), Command.STOP, Refusal.NOT_READY),
+        (replace(ARMED, ready=False), run(0.0), Command.STOP, Refusal.NOT_READY),
+        (replace(ARMED, ready=False), stop(), Command.STOP, None),
+        (replace(ARMED, ready=False), brake(), Command.BRAKE, None),
         # no neutral yet: only what does not move
-        (replace(ARMED, neutral=False), run(), Order.STOP, Refusal.NOT_NEUTRAL),
-        (replace(ARMED, neutral=False), run(0.0, 0.1), Order.STOP, Refusal.NOT_NEUTRAL),
-        (replace(ARMED, neutral=False), run(0.0, 0.0), Order.RUN, None),
-        (replace(ARMED, neutral=False), brake(), Order.BRAKE, None),
+        (replace(ARMED, neutral=False), run(), Command.STOP, Refusal.NOT_NEUTRAL),
+        (replace(ARMED, neutral=False), run(0.0, 0.1), Command.STOP, Refusal.NOT_NEUTRAL),
+        (replace(ARMED, neutral=False), run(0.0, 0.0), Command.RUN, None),
+        (replace(ARMED, neutral=False), brake(), Command.BRAKE, None),
         # an unjudged hit: BREAK, whatever is asked
-        (HIT, run(), Order.BRAKE, Refusal.NOT_JUDGED),
-        (HIT, stop(), Order.BRAKE, None),
-        (HIT, brake(), Order.BRAKE, None),
-        (HIT, run(judged=4, judged_boot=OWN_BOOT), Order.BRAKE, Refusal.NOT_JUDGED),
-        (HIT, run(judged=5, judged_boot=OWN_BOOT), Order.RUN, None),
-        (HIT, run(judged=6, judged_boot=OWN_BOOT), Order.RUN, None),
-        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), Order.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(), Command.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, stop(), Command.BRAKE, None),
+        (HIT, brake(), Command.BRAKE, None),
+        (HIT, run(judged=4, judged_boot=OWN_BOOT), Command.BRAKE, Refusal.NOT_JUDGED),
+        (HIT, run(judged=5, judged_boot=OWN_BOOT), Command.RUN, None),
+        (HIT, run(judged=6, judged_boot=OWN_BOOT), Command.RUN, None),
+        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), Command.BRAKE, Refusal.NOT_JUDGED),
         # seq must rise
         (ARMED, run(seq=10), None, Refusal.OLD),
         (ARMED, run(seq=9), None, Refusal.OLD),
-        (ARMED, run(seq=12), Order.RUN, None),
+        (ARMED, run(seq=12), Command.RUN, None),
         # and not by more than a sender can
-        (ARMED, run(seq=10 + SEQ_STEP_MAX), Order.RUN, None),
+        (ARMED, run(seq=10 + SEQ_STEP_MAX), Command.RUN, None),
         (ARMED, run(seq=11 + SEQ_STEP_MAX), None, Refusal.JUMP),
         (ARMED, brake(seq=2**62), None, Refusal.JUMP),
         # the vehicle moved without a command: BREAK until safety has latched that
-        (MOVED, run(), Order.BRAKE, Refusal.NOT_HEIR),
-        (MOVED, run(0.0, 0.0), Order.BRAKE, Refusal.NOT_HEIR),
-        (MOVED, stop(), Order.BRAKE, None),
-        (MOVED, brake(), Order.BRAKE, None),
-        (MOVED, taking_on(brake(), None), Order.BRAKE, None),
-        (MOVED, taking_on(stop(), None), Order.BRAKE, None),
-        (MOVED, taking_on(stop(), 1), Order.BRAKE, None),
-        (MOVED, replace_message(stop(), predecessor=OWN_BOOT), Order.BRAKE, None),
-        (MOVED, taking_on(stop(), OWN_BOOT), Order.STOP, None),
-        (MOVED, taking_on(brake(), OWN_BOOT), Order.BRAKE, None),
-        (MOVED, taking_on(run(), OWN_BOOT), Order.RUN, None),
-        (replace(MOVED, hit=5), run(), Order.BRAKE, Refusal.NOT_JUDGED),
-        (replace(MOVED, hit=5), stop(), Order.BRAKE, None),
+        (MOVED, run(), Command.BRAKE, Refusal.NOT_HEIR),
+        (MOVED, run(0.0, 0.0), Command.BRAKE, Refusal.NOT_HEIR),
+        (MOVED, stop(), Command.BRAKE, None),
+        (MOVED, brake(), Command.BRAKE, None),
+        (MOVED, taking_on(brake(), None), Command.BRAKE, None),
+        (MOVED, taking_on(stop(), None), Command.BRAKE, None),
+        (MOVED, taking_on(stop(), 1), Command.BRAKE, None),
+        (MOVED, replace_message(stop(), predecessor=OWN_BOOT), Command.BRAKE, None),
+        (MOVED, taking_on(stop(), OWN_BOOT), Command.STOP, None),
+        (MOVED, taking_on(brake(), OWN_BOOT), Command.BRAKE, None),
+        (MOVED, taking_on(run(), OWN_BOOT), Command.RUN, None),
+        (replace(MOVED, hit=5), run(), Command.BRAKE, Refusal.NOT_JUDGED),
+        (replace(MOVED, hit=5), stop(), Command.BRAKE, None),
         # a second authority
         (ARMED, run(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
         (ARMED, brake(boot=2, seq=99), None, Refusal.SECOND_AUTHORITY),
     ],
 )
-def test_order(state: Lease, motion: Motion, order: Order | None, refusal: Refusal | None) -> None:
+def test_order(
+    state: Lease, motion: Motion, order: Command | None, refusal: Refusal | None
+) -> None:
     assert obey(state, motion)[1:] == (order, refusal)
 
 
 def test_a_copied_authority_with_a_huge_seq_locks_nobody_out() -> None:
     after, _, refusal = obey(ARMED, run(seq=2**62))
     assert (after, refusal) == (ARMED, Refusal.JUMP)
-    assert obey(after, run(seq=11))[1] is Order.RUN
+    assert obey(after, run(seq=11))[1] is Command.RUN
     assert SEQ_STEP_MAX == 2**20
 
 
@@ -128,7 +130,7 @@ def test_a_copied_authority_with_a_huge_seq_locks_nobody_out() -> None:
 def test_an_authority_that_was_not_received_for_hours_is_taken_again(age: int) -> None:
     after, order, refusal = obey(ARMED, stop(seq=11 + SEQ_STEP_MAX), NOW + age)
     if age > LEASE:
-        assert (after.seq, order, refusal) == (11 + SEQ_STEP_MAX, Order.STOP, None)
+        assert (after.seq, order, refusal) == (11 + SEQ_STEP_MAX, Command.STOP, None)
     else:
         assert (after, order, refusal) == (ARMED, None, Refusal.JUMP)
     assert obey(ARMED, stop(seq=10), NOW + age)[2] is Refusal.OLD
@@ -138,7 +140,7 @@ def test_an_authority_may_begin_at_any_seq() -> None:
     assert obey(Lease(ready=True), stop(seq=2**40))[0].seq == 2**40
 
 
-def late(lease: Lease, motion: Motion, waited: int) -> tuple[Lease, Order | None, object]:
+def late(lease: Lease, motion: Motion, waited: int) -> tuple[Lease, Command | None, object]:
     """Handle a motion so long after it was received."""
     now = NOW + waited
     return on_motion(lease, motion, now, LEASE, OWN_BOOT, received_ns=NOW)
@@ -148,41 +150,41 @@ def late(lease: Lease, motion: Motion, waited: int) -> tuple[Lease, Order | None
 def test_the_lease_counts_from_when_a_motion_was_received(waited: int) -> None:
     state = replace(ARMED, renewed_ns=NOW + waited)
     after, order, refusal = late(state, run(), waited)
-    assert (order, refusal) == (Order.RUN, None)
+    assert (order, refusal) == (Command.RUN, None)
     assert (after.renewed_ns, after.sent_ns) == (NOW, NOW + waited)
     assert on_tick(after, NOW + LEASE, LEASE, COAST, True)[1] is None
-    assert on_tick(after, NOW + LEASE + 1, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(after, NOW + LEASE + 1, LEASE, COAST, True)[1] is Command.STOP
 
 
 @pytest.mark.parametrize(
-    ("motion", "order"), [(run(), None), (run(0.0), None), (stop(), None), (brake(), Order.BRAKE)]
+    ("motion", "order"), [(run(), None), (run(0.0), None), (stop(), None), (brake(), Command.BRAKE)]
 )
 def test_what_waited_for_longer_than_the_lease_renews_nothing(
-    motion: Motion, order: Order | None
+    motion: Motion, order: Command | None
 ) -> None:
     state = replace(ARMED, renewed_ns=NOW + LEASE, neutral=False)
-    after = replace(state, braked=order is Order.BRAKE)
+    after = replace(state, braked=order is Command.BRAKE)
     assert late(state, motion, LEASE + 1) == (after, order, Refusal.LATE)
 
 
 @pytest.mark.parametrize("waited", [0, LEASE + 1])
 def test_a_brake_goes_on_when_the_lease_ends(waited: int) -> None:
     state, order, _ = late(ARMED, brake(), waited)
-    assert (order, state.braked) == (Order.BRAKE, True)
+    assert (order, state.braked) == (Command.BRAKE, True)
     now = NOW + LEASE + 1
     over, order = on_tick(state, now, LEASE, COAST, True)
-    assert order is Order.BRAKE
-    assert on_tick(over, now + 3600 * NS_PER_S, LEASE, COAST, True)[1] is Order.BRAKE
+    assert order is Command.BRAKE
+    assert on_tick(over, now + 3600 * NS_PER_S, LEASE, COAST, True)[1] is Command.BRAKE
 
 
 @pytest.mark.parametrize("motion", [stop(12), run(seq=12), run(0.0, seq=12)])
 def test_a_brake_lasts_until_the_next_order(motion: Motion) -> None:
     state, _, _ = obey(ARMED, brake())
     lost = on_ready(state, False)
-    assert on_tick(lost, NOW + 60 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+    assert on_tick(lost, NOW + 60 * MS, LEASE, COAST, True)[1] is Command.BRAKE
     state, _, _ = obey(state, motion)
     assert not state.braked
-    assert on_tick(state, NOW + LEASE + 1, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(state, NOW + LEASE + 1, LEASE, COAST, True)[1] is Command.STOP
 
 
 def test_what_brakes_whether_it_stands_or_not() -> None:
@@ -194,7 +196,7 @@ def test_an_old_run_behind_an_old_zero_is_not_obeyed() -> None:
     after, _, _ = late(replace(ARMED, renewed_ns=NOW - NS_PER_S), run(0.0, seq=11), 3 * NS_PER_S)
     after, order, refusal = late(after, run(seq=12), 3 * NS_PER_S)
     assert (order, refusal) == (None, Refusal.LATE)
-    assert on_tick(after, NOW + 3 * NS_PER_S, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(after, NOW + 3 * NS_PER_S, LEASE, COAST, True)[1] is Command.STOP
 
 
 def test_a_late_message_of_a_second_authority_is_that_of_a_second_authority() -> None:
@@ -206,9 +208,9 @@ def test_moving_without_a_command_breaks_at_once_and_holds() -> None:
     over = replace(ARMED, over_since_ns=NOW - NS_PER_S, neutral=False)
     moved, order = on_uncommanded(over, NOW, OWN_BOOT)
     held = replace(over, uncommanded=True, latched_by=OWN_BOOT, sent_ns=NOW)
-    assert (order, moved) == (Order.BRAKE, held)
+    assert (order, moved) == (Command.BRAKE, held)
     assert on_uncommanded(moved, NOW + 1, OWN_BOOT) == (moved, None)
-    assert on_tick(moved, NOW + 50 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+    assert on_tick(moved, NOW + 50 * MS, LEASE, COAST, True)[1] is Command.BRAKE
 
 
 @pytest.mark.parametrize("owed", [None, 1, 3])
@@ -216,12 +218,12 @@ def test_moving_without_a_command_wants_a_reset_of_safety(owed: int | None) -> N
     over = replace(ARMED, over_since_ns=NOW - NS_PER_S, neutral=False, latched_by=owed)
     moved, _ = on_uncommanded(over, NOW, OWN_BOOT)
     back, order, _ = obey(moved, stop(seq=11))  # it has not heard of it yet
-    assert (order, back.uncommanded, back.latched_by) == (Order.BRAKE, True, OWN_BOOT)
+    assert (order, back.uncommanded, back.latched_by) == (Command.BRAKE, True, OWN_BOOT)
     latched, order, _ = obey(back, taking_on(brake(seq=12), OWN_BOOT))
-    assert (order, latched.uncommanded, latched.latched_by) == (Order.BRAKE, False, 1)
+    assert (order, latched.uncommanded, latched.latched_by) == (Command.BRAKE, False, 1)
     reset, order, _ = obey(latched, stop(seq=13))
-    assert (order, reset.latched_by) == (Order.STOP, None)
-    assert obey(reset, run(seq=14))[1] is Order.RUN
+    assert (order, reset.latched_by) == (Command.STOP, None)
+    assert obey(reset, run(seq=14))[1] is Command.RUN
 
 
 def test_while_the_lease_lives_safety_judges_what_moves() -> None:
@@ -231,7 +233,7 @@ def test_while_the_lease_lives_safety_judges_what_moves() -> None:
 @pytest.mark.parametrize(("age", "obeyed"), [(LEASE - 1, True), (LEASE, True), (LEASE + 1, False)])
 def test_lease_holds_for_its_time_and_takes_the_neutral_along(age: int, obeyed: bool) -> None:
     after, order, refusal = obey(ARMED, run(), NOW + age)
-    assert (order is Order.RUN) is obeyed
+    assert (order is Command.RUN) is obeyed
     assert (refusal is Refusal.NOT_NEUTRAL) is not obeyed
     assert after.neutral is obeyed
 
@@ -243,16 +245,16 @@ def test_second_authority_waits_for_the_end_of_the_first(age: int) -> None:
         assert (after, order, refusal) == (ARMED, None, Refusal.SECOND_AUTHORITY)
     else:
         assert (after.boot, after.seq, after.neutral) == (2, 3, False)
-        assert (order, refusal) == (Order.STOP, Refusal.NOT_NEUTRAL)
+        assert (order, refusal) == (Command.STOP, Refusal.NOT_NEUTRAL)
 
 
 def test_the_first_authority_must_be_neutral_too() -> None:
     fresh = Lease(ready=True)
     after, order, _ = obey(fresh, run(seq=1))
-    assert order is Order.STOP
+    assert order is Command.STOP
     after, order, _ = obey(after, stop(seq=2))
-    assert (order, after.neutral) == (Order.STOP, True)
-    assert obey(after, run(seq=3))[1] is Order.RUN
+    assert (order, after.neutral) == (Command.STOP, True)
+    assert obey(after, run(seq=3))[1] is Command.RUN
 
 
 @pytest.mark.parametrize("neutral", [stop(), brake(), run(0.0, 0.0)])
@@ -265,28 +267,28 @@ def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
     lost = on_ready(replace(ARMED, sent_ns=NOW), False)
     assert lost == replace(ARMED, ready=False, neutral=False, sent_ns=leases.AT_ONCE)
     assert on_ready(replace(lost, sent_ns=NOW), True) == replace(ARMED, neutral=False, sent_ns=NOW)
-    assert on_tick(lost, NOW, LEASE, COAST, True)[1] is Order.STOP
+    assert on_tick(lost, NOW, LEASE, COAST, True)[1] is Command.STOP
     again = on_ready(lost, True)
-    assert obey(again, run())[1:] == (Order.STOP, Refusal.NOT_NEUTRAL)
+    assert obey(again, run())[1:] == (Command.STOP, Refusal.NOT_NEUTRAL)
     assert on_ready(ARMED, True) is ARMED
 
 
 def test_the_reflex_breaks_at_once_and_holds_while_time_passes() -> None:
     hit, order = on_hit(ARMED, 42, NOW)
-    assert (order, hit.hit, hit.sent_ns) == (Order.BRAKE, 42, NOW)
+    assert (order, hit.hit, hit.sent_ns) == (Command.BRAKE, 42, NOW)
     over = replace(hit, over_since_ns=NOW)
-    assert on_tick(over, NOW + 60 * MS, LEASE, COAST, True)[1] is Order.BRAKE
+    assert on_tick(over, NOW + 60 * MS, LEASE, COAST, True)[1] is Command.BRAKE
 
 
 @pytest.mark.parametrize(
     ("age", "standing", "order"),
     [
         (LEASE, False, None),
-        (LEASE + 1, False, Order.STOP),
-        (LEASE + 1, True, Order.STOP),
+        (LEASE + 1, False, Command.STOP),
+        (LEASE + 1, True, Command.STOP),
     ],
 )
-def test_tick_when_the_lease_ends(age: int, standing: bool, order: Order | None) -> None:
+def test_tick_when_the_lease_ends(age: int, standing: bool, order: Command | None) -> None:
     state = replace(ARMED, sent_ns=NOW + age)
     after, sent = on_tick(state, NOW + age, LEASE, COAST, standing)
     assert sent is order
@@ -296,14 +298,14 @@ def test_tick_when_the_lease_ends(age: int, standing: bool, order: Order | None)
 @pytest.mark.parametrize(
     ("age", "standing", "order"),
     [
-        (COAST, False, Order.STOP),
-        (COAST + 1, False, Order.BRAKE),
-        (COAST + 1, True, Order.STOP),
-        (60 * NS_PER_S, False, Order.BRAKE),
-        (3600 * NS_PER_S, True, Order.STOP),
+        (COAST, False, Command.STOP),
+        (COAST + 1, False, Command.BRAKE),
+        (COAST + 1, True, Command.STOP),
+        (60 * NS_PER_S, False, Command.BRAKE),
+        (3600 * NS_PER_S, True, Command.STOP),
     ],
 )
-def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, order: Order) -> None:
+def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, order: Command) -> None:
     over = Lease(over_since_ns=NOW, sent_ns=NOW)
     assert on_tick(over, NOW + age, LEASE, COAST, standing)[1] is order
 
@@ -312,25 +314,25 @@ def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, orde
 def test_stop_goes_out_at_20_hz(wait: int, due: bool) -> None:
     over = Lease(over_since_ns=NOW, sent_ns=NOW)
     after, order = on_tick(over, NOW + wait, LEASE, COAST, True)
-    assert (order is Order.STOP) is due
+    assert (order is Command.STOP) is due
     assert after.sent_ns == (NOW + wait if due else NOW)
 
 
 def test_a_lease_that_lives_but_is_not_ready_still_stops() -> None:
     state = replace(ARMED, ready=False, sent_ns=NOW - 50 * MS)
-    assert on_tick(state, NOW, LEASE, COAST, False)[1] is Order.STOP
+    assert on_tick(state, NOW, LEASE, COAST, False)[1] is Command.STOP
 
 
 def test_the_frame_of_a_message_counts_for_the_20_hz() -> None:
     state, order, _ = obey(replace(ARMED, ready=False), stop())
-    assert order is Order.STOP
+    assert order is Command.STOP
     assert on_tick(state, NOW + 50 * MS - 1, LEASE, COAST, False) == (state, None)
-    assert on_tick(state, NOW + 50 * MS, LEASE, COAST, False)[1] is Order.STOP
+    assert on_tick(state, NOW + 50 * MS, LEASE, COAST, False)[1] is Command.STOP
 
 
 def test_a_message_ends_the_stopping_of_a_lease_that_was_over() -> None:
     over, order = on_tick(ARMED, NOW + LEASE + 1, LEASE, COAST, True)
-    assert (over.over_since_ns, over.neutral, order) == (NOW + LEASE + 1, False, Order.STOP)
+    assert (over.over_since_ns, over.neutral, order) == (NOW + LEASE + 1, False, Command.STOP)
     alive, _, _ = obey(over, stop(), NOW + NS_PER_S)
     assert (alive.renewed_ns, alive.over_since_ns, alive.neutral) == (NOW + NS_PER_S, None, True)
     assert on_tick(alive, NOW + NS_PER_S + LEASE, LEASE, COAST, True) == (alive, None)
@@ -350,20 +352,9 @@ def test_it_says_what_it_waits_for() -> None:
     assert replace(ARMED, latched_by=1).waiting == ""
 
 
-@pytest.mark.parametrize(
-    ("linear", "angular", "stands"),
-    [
-        (0.0, 0.0, True), (0.0199, 0.0, True), (0.02, 0.0, False), (-0.02, 0.0, False),
-        (0.0, 0.049, True), (0.0, 0.05, False), (0.0, -0.05, False),
-    ],
-)  # fmt: skip
-def test_standing(linear: float, angular: float, stands: bool) -> None:
-    assert leases.standing(linear, angular) is stands
-
-
 motions = st.builds(
     Motion,
-    command=st.sampled_from(["run", "stop", "brake"]),
+    command=st.sampled_from(Command),
     linear=st.sampled_from([0.0, 0.3, -1.0]),
     seq=st.integers(0, 20),
     boot=st.integers(1, 2),
@@ -384,10 +375,10 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
     lease, now = Lease(over_since_ns=NOW), NOW
     for event, wait in zip(happening, waits_ms, strict=False):
         now += wait * MS
-        order: Order | None
+        order: Command | None
         if isinstance(event, Motion):
             lease, order, _ = on_motion(lease, event, now, LEASE, OWN_BOOT, received_ns=now)
-            if order is Order.RUN and event.linear:
+            if order is Command.RUN and event.linear:
                 assert lease.ready
                 assert lease.neutral
                 assert lease.hit is None
@@ -398,12 +389,12 @@ def test_no_run_without_everything(happening: list[object], waits_ms: list[int])
             lease = on_ready(lease, event)
         elif isinstance(event, int):
             lease, order = on_hit(lease, event, now)
-            assert order is Order.BRAKE
+            assert order is Command.BRAKE
         elif event == "moved":
             lease, order = on_uncommanded(lease, now, OWN_BOOT)
-            assert order in (None, Order.BRAKE)
+            assert order in (None, Command.BRAKE)
         else:
             lease, order = on_tick(lease, now, LEASE, COAST, False)
-            assert order is not Order.RUN
+            assert order is not Command.RUN
         assert lease.over_since_ns is None or not lease.neutral
         assert not lease.uncommanded or lease.latched_by == OWN_BOOT

@@ -9,6 +9,7 @@ import pytest
 from common.bus.bus import Arrival
 from common.config import Sources, load
 from common.messages import Link, Motion
+from common.motion import Command
 from common.service import Node
 from common.settings import Board as Settings
 from common.wire.commands import MotionCommand, MotionKind
@@ -59,7 +60,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     assert sum(timing.durations["contact_to_break"].counts) == 1
     boot = bridge._node.bus.boot
     for seq in (1, 2):
-        motion = Motion(command="brake", seq=seq, boot=1, judged=99, judged_boot=boot)
+        motion = Motion(command=Command.BRAKE, seq=seq, boot=1, judged=99, judged_boot=boot)
         bridge._on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
     timing = bridge._node.timing()
     assert timing is not None
@@ -116,9 +117,9 @@ def refusing(bridge: Bridge, times: int) -> Refusing:
     return made
 
 
-def moves(bridge: Bridge, command: str, seq: int = 1) -> None:
+def moves(bridge: Bridge, command: Command, seq: int = 1) -> None:
     """Let safety command this."""
-    motion = Motion(command=command, seq=seq, boot=1)  # type: ignore[arg-type]
+    motion = Motion(command=command, seq=seq, boot=1)
     bridge._on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
 
 
@@ -130,13 +131,13 @@ def ticks(bridge: Bridge) -> None:
 @pytest.mark.parametrize("times", [0, 1, 3])
 def test_a_brake_that_cannot_be_sent_is_tried_again_at_once(bridge: Bridge, times: int) -> None:
     made = refusing(bridge, times)
-    moves(bridge, "brake")
+    moves(bridge, Command.BRAKE)
     assert (made.sent, bridge._sockets.send_errors) == ([BREAK], times)
 
 
 def test_a_brake_that_cannot_be_sent_at_once_is_tried_again_at_each_tick(bridge: Bridge) -> None:
     made = refusing(bridge, 4)
-    moves(bridge, "brake")
+    moves(bridge, Command.BRAKE)
     assert made.motions == []
     made.times = 10**9
     ticks(bridge)
@@ -149,8 +150,8 @@ def test_a_brake_that_cannot_be_sent_at_once_is_tried_again_at_each_tick(bridge:
 
 def test_a_newer_order_takes_the_place_of_a_brake_that_could_not_be_sent(bridge: Bridge) -> None:
     made = refusing(bridge, 4)
-    moves(bridge, "brake")
-    moves(bridge, "stop", seq=2)
+    moves(bridge, Command.BRAKE)
+    moves(bridge, Command.STOP, seq=2)
     ticks(bridge)
     assert made.motions == [STOP]
 
@@ -158,7 +159,7 @@ def test_a_newer_order_takes_the_place_of_a_brake_that_could_not_be_sent(bridge:
 def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
     refusing(bridge, 3)
     for seq in (1, 2, 3):
-        moves(bridge, "stop", seq)
+        moves(bridge, Command.STOP, seq)
     bridge._on_second(0)
     bridge._on_link(time.monotonic_ns())
     assert bridge._node.counters["send_errors"] == 3

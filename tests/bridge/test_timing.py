@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from common.messages import Durations, Motion
+from common.motion import Command
 from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import BOUNDS_NS, LONGEST_NS, Histogram, Timings, quantile
 
@@ -15,9 +16,9 @@ MS = 1_000_000
 BOUNDS_S = [bound / NS_PER_S for bound in BOUNDS_NS]
 HIT = Receipt(kernel_ns=100 * MS, read_ns=101 * MS)
 # Asked at 10 ms, heard at 12, sent at 15.
-ANSWER = Motion(command="run", asked_ns=10 * MS, heard_ns=12 * MS, mono_ns=15 * MS)
+ANSWER = Motion(command=Command.RUN, asked_ns=10 * MS, heard_ns=12 * MS, mono_ns=15 * MS)
 # The hit in sample 7: heard at 105 ms, judged and sent at 109.
-VERDICT = Motion(command="brake", judged=7, judged_ns=105 * MS, mono_ns=109 * MS)
+VERDICT = Motion(command=Command.BRAKE, judged=7, judged_ns=105 * MS, mono_ns=109 * MS)
 
 
 def measured(timings: Timings) -> dict[str, float]:
@@ -135,7 +136,7 @@ def test_a_request_that_became_a_frame() -> None:
 
 def test_of_a_foreign_driver_only_our_own_hops_are_measured() -> None:
     timings = Timings()
-    answer = Motion(command="run", heard_ns=12 * MS, mono_ns=15 * MS)
+    answer = Motion(command=Command.RUN, heard_ns=12 * MS, mono_ns=15 * MS)
     timings.on_motion(answer, True, 20 * MS, 26 * MS)
     assert measured(timings) == {
         "request_to_frame.in_safety": 3,
@@ -155,7 +156,7 @@ def test_of_a_foreign_safety_only_the_last_hop_is_measured() -> None:
 def test_a_motion_that_answers_no_request_is_not_measured() -> None:
     timings = Timings()
     for shared in (True, False):
-        timings.on_motion(Motion(command="run", mono_ns=15 * MS), shared, 20 * MS, 26 * MS)
+        timings.on_motion(Motion(command=Command.RUN, mono_ns=15 * MS), shared, 20 * MS, 26 * MS)
     assert measured(timings) == {}
     assert left_out(timings) == {}
 

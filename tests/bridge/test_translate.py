@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from common.errors import MessageError, WireError
 from common.messages import Bumper, Motion
+from common.motion import Command
 from common.settings import AngularUnit, Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.reports import DistanceReport, DriverReport, UltrasonicReport, VelocityReport
-from services.bridge.lease import Order
-from services.bridge.translate import BumperFilter, Translator, check_finite, clamp, driver
+from services.bridge.translate import BumperFilter, Translator, check_finite, driver
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def by_driver() -> Translator:
 
 
 def run(linear: float, angular: float) -> Motion:
-    return Motion(command="run", linear=linear, angular=angular)
+    return Motion(command=Command.RUN, linear=linear, angular=angular)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def run(linear: float, angular: float) -> Motion:
 def test_run_carries_the_motion_clamped(
     by_manual: Translator, motion: Motion, linear_mmps: int, angular_raw: int
 ) -> None:
-    frame = by_manual.command(Order.RUN, motion)
+    frame = by_manual.command(Command.RUN, motion)
     assert frame == MotionCommand(MotionKind.RUN, linear_mmps, angular_raw)
     assert b"\x00\x80" not in frame.to_bytes()
 
@@ -58,7 +58,7 @@ def test_run_carries_the_motion_clamped(
 def test_the_angular_unit_is_a_setting_both_ways(
     by_manual: Translator, by_driver: Translator
 ) -> None:
-    assert by_driver.command(Order.RUN, run(0.0, 0.3)).angular_raw == 300
+    assert by_driver.command(Command.RUN, run(0.0, 0.3)).angular_raw == 300
     assert by_driver.velocity(VelocityReport(0, 300)).angular == pytest.approx(0.3)
     assert by_manual.velocity(VelocityReport(0, 300)).angular == pytest.approx(math.radians(30))
 
@@ -72,7 +72,7 @@ def test_each_way_has_a_unit_of_its_own(
 ) -> None:
     wire = Wire(command_angular_unit=command, feedback_angular_unit=feedback)
     mixed = Translator(wire, Vehicle(), 1.0, 1.0)
-    assert mixed.command(Order.RUN, run(0.0, 0.3)).angular_raw == raw
+    assert mixed.command(Command.RUN, run(0.0, 0.3)).angular_raw == raw
     assert mixed.velocity(VelocityReport(0, 300)).angular == pytest.approx(angular)
 
 
@@ -83,15 +83,15 @@ def test_the_widest_settings_still_fit_fifteen_bits() -> None:
         100.0,
         100.0,
     )
-    frame = wide.command(Order.RUN, run(32.0, 99.0))
+    frame = wide.command(Command.RUN, run(32.0, 99.0))
     assert (frame.linear_mmps, frame.angular_raw) == (32000, 32767)
 
 
 @pytest.mark.parametrize(
-    ("order", "kind"), [(Order.STOP, MotionKind.STOP), (Order.BRAKE, MotionKind.BREAK)]
+    ("order", "kind"), [(Command.STOP, MotionKind.STOP), (Command.BRAKE, MotionKind.BREAK)]
 )
 def test_stop_and_brake_carry_no_velocity(
-    by_manual: Translator, order: Order, kind: MotionKind
+    by_manual: Translator, order: Command, kind: MotionKind
 ) -> None:
     assert by_manual.command(order, run(1.0, 1.0)) == MotionCommand(kind, 0, 0)
     assert by_manual.command(order) == MotionCommand(kind, 0, 0)
@@ -104,14 +104,16 @@ def test_what_is_not_finite_is_refused(value: float) -> None:
     with pytest.raises(MessageError, match="not finite"):
         check_finite(run(0.0, value))
     check_finite(run(1e300, -1e300))
-    check_finite(Motion(command="brake", linear=value))  # a stop stops, whatever stands beside it
+    check_finite(
+        Motion(command=Command.BRAKE, linear=value)
+    )  # a stop stops, whatever stands beside it
 
 
 @given(st.integers(-5000, 5000), st.integers(-5729, 5729))
 def test_velocities_come_back_as_they_went(linear_mmps: int, angular_raw: int) -> None:
     free = Translator(Wire(), Vehicle(), 100.0, 100.0)
     velocity = free.velocity(VelocityReport(linear_mmps, angular_raw))
-    frame = free.command(Order.RUN, run(velocity.linear, velocity.angular))
+    frame = free.command(Command.RUN, run(velocity.linear, velocity.angular))
     assert (frame.linear_mmps, frame.angular_raw) == (linear_mmps, angular_raw)
 
 
@@ -131,7 +133,7 @@ def test_the_fastest_plausible_velocity_is_taken(by_driver: Translator) -> None:
 
 
 def test_a_run_without_a_motion_carries_no_velocity(by_manual: Translator) -> None:
-    assert by_manual.command(Order.RUN) == MotionCommand(MotionKind.RUN, 0, 0)
+    assert by_manual.command(Command.RUN) == MotionCommand(MotionKind.RUN, 0, 0)
 
 
 def test_mileage(by_manual: Translator) -> None:
@@ -156,12 +158,6 @@ def test_driver_faults_by_name_all_32_bits() -> None:
     )  # fmt: skip
     assert message.bits == 0x8000003F
     assert driver(DriverReport(Side.RIGHT, 0)).faults == ()
-
-
-@given(st.floats(allow_nan=False), st.floats(0, 1e6))
-def test_clamp(value: float, limit: float) -> None:
-    assert abs(clamp(value, limit)) <= limit
-    assert clamp(clamp(value, limit), limit) == clamp(value, limit)
 
 
 @pytest.mark.parametrize(

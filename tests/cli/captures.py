@@ -1,4 +1,4 @@
-"""Captures made on the spot: pcap and pcapng files of UDP packets."""
+"""Generated captures: pcap and pcapng files with UDP packets."""
 
 import io
 import socket

@@ -1,4 +1,4 @@
-"""The command as a process of its own, and what it leaves in the process table."""
+"""``t2`` as a process, and its child processes."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def t2(*words: str) -> list[str]:
 
 
 def ran(*words: str) -> "subprocess.CompletedProcess[str]":
-    """Run ``t2`` to its end."""
+    """Run ``t2`` to completion."""
     return subprocess.run(
         t2(*words), capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
@@ -31,7 +31,7 @@ def sets(*texts: str) -> list[str]:
 
 
 def alive(pid: int) -> bool:
-    """Tell whether a process is there and no mere entry in the table."""
+    """Return whether a process runs and is not a zombie."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2]
     except (FileNotFoundError, ProcessLookupError):
@@ -40,7 +40,7 @@ def alive(pid: int) -> bool:
 
 
 def children(pid: int) -> dict[str, int]:
-    """Return the processes that a ``t2`` has started, by the name of their service."""
+    """Return the child processes of a ``t2``, by service name."""
     with contextlib.suppress(FileNotFoundError, ProcessLookupError):
         listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
         return {name: int(each) for each in listed if (name := _service(int(each)))}
@@ -58,7 +58,7 @@ def _service(pid: int) -> str:
 
 @contextlib.contextmanager
 def running(command: Sequence[str], output: Path) -> "Iterator[subprocess.Popen[bytes]]":
-    """Run a command with its output in a file; whatever happens, nothing of it stays."""
+    """Run a command with its output in a file; kill it and its children at the end."""
     with (
         output.open("wb") as file,
         subprocess.Popen(command, stdout=file, stderr=file) as process,
@@ -74,5 +74,5 @@ def running(command: Sequence[str], output: Path) -> "Iterator[subprocess.Popen[
 
 
 def wait_gone(pids: Sequence[int]) -> None:
-    """Wait until none of the processes is left."""
+    """Wait until all processes have ended."""
     wait_until(lambda: not any(map(alive, pids)), f"the end of {pids}", PATIENCE_S)

@@ -1,4 +1,4 @@
-"""``t2 latency`` without a stack: figures, table, silence, and a reader that goes away."""
+"""``t2 latency`` without a stack: figures, table, silence, and a closed pipe."""
 
 import io
 import json
@@ -48,10 +48,10 @@ def drawn(newest: Health | None, silent: bool = False) -> str:
 
 
 def test_figures_in_seconds() -> None:
-    told = figures(health())
-    assert (told["t_ns"], told["boot"], told["uptime"]) == (7, 8, 61.4)
-    assert told["not_counted"] == {"foreign_clock": 3, "implausible": 1}
-    durations = told["durations"]
+    shown_figures = figures(health())
+    assert (shown_figures["t_ns"], shown_figures["boot"], shown_figures["uptime"]) == (7, 8, 61.4)
+    assert shown_figures["not_counted"] == {"foreign_clock": 3, "implausible": 1}
+    durations = shown_figures["durations"]
     assert list(durations) == list(TIMING.durations)
     assert durations["contact_to_break"] == {
         "count": 1, "p50": 0.0042, "p99": 0.0042, "worst": 0.0042,
@@ -63,9 +63,9 @@ def test_figures_in_seconds() -> None:
     assert durations["request_to_frame"] == nothing
 
 
-def test_a_bridge_that_measures_nothing_has_no_figures() -> None:
-    told = figures(health(None))
-    assert (told["durations"], told["not_counted"]) == ({}, {})
+def test_no_timing_no_figures() -> None:
+    shown_figures = figures(health(None))
+    assert (shown_figures["durations"], shown_figures["not_counted"]) == ({}, {})
 
 
 def test_the_table_in_milliseconds() -> None:
@@ -83,7 +83,7 @@ def test_the_table_in_milliseconds() -> None:
 
 
 @pytest.mark.parametrize(
-    ("newest", "silent", "said"),
+    ("newest", "silent", "message"),
     [
         (None, False, "waiting for the bridge"),
         (None, True, SILENCE),
@@ -91,18 +91,18 @@ def test_the_table_in_milliseconds() -> None:
         (health(Timing(bounds=(), durations={}, not_counted={})), False, "not counted: nothing"),
     ],
 )
-def test_the_table_says_what_is_missing(newest: Health | None, silent: bool, said: str) -> None:
-    assert said in drawn(newest, silent)
+def test_captions_of_an_incomplete_table(newest: Health | None, silent: bool, message: str) -> None:
+    assert message in drawn(newest, silent)
 
 
-def test_a_line_is_json_and_silence_is_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_lines_and_silence(capsys: pytest.CaptureFixture[str]) -> None:
     print_line(health(), False)
     print_line(health(), True)
     print_line(None, True)
     print_line(None, False)
-    said = capsys.readouterr()
-    assert [json.loads(line) for line in said.out.splitlines()] == [figures(health())]
-    assert said.err == f"t2 latency: {SILENCE}\n" * 2
+    message = capsys.readouterr()
+    assert [json.loads(line) for line in message.out.splitlines()] == [figures(health())]
+    assert message.err == f"t2 latency: {SILENCE}\n" * 2
 
 
 # --- silence ----------------------------------------------------------------------------------
@@ -114,58 +114,58 @@ def watched(once: bool) -> tuple[Watch, Loop, list[tuple[Health | None, bool]]]:
     return Watch(loop, lambda newest, silent: shown.append((newest, silent)), once), loop, shown
 
 
-def told(received_ns: int) -> Arrival[Health]:
+def arrival(received_ns: int) -> Arrival[Health]:
     return Arrival(health(), "k", received_ns, None)
 
 
-def test_silence_is_said_once_and_again_after_the_next_word() -> None:
+def test_silence_is_shown_once_after_each_health_message() -> None:
     watch, loop, shown = watched(once=False)
     begin_ns = time.monotonic_ns()
-    watch.take(told(begin_ns))
+    watch.on_health(arrival(begin_ns))
     for seconds in (1, 4.9, 5.1, 6, 7):
-        watch.look(begin_ns + round(seconds * NS_PER_S))
+        watch.check(begin_ns + round(seconds * NS_PER_S))
     assert shown == [(health(), False), (health(), True)]
-    watch.take(told(begin_ns + 8 * NS_PER_S))
-    watch.look(begin_ns + 9 * NS_PER_S)
-    watch.look(begin_ns + 14 * NS_PER_S)
+    watch.on_health(arrival(begin_ns + 8 * NS_PER_S))
+    watch.check(begin_ns + 9 * NS_PER_S)
+    watch.check(begin_ns + 14 * NS_PER_S)
     assert shown[2:] == [(health(), False), (health(), True)]
     loop.close()
 
 
-def test_once_gives_up_without_showing_anything() -> None:
+def test_once_stops_without_output_if_the_bridge_is_silent() -> None:
     watch, loop, shown = watched(once=True)
-    watch.look(time.monotonic_ns() + 6 * NS_PER_S)
+    watch.check(time.monotonic_ns() + 6 * NS_PER_S)
     loop.run()  # returns: it was stopped before
     assert (watch.silent, shown) == (True, [])
     loop.close()
 
 
-def test_no_bridge_is_a_sentence(
+def test_no_bridge_is_an_error(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(latency, "PATIENCE_S", 0.0)
     monkeypatch.setattr("signal.signal", lambda *_: None)  # pytest keeps its own ctrl-c
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     assert main(["latency", "--once", *sets(f"bus.connect={endpoint}")]) == EXIT_LINK
-    assert f"t2 latency: no bridge was heard of at {endpoint}" in capsys.readouterr().err
+    assert f"t2 latency: no bridge at {endpoint}" in capsys.readouterr().err
 
 
 # --- where it is shown ------------------------------------------------------------------------
 
 
-def test_a_table_without_rich_says_what_to_install(
+def test_missing_rich_names_the_extra(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for module in ("rich.console", "rich.live"):
         monkeypatch.setitem(sys.modules, module, None)
     assert main(["latency", "--once"]) == 1
-    said = capsys.readouterr().err
-    assert said.startswith("t2 latency: the table wants rich")
-    assert "pip install -e '.[demo]'" in said
-    assert "t2 latency -o json" in said
+    message = capsys.readouterr().err
+    assert message.startswith("t2 latency: the table needs rich")
+    assert "pip install -e '.[demo]'" in message
+    assert "t2 latency -o json" in message
 
 
-def test_a_reader_that_goes_away_ends_it_without_a_word() -> None:
+def test_a_closed_pipe_ends_the_command_silently() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     publishers: list[Any] = []
     with router_process(endpoint), running(Loop()) as loop:

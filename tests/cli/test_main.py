@@ -1,4 +1,4 @@
-"""``t2`` itself: its help, its exit codes, and what it says without the extras."""
+"""``t2``: help, exit codes, and errors without the extras."""
 
 import re
 import subprocess
@@ -28,7 +28,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert max(map(len, shown.splitlines())) <= 80
 
 
-def test_no_word_at_all_shows_help(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_arguments_show_help(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main([])
     assert end.value.code == 0
@@ -87,7 +87,7 @@ def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "printed"),
     [
         (["fly"], "unknown command 'fly'; \"t2 --help\" lists the commands"),
         (["eco", "safety/state"], "unknown command 'eco'; did you mean \"t2 echo\"?"),
@@ -97,13 +97,13 @@ def test_help_of_a_command(command: str, option: str, capsys: pytest.CaptureFixt
         (["--set", "board.port=1", "up"], "options follow the command, as in: t2 COMMAND --set"),
     ],
 )
-def test_what_is_no_command_is_said(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_command_lines(
+    words: list[str], printed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
         main(words)
     assert end.value.code == 2
-    assert said in capsys.readouterr().err
+    assert printed in capsys.readouterr().err
 
 
 def raising(error: BaseException) -> Callable[[Namespace], int]:
@@ -121,26 +121,26 @@ def raising(error: BaseException) -> Callable[[Namespace], int]:
         (RobotError("something is missing"), 1),
     ],
 )
-def test_errors_are_sentences_with_exit_codes(
+def test_error_messages_and_exit_codes(
     error: RobotError,
     code: int,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("cli.config.run", raising(error))
+    monkeypatch.setattr("cli.settings.run", raising(error))
     assert main(["config"]) == code
     assert capsys.readouterr().err == f"t2 config: {error}\n"
 
 
-def test_an_early_ctrl_c_leaves_without_a_word(
+def test_an_early_ctrl_c_exits_silently(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("cli.config.run", raising(KeyboardInterrupt()))
+    monkeypatch.setattr("cli.settings.run", raising(KeyboardInterrupt()))
     assert main(["config"]) == 130
     assert capsys.readouterr().err == ""
 
 
-# The robot's set has none of the extras: only what wants them may miss them, in a sentence.
+# The robot's requirements have no extras: only commands that need one may fail, with a message.
 ROBOT_SET = """
 import sys
 class Absent:

@@ -1,4 +1,4 @@
-"""What the guide to operations names is there, and every event of the code is in it."""
+"""The operations guide lists every event and every alert of the code."""
 
 import ast
 import re
@@ -14,18 +14,18 @@ TREE = DOCS.parent
 ROW = re.compile(r"^\| (\w+) \| `(\w+)` \| ([\w, ]+) \| (.+) \| (.+) \|$", re.MULTILINE)
 LEVELS = set(Level.__args__)  # type: ignore[attr-defined]
 
-Told = dict[tuple[str, str], set[str]]  # levels by service and name
+Events = dict[tuple[str, str], set[str]]  # levels by service and name
 
 
 def words(node: ast.expr) -> list[str]:
-    """Return the strings that an expression may be, without those of its condition."""
+    """Return the possible string values of an expression, without its condition."""
     if isinstance(node, ast.IfExp):
         return words(node.body) + words(node.orelse)
     return [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []
 
 
 def calls(path: Path) -> Iterator[ast.Call]:
-    """Yield the calls that tell of an event: ``node.event(...)`` and safety's ``Note(...)``."""
+    """Yield the calls that publish an event: ``node.event(...)`` and safety's ``Note(...)``."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call):
             name = getattr(node.func, "attr", "") or getattr(node.func, "id", "")
@@ -33,14 +33,14 @@ def calls(path: Path) -> Iterator[ast.Call]:
                 yield node
 
 
-def told() -> Told:
-    """Return every event of the code; levels that are worked out are left out."""
-    found: Told = {}
+def events_of_the_code() -> Events:
+    """Return every event of the code, without computed levels."""
+    found: Events = {}
     for path in sorted((TREE / "services").rglob("*.py")):
         service = path.relative_to(TREE / "services").parts[0]
         for call in calls(path):
             names, levels = words(call.args[0]), words(call.args[1])
-            # Two names and two levels go by one condition.
+            # Two names and two levels depend on one condition.
             each = [[level] for level in levels] if len(levels) > 1 else [levels] * len(names)
             for name, given in zip(names, each, strict=True):
                 found.setdefault((service, name), set()).update(given)
@@ -51,16 +51,16 @@ def told() -> Told:
 
 
 def table() -> dict[tuple[str, str], tuple[set[str], str, str]]:
-    """Return the rows of the guide: levels, what it means, what to do."""
+    """Return the rows of the guide: levels, meaning, action."""
     page = (DOCS / "operations.md").read_text(encoding="utf-8")
     part = page.partition("<!-- events -->")[2].partition("<!-- end -->")[0]
     rows = ROW.findall(part)
-    assert len(rows) == part.count("\n| ") - 2, "a row is not as the others are"
+    assert len(rows) == part.count("\n| ") - 2, "a row has another format"
     return {(row[0], row[1]): (set(row[2].split(", ")), row[3], row[4]) for row in rows}
 
 
-def test_every_event_of_the_code_is_told_and_no_other() -> None:
-    code = told()
+def test_the_guide_lists_exactly_the_events_of_the_code() -> None:
+    code = events_of_the_code()
     assert {("bridge", "contact"), ("safety", "release_end"), ("recorder", "disk_full")} <= set(
         code
     )
@@ -68,8 +68,8 @@ def test_every_event_of_the_code_is_told_and_no_other() -> None:
     assert set(table()) == set(code)
 
 
-def test_an_event_has_the_level_that_the_code_gives_it() -> None:
-    code = told()
+def test_the_guide_has_the_levels_of_the_code() -> None:
+    code = events_of_the_code()
     for key, (levels, means, todo) in table().items():
         assert levels <= LEVELS, key
         assert code[key] <= levels, key
@@ -77,7 +77,7 @@ def test_an_event_has_the_level_that_the_code_gives_it() -> None:
         assert todo.strip(), key
 
 
-def test_the_services_name_their_events_as_the_guide_does() -> None:
+def test_service_readmes_list_their_events() -> None:
     for service in ("bridge", "recorder"):
         page = (TREE / "services" / service / "README.md").read_text(encoding="utf-8")
         row = next(line for line in page.splitlines() if f"| `evt/{service}`" in line)
@@ -86,7 +86,7 @@ def test_the_services_name_their_events_as_the_guide_does() -> None:
         }
 
 
-def test_every_alert_is_told() -> None:
+def test_the_guide_lists_every_alert() -> None:
     page = (DOCS / "operations.md").read_text(encoding="utf-8")
     rules = (TREE / "deploy" / "prometheus" / "alerts.yml").read_text(encoding="utf-8")
     alerts = set(re.findall(r"alert: (\w+)", rules))

@@ -20,6 +20,7 @@ from common.messages import (
     SafetyState,
     Ultrasonic,
 )
+from common.motion import Command
 
 STATE = SafetyState(
     seq=3,
@@ -54,7 +55,7 @@ def test_what_goes_out_comes_back() -> None:
     assert decode(encode(STATE), SafetyState) == STATE
 
 
-@given(st.builds(Motion, command=st.sampled_from(["run", "stop", "brake"]),
+@given(st.builds(Motion, command=st.sampled_from(Command),
                  linear=st.floats(allow_nan=False), angular=st.floats(allow_nan=False),
                  source=st.none() | st.text(), seq=st.integers(0, 2**63)))  # fmt: skip
 def test_every_motion_comes_back(motion: Motion) -> None:

@@ -36,3 +36,15 @@ def test_only_the_newest_are_kept() -> None:
     assert len(heartbeat.sent) == CAPACITY
     assert heartbeat.is_late(1001, NS_PER_S, NS_PER_S)
     assert not heartbeat.is_late(1002, NS_PER_S, NS_PER_S)
+
+
+def test_heartbeats_rise_and_are_forgotten_in_the_end() -> None:
+    beat = Heartbeat(1000)
+    assert beat.is_late(1000, 0, 10)
+    for now_ns in range(CAPACITY + 5):
+        beat = beat.beat(now_ns)
+    assert beat.number == 1000 + CAPACITY + 5
+    assert len(beat.sent) == CAPACITY
+    assert not beat.is_late(beat.number, CAPACITY + 4 + 10, 10)
+    assert beat.is_late(beat.number, CAPACITY + 4 + 11, 10)
+    assert beat.is_late(1001, 0, 10**9)

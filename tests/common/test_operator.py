@@ -7,12 +7,12 @@ from msgspec import structs
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, Direction, Limits, ReleaseRequest, ResetDone, SafetyState
+from common.motion import STILL, Twist
 from common.operator import (
     AHEAD,
     CONFIRM_S,
     ESTOP_TICKS,
     MAX_CALL_AGE_NS,
-    ZERO_TWIST,
     ZEROS,
     DriveRequests,
     Echoes,
@@ -21,7 +21,6 @@ from common.operator import (
     Phase,
     ReleaseCalls,
     ResetCheck,
-    Twist,
     confirms,
     release_request,
     reset_request,
@@ -41,12 +40,12 @@ GO = Twist(0.2, 0.1)
 
 DRIVE_TABLE = [  # before, requested, request, after
     (DriveRequests(Phase.SILENT), None, None, DriveRequests(Phase.SILENT)),
-    (DriveRequests(Phase.SILENT), GO, ZERO_TWIST, DriveRequests(Phase.DRIVING)),
+    (DriveRequests(Phase.SILENT), GO, STILL, DriveRequests(Phase.DRIVING)),
     (DriveRequests(Phase.DRIVING), GO, GO, DriveRequests(Phase.DRIVING)),
-    (DriveRequests(Phase.DRIVING), None, ZERO_TWIST, DriveRequests(Phase.RELEASING, 2)),
-    (DriveRequests(Phase.RELEASING, 2), None, ZERO_TWIST, DriveRequests(Phase.RELEASING, 1)),
-    (DriveRequests(Phase.RELEASING, 1), None, ZERO_TWIST, DriveRequests(Phase.SILENT)),
-    (DriveRequests(Phase.RELEASING, 2), GO, ZERO_TWIST, DriveRequests(Phase.DRIVING, 2)),
+    (DriveRequests(Phase.DRIVING), None, STILL, DriveRequests(Phase.RELEASING, 2)),
+    (DriveRequests(Phase.RELEASING, 2), None, STILL, DriveRequests(Phase.RELEASING, 1)),
+    (DriveRequests(Phase.RELEASING, 1), None, STILL, DriveRequests(Phase.SILENT)),
+    (DriveRequests(Phase.RELEASING, 2), GO, STILL, DriveRequests(Phase.DRIVING, 2)),
 ]
 
 
@@ -60,8 +59,8 @@ def test_the_table_of_drive_requests(
 
 
 def test_a_twist_is_zero_by_default() -> None:
-    assert (ZERO_TWIST.linear, ZERO_TWIST.angular) == (0.0, 0.0)
-    assert Twist() == ZERO_TWIST
+    assert (STILL.linear, STILL.angular) == (0.0, 0.0)
+    assert Twist() == STILL
     assert [phase.value for phase in Phase] == ["silent", "driving", "releasing"]
 
 
@@ -69,7 +68,7 @@ def test_a_twist_is_zero_by_default() -> None:
 def test_stop_sends_three_zeros_from_any_phase(phase: Phase) -> None:
     requests = DriveRequests(phase, 1)
     requests.stop()
-    assert [requests.tick(None) for _ in range(5)] == [ZERO_TWIST] * 3 + [None] * 2
+    assert [requests.tick(None) for _ in range(5)] == [STILL] * 3 + [None] * 2
 
 
 @given(st.lists(st.sampled_from(["go", "idle", "stop"])))
@@ -84,7 +83,7 @@ def test_a_drive_begins_with_a_zero_and_ends_with_three(steps: list[str]) -> Non
     assert sent[-1] is None
     for i, request in enumerate(sent):
         if request == GO:
-            assert sent[i - 1] in (GO, ZERO_TWIST)
+            assert sent[i - 1] in (GO, STILL)
             assert i > 0
             assert sent[i + 1] is not None  # a zero or another twist, never silence
 

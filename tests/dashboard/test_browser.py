@@ -72,7 +72,7 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
 
 def test_the_content_of_the_page(page: Page, stack: Chain) -> None:
     wait_for_text(page, "#verdict", "STOP")
-    wait_for_text(page, "#sentence", "Nobody asks to move.")
+    wait_for_text(page, "#sentence", "No source requests motion.")
     wait_for_text(page, "#speed", "0.00")
     wait_for_text(page, "#driver", "No driver")
     wait_for_text(page, "#bumper", "clear")

@@ -26,6 +26,7 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
+from common.motion import Command
 from common.settings import Vehicle
 from services.dashboard import snapshot
 from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState
@@ -65,7 +66,7 @@ def full() -> TelemetryCache:
         ),
         "@cmd/drive/nav": Drive(linear=0.7, angular=0.2, echo=1),
         "@cmd/drive/web": Drive(linear=0.1, angular=0.0, echo=1),
-        "@cmd/motion": Motion(command="brake"),
+        "@cmd/motion": Motion(command=Command.BRAKE),
         "tel/safety/health": Health(
             service="safety", version="0.1", uptime=9.0, rates={},
             counters={"late": 2, "overrun": 0}, lateness=0.001, rss=1000,

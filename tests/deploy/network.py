@@ -1,4 +1,4 @@
-"""A vehicle's network in namespaces of their own: industrial PC, its cable, its Wi-Fi."""
+"""A vehicle's network of namespaces: industrial PC, cable, Wi-Fi."""
 
 import contextlib
 import os
@@ -14,15 +14,15 @@ PC, CABLE, WIFI, OFFICE, BOX = (f"{NAME}{each}" for each in ("pc", "cable", "wif
 
 
 def missing() -> str:
-    """Return why there can be no such network here; nothing if there can."""
+    """Return why this host cannot create the network; empty if it can."""
     if os.geteuid() != 0:
-        return "network namespaces want root"
+        return "network namespaces need root"
     absent = [name for name in NEEDS if not shutil.which(name)]
     if absent:
-        return f"it wants {', '.join(absent)} (Debian: iproute2, nftables)"
+        return f"missing: {', '.join(absent)} (Debian: iproute2, nftables)"
     made = subprocess.run(["ip", "netns", "add", NAME], capture_output=True, text=True, check=False)
     if made.returncode:
-        return f"no network namespace can be made: {made.stderr.strip()}"
+        return f"cannot create a network namespace: {made.stderr.strip()}"
     table = within(NAME, "nft", "add", "table", "inet", "t2", check=False)
     run("ip", "netns", "del", NAME)
     return "" if table.returncode == 0 else f"the kernel has no nftables: {table.stderr.strip()}"
@@ -30,9 +30,9 @@ def missing() -> str:
 
 @contextlib.contextmanager
 def vehicle() -> Iterator[None]:
-    """Lay the cable with the board and a stranger on it, the Wi-Fi with a laptop, and two more.
+    """Create the cable with board and stranger, the Wi-Fi with a laptop, and two more networks.
 
-    These are a network that is nobody's, and a container's, where published ports lead.
+    These are an unrelated network, and a container network with published ports.
     """
     names = (PC, CABLE, WIFI, OFFICE, BOX)
     try:
@@ -48,7 +48,7 @@ def vehicle() -> Iterator[None]:
         within(PC, "sysctl", "-qw", "net.ipv4.ip_forward=1")
         within(WIFI, "ip", "route", "add", "10.7.5.0/24", "via", "192.168.201.1")
         within(CABLE, "ip", "route", "add", "192.168.201.0/24", "via", "10.7.5.220")
-        for at in ("all", "cable0", "wifi0"):  # the rules have to find it out, not the kernel
+        for at in ("all", "cable0", "wifi0"):  # the rules must detect spoofing, not the kernel
             within(PC, "sysctl", "-qw", f"net.ipv4.conf.{at}.rp_filter=0")
         yield
     finally:
@@ -57,7 +57,7 @@ def vehicle() -> Iterator[None]:
 
 
 def link(peer: str, device: str, ours: str, theirs: Sequence[str]) -> None:
-    """Join the PC and another namespace by a cable."""
+    """Connect the PC and another namespace."""
     run("ip", "link", "add", device, "netns", PC, "type", "veth",
         "peer", "name", "there", "netns", peer)  # fmt: skip
     within(PC, "ip", "address", "add", ours, "dev", device)
@@ -68,7 +68,7 @@ def link(peer: str, device: str, ours: str, theirs: Sequence[str]) -> None:
 
 
 def run(*words: str, check: bool = True) -> "subprocess.CompletedProcess[str]":
-    """Run a command to its end."""
+    """Run a command to completion."""
     return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=check)
 
 
@@ -78,5 +78,5 @@ def within(name: str, *words: str, check: bool = True) -> "subprocess.CompletedP
 
 
 def python(name: str, code: str, *words: str) -> list[str]:
-    """Return the command line of a little program in a namespace."""
+    """Return the command line of a Python program in a namespace."""
     return ["ip", "netns", "exec", name, sys.executable, "-c", code, *words]

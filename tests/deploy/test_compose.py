@@ -1,4 +1,4 @@
-"""What ``compose.yaml`` makes of its variables, as Compose itself reads it; no engine is asked."""
+"""``compose.yaml`` as parsed by Compose; no engine needed."""
 
 import os
 import re
@@ -20,9 +20,9 @@ OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "d
 
 
 def config(*over: str, **environ: str) -> dict[str, str]:
-    """Return what each service is, as text, for whoever has copied ``robot.env``."""
+    """Return the effective definition of each service, with ``robot.env``."""
     if not shutil.which("docker") or not (command := compose()):
-        pytest.skip("there is no Compose")
+        pytest.skip("Compose is not installed")
     files = [word for file in ("compose.yaml", *over) for word in ("-f", file)]
     whole = subprocess.run(
         [*command, "--env-file", ENV, *files, *PROFILES, "config"],
@@ -36,36 +36,36 @@ def config(*over: str, **environ: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("over", [(TLS,), (OWN_ROUTER, TLS)])
-def test_every_container_knows_which_robot_it_is(over: tuple[str, ...]) -> None:
+def test_every_container_has_the_robot_id(over: tuple[str, ...]) -> None:
     services = config(*over, T2_ROBOT="002")
     assert services.keys() == OF_T2 | {"sim", "laptop"}
     for name, text in services.items():
         assert re.search(r"^ +T2__ROBOT__ID: .?002", text, re.MULTILINE), name
 
 
-def test_a_copy_that_nobody_has_edited_is_the_first_robot() -> None:
+def test_the_default_robot_id() -> None:
     assert all(re.search(r"T2__ROBOT__ID: .?001", text) for text in config(TLS).values())
 
 
-def test_a_laptop_dials_the_vehicles_wifi() -> None:
+def test_a_laptop_connects_to_the_vehicles_wifi() -> None:
     assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in config(TLS)["laptop"]
 
 
-def test_who_stands_before_the_wheels_alone_may_go_ahead() -> None:
+def test_only_the_control_chain_has_realtime_priority() -> None:
     granted = re.compile(rf"^ +rtprio: {realtime.GUARD}$", re.MULTILINE)
     ahead = {name for name, text in config(TLS, REALTIME).items() if granted.search(text)}
     assert ahead == {"router", "bridge", "safety"}
     assert not any("rtprio" in text for text in config(TLS).values())
 
 
-def test_nobody_is_sent_to_the_boards_cable() -> None:
-    """SECURITY.md wants nobody there, and deploy/nftables/t2.nft drops whoever is."""
+def test_no_file_uses_the_boards_network() -> None:
+    """No container uses the board's network: deploy/nftables/t2.nft drops its traffic."""
     for file in (ROOT / "compose.yaml", *(ROOT / "deploy" / "compose").iterdir()):
         assert "10.7.5." not in file.read_text(encoding="utf-8"), file
 
 
 @pytest.mark.parametrize("over", [(TLS,), (OWN_ROUTER, TLS, REALTIME)])
-def test_bridge_and_safety_alone_have_the_drive_link(over: tuple[str, ...]) -> None:
+def test_only_bridge_and_safety_have_the_drive_link(over: tuple[str, ...]) -> None:
     services = config(*over)
     mounted = {name for name, text in services.items() if "target: /run/t2-drive" in text}
     short = {name for name, text in services.items() if "drive:/run/t2-drive" in text}

@@ -1,4 +1,4 @@
-"""``deploy/nftables/t2.nft`` on a vehicle's network made of namespaces: who gets through."""
+"""``deploy/nftables/t2.nft`` on a vehicle's network of namespaces: accepted and dropped traffic."""
 
 import contextlib
 import subprocess
@@ -20,35 +20,35 @@ from tests.deploy.network import (
     within,
 )
 
-# As Docker does it for `ports:`, whatever the address that was dialled.
+# As Docker publishes `ports:`, for any destination address.
 PUBLISH = (
     "add table ip nat; add chain ip nat PREROUTING { type nat hook prerouting priority dstnat; };"
     "add rule ip nat PREROUTING fib daddr type local tcp dport { 7447, 8080 } dnat to 172.30.0.2"
 )
 RULES = Path(__file__).parents[2] / "deploy" / "nftables" / "t2.nft"
 
-# Prints each datagram that comes, and ends with the one that says so.
+# Prints each received datagram, until one holds "end".
 LISTEN = """
 import socket, sys
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
     sock.bind((sys.argv[1], int(sys.argv[2])))
     sock.settimeout(20)
     print("listening", flush=True)
-    said = ""
-    while said != "end":
-        said = sock.recv(100).decode()
-        print(said, flush=True)
+    message = ""
+    while message != "end":
+        message = sock.recv(100).decode()
+        print(message, flush=True)
 """
-# From any address, whoever has it.
+# Sends from any source address.
 SEND = """
 import socket, sys
-source, to, port, said = sys.argv[1:]
+source, to, port, message = sys.argv[1:]
 IP_TRANSPARENT = 19
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
     sock.setsockopt(socket.SOL_IP, IP_TRANSPARENT, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
     sock.bind((source, 0))
-    sock.sendto(said.encode(), (to, int(port)))
+    sock.sendto(message.encode(), (to, int(port)))
 """
 SERVE = """
 import socket, sys
@@ -77,7 +77,7 @@ def network() -> Iterator[None]:
 
 @contextlib.contextmanager
 def loaded(file: Path = RULES) -> Iterator[None]:
-    """Load the rules for a while."""
+    """Load the rules while the context lasts."""
     within(PC, "nft", "-f", str(file))
     try:
         yield
@@ -92,7 +92,7 @@ def rules(network: None) -> Iterator[None]:
 
 
 class Listener:
-    """Somebody who listens on UDP, until told to end."""
+    """A UDP listener, until it receives \"end\"."""
 
     def __init__(self, name: str, address: str, port: int) -> None:
         self._to = (address, str(port))
@@ -102,11 +102,13 @@ class Listener:
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "listening\n"
 
-    def send(self, name: str, source: str, said: str) -> None:
-        subprocess.run(python(name, SEND, source, *self._to, said), timeout=PATIENCE_S, check=True)
+    def send(self, name: str, source: str, message: str) -> None:
+        subprocess.run(
+            python(name, SEND, source, *self._to, message), timeout=PATIENCE_S, check=True
+        )
 
-    def heard(self, name: str, source: str) -> list[str]:
-        """End it by a datagram that gets through, and return those that came before."""
+    def received(self, name: str, source: str) -> list[str]:
+        """Stop it with an accepted datagram, and return the earlier ones."""
         self.send(name, source, "end")
         out, _ = self._process.communicate(timeout=PATIENCE_S)
         return out.split()[:-1]
@@ -118,16 +120,16 @@ def board_and_others(port: int) -> list[str]:
     listener.send(CABLE, "10.7.5.99", "stranger")
     listener.send(WIFI, "192.168.201.50", "laptop")
     listener.send(WIFI, "10.7.5.224", "impostor")
-    return listener.heard(CABLE, "10.7.5.224")
+    return listener.received(CABLE, "10.7.5.224")
 
 
 def passed(counter: str) -> int:
-    said = within(PC, "nft", "list", "counter", "inet", "t2", counter).stdout
-    return int(said.split("packets ")[1].split()[0])
+    message = within(PC, "nft", "list", "counter", "inet", "t2", counter).stdout
+    return int(message.split("packets ")[1].split()[0])
 
 
 @pytest.mark.usefixtures("network")
-def test_without_rules_everybody_is_the_board() -> None:
+def test_without_rules_every_host_reaches_the_bridge() -> None:
     assert sorted(board_and_others(4002)) == ["board", "impostor", "laptop", "stranger"]
 
 
@@ -135,28 +137,28 @@ def test_without_rules_everybody_is_the_board() -> None:
 @pytest.mark.parametrize("port", [4001, 4002])
 def test_only_the_board_reaches_the_bridge(port: int) -> None:
     assert board_and_others(port) == ["board"]
-    assert passed("from_board") == 2  # and the end
+    assert passed("from_board") == 2  # including the end
     assert passed("strangers") >= 2
     assert passed("spoofed") >= 1
 
 
 @pytest.mark.usefixtures("rules")
-def test_the_board_itself_reaches_nothing_else() -> None:
+def test_the_board_reaches_no_other_port() -> None:
     listener = Listener(PC, "0.0.0.0", 5000)
     listener.send(CABLE, "10.7.5.224", "board")
     ending = Listener(PC, "10.7.5.220", 4002)
-    assert ending.heard(CABLE, "10.7.5.224") == []
+    assert ending.received(CABLE, "10.7.5.224") == []
     listener._to = ("127.0.0.1", "5000")
-    assert listener.heard(PC, "127.0.0.1") == []
+    assert listener.received(PC, "127.0.0.1") == []
 
 
 @pytest.mark.usefixtures("network")
-def test_nobody_reaches_the_board_through_the_pc() -> None:
+def test_the_pc_forwards_nothing_to_the_board() -> None:
     def through() -> list[str]:
         listener = Listener(CABLE, "10.7.5.224", 4002)
         listener.send(WIFI, "192.168.201.50", "laptop")
         listener.send(PC, "10.7.5.220", "bridge")
-        return listener.heard(PC, "10.7.5.220")
+        return listener.received(PC, "10.7.5.220")
 
     assert through() == ["laptop", "bridge"]
     with loaded():
@@ -174,10 +176,10 @@ def test_nobody_reaches_the_board_through_the_pc() -> None:
     ],
     ids=["router", "ssh", "REST", "cable"],  # the names hold a process' number
 )
-def test_operators_find_the_router_and_nothing_else(
+def test_operators_reach_only_ssh_and_the_router(
     name: str, address: str, port: int, answer: str
 ) -> None:
-    assert dialled(PC, name, address, port) == answer
+    assert answer_to(PC, name, address, port) == answer
 
 
 @pytest.mark.usefixtures("network")
@@ -192,20 +194,20 @@ def test_operators_find_the_router_and_nothing_else(
     ],
     ids=["router", "dashboard", "another network", "the Wi-Fi's address", "cable"],
 )
-def test_a_port_that_a_container_publishes_has_the_same_doors(
+def test_published_container_ports_have_the_same_rules(
     name: str, address: str, port: int, answer: str
 ) -> None:
     within(PC, "nft", PUBLISH)
     try:
-        assert dialled(BOX, name, address, port) == "welcome"  # past `input`, and without rules
+        assert answer_to(BOX, name, address, port) == "welcome"  # past `input`, and without rules
         within(PC, "nft", "-f", str(RULES))
-        assert dialled(BOX, name, address, port) == answer
+        assert answer_to(BOX, name, address, port) == answer
     finally:
         within(PC, "nft", "flush", "ruleset")
 
 
-def dialled(server_at: str, name: str, address: str, port: int) -> str:
-    """Return what somebody who dials a server on TCP is answered."""
+def answer_to(server_at: str, name: str, address: str, port: int) -> str:
+    """Return the answer to a TCP connection."""
     with subprocess.Popen(
         python(server_at, SERVE, str(port)),
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -223,7 +225,7 @@ def dialled(server_at: str, name: str, address: str, port: int) -> str:
 
 
 @pytest.mark.usefixtures("network")
-def test_it_can_be_loaded_again_and_beside_others() -> None:
+def test_reload_beside_other_tables() -> None:
     within(PC, "nft", "add", "table", "inet", "other")
     with loaded(), loaded():
         tables = within(PC, "nft", "list", "tables").stdout.splitlines()
@@ -245,4 +247,4 @@ def test_only_the_bridges_user_may_command_the_board(tmp_path: Path) -> None:
                 capture_output=True, text=True, timeout=PATIENCE_S, check=False,
             )  # fmt: skip
             assert "Operation not permitted" in sent.stderr, to
-    assert listener.heard(PC, "10.7.5.220") == []
+    assert listener.received(PC, "10.7.5.220") == []

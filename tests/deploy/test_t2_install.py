@@ -1,4 +1,4 @@
-"""``t2-install.sh``, run for real and without a network: install, upgrade, roll back, refuse."""
+"""``t2-install.sh`` without a network: install, upgrade, rollback, errors."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ import pytest
 from tests.deploy.wheelhouse import OFFLINE, SCRIPT, bundled_pip, offline, seal, wheelhouse
 
 PIP = bundled_pip()
-LACKING = offline() or ("" if PIP else "this Python carries no pip of its own")
+LACKING = offline() or ("" if PIP else "this Python has no bundled pip")
 pytestmark = pytest.mark.skipif(bool(LACKING), reason=f"t2-install.sh cannot run: {LACKING}")
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -24,7 +24,7 @@ def home(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def house(tmp_path: Path) -> Callable[[str], Path]:
-    """Make a wheelhouse of a version."""
+    """Create a wheelhouse of a version."""
     assert PIP is not None
     pip = PIP
     return lambda version: wheelhouse(tmp_path / f"wheelhouse-{version}", version, pip)
@@ -63,7 +63,7 @@ def test_install_again_upgrade_and_roll_back(
 
     again = run(one)
     assert again.returncode == 0
-    assert "is there already" in again.stdout
+    assert "exists already" in again.stdout
     assert not (home / "previous").exists()
 
     upgrade = run(house("2.0"))
@@ -78,7 +78,7 @@ def test_install_again_upgrade_and_roll_back(
     assert "t2 2.0 install" in forth.stdout
 
 
-def test_the_same_version_with_other_contents_has_a_place_of_its_own(
+def test_another_build_of_a_version_has_its_own_folder(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     folder = house("1.0")
@@ -90,38 +90,38 @@ def test_the_same_version_with_other_contents_has_a_place_of_its_own(
     assert len(list(home.glob("1.0-*"))) == 2
 
 
-def test_a_version_that_refuses_the_settings_is_not_made_current(
+def test_a_version_that_rejects_the_settings_is_not_activated(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     run(house("1.0"))
     refused = run(house("2.0"), T2_TEST_REFUSES="2.0")
     assert refused.returncode == 1
     assert "the settings will not do" in refused.stderr
-    assert "would not run with these settings; nothing was changed" in refused.stderr
+    assert "cannot run with these settings; nothing was changed" in refused.stderr
     assert link(home, "current") == "1.0"
 
 
 @pytest.mark.parametrize(
     "words", [("--rolback",), ("--help",), ("--dry-run",), ("--rollback", "--sim"), ("--sim", "x")]
 )
-def test_what_is_not_understood_changes_nothing(
+def test_unknown_arguments_change_nothing(
     home: Path, house: Callable[[str], Path], run: Run, words: tuple[str, ...]
 ) -> None:
     refused = run(house("1.0"), *words)
     assert refused.returncode == 1
-    assert f"does not know '{' '.join(words)}', nothing was changed" in refused.stderr
+    assert f"unknown arguments '{' '.join(words)}'; nothing was changed" in refused.stderr
     assert "[--sim | --rollback]" in refused.stderr
     assert not home.exists()
 
 
-def test_a_version_is_tried_as_it_will_be_installed(
+def test_the_dry_run_uses_the_same_arguments(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     assert run(house("1.0"), "--sim", T2_TEST_REFUSES="--sim").returncode == 1
     assert not (home / "current").exists()
 
 
-def test_what_was_interrupted_is_made_anew(
+def test_an_interrupted_build_is_repeated(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     folder = house("1.0")
@@ -133,7 +133,7 @@ def test_what_was_interrupted_is_made_anew(
     assert (version / "bin" / "python").exists()
 
 
-def test_a_damaged_wheelhouse_is_refused_before_anything_is_made(
+def test_a_damaged_wheelhouse_is_rejected(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     folder = house("1.0")
@@ -144,29 +144,29 @@ def test_a_damaged_wheelhouse_is_refused_before_anything_is_made(
     assert list(home.iterdir()) == []
 
 
-def test_a_wheel_of_another_hash_is_refused(
+def test_a_wheel_with_another_hash_is_rejected(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
     folder = house("1.0")
     with (folder / "t2-1.0-py3-none-any.whl").open("ab") as file:
         file.write(b"\0")
-    seal(folder)  # whoever exchanges a wheel may renew the sums; pip knows what was locked
+    seal(folder)  # an attacker can renew the checksums, but not pip's locked hashes
     refused = run(folder)
     assert refused.returncode == 1
     assert "DO NOT MATCH THE HASHES" in refused.stderr
     assert not (home / "current").exists()
 
 
-def test_it_says_what_is_missing(home: Path, house: Callable[[str], Path], run: Run) -> None:
+def test_missing_requirements(home: Path, house: Callable[[str], Path], run: Run) -> None:
     folder = house("1.0")
-    assert "wants Python 3.11 or newer" in run(folder, PYTHON="false").stderr
-    assert "there is no version before" in run(folder, "--rollback").stderr
+    assert "needs Python 3.11 or newer" in run(folder, PYTHON="false").stderr
+    assert "there is no previous version" in run(folder, "--rollback").stderr
     (folder / "VERSION").unlink()
-    assert "is no wheelhouse, VERSION is missing" in run(folder).stderr
+    assert "is not a wheelhouse, VERSION is missing" in run(folder).stderr
     assert list(home.iterdir()) == []
 
 
-@pytest.mark.skipif(shutil.which("shellcheck") is None, reason="there is no shellcheck here")
-def test_shellcheck_finds_nothing() -> None:
+@pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")
+def test_shellcheck_passes() -> None:
     done = subprocess.run(["shellcheck", SCRIPT], capture_output=True, text=True, check=False)
     assert done.stdout == ""

@@ -1,4 +1,4 @@
-"""What the wheel installs, and that packages of the same names elsewhere do not replace it."""
+"""Content of the wheel, and its precedence over packages of the same names."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         return set(archive.namelist())
 
 
-def test_the_wheel_holds_what_ships_and_nothing_else(names: set[str]) -> None:
+def test_the_wheel_contains_only_shipped_packages(names: set[str]) -> None:
     tops = {name.partition("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == SHIPPED
     assert not [name for name in names if "test" in name.lower()]
@@ -40,7 +40,7 @@ def test_the_wheel_holds_what_ships_and_nothing_else(names: set[str]) -> None:
     }
 
 
-def test_the_wheel_holds_every_module_and_every_data_file(names: set[str]) -> None:
+def test_the_wheel_contains_every_module_and_data_file(names: set[str]) -> None:
     listed = ["git", "ls-files", *(SHIPPED - {"deploy"})]
     tracked = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True, text=True)
     assert set(tracked.stdout.split()) <= names
@@ -48,7 +48,7 @@ def test_the_wheel_holds_every_module_and_every_data_file(names: set[str]) -> No
 
 @pytest.fixture
 def foreign(tmp_path: Path) -> Path:
-    """Return a folder with packages of our names, as a ROS workspace may have them."""
+    """Return a folder with packages of the same names, as in a ROS workspace."""
     for name in FOREIGN:
         package = tmp_path / "workspace" / name
         package.mkdir(parents=True)
@@ -57,7 +57,7 @@ def foreign(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("is_on_path", [False, True], ids=["working directory", "PYTHONPATH"])
-def test_foreign_packages_do_not_replace_ours(
+def test_foreign_packages_have_no_precedence(
     foreign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_on_path: bool
 ) -> None:
     monkeypatch.chdir(foreign)
@@ -78,7 +78,7 @@ def test_foreign_packages_do_not_replace_ours(
     assert "foreign" not in log.read_text()
 
 
-def test_the_environment_of_a_child_names_our_packages_first(
+def test_the_environment_of_a_child_has_our_packages_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv("PYTHONPATH", raising=False)

@@ -1,4 +1,4 @@
-"""A small wheelhouse: pip, and a T2 that only says what it was asked."""
+"""A small wheelhouse: pip, and a T2 that prints its arguments."""
 
 import base64
 import ensurepip
@@ -20,7 +20,7 @@ sys.exit("the settings will not do" if refused else 0)
 
 
 def offline() -> str:
-    """Return why no program can be run without a network here, or nothing."""
+    """Return why programs cannot run without a network here; empty if they can."""
     try:
         done = subprocess.run([*OFFLINE, "true"], capture_output=True, text=True, check=False)
     except OSError as error:
@@ -29,7 +29,7 @@ def offline() -> str:
 
 
 def bundled_pip() -> Path | None:
-    """Return the wheel of pip that Python itself carries, where it does."""
+    """Return the pip wheel bundled with Python, if any."""
     found = (Path(ensurepip.__file__).parent / "_bundled").glob("pip-*.whl")
     return next(found, None)
 
@@ -53,12 +53,12 @@ def wheel(folder: Path, version: str) -> Path:
 
 
 def digest(data: bytes) -> str:
-    """Return a hash as a wheel's record has it."""
+    """Return a hash in the format of a wheel's record."""
     return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
 
 
 def wheelhouse(folder: Path, version: str, pip: Path) -> Path:
-    """Write a whole wheelhouse, as `make wheelhouse` does."""
+    """Write a complete wheelhouse, as `make wheelhouse` does."""
     folder.mkdir()
     made = wheel(folder, version)
     shutil.copy(pip, folder)
@@ -72,7 +72,7 @@ def wheelhouse(folder: Path, version: str, pip: Path) -> Path:
 
 
 def seal(folder: Path) -> None:
-    """Write the sums of what is in a wheelhouse."""
+    """Write the checksums of a wheelhouse."""
     files = sorted(path for path in folder.iterdir() if path.name != "SHA256SUMS")
     sums = (f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
     (folder / "SHA256SUMS").write_text("".join(sums))

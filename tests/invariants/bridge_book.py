@@ -14,7 +14,7 @@ CLEAR_SAMPLES = 3
 
 
 @dataclass(slots=True)
-class Gate:
+class BridgeBook:
     """What one bridge was told, by the time of delivery."""
 
     boot: int

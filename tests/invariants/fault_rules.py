@@ -8,9 +8,9 @@ from msgspec.structs import replace
 
 from common import keys
 from common import messages as m
+from common.motion import Twist
 from common.wire.frame import Side
-from sim.vehicle import Twist
-from tests.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Letter, Weather
+from tests.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance, Envelope
 from tests.invariants.process import ROBOT
 from tests.invariants.stack import Stack
 from tests.invariants.strategies import (
@@ -27,13 +27,13 @@ from tests.invariants.strategies import (
 )
 
 
-class Troubles(RuleBasedStateMachine):
+class FaultRules(RuleBasedStateMachine):
     """Sensors, board, processes, bus, cable and strangers."""
 
     def __init__(self) -> None:
         super().__init__()
         self.stack = Stack()
-        self.judge = self.stack.judge
+        self.oracle = self.stack.oracle
 
     # --- what the board sees ----------------------------------------------------------------
 
@@ -122,16 +122,16 @@ class Troubles(RuleBasedStateMachine):
         self.stack.run(60)
 
     @rule(ms=SHORT | LONG)
-    def hang_safety(self, ms: int) -> None:
+    def stall_safety(self, ms: int) -> None:
         """Let safety do nothing, and then go on as if nothing was."""
-        self.stack.hang("safety", ms)
+        self.stack.stall("safety", ms)
         self.stack.run(60)
 
     @rule(ms=st.sampled_from([50, 120, 180]))
-    def hang_bridge(self, ms: int) -> None:
+    def stall_bridge(self, ms: int) -> None:
         """Let the bridge do nothing, for less than its guard bears."""
-        self.stack.hang("bridge", ms)
-        self.judge.slack_ns = max(self.judge.slack_ns, ms * MS)
+        self.stack.stall("bridge", ms)
+        self.oracle.slack_ns = max(self.oracle.slack_ns, ms * MS)
         self.stack.run(60)
 
     @rule(ms=SHORT | LONG)
@@ -142,34 +142,34 @@ class Troubles(RuleBasedStateMachine):
         self.stack.router(True)
         self.stack.run(5)
 
-    @rule(route=BUS, weather=ON_BUS, ms=SHORT)
-    def bus_weather(self, route: str, weather: Weather, ms: int) -> None:
+    @rule(route=BUS, disturbance=ON_BUS, ms=SHORT)
+    def bus_disturbance(self, route: str, disturbance: Disturbance, ms: int) -> None:
         """Let messages be late, lost, doubled or out of order."""
-        self.stack.net.weather[route] = weather
+        self.stack.net.disturbances[route] = disturbance
         self.stack.run(ms)
 
-    @rule(route=CABLE, weather=ON_CABLE, ms=SHORT)
-    def cable_weather(self, route: str, weather: Weather, ms: int) -> None:
+    @rule(route=CABLE, disturbance=ON_CABLE, ms=SHORT)
+    def cable_disturbance(self, route: str, disturbance: Disturbance, ms: int) -> None:
         """Let datagrams be late, lost or doubled; a cable keeps their order."""
-        self.stack.net.weather[route] = weather
+        self.stack.net.disturbances[route] = disturbance
         # Every second one lost: a STOP of 20 Hz may be the third one that goes out.
-        slack_ms = weather.late_ms + (100 if weather.lose else 0)
-        self.judge.slack_ns = max(self.judge.slack_ns, slack_ms * MS)
+        slack_ms = disturbance.late_ms + (100 if disturbance.lose else 0)
+        self.oracle.slack_ns = max(self.oracle.slack_ns, slack_ms * MS)
         self.stack.run(ms)
 
     @rule(route=BUS, ms=SHORT)
     def cut(self, route: str, ms: int) -> None:
         """Let everything on one route get lost for a while."""
-        before = self.stack.net.weather.get(route, CLEAR)
-        self.bus_weather(route, Weather(lose=1), ms)
-        self.stack.net.weather[route] = before
+        before = self.stack.net.disturbances.get(route, CLEAR)
+        self.bus_disturbance(route, Disturbance(lose=1), ms)
+        self.stack.net.disturbances[route] = before
 
-    @precondition(lambda self: self.stack.net.weather)
+    @precondition(lambda self: self.stack.net.disturbances)
     @rule(settled=st.booleans())
-    def fine_weather(self, settled: bool) -> None:
+    def end_disturbances(self, settled: bool) -> None:
         """Let everything arrive at once again, before what is late or after it."""
         self.stack.run(ECHO_MS + HOLD_MS + 120 if settled else 0)
-        self.stack.net.weather.clear()
+        self.stack.net.disturbances.clear()
 
     # --- hostile values ---------------------------------------------------------------------
 
@@ -203,4 +203,4 @@ class Troubles(RuleBasedStateMachine):
     def forge(self, topic: keys.Topic[Any], message: m.Message) -> None:
         """Put a message as a client without a drive link."""
         hand = self.stack.hand
-        hand.send(Letter(topic.on(ROBOT), message, hand.boot, hand.net.now_ns))
+        hand.send(Envelope(topic.on(ROBOT), message, hand.boot, hand.net.now_ns))

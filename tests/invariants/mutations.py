@@ -10,28 +10,27 @@ from msgspec.structs import replace
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.motion import Command, Twist
 from common.wire.frame import Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperReport
 from services.bridge import lease as leases
 from services.bridge import link as links
 from services.bridge.core import Core
-from services.bridge.lease import Lease, Order
+from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
 from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
-from services.safety.service import Ports
-from services.safety.twist import Twist
+from services.safety.service import SafetyService
 from services.safety.zones import Zones
-from sim.vehicle import Twist as Rolling
-from tests.invariants.net import Letter, Weather
+from tests.invariants.net import Disturbance, Envelope
 from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
 
 # What is taken out, by what; the scenario in which that matters; the judge's objection.
-Breakage = tuple[object, str, object, Callable[[Stack], None], str]
+Mutation = tuple[object, str, object, Callable[[Stack], None], str]
 
 
 def driving(linear: float = 0.5) -> Stack:
@@ -74,28 +73,28 @@ def wall(stack: Stack) -> None:
 
 
 def hit_while_a_run_is_under_way(stack: Stack) -> None:
-    stack.net.weather["motion"] = Weather(late_ms=60)
+    stack.net.disturbances["motion"] = Disturbance(late_ms=60)
     stack.run(300)
     stack.vehicle.pressed = True
 
 
 def motions_get_lost(stack: Stack) -> None:
     """Let the bridge's lease end without safety hearing of it in time."""
-    stack.net.weather.update(streams=Weather(late_ms=120), motion=Weather(lose=1))
+    stack.net.disturbances.update(streams=Disturbance(late_ms=120), motion=Disturbance(lose=1))
     stack.run(250)
-    stack.net.weather.pop("motion")
+    stack.net.disturbances.pop("motion")
 
 
 def board_freezes_and_safety_hears_late(stack: Stack) -> None:
     """Let the board be back before safety has missed its samples."""
-    stack.net.weather["streams"] = Weather(late_ms=120)
+    stack.net.disturbances["streams"] = Disturbance(late_ms=120)
     stack.run(300)
     stack.vehicle.freeze(240)
 
 
 def brakes_go_off_and_on(stack: Stack) -> None:
     """Let safety hear too late that the board's brake was off."""
-    stack.net.weather["streams"] = Weather(late_ms=120)
+    stack.net.disturbances["streams"] = Disturbance(late_ms=120)
     stack.run(300)
     for on, ms in ((False, 60), (True, 60)):
         assert stack.switches(on=on)
@@ -142,7 +141,7 @@ def driver_blinks(stack: Stack) -> None:
     stack.vehicle.say(stack.vehicle.board.driver(Side.LEFT))
 
 
-def at_the_next_tick(ports: Ports, field: str, *, at_once: bool = False) -> Any:
+def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False) -> Any:
     return KEEP(ports, field)
 
 
@@ -167,29 +166,29 @@ def however_old(inputs: Inputs, *_: object) -> Twist | None:
     return inputs.measured
 
 
-def successor(stack: Stack, hear: Callable[[Callable[[Letter], None], Letter], None]) -> None:
+def successor(stack: Stack, hear: Callable[[Callable[[Envelope], None], Envelope], None]) -> None:
     """Let safety die of an emergency stop; the next one hears of the link by ``hear``."""
     stack.estop()
     stack.kill("safety", 20)
     stack.run(25)
-    (ear,) = [
-        ear for ear in stack.net.ears
-        if ear.owner is stack.safety and ear.hears(keys.LINK.on(ROBOT))
+    (subscription,) = [
+        subscription for subscription in stack.net.subscriptions
+        if subscription.owner is stack.safety and subscription.matches(keys.LINK.on(ROBOT))
     ]  # fmt: skip
-    take = ear.take
-    ear.take = lambda letter: hear(take, letter)
+    take = subscription.take
+    subscription.take = lambda envelope: hear(take, envelope)
 
 
 def successor_hits_something(stack: Stack) -> None:
     """Let it latch a contact before it hears of the link, and creep off."""
     deaf_until_ns = stack.net.now_ns + NS_PER_S
 
-    def late(take: Callable[[Letter], None], letter: Letter) -> None:
+    def late(take: Callable[[Envelope], None], envelope: Envelope) -> None:
         if stack.net.now_ns > deaf_until_ns:
-            take(letter)
+            take(envelope)
 
     successor(stack, late)
-    stack.vehicle.measured = Rolling(0.2)  # still, so that a way off is known
+    stack.vehicle.measured = Twist(0.2)  # still, so that a way off is known
     stack.run(40)
     stack.vehicle.pressed, stack.vehicle.measured = True, None
     stack.sticks["teleop"].asks = None
@@ -200,11 +199,11 @@ def successor_hits_something(stack: Stack) -> None:
 def successor_hears_of_no_latch(stack: Stack) -> None:
     """Let what it hears of the link be older than the latch."""
 
-    def old(take: Callable[[Letter], None], letter: Letter) -> None:
-        assert isinstance(letter.message, m.Link)
+    def old(take: Callable[[Envelope], None], envelope: Envelope) -> None:
+        assert isinstance(envelope.message, m.Link)
         take(
             dataclasses.replace(
-                letter, message=replace(letter.message, latched_by=None, armed=True)
+                envelope, message=replace(envelope.message, latched_by=None, armed=True)
             )
         )
 
@@ -233,8 +232,8 @@ def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
     return replace(EXPIRE(lease, now_ns, lease_ns), neutral=lease.neutral)
 
 
-def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Order]:
-    return replace(lease, sent_ns=now_ns), Order.BRAKE
+def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=now_ns), Command.BRAKE
 
 
 def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
@@ -244,15 +243,15 @@ def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: 
 
 def authority_is_copied(stack: Stack) -> None:
     hand = stack.hand
-    copy = m.Motion(command="run", linear=0.9, seq=2**19, boot=stack.safety.boot)
-    hand.send(Letter(keys.MOTION.on(ROBOT), copy, hand.boot, stack.net.now_ns))
+    copy = m.Motion(command=Command.RUN, linear=0.9, seq=2**19, boot=stack.safety.boot)
+    hand.send(Envelope(keys.MOTION.on(ROBOT), copy, hand.boot, stack.net.now_ns))
 
 
 ORDER = leases._order
-EXPIRE, ON_MOTION, KEEP = leases.expire, leases.on_motion, Ports._keep
+EXPIRE, ON_MOTION, KEEP = leases.expire, leases.on_motion, SafetyService._store
 
 
-BREAKAGES: dict[str, Breakage] = {
+MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
         leases, "expire", lambda lease, *_: lease, safety_dies, "a RUN is held",
     ),
@@ -289,7 +288,7 @@ BREAKAGES: dict[str, Breakage] = {
         Inputs, "known_velocity", however_old, reset_without_a_velocity, "safety knows of estop",
     ),
     "samples are not decided upon one by one": (
-        Ports, "_keep", at_the_next_tick, driver_blinks, "safety knows of driver",
+        SafetyService, "_store", at_the_next_tick, driver_blinks, "safety knows of driver",
     ),
     "a successor's own latch hides the one that is due": (
         leases, "_latched_by", overwritten, successor_hits_something, "safety knows of estop",

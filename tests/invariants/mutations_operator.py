@@ -6,7 +6,7 @@ from common.heartbeat import Heartbeat
 from services.safety import latches
 from services.safety.latches import Held
 from services.safety.release import Release
-from tests.invariants.mutations import Breakage, hold
+from tests.invariants.mutations import Mutation, hold
 from tests.invariants.stack import Stack
 
 
@@ -88,7 +88,7 @@ def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) 
 
 AFTER = Release.after
 
-OPERATOR_BREAKAGES: dict[str, Breakage] = {
+OPERATOR_MUTATIONS: dict[str, Mutation] = {
     "late calls are obeyed": (
         Heartbeat, "refusal", lambda *_: "", late_holds, "nobody holds the release",
     ),

@@ -3,24 +3,24 @@
 from collections.abc import Callable
 from typing import Any
 
+from common.motion import Twist
 from services.safety.arbiter import Arbiter
-from services.safety.blind import Blind
+from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
-from sim.vehicle import Twist as Rolling
 from tests.invariants.stack import Stack
 
 FAULT_MM = 0xFFFF
 
 
 def never_stops(stack: Stack) -> None:
-    stack.vehicle.measured = Rolling(0.28)
+    stack.vehicle.measured = Twist(0.28)
     stack.sticks["teleop"].asks = None
 
 
 def pushed(stack: Stack) -> None:
     stack.sticks["teleop"].asks = None
     stack.run(2500)
-    stack.vehicle.measured = Rolling(0.28)
+    stack.vehicle.measured = Twist(0.28)
 
 
 def nav_goes_on(stack: Stack) -> None:
@@ -39,11 +39,11 @@ def goes_on_blind(stack: Stack) -> None:
     stack.vehicle.ranges[2] = FAULT_MM
 
 
-def knows_at_once(blind: Blind, unseen: Any, _: Any, now_ns: int) -> Blind:
-    return Blind(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
+def knows_at_once(overrides: SonarOverrides, unseen: Any, _: Any, now_ns: int) -> SonarOverrides:
+    return SonarOverrides(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
 
 
-SAFETY_BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] = {
+SAFETY_MUTATIONS: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] = {
     "a stop is not supervised": (
         Standstill, "is_late", lambda *_: False, never_stops, "no BRAKE while",
     ),
@@ -54,6 +54,6 @@ SAFETY_BREAKAGES: dict[str, tuple[object, str, object, Callable[[Stack], None], 
         Arbiter, "overruled", lambda self, _: self, nav_goes_on, "nav was not neutral",
     ),
     "a hold that was meant for a good sonar drives on blind": (
-        Blind, "after", knows_at_once, goes_on_blind, "toward sonar 2",
+        SonarOverrides, "updated", knows_at_once, goes_on_blind, "toward sonar 2",
     ),
 }  # fmt: skip

@@ -1,13 +1,13 @@
-"""A bus without a bus: one thread, simulated time, and weather of its own on each route.
+"""Simulated bus: one thread, simulated time, and a disturbance per route.
 
-Messages are handed over as they are: what MessagePack and Zenoh do to them is tested elsewhere.
+Messages are delivered as Python objects: MessagePack and Zenoh are tested elsewhere.
 """
 
 import heapq
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any, Protocol
 
 from common.freshness import NS_PER_S
@@ -18,16 +18,16 @@ ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbour
 
 
 @dataclass(frozen=True, slots=True)
-class Weather:
-    """What happens to the messages of a route; counts are "every so many-th", 0 for none."""
+class Disturbance:
+    """Disturbance of a route: delay, loss, duplicates; counts mean every n-th message, 0 none."""
 
     late_ms: int = 0
     lose: int = 0
     double: int = 0
-    hold: int = 0  # so late that others overtake it
+    hold: int = 0  # delayed so that later ones overtake it
 
     def delays_ms(self, count: int) -> list[int]:
-        """Return when the copies of the ``count``-th message arrive; none when it is lost."""
+        """Return the delays of the copies of the ``count``-th message; none when it is lost."""
         if self.lose and count % self.lose == 0:
             return []
         held = HOLD_MS if self.hold and count % self.hold == 0 else 0
@@ -35,71 +35,71 @@ class Weather:
         return [first, first + ECHO_MS] if self.double and count % self.double == 0 else [first]
 
 
-CLEAR = Weather()
+CLEAR = Disturbance()
 
 
 class Owner(Protocol):
-    """A process at one end."""
+    """The subscribing process."""
 
     boot: int
     alive: bool
 
     @property
-    def hangs(self) -> bool:
-        """Whether it does nothing for now."""
+    def stalled(self) -> bool:
+        """Whether the process is stalled."""
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
-    """One message under way."""
+class Envelope:
+    """One message in transit."""
 
     key: str
     message: Message
     sender: int  # ``boot`` of the process that sent it
     sent_ns: int
-    private: bool = False  # it travels on the drive link, too
+    private: bool = False  # also sent on the drive link
 
 
 @dataclass(slots=True)
-class Ear:
-    """One subscription; what came while its owner hung waits, the newest only."""
+class Subscription:
+    """One subscription; during a stall of its owner it queues the newest messages."""
 
     owner: Owner
     key: str
-    take: Callable[[Letter], None]
+    take: Callable[[Envelope], None]
     depth: int
-    private: bool = False  # it takes what comes by the drive link, and nothing else
-    waiting: deque[Letter] = field(default_factory=deque)
+    private: bool = False  # receives from the drive link only
+    waiting: deque[Envelope] = field(default_factory=deque)
 
-    def hears(self, key: str) -> bool:
-        """Tell whether a key is meant."""
+    def matches(self, key: str) -> bool:
+        """Return whether a key matches."""
         return matches(self.key, key)
 
-    def hand_over(self, letter: Letter) -> None:
-        """Give it to the owner, now or when it hangs no more."""
+    def hand_over(self, envelope: Envelope) -> None:
+        """Deliver to the owner, now or after its stall."""
         if not self.owner.alive:
             return
-        self.waiting.append(letter)
+        self.waiting.append(envelope)
         while len(self.waiting) > self.depth:
             self.waiting.popleft()
         self.drain()
 
     def drain(self) -> None:
-        """Let the owner take what waits, unless it hangs."""
-        while self.waiting and not self.owner.hangs:
+        """Deliver the queued messages, unless the owner is stalled."""
+        while self.waiting and not self.owner.stalled:
             self.take(self.waiting.popleft())
 
 
 @cache
 def matches(expression: str, key: str) -> bool:
-    """Tell whether a key is one of an expression's; ``*`` stands for one chunk."""
+    """Return whether a key expression matches a key; ``*`` is one chunk."""
     mine, others = expression.split("/"), key.split("/")
     pairs = zip(mine, others, strict=False)
     return len(mine) == len(others) and all(one in ("*", other) for one, other in pairs)
 
 
 def route(key: str) -> str:
-    """Name the route of a key, for its weather."""
+    """Return the route of a key, for its disturbance."""
     for name in ("drive", "motion", "state"):
         if f"/{name}" in key:
             return name
@@ -107,59 +107,64 @@ def route(key: str) -> str:
 
 
 class Net:
-    """Carries letters to ears; while it is down nothing arrives but by the drive link."""
+    """Delivers envelopes to subscriptions; while it is down only the drive link delivers."""
 
     def __init__(self, now_ns: int) -> None:
         self.now_ns = now_ns
         self.up = True
-        self.weather: dict[str, Weather] = {}
-        self.ears: list[Ear] = []
-        self._under_way: list[tuple[int, int, Ear | None, Callable[[], None]]] = []
+        self.disturbances: dict[str, Disturbance] = {}
+        self.subscriptions: list[Subscription] = []
+        self._under_way: list[tuple[int, int, Subscription | None, Callable[[], None]]] = []
         self._counts: Counter[tuple[str, str]] = Counter()
         self._order = 0
 
-    def put(self, letter: Letter) -> None:
-        """Send one to all who listen."""
-        for ear in self.ears:
-            reached = letter.private if ear.private else self.up
-            if reached and ear.owner.alive and ear.hears(letter.key):
-                self.later(route(letter.key), lambda ear=ear: ear.hand_over(letter), ear)  # type: ignore[misc]
+    def put(self, envelope: Envelope) -> None:
+        """Send an envelope to all matching subscriptions."""
+        for subscription in self.subscriptions:
+            reached = envelope.private if subscription.private else self.up
+            if reached and subscription.owner.alive and subscription.matches(envelope.key):
+                deliver = partial(subscription.hand_over, envelope)
+                self.later(route(envelope.key), deliver, subscription)
 
     def later(
-        self, name: str, arrive: Callable[[], None], ear: Ear | None = None, kind: str = ""
+        self,
+        name: str,
+        arrive: Callable[[], None],
+        subscription: Subscription | None = None,
+        kind: str = "",
     ) -> None:
-        """Let something arrive by the weather of a route; each kind is counted on its own."""
+        """Deliver something under the disturbance of a route; each kind is counted separately."""
         self._counts[name, kind] += 1
-        for delay_ms in self.weather.get(name, CLEAR).delays_ms(self._counts[name, kind]):
+        for delay_ms in self.disturbances.get(name, CLEAR).delays_ms(self._counts[name, kind]):
             self._order += 1
-            entry = (self.now_ns + delay_ms * MS, self._order, ear, arrive)
+            entry = (self.now_ns + delay_ms * MS, self._order, subscription, arrive)
             heapq.heappush(self._under_way, entry)
 
     def turn(self) -> None:
-        """Hand over what has arrived by now."""
+        """Deliver everything that is due."""
         while self._under_way and self._under_way[0][0] <= self.now_ns:
-            _, _, ear, arrive = heapq.heappop(self._under_way)
-            if self.up or ear is None or ear.private:
+            _, _, subscription, arrive = heapq.heappop(self._under_way)
+            if self.up or subscription is None or subscription.private:
                 arrive()
 
     def wake(self, owner: Owner) -> None:
-        """Hand over what waited for a process that hangs no more."""
-        for ear in self.ears:
-            if ear.owner is owner:
-                ear.drain()
+        """Deliver what queued up during the stall of a process."""
+        for subscription in self.subscriptions:
+            if subscription.owner is owner:
+                subscription.drain()
 
 
 class Caller:
-    """Takes the answer to a call."""
+    """Stores the answer to a call."""
 
     def __init__(self) -> None:
         self.done: bool | None = None
         self.text = ""
 
     def reply(self, message: Any) -> None:
-        """Take a reply."""
+        """Store a reply."""
         self.done = True
 
     def refuse(self, reason: str) -> None:
-        """Take a refusal."""
+        """Store a refusal."""
         self.done, self.text = False, reason

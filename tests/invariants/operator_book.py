@@ -23,7 +23,7 @@ Hold = tuple[Direction, int]  # the direction, and when
 
 
 @dataclass(slots=True)
-class Operators:
+class OperatorBook:
     """What operators saw of one safety service, and asked of it."""
 
     beats: dict[int, int] = field(default_factory=dict)  # heartbeat: when it was sent

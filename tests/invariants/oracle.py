@@ -1,10 +1,10 @@
-"""The oracle: judges every frame that the board receives by what everybody had been told.
+"""Oracle: checks every frame that the board receives against the messages delivered before.
 
-A RUN that moves is traced back to its motion message, the verdict behind that, and the request and
-the samples behind the verdict. What is wrong on the way is a *complaint*; a complaint counts
-when the frame that it is about reaches the board. A *trip* is an event that latches. It has
-holders, the processes that know of it, and is forgotten with the last of them: two processes that
-die at once take it along, which the safety case says.
+A RUN that moves is traced back to its motion message, the verdict behind it, and the request and
+samples behind the verdict. Each error on that path is a *complaint*. A complaint counts when its
+frame reaches the board. A *trip* is an event that latches. Its *holders* are the processes that
+know of it. The trip is dropped with its last holder: the safety case accepts that for two processes
+that die at once.
 """
 
 from collections.abc import Iterable
@@ -15,11 +15,11 @@ from common.freshness import NS_PER_S
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
-from tests.invariants.bridge_book import Gate
-from tests.invariants.net import MS, Letter
+from tests.invariants.bridge_book import BridgeBook
+from tests.invariants.net import MS, Envelope
 from tests.invariants.operator_book import Hold
 from tests.invariants.process import Process, Watch
-from tests.invariants.safety_book import FAST_S, Desk
+from tests.invariants.safety_book import FAST_S, SafetyBook
 
 # The bridge's lease and tick; the guard needs less.
 BUDGET_NS = 230 * MS
@@ -28,256 +28,260 @@ STEP_NS = 5 * MS
 
 @dataclass(eq=False, slots=True)
 class Trip:
-    """Something that latches, and who knows of it."""
+    """An event that latches, and the processes that know of it."""
 
     name: str
     holders: set[int]
-    bridge: tuple[int, int] | None = None  # boot, and the bumper's ``seq`` that will tell of it
+    bridge: tuple[int, int] | None = None  # boot, and the bumper's ``seq`` that will report it
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What is wrong with one motion, and which trips its sender knew."""
+    """Complaints about one motion message, and the trips known to its sender."""
 
     complaints: tuple[str, ...]
     known: frozenset[Trip]
 
 
 @dataclass(repr=False)
-class Judge(Watch):
-    """Everybody's books, and what came of them."""
+class Oracle(Watch):
+    """The books on all processes, and the violations found."""
 
     now_ns: int
-    desks: dict[int, Desk] = field(default_factory=dict)
-    gates: dict[int, Gate] = field(default_factory=dict)
+    safety_books: dict[int, SafetyBook] = field(default_factory=dict)
+    bridge_books: dict[int, BridgeBook] = field(default_factory=dict)
     trips: list[Trip] = field(default_factory=list)
     violations: list[str] = field(default_factory=list)
     runs: int = 0  # frames that moved the vehicle
-    comeback_ns: int = 0  # when a process or the board came back last
-    slack_ns: int = 0  # what the weather and hang-ups may add to the budget
-    reader_up: bool = True
+    comeback_ns: int = 0  # last restart of a process or the board
+    slack_ns: int = 0  # addition to the budget for disturbances and stalls
+    estop_session_up: bool = True
     _records: dict[tuple[int, int], Record] = field(default_factory=dict)
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
     _moved_ns: int | None = None  # when the board last took a RUN that moves
     _framing: Framing = field(default_factory=Framing)
 
-    # --- what is told -----------------------------------------------------------------------
+    # --- deliveries -------------------------------------------------------------------------
 
-    def on_put(self, process: Process, letter: Letter) -> None:
-        """Note what a process says."""
-        message = letter.message
-        desk, gate = self.desks.get(process.boot), self.gates.get(process.boot)
-        if desk is not None and isinstance(message, m.SafetyState):
-            desk.operators.on_state(message, self.now_ns)
-        if desk is not None and isinstance(message, m.Motion):
-            self._on_verdict(desk, message)
-        if gate is not None and isinstance(message, m.Bumper):
-            gate.published += 1
-        if gate is not None and isinstance(message, m.Link):
+    def on_put(self, process: Process, envelope: Envelope) -> None:
+        """Record a message that a process publishes."""
+        message = envelope.message
+        book, bridge_book = self.safety_books.get(process.boot), self.bridge_books.get(process.boot)
+        if book is not None and isinstance(message, m.SafetyState):
+            book.operators.on_state(message, self.now_ns)
+        if book is not None and isinstance(message, m.Motion):
+            self._on_verdict(book, message)
+        if bridge_book is not None and isinstance(message, m.Bumper):
+            bridge_book.published += 1
+        if bridge_book is not None and isinstance(message, m.Link):
             key = process.boot, message.seq
             self._links[key] = frozenset(self._held_by(process.boot))
 
-    def on_delivery(self, process: Process, letter: Letter) -> None:
-        """Note what a process is told, before it knows."""
-        desk, gate = self.desks.get(process.boot), self.gates.get(process.boot)
-        if gate is not None and isinstance(letter.message, m.Motion):
-            record = self._records.get((letter.message.boot, letter.message.seq))
-            if gate.on_motion(letter.message, self.now_ns) and record is not None:
-                self._tell(record.known, gate.boot)
-        if desk is not None:
-            self._on_told(desk, letter)
+    def on_delivery(self, process: Process, envelope: Envelope) -> None:
+        """Record a message before its receiver handles it."""
+        book, bridge_book = self.safety_books.get(process.boot), self.bridge_books.get(process.boot)
+        if bridge_book is not None and isinstance(envelope.message, m.Motion):
+            record = self._records.get((envelope.message.boot, envelope.message.seq))
+            if bridge_book.on_motion(envelope.message, self.now_ns) and record is not None:
+                self._inform(record.known, bridge_book.boot)
+        if book is not None:
+            self._on_delivered(book, envelope)
 
-    def _on_told(self, desk: Desk, letter: Letter) -> None:
-        message, name = letter.message, letter.key.rsplit("/", 1)[-1]
+    def _on_delivered(self, book: SafetyBook, envelope: Envelope) -> None:
+        message, name = envelope.message, envelope.key.rsplit("/", 1)[-1]
         if isinstance(message, m.Drive):
-            desk.on_drive(name, message, self.now_ns)
+            book.on_drive(name, message, self.now_ns)
         elif name == "estop":
-            self.trip("estop", desk.boot)
+            self.trip("estop", book.boot)
         else:
-            desk.on_sample(name, message, self.now_ns)
+            book.on_sample(name, message, self.now_ns)
         if isinstance(message, m.Bumper) and message.pressed:
-            self._on_pressed(desk, message)
+            self._on_pressed(book, message)
         if isinstance(message, m.Driver) and message.bits:
-            self.trip("driver", desk.boot)
+            self.trip("driver", book.boot)
         if isinstance(message, m.Link):
             trips = self._links.get((message.boot, message.seq), ())
-            if message.latched_by not in (None, desk.boot):
-                desk.operators.on_trip("predecessor", self.now_ns)
-            self._tell(trips, desk.boot)
+            if message.latched_by not in (None, book.boot):
+                book.operators.on_trip("predecessor", self.now_ns)
+            self._inform(trips, book.boot)
 
-    def _on_pressed(self, desk: Desk, message: m.Bumper) -> None:
+    def _on_pressed(self, book: SafetyBook, message: m.Bumper) -> None:
         for trip in self.trips:
             if trip.bridge is not None and trip.bridge[0] == message.boot:
-                self._tell([trip] if message.seq >= trip.bridge[1] else [], desk.boot)
-        if not any(trip.name == "contact" for trip in self._held_by(desk.boot)):
-            self.trip("contact", desk.boot)
+                self._inform([trip] if message.seq >= trip.bridge[1] else [], book.boot)
+        if not any(trip.name == "contact" for trip in self._held_by(book.boot)):
+            self.trip("contact", book.boot)
 
     def on_report(self, process: Process, frames: Iterable[Frame]) -> None:
-        """Note what the board tells a bridge, before it knows."""
-        gate = self.gates[process.boot]
+        """Record frames of the board before the bridge handles them."""
+        bridge_book = self.bridge_books[process.boot]
         for frame in frames:
-            if gate.on_report(frame, self.now_ns):
-                self.trip("contact", gate.boot, (gate.boot, gate.published + 1))
+            if bridge_book.on_report(frame, self.now_ns):
+                self.trip(
+                    "contact", bridge_book.boot, (bridge_book.boot, bridge_book.published + 1)
+                )
 
     def on_reset(self, process: Process, request: m.ResetRequest) -> None:
-        """Note that an operator's reset was granted; what it must not clear stays."""
-        desk = self.desks.get(process.boot)
-        if desk is None or not self.reader_up or not desk.may_reset(self.now_ns):
+        """Record a granted reset; trips that it must not clear stay."""
+        book = self.safety_books.get(process.boot)
+        if book is None or not self.estop_session_up or not book.may_reset(self.now_ns):
             return
         cleared = [
             trip
-            for trip in self._held_by(desk.boot)
-            if desk.is_gone(trip.name) and desk.operators.may_clear(request, trip.name, self.now_ns)
+            for trip in self._held_by(book.boot)
+            if book.is_gone(trip.name) and book.operators.may_clear(request, trip.name, self.now_ns)
         ]
         self.trips = [trip for trip in self.trips if trip not in cleared]
         if any(trip.name == "contact" for trip in cleared):
-            desk.operators.on_cleared()
+            book.operators.on_cleared()
 
     def on_hold(self, process: Process, request: m.ReleaseRequest) -> None:
-        """Note that an operator holds or ends the release."""
-        desk = self.desks.get(process.boot)
-        if desk is not None:
-            desk.operators.on_hold(request, self.now_ns)
+        """Record a call that holds or ends the release."""
+        book = self.safety_books.get(process.boot)
+        if book is not None:
+            book.operators.on_hold(request, self.now_ns)
 
     def holds(self, process: Process) -> Hold | None:
-        """Return which release was granted last."""
-        desk = self.desks.get(process.boot)
-        return desk.operators.hold if desk is not None else None
+        """Return the last granted release."""
+        book = self.safety_books.get(process.boot)
+        return book.operators.hold if book is not None else None
 
     def on_refusal(self, process: Process, before: Hold | None) -> None:
-        """Note that a call was refused: what was granted before may go on."""
-        desk = self.desks.get(process.boot)
-        if desk is not None:
-            desk.operators.hold = before
+        """Record a refused call: the previous release stays granted."""
+        book = self.safety_books.get(process.boot)
+        if book is not None:
+            book.operators.hold = before
 
     def on_start(self, process: Process) -> None:
-        """Open a book for a process that has started."""
+        """Open the book of a started process."""
         self.comeback_ns = self.now_ns
         if process.name == "safety":
-            self.desks[process.boot] = Desk(process.boot, bad_ns=self.now_ns)
+            self.safety_books[process.boot] = SafetyBook(process.boot, bad_ns=self.now_ns)
         else:
-            self.gates[process.boot] = Gate(process.boot)
+            self.bridge_books[process.boot] = BridgeBook(process.boot)
 
     def on_end(self, process: Process) -> None:
-        """A process has died, and what it alone knew is forgotten."""
-        self.desks.pop(process.boot, None)
-        self.gates.pop(process.boot, None)
+        """Close the book of a process; trips known only to it are dropped."""
+        self.safety_books.pop(process.boot, None)
+        self.bridge_books.pop(process.boot, None)
         for trip in self.trips:
             trip.holders.discard(process.boot)
         self.trips = [trip for trip in self.trips if trip.holders]
 
     def trip(self, name: str, holder: int, bridge: tuple[int, int] | None = None) -> None:
-        """Something latches; ``holder`` knows of it."""
+        """Record a trip; ``holder`` knows of it."""
         self.trips.append(Trip(name, {holder}, bridge))
-        if holder in self.desks and name != "contact":
-            self.desks[holder].operators.on_trip(name, self.now_ns)
+        if holder in self.safety_books and name != "contact":
+            self.safety_books[holder].operators.on_trip(name, self.now_ns)
 
     def _held_by(self, boot: int) -> list[Trip]:
         return [trip for trip in self.trips if boot in trip.holders]
 
-    def _tell(self, trips: Iterable[Trip], boot: int) -> None:
+    def _inform(self, trips: Iterable[Trip], boot: int) -> None:
         for trip in trips:
             if trip in self.trips:
                 trip.holders.add(boot)
 
-    # --- what is done -----------------------------------------------------------------------
+    # --- decisions --------------------------------------------------------------------------
 
-    def _on_verdict(self, desk: Desk, motion: m.Motion) -> None:
-        if desk.reader_was_up and not self.reader_up:
-            self.trip("estop_reader", desk.boot)
-        desk.reader_was_up = desk.reader_was_up or self.reader_up
-        if desk.fast_ns is not None and self.now_ns - desk.fast_ns > FAST_S * NS_PER_S:
-            self.trip("runaway", desk.boot)
-        known = frozenset(self._held_by(desk.boot))
-        desk.look(self.now_ns, self.reader_up, bool(known))
-        rolls = desk.rest.complaint(motion, moves(motion), self.now_ns)
+    def _on_verdict(self, book: SafetyBook, motion: m.Motion) -> None:
+        if book.estop_session_was_up and not self.estop_session_up:
+            self.trip("estop_reader", book.boot)
+        book.estop_session_was_up = book.estop_session_was_up or self.estop_session_up
+        if book.fast_ns is not None and self.now_ns - book.fast_ns > FAST_S * NS_PER_S:
+            self.trip("runaway", book.boot)
+        known = frozenset(self._held_by(book.boot))
+        book.look(self.now_ns, self.estop_session_up, bool(known))
+        rolls = book.standstill.complaint(motion, moves(motion), self.now_ns)
         self.violations += [rolls] if rolls else []
         complaints: tuple[str, ...] = ()
-        desk.operators.on_verdict(motion, self.now_ns)
+        book.operators.on_verdict(motion, self.now_ns)
         if moves(motion):
-            complaints = tuple(self._of_verdict(desk, motion, known))
+            complaints = tuple(self._of_verdict(book, motion, known))
         self._records[motion.boot, motion.seq] = Record(complaints, known)
 
-    def _of_verdict(self, desk: Desk, motion: m.Motion, known: frozenset[Trip]) -> list[str]:
-        complaints = [f"safety: {one}" for one in desk.complaints(motion, self.now_ns)]
+    def _of_verdict(self, book: SafetyBook, motion: m.Motion, known: frozenset[Trip]) -> list[str]:
+        complaints = [f"safety: {one}" for one in book.complaints(motion, self.now_ns)]
         creeps = motion.source == "release"
         complaints += [
             f"safety knows of {trip.name}"
             for trip in known
             if not (creeps and trip.name == "contact")
         ]
-        neutral_ns = desk.neutral.get(motion.source or "", 0)
+        neutral_ns = book.neutral.get(motion.source or "", 0)
         if not creeps and neutral_ns <= self.comeback_ns:
             complaints.append("nobody was neutral since something came back")
         return complaints
 
     def on_leaving(self, process: Process, datagram: bytes) -> tuple[str, ...]:
-        """Judge a datagram that leaves a bridge; return the complaints that travel with it."""
-        gate = self.gates[process.boot]
+        """Check a datagram that leaves a bridge; return the complaints that travel with it."""
+        bridge_book = self.bridge_books[process.boot]
         for part in self._framing.read(datagram, TO_BOARD):
             assert isinstance(part, Received), part
             if not isinstance(part.frame, MotionCommand):
                 continue
-            if gate.brake_due and part.frame.kind is not MotionKind.BREAK:
+            if bridge_book.brake_due and part.frame.kind is not MotionKind.BREAK:
                 self.violations.append("a hit without a BREAK at once")
-            gate.brake_due = False
-            if part.frame.kind is MotionKind.RUN and moving(part.frame):
-                return tuple(self._of_frame(gate, process.taking, part.frame))
+            bridge_book.brake_due = False
+            if part.frame.kind is MotionKind.RUN and moves_vehicle(part.frame):
+                return tuple(self._of_frame(bridge_book, process.taking, part.frame))
         return ()
 
-    def _of_frame(self, gate: Gate, cause: Letter | None, frame: MotionCommand) -> list[str]:
+    def _of_frame(
+        self, bridge_book: BridgeBook, cause: Envelope | None, frame: MotionCommand
+    ) -> list[str]:
         if cause is None or not isinstance(cause.message, m.Motion):
             return ["bridge: a RUN without a motion"]
         motion = cause.message
         record = self._records.get((motion.boot, motion.seq))
         if record is None or cause.sender != motion.boot:
             return ["bridge: a RUN that no safety sent"]
-        complaints = [*record.complaints, *gate.complaints(self.now_ns)]
-        if gate.authority != motion.boot or gate.seq != motion.seq:
+        complaints = [*record.complaints, *bridge_book.complaints(self.now_ns)]
+        if bridge_book.authority != motion.boot or bridge_book.seq != motion.seq:
             complaints.append("bridge: from who has not the say, or out of order")
         if not follows(frame, motion):
             complaints.append(f"bridge: {frame} is not {motion}")
         complaints += [
             f"bridge knows of {trip.name}, safety did not"
-            for trip in self._held_by(gate.boot)
+            for trip in self._held_by(bridge_book.boot)
             if not (motion.source == "release" and trip in record.known)
         ]
         return complaints
 
     def on_board(self, frame: MotionCommand, complaints: tuple[str, ...]) -> None:
-        """The board takes a frame: now the complaints count."""
-        moves = frame.kind is MotionKind.RUN and moving(frame)
+        """Record a frame at the board: its complaints count now."""
+        moves = frame.kind is MotionKind.RUN and moves_vehicle(frame)
         self._moved_ns = self.now_ns if moves else None
         self.runs += moves
         self.violations += [f"{frame.linear_mmps} mm/s: {one}" for one in complaints]
 
     def on_power_cycle(self) -> None:
-        """The board has forgotten its command."""
+        """Record a power cycle: the board has lost its command."""
         self._moved_ns = None
 
     def on_step(self, deaf: bool) -> None:
-        """Judge what the board holds while time passes (invariant 2); ``deaf`` hears nothing."""
+        """Check the command that the board holds (invariant 2); ``deaf``: it receives nothing."""
         budget_ns = BUDGET_NS + self.slack_ns
         if deaf and self._moved_ns is not None:
             self._moved_ns = self.now_ns
         if self._moved_ns is not None and self.now_ns - self._moved_ns > budget_ns:
             self.violations.append(f"a RUN is held for more than {budget_ns / MS:.0f} ms")
-        for gate in self.gates.values():
-            if gate.brake_due:
+        for bridge_book in self.bridge_books.values():
+            if bridge_book.brake_due:
                 self.violations.append("a hit without a BREAK at once")
 
 
 def moves(motion: m.Motion) -> bool:
-    """Tell whether a motion is to move the vehicle."""
+    """Return whether a motion message moves the vehicle."""
     return motion.command == "run" and not (motion.linear == 0 == motion.angular)
 
 
-def moving(frame: MotionCommand) -> bool:
-    """Tell whether a RUN frame moves the vehicle."""
+def moves_vehicle(frame: MotionCommand) -> bool:
+    """Return whether a RUN frame moves the vehicle."""
     return frame.linear_mmps != 0 or frame.angular_raw != 0
 
 
 def follows(frame: MotionCommand, motion: m.Motion) -> bool:
-    """Tell whether a frame says what the motion says, within the wire's resolution."""
+    """Return whether a frame matches the motion message, within the wire's resolution."""
     linear = abs(frame.linear_mmps / 1000 - motion.linear) < 0.001
     return linear and abs(frame.angular_raw * 0.1 - motion.angular * 57.29578) < 0.1

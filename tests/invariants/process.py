@@ -1,4 +1,4 @@
-"""A process of the stack as its shell sees it: ``common.service.Node``, but in simulated time."""
+"""Process of the stack: stands in for ``common.service.Node``, in simulated time."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -11,20 +11,20 @@ from common.bus.bus import Arrival
 from common.keys import Call, Topic
 from common.loop import Timer
 from common.messages import Message
-from tests.invariants.net import Caller, Ear, Letter, Net
+from tests.invariants.net import Caller, Envelope, Net, Subscription
 
 ROBOT = "001"
 M = TypeVar("M", bound=Message)
 
 
 class Watch:
-    """Sees all letters: when they are put, and before their receiver sees them."""
+    """Observes all envelopes: when sent, and before their receiver handles them."""
 
-    def on_put(self, process: "Process", letter: Letter) -> None:
-        """A process has put a letter."""
+    def on_put(self, process: "Process", envelope: Envelope) -> None:
+        """Observe an envelope that a process sends."""
 
-    def on_delivery(self, process: "Process", letter: Letter) -> None:
-        """A process is about to take a letter."""
+    def on_delivery(self, process: "Process", envelope: Envelope) -> None:
+        """Observe an envelope before a process handles it."""
 
 
 class Publisher:
@@ -43,16 +43,16 @@ class Publisher:
         return self._seq + 1
 
     def put(self, message: M, raw: bytes | None = None) -> M:
-        """Send it to all who listen."""
+        """Send a message to all subscriptions."""
         self._seq += 1
         now_ns, boot = self._process.net.now_ns, self._process.boot
         self.last = msgspec.structs.replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
-        self._process.send(Letter(self.key, self.last, boot, now_ns, self._private))
+        self._process.send(Envelope(self.key, self.last, boot, now_ns, self._private))
         return self.last  # type: ignore[no-any-return]
 
 
 class DriveEnd:
-    """One end of the drive link: it takes nothing from the router, and does not need one."""
+    """One end of the drive link; independent of the router."""
 
     def __init__(self, process: "Process") -> None:
         self._process = process
@@ -67,7 +67,7 @@ class DriveEnd:
 
 
 class Loop:
-    """Timers and sockets, turned by hand."""
+    """Timers and sockets, stepped by the test."""
 
     def __init__(self, net: Net) -> None:
         self._net = net
@@ -75,17 +75,17 @@ class Loop:
         self._sockets: list[Callable[[int], None]] = []
 
     def every(self, period_s: float, handler: Callable[[int], None]) -> Timer:
-        """Call it every period, the first time at once."""
+        """Call the handler every period, the first time at once."""
         timer = Timer(round(period_s * 1e9), self._net.now_ns, handler)
         self._timers.append(timer)
         return timer
 
     def watch(self, sock: object, handler: Callable[[int], None]) -> None:
-        """Call it when there may be something to read."""
+        """Call the handler when there may be something to read."""
         self._sockets.append(handler)
 
     def read(self) -> None:
-        """Let the sockets be read."""
+        """Read all sockets."""
         for handler in self._sockets:
             handler(self._net.now_ns)
 
@@ -96,14 +96,14 @@ class Loop:
 
 
 class Silent:
-    """A log that nobody reads."""
+    """Log that discards everything."""
 
     def __getattr__(self, _: str) -> Callable[..., None]:
         return lambda *_, **__: None
 
 
 class Process:
-    """Node and bus in one; as good as dead once it was killed."""
+    """Node and bus in one."""
 
     def __init__(self, name: str, net: Net, config: Any, boot: int, watch: Watch) -> None:
         self.name = name
@@ -111,8 +111,8 @@ class Process:
         self.config = config
         self.boot = boot
         self.alive = True
-        self.hung_until_ns = 0
-        self.taking: Letter | None = None  # what its code is dealing with right now
+        self.stalled_until_ns = 0
+        self.taking: Envelope | None = None  # the envelope being handled
         self.bus = self
         self.drive = DriveEnd(self)
         self.loop = Loop(net)
@@ -125,9 +125,9 @@ class Process:
         self._watch = watch
 
     @property
-    def hangs(self) -> bool:
-        """Whether it does nothing for now."""
-        return self.net.now_ns < self.hung_until_ns
+    def stalled(self) -> bool:
+        """Whether the process is stalled."""
+        return self.net.now_ns < self.stalled_until_ns
 
     @property
     def connected(self) -> bool:
@@ -135,11 +135,11 @@ class Process:
         return self.net.up
 
     def shares_clock(self, message: Message) -> bool:
-        """Tell whether a message was stamped on this host."""
+        """Return whether a message was stamped on this host."""
         return True
 
     def open_bus(self) -> "Process":
-        """Return a bus; one will do."""
+        """Return a bus; the same one."""
         return self
 
     def open_drive(self, *, listens: bool) -> DriveEnd:
@@ -150,10 +150,10 @@ class Process:
         """Return a publisher for a topic."""
         return Publisher(self, topic, topic.on(ROBOT, **names), private=False)
 
-    def send(self, letter: Letter) -> None:
-        """Put a letter, stamped or forged."""
-        self._watch.on_put(self, letter)
-        self.net.put(letter)
+    def send(self, envelope: Envelope) -> None:
+        """Send an envelope, stamped or forged."""
+        self._watch.on_put(self, envelope)
+        self.net.put(envelope)
 
     def subscribe(
         self,
@@ -168,49 +168,51 @@ class Process:
     ) -> None:
         """Call the handler for each message."""
 
-        def take(letter: Letter) -> None:
-            with self.dealing_with(letter):
-                handler(Arrival(letter.message, letter.key, self.net.now_ns, None))
+        def take(envelope: Envelope) -> None:
+            with self.handling(envelope):
+                handler(Arrival(envelope.message, envelope.key, self.net.now_ns, None))
 
-        self.net.ears.append(Ear(self, topic.on(ROBOT, **names), take, depth, private))
+        self.net.subscriptions.append(
+            Subscription(self, topic.on(ROBOT, **names), take, depth, private)
+        )
 
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler for anything on a key."""
 
-        def take(letter: Letter) -> None:
-            with self.dealing_with(letter):
+        def take(envelope: Envelope) -> None:
+            with self.handling(envelope):
                 handler(self.net.now_ns)
 
-        self.net.ears.append(Ear(self, key, take, 1))
+        self.net.subscriptions.append(Subscription(self, key, take, 1))
 
     def announce(self, key: str) -> None:
-        """Declare nothing: every key reaches every reader here."""
+        """Do nothing: every key reaches every subscription here."""
 
     def serve(self, call: Call[Any, Any], handler: Callable[[Any, Any], None]) -> None:
-        """Answer a call."""
+        """Register the handler of a call."""
         self.calls[call.path] = handler
 
     def call(self, call: Call[Any, Any], request: object) -> Caller:
-        """Make a call to this process; one that is dead, hung or cut off does not answer."""
+        """Call this process; it does not answer while dead, stalled or cut off."""
         caller = Caller()
-        if self.alive and self.net.up and not self.hangs:
+        if self.alive and self.net.up and not self.stalled:
             self.calls[call.path](request, caller)
         return caller
 
     @contextmanager
-    def dealing_with(self, letter: Letter) -> Iterator[None]:
-        """Remember the letter while it is being dealt with."""
-        self._watch.on_delivery(self, letter)
-        self.taking = letter
+    def handling(self, envelope: Envelope) -> Iterator[None]:
+        """Record the envelope while it is being handled."""
+        self._watch.on_delivery(self, envelope)
+        self.taking = envelope
         yield
         self.taking = None
 
     def event(self, name: str, level: str, text: str, **about: object) -> None:
-        """Nobody hears of transitions."""
+        """Discard events."""
 
     def turn(self) -> None:
-        """Do what is due, unless it hangs."""
-        if not self.alive or self.hangs:
+        """Do what is due, unless stalled."""
+        if not self.alive or self.stalled:
             return
         self.loop.read()
         self.net.wake(self)

@@ -21,8 +21,8 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from tests.invariants.operator_book import Operators
-from tests.invariants.standstill_book import Rest
+from tests.invariants.operator_book import OperatorBook
+from tests.invariants.standstill_book import StandstillBook
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
@@ -36,7 +36,7 @@ LOST_POLLS = 3  # of the bumper
 MOST_MPS, MOST_RADPS = 1.0, 1.0
 RAMP_S = 2.5  # from the highest speed to standstill, and some
 FAST_MPS, FAST_S = 1.35, 0.4  # measured: no command allows it, so it is a runaway
-STEP_S = 0.03  # decisions are that far apart at most, while nothing hangs
+STEP_S = 0.03  # decisions are that far apart at most, while nothing stalled
 ROUNDING = 2e-3
 
 FRONT, LEFT = 0.55, 0.35  # m from the middle to the bumpers
@@ -66,7 +66,7 @@ class Wish:
 
 
 @dataclass(slots=True)
-class Desk:
+class SafetyBook:
     """What one safety service was told, by the time of delivery."""
 
     boot: int
@@ -77,12 +77,12 @@ class Desk:
     zeros: dict[str, int] = field(default_factory=dict)  # source: its last request of zero
     unseen: dict[int, int] = field(default_factory=dict)  # sonar: since when it shows nothing
     rivals: dict[str, int] = field(default_factory=dict)
-    operators: Operators = field(default_factory=Operators)
+    operators: OperatorBook = field(default_factory=OperatorBook)
     bad_ns: int = 0  # when inputs were last seen to be bad
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
-    reader_was_up: bool = False
-    rest: Rest = field(default_factory=Rest)
+    estop_session_was_up: bool = False
+    standstill: StandstillBook = field(default_factory=StandstillBook)
     well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
 
     def on_drive(self, source: str, drive: Drive, now_ns: int) -> None:
@@ -113,7 +113,7 @@ class Desk:
         if isinstance(message, Velocity):
             too_fast = abs(message.linear) > FAST_MPS
             self.fast_ns = (self.fast_ns or now_ns) if too_fast else None
-            self.rest.on_velocity(message, now_ns)
+            self.standstill.on_velocity(message, now_ns)
         if isinstance(message, Driver):
             self._on_driver(name, message)
         if isinstance(message, Ultrasonic):

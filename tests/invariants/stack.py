@@ -21,9 +21,9 @@ from services.bridge.config import BridgeConfig
 from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
-from services.safety.service import Ports
-from tests.invariants.net import MS, Letter, Net
-from tests.invariants.oracle import STEP_NS, Judge
+from services.safety.service import SafetyService
+from tests.invariants.net import MS, Envelope, Net
+from tests.invariants.oracle import STEP_NS, Oracle
 from tests.invariants.process import ROBOT, Process
 from tests.invariants.vehicle import Vehicle
 
@@ -54,13 +54,13 @@ class Sockets:
         self._framing = Framing()
 
     def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
-        """Yield what waits, after the judge has seen it."""
+        """Yield what waits, after the oracle has seen it."""
         inbox = self._stack.vehicle.inbox
         while inbox:
             datagram = inbox.popleft()
             parts = self._framing.read(datagram, FROM_BOARD)
             frames = [part.frame for part in parts if isinstance(part, Received)]
-            self._stack.judge.on_report(self._process, frames)
+            self._stack.oracle.on_report(self._process, frames)
             yield datagram, [], self._stack.net.now_ns
 
     def receipt(self, _: Ancillary, read_ns: int) -> Receipt:
@@ -68,9 +68,9 @@ class Sockets:
         return Receipt(None, read_ns)
 
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
-        """Send to the board, with the judge's complaints."""
-        complaints = self._stack.judge.on_leaving(self._process, datagram)
-        self._stack.vehicle.hear(datagram, complaints)
+        """Send to the board, with the oracle's complaints."""
+        complaints = self._stack.oracle.on_leaving(self._process, datagram)
+        self._stack.vehicle.receive(datagram, complaints)
         return True
 
 
@@ -100,7 +100,7 @@ class Stick:
         process = self.process
         drive = msgspec.structs.replace(drive, boot=drive.boot or process.boot)
         key = keys.DRIVE.on(ROBOT, source=source or self.name)
-        process.send(Letter(key, drive, process.boot, process.net.now_ns))
+        process.send(Envelope(key, drive, process.boot, process.net.now_ns))
 
 
 class Stack:
@@ -108,9 +108,9 @@ class Stack:
 
     def __init__(self) -> None:
         self.net = Net(START_NS)
-        self.judge = Judge(START_NS)
+        self.oracle = Oracle(START_NS)
         self.vehicle = Vehicle(self.net)
-        self.vehicle.on_motion = self.judge.on_board
+        self.vehicle.on_motion = self.oracle.on_board
         self._boots = 1000
         self._brake_ns: int | None = None  # when the guard brakes next
         self._starts: dict[str, int] = {}
@@ -128,7 +128,7 @@ class Stack:
         end_ns = self.net.now_ns + duration_ms * MS
         while self.net.now_ns < end_ns:
             self.net.now_ns += STEP_NS
-            self.judge.now_ns = self.net.now_ns
+            self.oracle.now_ns = self.net.now_ns
             with self.time():
                 self._turn()
 
@@ -147,28 +147,28 @@ class Stack:
             for stick in self.sticks.values():
                 stick.ask()
             self.net.turn()
-        self.judge.on_step(self.vehicle.silent)
+        self.oracle.on_step(self.vehicle.silent)
 
     def _guard(self) -> None:
         """Brake while there is no bridge: a model, the real one is tested in ``tests/bridge``."""
         if self.bridge.alive or (self._brake_ns or 0) > self.net.now_ns:
             return
         self._brake_ns = self.net.now_ns + BREAK_NS
-        self.vehicle.hear(Framing().pack(MotionCommand(MotionKind.BREAK)), ())
+        self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), ())
 
     # --- processes --------------------------------------------------------------------------
 
     def _process(self, name: str, config: Any) -> Process:
         self._boots += 1
-        return Process(name, self.net, config, self._boots, self.judge)
+        return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
         config = SafetyConfig() if name == "safety" else BridgeConfig()
         process = self._process(name, config)
-        self.judge.on_start(process)
+        self.oracle.on_start(process)
         with self.time():
             if name == "safety":
-                Ports(process, process)  # type: ignore[arg-type]
+                SafetyService(process, process)  # type: ignore[arg-type]
             else:
                 made = Sockets(self, process)
                 with patch("services.bridge.bridge.Sockets", lambda *_, **__: made):
@@ -181,32 +181,34 @@ class Stack:
         if not process.alive:
             return
         process.alive = False
-        self.judge.on_end(process)
+        self.oracle.on_end(process)
         self._starts[name] = self.net.now_ns + pause_ms * MS
         self._brake_ns = None
         if name == "bridge":
             self.vehicle.inbox.clear()
 
-    def hang(self, name: str, duration_ms: int) -> None:
+    def stall(self, name: str, duration_ms: int) -> None:
         """Let a process do nothing for so long."""
-        getattr(self, name).hung_until_ns = self.net.now_ns + duration_ms * MS
+        getattr(self, name).stalled_until_ns = self.net.now_ns + duration_ms * MS
 
     def power_cycle(self, duration_ms: int) -> None:
         """Start the board anew."""
         self.vehicle.power_cycle(duration_ms)
-        self.judge.on_power_cycle()
+        self.oracle.on_power_cycle()
         self.run(duration_ms)
-        self.judge.comeback_ns = self.net.now_ns
+        self.oracle.comeback_ns = self.net.now_ns
 
     def router(self, up: bool) -> None:
         """Take the router away, or bring it back."""
-        self.net.up = self.judge.reader_up = up
+        self.net.up = self.oracle.estop_session_up = up
 
     # --- people -----------------------------------------------------------------------------
 
     def estop(self) -> None:
         """Press the emergency stop."""
-        self.hand.send(Letter(keys.estop_key(ROBOT), m.Message(), self.hand.boot, self.net.now_ns))
+        self.hand.send(
+            Envelope(keys.estop_key(ROBOT), m.Message(), self.hand.boot, self.net.now_ns)
+        )
         self.run(5)
 
     def _look(self, arrival: Any) -> None:
@@ -219,7 +221,7 @@ class Stack:
         with self.time():
             caller = self.safety.call(keys.RESET, request)
         if caller.done:
-            self.judge.on_reset(self.safety, request)
+            self.oracle.on_reset(self.safety, request)
         self.run(5)
         return caller.done is True
 
@@ -231,17 +233,17 @@ class Stack:
     ) -> bool:
         """Hold the release, or let it go, by what is seen now or was seen earlier."""
         request = release_request(seen or self.seen, direction, held=held)
-        before = self.judge.holds(self.safety)
-        self.judge.on_hold(self.safety, request)  # a verdict comes along with the answer
+        before = self.oracle.holds(self.safety)
+        self.oracle.on_hold(self.safety, request)  # a verdict comes along with the answer
         with self.time():
             caller = self.safety.call(keys.RELEASE, request)
         if caller.done is not True:
-            self.judge.on_refusal(self.safety, before)
+            self.oracle.on_refusal(self.safety, before)
         self.run(5)
         return caller.done is True
 
     def switches(self, *, on: bool) -> bool:
-        """Ask the bridge to set the board's bumper brake."""
+        """DriveRequest the bridge to set the board's bumper brake."""
         echo = self.seen.heartbeat if self.seen else None
         with self.time():
             caller = self.bridge.call(

@@ -20,7 +20,7 @@ FRESH_S = 0.2
 
 
 @dataclass(slots=True)
-class Rest:
+class StandstillBook:
     """The velocities that one safety service received, and when it last commanded motion."""
 
     due_ns: int | None = None  # when the vehicle must stand; None while motion is commanded

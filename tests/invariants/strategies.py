@@ -5,19 +5,26 @@ import math
 from hypothesis import strategies as st
 
 from common import messages as m
-from tests.invariants.net import CLEAR, Weather
+from common.motion import Command
+from tests.invariants.net import CLEAR, Disturbance
 from tests.invariants.vehicle import NO_ECHO_MM
 
 BUS = st.sampled_from(["drive", "motion", "state", "streams"])
 CABLE = st.sampled_from(["to_board", "from_board"])
 ON_BUS = st.sampled_from(
-    [CLEAR, Weather(late_ms=30), Weather(late_ms=120), Weather(lose=2), Weather(lose=3),
-     Weather(double=2), Weather(hold=3), Weather(late_ms=20, lose=5, double=3, hold=4),
-     Weather(lose=1)]
+    [CLEAR, Disturbance(late_ms=30), Disturbance(late_ms=120), Disturbance(lose=2),
+     Disturbance(lose=3), Disturbance(double=2), Disturbance(hold=3),
+     Disturbance(late_ms=20, lose=5, double=3, hold=4), Disturbance(lose=1)]
 )  # fmt: skip
 ON_CABLE = st.sampled_from(
-    [CLEAR, Weather(late_ms=20), Weather(lose=2), Weather(lose=3), Weather(double=2)]
-)
+    [
+        CLEAR,
+        Disturbance(late_ms=20),
+        Disturbance(lose=2),
+        Disturbance(lose=3),
+        Disturbance(double=2),
+    ]
+)  # fmt: skip
 SPEEDS = st.sampled_from([0.0, 0.3, 1.0, -0.5, 5.0])
 FAST = st.sampled_from([1.0, 0.6, -1.0])
 TURNS = st.sampled_from([0.0, 0.0, 0.4, -1.0, 9.0])
@@ -40,6 +47,6 @@ HOSTILE = {
     "rival zero": m.Drive(linear=0.0, angular=0.0, echo=0, boot=6),
 }
 FORGED = [
-    [m.Motion(command="stop", boot=666), m.Motion(command="run", linear=0.7, boot=666)],
-    [m.Motion(command="run", linear=math.nan, boot=666)],
+    [m.Motion(command=Command.STOP, boot=666), m.Motion(command=Command.RUN, linear=0.7, boot=666)],
+    [m.Motion(command=Command.RUN, linear=math.nan, boot=666)],
 ]

@@ -1,4 +1,4 @@
-"""Anything in any order: no frame that the board receives breaks an invariant.
+"""StackMachine in any order: no frame that the board receives breaks an invariant.
 
 In CI the search is the same each time. A longer one, another each time, half a second an example:
 
@@ -14,8 +14,8 @@ from hypothesis.stateful import initialize, invariant, rule, run_state_machine_a
 
 from common import messages as m
 from common.wire.frame import Side
-from tests.invariants.fault_rules import Troubles
-from tests.invariants.net import ECHO_MS, HOLD_MS, MS, Weather
+from tests.invariants.fault_rules import FaultRules
+from tests.invariants.net import ECHO_MS, HOLD_MS, MS, Disturbance
 from tests.invariants.oracle import STEP_NS
 from tests.invariants.strategies import (
     BUS,
@@ -38,7 +38,7 @@ SEEDS, EXAMPLES_PER_SEED = 8, 9
 EXAMPLES = int(os.environ.get("T2_EXAMPLES", "0"))
 
 
-class Anything(Troubles):
+class StackMachine(FaultRules):
     """What people do, on top of all troubles; the judge looks at every frame at the board."""
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class Anything(Troubles):
         vehicle.ranges[:] = [NO_ECHO_MM] * 8
         for side in Side:
             vehicle.fault(side, 0)
-        self.stack.net.weather.clear()
+        self.stack.net.disturbances.clear()
         self.wait(1000)
         self.brakes(on=True)
         self.reset(lets_go=True)
@@ -149,13 +149,13 @@ class Anything(Troubles):
         self.release(6, "backward")
         self.bumper(pressed=False, ms=320)
 
-    @rule(linear=FAST, route=BUS, weather=ON_BUS, hits=st.booleans())
-    def storm(self, linear: float, route: str, weather: Weather, hits: bool) -> None:
-        """Drive into any weather, perhaps hit something in it, and out again."""
+    @rule(linear=FAST, route=BUS, disturbance=ON_BUS, hits=st.booleans())
+    def storm(self, linear: float, route: str, disturbance: Disturbance, hits: bool) -> None:
+        """Drive under a disturbance, perhaps hit something, and end it."""
         self.off_we_go("teleop", linear, 0.0, 400)
-        self.bus_weather(route, weather, 210)
+        self.bus_disturbance(route, disturbance, 210)
         self.bumper(pressed=hits, ms=60)
-        self.fine_weather(settled=False)
+        self.end_disturbances(settled=False)
         self.stack.run(210)
 
     @rule(linear=FAST, gap_ms=st.sampled_from([450, 600, 1200]))
@@ -219,7 +219,7 @@ class Anything(Troubles):
     @invariant()
     def no_frame_breaks_an_invariant(self) -> None:
         """Look at all frames since the last look."""
-        violations = list(dict.fromkeys(self.judge.violations))[:5]
+        violations = list(dict.fromkeys(self.oracle.violations))[:5]
         assert not violations
 
     @invariant()
@@ -240,7 +240,7 @@ class Anything(Troubles):
         self.no_frame_breaks_an_invariant()
 
 
-def search(examples: int, phases: list[Phase], machine: type[Anything]) -> None:
+def search(examples: int, phases: list[Phase], machine: type[StackMachine]) -> None:
     """Let a machine run that often."""
     run_state_machine_as_test(
         machine,
@@ -259,14 +259,14 @@ def search(examples: int, phases: list[Phase], machine: type[Anything]) -> None:
 def test_no_order_of_events_breaks_an_invariant(number: int) -> None:
     # Hypothesis draws its first ten examples afresh and varies them from there on: few examples
     # of many seeds are more different than many of one.
-    machine = seed(number)(type(f"Anything{number}", (Anything,), {}))
+    machine = seed(number)(type(f"StackMachine{number}", (StackMachine,), {}))
     # Making an example smaller takes minutes: more than a test may take.
     search(EXAMPLES_PER_SEED, [Phase.generate], machine)
 
 
 @pytest.mark.skipif(not EXAMPLES, reason="a longer search: say T2_EXAMPLES=3000, --timeout 0")
 def test_no_order_of_events_breaks_an_invariant_for_long() -> None:
-    search(EXAMPLES, list(Phase), Anything)
+    search(EXAMPLES, list(Phase), StackMachine)
 
 
 def test_time_goes_in_whole_steps() -> None:

@@ -3,19 +3,19 @@
 import pytest
 
 from common.messages import Direction
-from sim.vehicle import Twist as Rolling
-from tests.invariants.mutations import BREAKAGES, driver_blinks, driving, hold
-from tests.invariants.mutations_operator import OPERATOR_BREAKAGES
-from tests.invariants.mutations_safety import SAFETY_BREAKAGES
+from common.motion import Twist
+from tests.invariants.mutations import MUTATIONS, driver_blinks, driving, hold
+from tests.invariants.mutations_operator import OPERATOR_MUTATIONS
+from tests.invariants.mutations_safety import SAFETY_MUTATIONS
 from tests.invariants.stack import Stack
 
-ALL = BREAKAGES | OPERATOR_BREAKAGES | SAFETY_BREAKAGES
+ALL = MUTATIONS | OPERATOR_MUTATIONS | SAFETY_MUTATIONS
 
 
 def test_a_drive_is_seen_and_found_good() -> None:
     stack = driving()
-    assert stack.judge.runs > 50
-    assert stack.judge.violations == []
+    assert stack.oracle.runs > 50
+    assert stack.oracle.violations == []
 
 
 def test_a_hit_stops_and_only_reset_and_neutral_let_it_drive_again() -> None:
@@ -23,17 +23,17 @@ def test_a_hit_stops_and_only_reset_and_neutral_let_it_drive_again() -> None:
     stack.vehicle.pressed = True
     stack.run(300)
     stack.vehicle.pressed = False
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     stack.run(3000)
-    assert (stack.judge.runs, stack.vehicle.twist.linear) == (runs, 0.0)
+    assert (stack.oracle.runs, stack.vehicle.twist.linear) == (runs, 0.0)
     stack.sticks["teleop"].asks = (0.0, 0.0)
     stack.run(600)
     assert stack.reset()
     stack.run(200)
     stack.sticks["teleop"].asks = (0.5, 0.0)
     stack.run(500)
-    assert stack.judge.runs > runs
-    assert stack.judge.violations == []
+    assert stack.oracle.runs > runs
+    assert stack.oracle.violations == []
 
 
 def stuck() -> Stack:
@@ -48,27 +48,27 @@ def stuck() -> Stack:
 
 def test_who_stands_on_the_bumper_gets_off_after_a_reset_and_not_before() -> None:
     stack = stuck()
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     hold(stack)
-    assert stack.judge.runs == runs
+    assert stack.oracle.runs == runs
     assert stack.reset()
     hold(stack)
-    assert stack.judge.runs > runs
+    assert stack.oracle.runs > runs
     assert -0.11 < stack.vehicle.twist.linear < -0.05
-    assert [trip.name for trip in stack.judge.trips] == ["contact"]
-    assert stack.judge.violations == []
+    assert [trip.name for trip in stack.oracle.trips] == ["contact"]
+    assert stack.oracle.violations == []
 
 
 @pytest.mark.parametrize("direction", ["forward", "backward"])
 def test_the_operator_chooses_the_direction(direction: Direction) -> None:
     stack = stuck()
     stack.reset()
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     hold(stack, direction)
-    assert stack.judge.runs > runs
+    assert stack.oracle.runs > runs
     # The board's own brake lets no RUN pass toward what was hit.
     assert (stack.vehicle.twist.linear < 0) == (direction == "backward")
-    assert stack.judge.violations == []
+    assert stack.oracle.violations == []
 
 
 def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
@@ -77,51 +77,51 @@ def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
     stack.run(1500)
     stack.kill("safety", 3000)
     stack.run(1000)
-    stack.vehicle.measured = Rolling(0.3)
+    stack.vehicle.measured = Twist(0.3)
     stack.run(600)
     stack.vehicle.measured = None
     stack.run(3000)
     assert stack.seen is not None
     assert "predecessor" in [cause.name for cause in stack.seen.causes]
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     stack.sticks["teleop"].asks = (0.5, 0.0)
     stack.run(1000)
-    assert stack.judge.runs == runs
+    assert stack.oracle.runs == runs
     stack.sticks["teleop"].asks = (0.0, 0.0)
     stack.run(700)
     assert stack.reset()
     stack.run(700)
     stack.sticks["teleop"].asks = (0.5, 0.0)
     stack.run(500)
-    assert stack.judge.runs > runs
-    assert stack.judge.violations == []
+    assert stack.oracle.runs > runs
+    assert stack.oracle.violations == []
 
 
 @pytest.mark.parametrize("late_ms", [450, 2000, 4000])
 def test_twenty_late_holds_give_no_run(late_ms: int) -> None:
     stack = stuck()
     stack.reset()
-    runs, made = stack.judge.runs, []
+    runs, made = stack.oracle.runs, []
     for _ in range(20):
         made.append(stack.seen)
         stack.run(late_ms // 20)
     stack.run(late_ms)
     assert [stack.hold(True, "backward", seen) for seen in made[:20]] == [False] * 20
-    assert stack.judge.runs == runs
+    assert stack.oracle.runs == runs
     assert stack.hold(True)
 
 
 @pytest.mark.parametrize("hung_ms", [0, 60])
 def test_a_fault_that_is_over_at_once_latches_however_late_it_is_read(hung_ms: int) -> None:
     stack = driving()
-    stack.hang("safety", hung_ms)
+    stack.stall("safety", hung_ms)
     driver_blinks(stack)
     stack.run(300)
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     stack.run(1000)
-    assert [trip.name for trip in stack.judge.trips] == ["driver"]
-    assert (stack.judge.runs, stack.vehicle.twist.linear) == (runs, 0.0)
-    assert stack.judge.violations == []
+    assert [trip.name for trip in stack.oracle.trips] == ["driver"]
+    assert (stack.oracle.runs, stack.vehicle.twist.linear) == (runs, 0.0)
+    assert stack.oracle.violations == []
 
 
 @pytest.mark.parametrize("name", ["safety", "bridge", "board", "router"])
@@ -136,17 +136,17 @@ def test_what_came_back_drives_after_a_neutral_request_and_not_before(name: str)
     else:
         stack.kill(name, 300)
     stack.run(500)
-    runs = stack.judge.runs
+    runs = stack.oracle.runs
     stack.run(1500)
-    assert stack.judge.runs == runs
+    assert stack.oracle.runs == runs
     stack.sticks["teleop"].asks = (0.0, 0.0)
     stack.run(700)
     assert stack.reset() == (name == "router")
     stack.run(700)
     stack.sticks["teleop"].asks = (0.5, 0.0)
     stack.run(500)
-    assert stack.judge.runs > runs
-    assert stack.judge.violations == []
+    assert stack.oracle.runs > runs
+    assert stack.oracle.violations == []
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -156,10 +156,10 @@ def test_a_protection_that_is_missing_is_objected_to(
     owner, attribute, broken, scenario, objection = ALL[name]
     monkeypatch.setattr(owner, attribute, broken)
     stack = driving()
-    assert stack.judge.violations == []
+    assert stack.oracle.violations == []
     scenario(stack)
     stack.run(2000)
-    assert any(objection in one for one in stack.judge.violations), stack.judge.violations[:5]
+    assert any(objection in one for one in stack.oracle.violations), stack.oracle.violations[:5]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -167,4 +167,4 @@ def test_the_same_scenario_is_harmless_as_shipped(name: str) -> None:
     stack = driving()
     ALL[name][3](stack)
     stack.run(2000)
-    assert stack.judge.violations == []
+    assert stack.oracle.violations == []

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from common.motion import Twist
 from common.settings import Wire
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Side
@@ -10,7 +11,7 @@ from common.wire.framing import Framing, Received
 from common.wire.reports import VelocityReport
 from sim.board import Board
 from sim.config import Drive, Sim
-from sim.vehicle import Twist, next_twist
+from sim.vehicle import next_twist
 from tests.invariants.net import MS, Net
 
 STEP_NS, STREAM_NS = 10 * MS, 20 * MS
@@ -22,7 +23,7 @@ class Vehicle:
     """Hears datagrams with the complaints about them, and says its own."""
 
     def __init__(self, net: Net) -> None:
-        self.heard = 0  # frames
+        self.received = 0  # frames
         self.ranges = [NO_ECHO_MM] * 8
         self.board = Board(Wire(), Sim(), self._measure())
         self.twist = Twist()
@@ -66,7 +67,7 @@ class Vehicle:
         if not self.silent:
             self._net.later("from_board", lambda: self.inbox.append(datagram))
 
-    def hear(self, datagram: bytes, complaints: Complaints) -> None:
+    def receive(self, datagram: bytes, complaints: Complaints) -> None:
         """Let a datagram travel to the board."""
         moves = any(isinstance(frame, MotionCommand) for frame in frames(self._framing, datagram))
         kind = "motion" if moves else "query"  # or all that is lost might be of one kind
@@ -86,7 +87,7 @@ class Vehicle:
         if self.silent:
             return
         for frame in frames(self._framing, datagram):
-            self.heard += 1
+            self.received += 1
             answer = self.board.answer(frame)
             if isinstance(frame, MotionCommand):
                 self.on_motion(frame, complaints)
@@ -109,7 +110,7 @@ class Vehicle:
     def _measure(self) -> tuple[int, int, int, int, int, int, int, int]:
         a, b, c, d, e, f, g, h = (
             # A wall that stays the same to the millimetre would be a stuck sensor.
-            mm + (self.heard % 5 if 60 < mm < NO_ECHO_MM else 0)
+            mm + (self.received % 5 if 60 < mm < NO_ECHO_MM else 0)
             for mm in self.ranges
         )
         return a, b, c, d, e, f, g, h

@@ -1,1 +1,1 @@
-"""The exporter: what was heard, what is told of it, and a real scrape."""
+"""Tests of the exporter."""

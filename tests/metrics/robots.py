@@ -1,8 +1,8 @@
-"""What robots say, for tests that look at what is made of it."""
+"""Messages and states of robots."""
 
 from common import messages as m
 from common.freshness import NS_PER_S, Latest
-from services.metrics.robot import Robot
+from services.metrics.robot import RobotState
 
 NOW_NS = 1_000_000 * NS_PER_S  # any time but zero
 
@@ -42,9 +42,9 @@ def event(name: str, *, t_ns: int = 0, boot: int = 1, level: m.Level = "error") 
     return m.Event(name=name, level=level, text=name, t_ns=t_ns, boot=boot)
 
 
-def whole(at_ns: int = NOW_NS) -> Robot:
-    """Return a robot of which everything was heard at that time."""
-    robot = Robot()
+def whole(at_ns: int = NOW_NS) -> RobotState:
+    """Return a robot whose messages all arrived at that time."""
+    robot = RobotState()
     for name in ("bridge", "safety", "odom", "recorder"):
         robot.on_live(name, "a", True, at_ns)
         robot.on_health(name, health(name), at_ns)

@@ -1,4 +1,4 @@
-"""The exporter as a process, scraped as Prometheus does."""
+"""The exporter as a process, scraped over HTTP."""
 
 import contextlib
 import subprocess
@@ -14,7 +14,7 @@ from verification.harness.support import PATIENCE_S, free_port, wait_until
 
 
 def scraped(port: int) -> Values:
-    """Scrape as Prometheus does, by its own client's parser."""
+    """Scrape with the parser of Prometheus' client."""
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
         text = answer.read().decode()
     return flat(list(text_string_to_metric_families(text)))
@@ -27,7 +27,7 @@ def value(port: int, name: str, /, **labels: str) -> float | None:
 
 @contextlib.contextmanager
 def running(endpoint: str, folder: Path, *sets: str) -> Iterator[int]:
-    """Run the exporter as a process while the context lasts, and name its port."""
+    """Run the exporter as a process while the context lasts; yield its port."""
     port = free_port()
     given = (f"bus.connect={endpoint}", f"metrics.port={port}", *sets)
     command = [sys.executable, "-m", "cli", "metrics"]

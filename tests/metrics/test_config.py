@@ -1,4 +1,4 @@
-"""The exporter's settings: of whom it tells, and to whom."""
+"""The exporter's settings."""
 
 import pytest
 
@@ -12,44 +12,44 @@ def given(*sets: str) -> Metrics:
     return load(MetricsConfig, Sources(environ={}, sets=words)).config.metrics
 
 
-def test_as_shipped_it_tells_this_machine_alone() -> None:
+def test_default_is_the_local_machine() -> None:
     assert given() == Metrics()
     assert Metrics().host == "127.0.0.1"
     assert Metrics().port == 9317
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "10.7.5.220", "::"])
-def test_a_host_that_others_reach_must_be_owned_up_to(host: str) -> None:
+def test_a_public_host_needs_an_override(host: str) -> None:
     with pytest.raises(
-        ConfigError, match=r"metrics: host .* tells everybody .* in unsafe_overrides"
+        ConfigError, match=r"metrics: host .* serves the network .* in unsafe_overrides"
     ):
         given(f"host={host}")
     assert given(f"host={host}", "unsafe_overrides=host").host == host
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "::1"])
-def test_this_machine_has_several_addresses(host: str) -> None:
+def test_every_loopback_address_is_allowed(host: str) -> None:
     assert given(f"host={host}").host == host
 
 
-def test_a_name_is_no_host() -> None:
+def test_a_host_name_is_rejected() -> None:
     with pytest.raises(ConfigError, match="host is 'localhost', allowed is an IP address"):
         given("host=localhost")
 
 
-def test_only_what_takes_a_protection_away_can_be_accepted() -> None:
+def test_only_protected_settings_can_be_overridden() -> None:
     with pytest.raises(
-        ConfigError, match="unsafe_overrides names 'port', which takes no protection away"
+        ConfigError, match="unsafe_overrides names 'port', which is not a protected setting"
     ):
         given("unsafe_overrides=port")
 
 
 @pytest.mark.parametrize("robots", ["", "*", "001", "berlin-$*", "$*-007", "a$*b"])
-def test_robots_are_an_id_or_an_expression_of_ids(robots: str) -> None:
+def test_robots_is_an_id_or_an_expression(robots: str) -> None:
     assert given(f"robots={robots}").robots == robots
 
 
 @pytest.mark.parametrize("robots", ["**", "$*", "a*", "a/b", "$*$*", "a b", "@x", "a$"])
-def test_what_is_no_chunk_of_a_key_expression_is_refused(robots: str) -> None:
+def test_invalid_key_expressions_are_rejected(robots: str) -> None:
     with pytest.raises(ConfigError, match=r"metrics\.robots"):
         given(f"robots={robots}")

@@ -1,4 +1,4 @@
-"""The exporter on a real bus, scraped as Prometheus scrapes it."""
+"""The exporter on a real bus, scraped over HTTP."""
 
 import contextlib
 import subprocess
@@ -16,7 +16,7 @@ from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.members import Member, Members
 from services.metrics import __main__ as metrics
 from services.metrics import exporter
-from services.metrics.exporter import asked
+from services.metrics.exporter import call_in_loop
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import Rig, until_heard
@@ -26,7 +26,7 @@ from tests.metrics.values import names
 from verification.harness.support import free_port, router_process, wait_until
 
 
-def test_a_robot_is_scraped_as_it_fares(rig: Rig, tmp_path: Path) -> None:
+def test_scrape_of_a_running_robot(rig: Rig, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
@@ -45,7 +45,7 @@ def test_a_robot_is_scraped_as_it_fares(rig: Rig, tmp_path: Path) -> None:
     assert names(found) <= known
 
 
-def test_a_robot_that_is_gone_has_no_values_left(rig: Rig, tmp_path: Path) -> None:
+def test_a_dead_robot_has_no_values(rig: Rig, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         bus = pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
@@ -69,7 +69,7 @@ def test_a_robot_that_is_gone_has_no_values_left(rig: Rig, tmp_path: Path) -> No
         )
 
 
-def test_all_robots_of_a_site_are_told(rig: Rig, tmp_path: Path) -> None:
+def test_all_robots_of_a_site_are_exported(rig: Rig, tmp_path: Path) -> None:
     root = "t2/v1"
     site, stranger = f"{rig.robot}s", rig.session()
 
@@ -90,12 +90,12 @@ def test_all_robots_of_a_site_are_told(rig: Rig, tmp_path: Path) -> None:
             "both robots of the site, and no other",
         )  # fmt: skip
         assert value(port, "t2_robot_up", robot="001") is None
-        assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # a laptop bears its id
+        assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # only a laptop has its id
 
 
-def test_events_are_counted_and_tell_of_a_full_disk(rig: Rig, tmp_path: Path) -> None:
+def test_events_are_counted_and_set_disk_full(rig: Rig, tmp_path: Path) -> None:
     robot = {"robot": rig.robot}
-    told = {"event": "disk_full", "level": "error", "service": "recorder"}
+    labels = {"event": "disk_full", "level": "error", "service": "recorder"}
     with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
         made: list[m.Health] = []
 
@@ -107,7 +107,7 @@ def test_events_are_counted_and_tell_of_a_full_disk(rig: Rig, tmp_path: Path) ->
         events = bus.publisher(keys.EVENTS, service="recorder")
         until_heard(
             lambda: events.put(event("disk_full")),
-            lambda: value(port, "t2_events_total", **told, **robot),
+            lambda: value(port, "t2_events_total", **labels, **robot),
             "the event",
         )
         assert value(port, "t2_recorder_disk_full", **robot) == 1
@@ -115,7 +115,7 @@ def test_events_are_counted_and_tell_of_a_full_disk(rig: Rig, tmp_path: Path) ->
         wait_until(lambda: value(port, "t2_recorder_disk_full", **robot) == 0, "room again")
 
 
-def test_a_router_that_goes_is_told(tmp_path: Path) -> None:
+def test_router_loss_is_exported(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with contextlib.ExitStack() as stack:
         with router_process(endpoint):
@@ -126,21 +126,21 @@ def test_a_router_that_goes_is_told(tmp_path: Path) -> None:
             stack.close()
 
 
-def test_certificates_are_read_from_the_list_of_members(rig: Rig, tmp_path: Path) -> None:
+def test_certificates_are_read_from_the_member_list(rig: Rig, tmp_path: Path) -> None:
     members = tmp_path / "members.json"
     end = datetime(2030, 1, 1, tzinfo=UTC)
     one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
     members.write_bytes(msgspec.json.encode(Members(site="berlin", members=(one,))))
-    told = {"role": "driver", "name": "anna"}
+    labels = {"role": "driver", "name": "anna"}
     name = "t2_certificate_expiry_timestamp_seconds"
     with running(rig.endpoint, tmp_path, f"bus.members={members}") as port:
-        assert value(port, name, **told) == end.timestamp()
+        assert value(port, name, **labels) == end.timestamp()
     with running(rig.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
-        assert value(port, name, **told) is None
-    assert "no list of members" in (tmp_path / "metrics.log").read_text()
+        assert value(port, name, **labels) is None
+    assert "cannot read the member list" in (tmp_path / "metrics.log").read_text()
 
 
-def test_a_taken_port_ends_it_with_a_sentence(
+def test_a_taken_port_is_an_error(
     rig: Rig, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with running(rig.endpoint, tmp_path) as port:
@@ -153,7 +153,7 @@ def test_a_taken_port_ends_it_with_a_sentence(
     assert f"metrics cannot listen on 127.0.0.1:{port}" in done.stderr
 
 
-def test_without_its_library_it_says_what_to_install(
+def test_missing_library_names_the_extra(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "services.metrics.exporter", None)
@@ -161,8 +161,8 @@ def test_without_its_library_it_says_what_to_install(
     assert "install the extra `metrics`" in capsys.readouterr().err
 
 
-def test_a_loop_that_hangs_gives_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hanging_loop_raises_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exporter, "PATIENCE_S", 0.05)
     with pytest.raises(TimeoutError):
-        asked(lambda _: None, lambda: 1)
-    assert asked(lambda call: threading.Thread(target=call).start(), lambda: 1) == 1
+        call_in_loop(lambda _: None, lambda: 1)
+    assert call_in_loop(lambda call: threading.Thread(target=call).start(), lambda: 1) == 1

@@ -1,34 +1,37 @@
-"""What is told of what was heard: names, labels, and nothing that is old."""
+"""Exported samples: names, labels and freshness."""
 
+from datetime import UTC, datetime
 from itertools import pairwise
 
 import pytest
 
 from common.freshness import NS_PER_S, Latest
+from common.members import Member, Members, Role
 from common.messages import Durations, Timing
-from services.metrics.robot import WORTH_S, Robot
-from services.metrics.samples import FAMILIES, sheet
+from services.metrics.robot import FRESH_S, RobotState
+from services.metrics.samples import FAMILIES, certificate_expiry, metric_families
 from tests.metrics.robots import NOW_NS, event, health, link, odometry, safety, whole
 from tests.metrics.values import Values, flat, names
 
-LATE_NS = NOW_NS + round(WORTH_S * NS_PER_S) + 1
-# What is told of a robot of which nothing is fresh.
+SOON, LATER = (datetime(2027, month, 1, tzinfo=UTC) for month in (1, 2))
+LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
+# Exported for a robot without fresh values.
 ALWAYS = {
     "t2_robot_up", "t2_stream_age_seconds", "t2_service_up", "t2_service_instances",
     "t2_service_health_age_seconds", "t2_events_total",
 }  # fmt: skip
 
 
-def values(robot: Robot, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
-    """Return every sample's value by its name and labels."""
-    return flat(sheet({"007": robot}, now_ns, connected=connected, certificates={}))
+def values(robot: RobotState, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
+    """Return the value of every sample by name and labels."""
+    return flat(metric_families({"007": robot}, now_ns, connected=connected, certificates={}))
 
 
 def value(found: Values, name: str, **labels: str) -> float:
     return found[name, frozenset({"robot": "007", **labels}.items())]
 
 
-def test_a_robot_that_fares_well() -> None:
+def test_samples_of_a_healthy_robot() -> None:
     found = values(whole())
     assert found["t2_bus_connected", frozenset()] == 1
     assert value(found, "t2_robot_up") == 1
@@ -53,7 +56,7 @@ def test_a_robot_that_fares_well() -> None:
     assert value(found, "t2_recorder_disk_full") == 0
 
 
-def test_the_verdict_in_force_is_one_and_the_others_are_none() -> None:
+def test_the_current_verdict_is_one_and_the_others_are_zero() -> None:
     robot = whole()
     robot.safety = Latest(safety("contact", "estop"), NOW_NS)
     found = values(robot)
@@ -67,7 +70,7 @@ def test_the_verdict_in_force_is_one_and_the_others_are_none() -> None:
     assert value(found, "t2_safety_cause_active", cause="estop", action="brake") == 1
 
 
-def test_nothing_old_is_told_of_a_robot_that_is_gone() -> None:
+def test_stale_values_are_not_exported() -> None:
     robot = whole()
     robot.on_event("bridge", event("contact"))
     found = values(robot, LATE_NS)
@@ -75,12 +78,12 @@ def test_nothing_old_is_told_of_a_robot_that_is_gone() -> None:
     assert value(found, "t2_robot_up") == 0
     assert value(found, "t2_service_up", service="bridge") == 0
     for stream in ("safety", "link", "odometry"):
-        assert value(found, "t2_stream_age_seconds", stream=stream) > WORTH_S
-    assert value(found, "t2_service_health_age_seconds", service="bridge") > WORTH_S
+        assert value(found, "t2_stream_age_seconds", stream=stream) > FRESH_S
+    assert value(found, "t2_service_health_age_seconds", service="bridge") > FRESH_S
 
 
-def test_a_robot_that_was_never_heard_is_told_to_be_down() -> None:
-    found = values(Robot(), connected=False)
+def test_an_unseen_robot_is_exported_as_down() -> None:
+    found = values(RobotState(), connected=False)
     assert found["t2_bus_connected", frozenset()] == 0
     assert value(found, "t2_robot_up") == 0
     for service in ("bridge", "safety", "odom"):
@@ -90,7 +93,7 @@ def test_a_robot_that_was_never_heard_is_told_to_be_down() -> None:
     }  # fmt: skip
 
 
-def test_what_is_unknown_has_no_sample() -> None:
+def test_unknown_values_have_no_sample() -> None:
     robot = whole()
     robot.link = Latest(link(round_trip=None), NOW_NS)
     robot.odometry = Latest(odometry(residual=None), NOW_NS)
@@ -101,21 +104,21 @@ def test_what_is_unknown_has_no_sample() -> None:
         assert name not in found
 
 
-def test_rates_and_counts_are_told_by_key_and_by_name() -> None:
+def test_rates_by_key_and_counters_by_name() -> None:
     robot = whole()
     rates = {"t2/v1/007/tel/bridge/link": 5.0, "t2/v1/008/tel/bridge/link": 4.0}
-    told = health(rates=rates, counters={"overrun": 2})
-    robot.on_health("bridge", told, NOW_NS)
+    message = health(rates=rates, counters={"overrun": 2})
+    robot.on_health("bridge", message, NOW_NS)
     found = values(robot)
     rate = value(found, "t2_service_message_rate_hertz", service="bridge", key="tel/bridge/link")
     assert rate == 5
-    other = "t2/v1/008/tel/bridge/link"  # as who watches several robots has it
+    other = "t2/v1/008/tel/bridge/link"  # of another robot
     assert value(found, "t2_service_message_rate_hertz", service="bridge", key=other) == 4
     assert value(found, "t2_service_counts_total", service="bridge", counter="overrun") == 2
 
 
-def test_lateness_is_a_histogram_of_all_seconds() -> None:
-    robot = Robot()
+def test_lateness_histogram_covers_every_second() -> None:
+    robot = RobotState()
     for late_s in (0.001, 0.03, 0.3):
         robot.on_health("odom", health("odom", late_s=late_s), NOW_NS)
     found = values(robot)
@@ -127,7 +130,7 @@ def test_lateness_is_a_histogram_of_all_seconds() -> None:
     assert value(found, f"{name}_sum", service="odom") == pytest.approx(0.331)
 
 
-def test_reactions_are_told_whole_and_thinned_without_losing_one() -> None:
+def test_reactions_are_downsampled_without_losing_counts() -> None:
     bounds = tuple(10e-6 * 10 ** (step / 8) for step in range(41))
     counts = tuple(range(42))
     timing = Timing(
@@ -159,7 +162,7 @@ def test_reactions_are_told_whole_and_thinned_without_losing_one() -> None:
     assert reactions == {"contact_to_break"}
 
 
-def test_a_full_disk_is_told_while_the_recorder_is_there() -> None:
+def test_disk_full_is_exported_while_the_recorder_runs() -> None:
     robot = whole()
     robot.on_event("recorder", event("disk_full", t_ns=1))
     assert value(values(robot), "t2_recorder_disk_full") == 1
@@ -169,22 +172,55 @@ def test_a_full_disk_is_told_while_the_recorder_is_there() -> None:
     assert "t2_recorder_disk_full" not in names(values(robot))
 
 
-def test_robots_stand_beside_each_other() -> None:
-    both = {"b": whole(), "a": Robot()}
-    found = flat(sheet(both, NOW_NS, connected=True, certificates={}))
+def test_samples_of_several_robots() -> None:
+    both = {"b": whole(), "a": RobotState()}
+    found = flat(metric_families(both, NOW_NS, connected=True, certificates={}))
     assert found["t2_robot_up", frozenset({("robot", "a")})] == 0
     assert found["t2_robot_up", frozenset({("robot", "b")})] == 1
 
 
-def test_certificates_are_told_by_whose_they_are() -> None:
-    found = flat(sheet({}, NOW_NS, connected=True, certificates={("driver", "anna"): 5.0}))
+def test_certificates_by_role_and_name() -> None:
+    found = flat(
+        metric_families({}, NOW_NS, connected=True, certificates={("driver", "anna"): 5.0})
+    )
     labels = frozenset({("role", "driver"), ("name", "anna")})
     assert found["t2_certificate_expiry_timestamp_seconds", labels] == 5
 
 
-def test_every_family_bears_a_name_by_the_conventions() -> None:
+def test_metric_names_follow_the_conventions() -> None:
     assert len({family.name for family in FAMILIES}) == len(FAMILIES)
     for family in FAMILIES:
         assert family.name.startswith("t2_")
         assert family.name.endswith("_total") == (family.kind == "counter"), family.name
-        assert family.what[0].isalnum()
+        assert family.help[0].isalnum()
+
+
+def member(role: Role, name: str, expires: datetime, *, revoked: bool = False) -> Member:
+    number = f"{expires:%m}"
+    return Member(
+        common_name=f"{role}.{name}.{number}", role=role, name=name, expires=expires,
+        revoked=revoked,
+    )  # fmt: skip
+
+
+def listed(*members: Member) -> Members:
+    return Members(site="berlin", members=members)
+
+
+def test_expiry_of_each_member() -> None:
+    made = listed(member("driver", "anna", SOON), member("robot", "001", LATER))
+    assert certificate_expiry(made) == {
+        ("driver", "anna"): SOON.timestamp(),
+        ("robot", "001"): LATER.timestamp(),
+    }
+
+
+@pytest.mark.parametrize("dates", [(SOON, LATER), (LATER, SOON)])
+def test_the_latest_certificate_of_a_member_counts(dates: tuple[datetime, datetime]) -> None:
+    made = listed(*(member("driver", "anna", each) for each in dates))
+    assert certificate_expiry(made) == {("driver", "anna"): LATER.timestamp()}
+
+
+def test_revoked_certificates_are_ignored() -> None:
+    made = listed(member("driver", "anna", SOON), member("driver", "anna", LATER, revoked=True))
+    assert certificate_expiry(made) == {("driver", "anna"): SOON.timestamp()}

@@ -1,4 +1,4 @@
-"""The exporter with a viewer's certificate: it needs no right to say anything."""
+"""The exporter with a viewer's certificate."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,11 +28,11 @@ def loop() -> Iterator[Loop]:
         yield it
 
 
-def test_a_viewer_is_told_all_that_it_exports(loop: Loop, tmp_path: Path) -> None:
+def test_a_viewer_certificate_is_sufficient(loop: Loop, tmp_path: Path) -> None:
     site = Site(tmp_path / "keys")
     own = site.member("robot", ROBOT, "--address", "127.0.0.1")
     viewer = site.member("viewer", "prometheus")
-    said: dict[Topic[Any], Message] = {
+    printed: dict[Topic[Any], Message] = {
         keys.SAFETY: safety(),
         keys.LINK: link(),
         keys.ODOMETRY: odometry(),
@@ -42,7 +42,7 @@ def test_a_viewer_is_told_all_that_it_exports(loop: Loop, tmp_path: Path) -> Non
 
     def declare(bus: Bus) -> None:
         bus.live(keys.live_key(ROBOT, "bridge", "1"))
-        puts.extend((bus.publisher(topic, service="bridge"), one) for topic, one in said.items())
+        puts.extend((bus.publisher(topic, service="bridge"), one) for topic, one in printed.items())
 
     def put(_: int) -> None:
         for publisher, message in puts:
@@ -53,8 +53,8 @@ def test_a_viewer_is_told_all_that_it_exports(loop: Loop, tmp_path: Path) -> Non
         files = {name: getattr(viewer, name) for name in ("ca", "certificate", "private_key")}
         sets = [f"bus.{name}={path}" for name, path in files.items()]
         with exporting(secured, tmp_path, *sets, "metrics.robots=*") as port:
-            told = {"t2_safety_latched", "t2_link_up", "t2_odometry_slip"}
-            wait_until(lambda: told <= names(scraped(port)), "the streams")
+            wanted = {"t2_safety_latched", "t2_link_up", "t2_odometry_slip"}
+            wait_until(lambda: wanted <= names(scraped(port)), "the streams")
             wait_until(
                 lambda: value(port, "t2_service_up", robot=ROBOT, service="bridge") == 1,
                 "the token and the health",

@@ -1,5 +1,6 @@
-"""A router for all these tests, and a robot on it for each."""
+"""A router for all tests of this folder; for each test a robot id and a recordings folder."""
 
 from tests.cli.inspect.conftest import rig, shared_router, tool
+from tests.recorder.files_fixture import files
 
-__all__ = ["rig", "shared_router", "tool"]
+__all__ = ["files", "rig", "shared_router", "tool"]

@@ -1,7 +1,7 @@
-"""Makes the kept recording anew: ``python -m tests.recorder.make``.
+"""Regenerates the reference recording: ``python -m tests.recorder.make``.
 
-The whole stack drives a simulated vehicle straight on, around a bend, and its bumper is pressed.
-What bridge, odometry, safety and the driver say is kept; health and the recorder's own are not.
+The stack drives a simulated vehicle straight ahead and around a bend; then its bumper is pressed.
+The recording keeps bridge, odometry, safety, events and commands, and drops health messages.
 """
 
 import subprocess
@@ -17,9 +17,9 @@ from common.loop import Loop
 from common.messages import SafetyState
 from common.settings import Vehicle
 from common.source import DriveSource
-from services.recorder.mcap_codec import Translator
+from services.recorder.mcap_codec import Encoder
 from services.recorder.reader import Reader
-from services.recorder.writer import Recording
+from services.recorder.writer import RecordingWriter
 from sim.requests import Bumper
 from verification.harness.stack import Chain, chain
 from verification.harness.support import PATIENCE_S, at, running, wait_until
@@ -30,7 +30,7 @@ SPEED_MPS, TURN_RADPS = 0.5, 0.5
 
 
 def main() -> int:
-    """Drive, record, and keep the part of it that matters."""
+    """Drive, record, and keep the relevant keys."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         with chain(folder) as stack, recorder(stack, folder) as process:
@@ -45,7 +45,7 @@ def main() -> int:
 
 @contextmanager
 def recorder(stack: Chain, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
-    """Record all of a running stack while the context lasts."""
+    """Record a running stack while the context lasts."""
     where = f"bus.connect={stack.endpoint}", f"recorder.folder={folder}"
     words = [word for each in (*where, "recorder.everything=true") for word in ("--set", each)]
     with subprocess.Popen([sys.executable, "-m", "services.recorder", *words]) as process:
@@ -56,7 +56,7 @@ def recorder(stack: Chain, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
 
 
 def drive(stack: Chain) -> None:
-    """Drive straight on, around a bend, and be hit."""
+    """Drive straight ahead and around a bend, then press the bumper."""
     twist = [0.0, 0.0]
     with ExitStack() as closing_all:
         loop = Loop()
@@ -77,7 +77,7 @@ def drive(stack: Chain) -> None:
             twist[:] = linear, angular
             wait_until(true, what)
 
-        # Requests of zero, until safety has all it needs.
+        # Requests of zero, until safety has all its inputs.
         until(lambda: [s.verdict for s in states[-1:]] == ["run"], 0.0, 0.0, "safety's run")
         until(lambda: stack.speed() > 0.1, SPEED_MPS, 0.0, "the vehicle moves")
         until(lambda: stack.control.truth().x > 1.0, SPEED_MPS, 0.0, "a metre")
@@ -87,11 +87,11 @@ def drive(stack: Chain) -> None:
 
 
 def keep(path: Path) -> None:
-    """Write the part that matters; in large chunks it is small."""
+    """Write the relevant keys; large chunks compress better."""
     KEPT.unlink(missing_ok=True)
     with Reader(path) as reader:
         entries = [each.sample for each in reader]
-    kept = Recording(KEPT, Translator(Vehicle()), reader.about)
+    kept = RecordingWriter(KEPT, Encoder(Vehicle()), reader.about)
     for sample in entries:
         if sample.key.removeprefix(f"{keys.ROOT}/001/").startswith(PATHS):
             kept.write(sample)

@@ -1,4 +1,4 @@
-"""Samples as they come from the bus."""
+"""Samples as received from the bus."""
 
 from common import codec
 from common import messages as m
@@ -16,7 +16,7 @@ def sample(
     at_s: float = 0.0,
     raw: bytes | None = None,
 ) -> Sample:
-    """Return what a message is on the bus, so long after the beginning."""
+    """Return the sample of a message, received ``at_s`` seconds after the start."""
     payload, encoding = codec.encode(message), codec.encoding(type(message))
     return bare(path, payload, encoding, at_s, raw=raw)
 
@@ -30,7 +30,7 @@ def bare(
     raw: bytes | None = None,
     deleted: bool = False,
 ) -> Sample:
-    """Return any bytes as they would come."""
+    """Return a sample of arbitrary bytes."""
     past_ns = round(at_s * NS_PER_S)
     return Sample(
         key=f"{ROOT}/{path}",

@@ -1,4 +1,4 @@
-"""What a 3D panel draws."""
+"""Views for Foxglove's 3D and log panels."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ import pytest
 
 from common.messages import SONAR_NAMES, Event, Message
 from common.settings import Vehicle
-from services.recorder.foxglove_views import Views
+from services.recorder.foxglove_views import FoxgloveViews
 from services.recorder.schema import Schema
 from tests.recorder import samples
 
@@ -16,8 +16,8 @@ VEHICLE = Vehicle(length=1.0, width=0.6)
 AT_NS = 1_700_000_000_250_000_000
 
 
-def drawn(message: Message, service: str = "") -> dict[str, tuple[Schema, dict[str, Any]]]:
-    views = Views(VEHICLE).of(message, service, AT_NS)
+def views_of(message: Message, service: str = "") -> dict[str, tuple[Schema, dict[str, Any]]]:
+    views = FoxgloveViews(VEHICLE).of(message, service, AT_NS)
     return {topic: (kind, fields) for topic, kind, fields in views}
 
 
@@ -25,15 +25,15 @@ def drawn(message: Message, service: str = "") -> dict[str, tuple[Schema, dict[s
     "message",
     [samples.odometry(), samples.ultrasonic(), Event(name="a", level="info", text="b")],
 )
-def test_each_has_what_its_schema_says(message: Message) -> None:
-    assert drawn(message)
-    for kind, fields in drawn(message).values():
+def test_views_match_their_schemas(message: Message) -> None:
+    assert views_of(message)
+    for kind, fields in views_of(message).values():
         assert fields.keys() == msgspec.json.decode(kind.data)["properties"].keys()
         assert fields["timestamp"] == {"sec": 1_700_000_000, "nsec": 250_000_000}
 
 
-def test_the_pose_is_turned_by_its_heading() -> None:
-    made = drawn(samples.odometry(x=3.0, heading=math.pi / 2))
+def test_pose_orientation_follows_the_heading() -> None:
+    made = views_of(samples.odometry(x=3.0, heading=math.pi / 2))
     pose = made["foxglove/pose"][1]["pose"]
     assert pose["position"] == {"x": 3.0, "y": 2.0, "z": 0.0}
     half = math.sqrt(0.5)
@@ -43,8 +43,8 @@ def test_the_pose_is_turned_by_its_heading() -> None:
     assert (transform["translation"], transform["rotation"]) == tuple(pose.values())
 
 
-def test_covariances_are_of_x_y_and_the_turn() -> None:
-    fields = drawn(samples.odometry())["foxglove/odometry"][1]
+def test_covariances_of_x_y_and_yaw() -> None:
+    fields = views_of(samples.odometry())["foxglove/odometry"][1]
     assert fields["linear_velocity"]["x"] == 0.5
     assert fields["angular_velocity"]["z"] == -0.25
     pose = fields["pose_covariance"]
@@ -55,12 +55,12 @@ def test_covariances_are_of_x_y_and_the_turn() -> None:
     assert (sum(pose), sum(twist), len(pose), len(twist)) == (45.0, 46.0, 36, 36)
 
 
-def test_a_pose_that_is_no_number_is_not_drawn() -> None:
-    assert drawn(samples.odometry(x=math.nan)) == {}
+def test_a_non_finite_pose_has_no_view() -> None:
+    assert views_of(samples.odometry(x=math.nan)) == {}
 
 
-def test_each_sonar_is_a_scan_where_it_sits() -> None:
-    made = drawn(samples.ultrasonic())
+def test_each_sonar_is_a_scan_at_its_mounting_position() -> None:
+    made = views_of(samples.ultrasonic())
     assert list(made) == [f"foxglove/sonar/{name}" for name in SONAR_NAMES]
     left = made["foxglove/sonar/left"][1]
     assert left["pose"]["position"] == {"x": 0.0, "y": 0.3, "z": 0.0}
@@ -69,12 +69,12 @@ def test_each_sonar_is_a_scan_where_it_sits() -> None:
     assert made["foxglove/sonar/front_left"][1]["ranges"] == []
 
 
-def test_an_event_is_a_line_of_the_log() -> None:
+def test_an_event_is_a_log_entry() -> None:
     event = Event(name="contact", level="error", text="the bumper is hit")
-    line = drawn(event, "bridge")["foxglove/log"][1]
+    line = views_of(event, "bridge")["foxglove/log"][1]
     assert (line["level"], line["name"]) == (4, "bridge")
     assert line["message"] == "contact: the bumper is hit"
 
 
-def test_the_rest_is_not_drawn() -> None:
-    assert drawn(samples.velocity()) == {}
+def test_other_messages_have_no_view() -> None:
+    assert views_of(samples.velocity()) == {}

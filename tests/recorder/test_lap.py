@@ -1,9 +1,8 @@
-"""The kept recording: its raw frames, played to a real bridge, make the same messages again.
+"""Replay of the reference recording: its raw frames yield the same messages on a real bridge.
 
-What is compared: every field of every message that is made of one frame. What is not: the header,
-which is of the sender and the moment; link, switches and events, which tell of the way to the board
-and of the bridge's own doing; and the first two samples of the bumper, because a bridge that has
-just started takes three clear ones for one.
+The test compares every field of each message that is decoded from one frame. It ignores the header,
+which depends on sender and time; link, switches and events, which depend on the connection and on
+the bridge's state; and the first two bumper samples, because a new bridge filters three clear ones.
 """
 
 from collections import defaultdict
@@ -34,14 +33,14 @@ FIRST_CLEAR = BumperFilter.CLEAR_SAMPLES - 1
 
 
 def body(message: Message) -> dict[str, Any]:
-    """Return a message without its header, and without what depends on when polls were sent."""
+    """Return the fields of a message without its header and without poll losses."""
     fields = msgspec.structs.asdict(message)
     return {name: value for name, value in fields.items() if name not in (*HEADER, "lost")}
 
 
 @cache
 def recorded() -> dict[str, list[dict[str, Any]]]:
-    """Return what was recorded of each stream."""
+    """Return the recorded messages of each stream."""
     found: dict[str, list[dict[str, Any]]] = defaultdict(list)
     with Reader(KEPT) as reader:
         for each in reader:
@@ -53,14 +52,14 @@ def recorded() -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def test_it_is_worth_playing() -> None:
+def test_the_recording_covers_every_stream() -> None:
     assert KEPT.stat().st_size < 300_000
     assert set(recorded()) == set(STREAMS)
     assert max(each["linear"] for each in recorded()["velocity"]) > 0.3
     assert {each["pressed"] for each in recorded()["bumper"]} == {False, True}
 
 
-def test_every_frame_is_one_of_the_board_s() -> None:
+def test_every_raw_frame_is_valid() -> None:
     framing, frames = Framing(), 0
     with Reader(KEPT) as reader:
         for each in reader:
@@ -73,11 +72,11 @@ def test_every_frame_is_one_of_the_board_s() -> None:
 
 
 @pytest.fixture
-def heard(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]]]]:
-    """A real bridge, and what it says of each stream."""
+def published(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]]]]:
+    """A real bridge, and the messages that it publishes on each stream."""
     found: dict[str, list[dict[str, Any]]] = defaultdict(list)
     board, links = Board(), list[Message]()
-    board.sock.close()  # its place is the replay's
+    board.sock.close()  # the replay takes its port
 
     def take(arrival: Arrival[Any]) -> None:
         found[arrival.key.partition("/tel/bridge/")[2]].append(body(arrival.message))
@@ -97,10 +96,10 @@ def heard(endpoint: str) -> Iterator[tuple[Board, dict[str, list[dict[str, Any]]
         yield board, found
 
 
-def test_the_frames_make_the_same_messages(
-    heard: tuple[Board, dict[str, list[dict[str, Any]]]],
+def test_replayed_frames_yield_the_same_messages(
+    published: tuple[Board, dict[str, list[dict[str, Any]]]],
 ) -> None:
-    board, found = heard
+    board, found = published
     ports = f"board.listen_ports={board.ports}"
     where = ["--set", f"board.port={board.address[1]}", "--set", ports]
     assert main(["replay", str(KEPT), "--frames", "--rate", "2", *where]) == 0

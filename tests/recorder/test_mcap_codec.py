@@ -1,4 +1,4 @@
-"""Samples to JSON and back to the very bytes."""
+"""Round trip of samples through JSON."""
 
 import math
 
@@ -12,20 +12,20 @@ from common.errors import MessageError
 from common.messages import Velocity
 from common.sample import Sample
 from common.settings import Vehicle
-from services.recorder.mcap_codec import JSON, Channel, Entry, Translator, to_sample
+from services.recorder.mcap_codec import JSON, Channel, Encoder, Entry, decode_sample
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
 
-TRANSLATOR = Translator(Vehicle())
+ENCODER = Encoder(Vehicle())
 VELOCITY = "tel/bridge/velocity"
 
 
 def entry(it: Sample) -> Entry:
-    """Return the message itself, without what is drawn of it."""
-    return next(TRANSLATOR.entries(it, it.wall_ns))
+    """Return the message without its views."""
+    return next(ENCODER.entries(it, it.wall_ns))
 
 
-def test_a_message_is_plain_json_with_its_schema() -> None:
+def test_a_message_is_json_with_its_schema() -> None:
     made = entry(sample(VELOCITY, samples.velocity(seq=2**32 + 7)))
     assert msgspec.json.decode(made.data, type=Velocity) == samples.velocity(seq=2**32 + 7)
     assert set(msgspec.json.decode(made.data)) == set(Velocity.__struct_fields__)
@@ -55,27 +55,27 @@ def test_a_message_is_plain_json_with_its_schema() -> None:
         bare("tel/mine", msgspec.msgpack.encode({"_raw": "mine"})),
         bare("tel/mine", msgspec.msgpack.encode({"x": msgspec.msgpack.Ext(5, b"x")})),
         bare("tel/mine", b"\x81\xa1a\xca\x3f\x80\x00\x00"),  # a float of 32 bits
-        bare("tel/mine", b"\xdf\x00\x00\x00\x00"),  # an empty map, said at length
-        bare("tel/mine", b"\x91" * 3000 + b"\x90"),  # deeper than anybody reads
+        bare("tel/mine", b"\xdf\x00\x00\x00\x00"),  # an empty map with a long header
+        bare("tel/mine", b"\x91" * 3000 + b"\x90"),  # deeper than the recursion limit
         bare(VELOCITY, b"\xc1", codec.encoding(Velocity)),
     ],
     ids=repr,
 )
-def test_the_very_bytes_come_back(it: Sample) -> None:
-    back = to_sample(entry(it))
+def test_round_trip_restores_the_bytes(it: Sample) -> None:
+    back = decode_sample(entry(it))
     assert (back.key, back.payload, back.encoding) == (it.key, it.payload, it.encoding)
     assert (back.raw, back.deleted) == (it.raw, it.deleted)
     assert back.wall_ns == it.wall_ns
 
 
 @given(payload=st.binary(max_size=60), raw=st.none() | st.binary(max_size=9), deleted=st.booleans())
-def test_any_bytes_come_back(payload: bytes, raw: bytes | None, deleted: bool) -> None:
+def test_round_trip_of_arbitrary_bytes(payload: bytes, raw: bytes | None, deleted: bool) -> None:
     for encoding in ("", JSON, codec.encoding(Velocity)):
-        back = to_sample(entry(bare("tel/mine", payload, encoding, raw=raw, deleted=deleted)))
+        back = decode_sample(entry(bare("tel/mine", payload, encoding, raw=raw, deleted=deleted)))
         assert (back.payload, back.raw, back.deleted) == (payload, raw, deleted)
 
 
-def test_bytes_stand_beside_the_fields_only_where_they_are_needed() -> None:
+def test_payload_is_stored_only_if_needed() -> None:
     plain = entry(sample(VELOCITY, samples.velocity()))
     odd = entry(sample(VELOCITY, samples.velocity(math.nan)))
     assert b"_payload" not in plain.data
@@ -83,32 +83,32 @@ def test_bytes_stand_beside_the_fields_only_where_they_are_needed() -> None:
     assert b"_payload" in odd.data
 
 
-def test_what_is_none_of_ours_has_no_schema() -> None:
+def test_foreign_messages_have_no_schema() -> None:
     made = entry(bare("tel/mine", msgspec.msgpack.encode({"celsius": 21.5}), "application/msgpack"))
     assert made.channel.schema is None
     assert msgspec.json.decode(made.data) == {"celsius": 21.5}
 
 
 @pytest.mark.parametrize("wrong", [{"t_ns": -1, "seq": "x"}, {"t_ns": 2**63, "seq": -1}, {}])
-def test_a_header_that_a_file_cannot_hold_is_left_out(wrong: dict[str, object]) -> None:
+def test_invalid_header_fields_are_replaced(wrong: dict[str, object]) -> None:
     made = entry(bare("tel/mine", msgspec.msgpack.encode(wrong)))
     assert (made.publish_ns, made.sequence) == (BEGIN_NS, 0)
 
 
-def test_what_is_drawn_follows_and_is_marked() -> None:
+def test_views_follow_the_message_and_are_marked() -> None:
     it = sample("evt/safety", samples.state())
-    assert [each.channel.drawn for each in TRANSLATOR.entries(it, 5)] == [False]
+    assert [each.channel.is_view for each in ENCODER.entries(it, 5)] == [False]
     it = sample("tel/odom/odometry", samples.odometry())
-    assert [each.channel.drawn for each in TRANSLATOR.entries(it, 5)] == [False, True, True, True]
+    assert [each.channel.is_view for each in ENCODER.entries(it, 5)] == [False, True, True, True]
 
 
-def test_a_damaged_message_is_kept_and_not_drawn() -> None:
+def test_an_invalid_message_is_stored_without_views() -> None:
     it = bare("tel/odom/odometry", b"\x81\xa1x\x05", codec.encoding(type(samples.odometry())))
-    (only,) = TRANSLATOR.entries(it, 5)
+    (only,) = ENCODER.entries(it, 5)
     assert msgspec.json.decode(only.data) == {"x": 5}
 
 
 @pytest.mark.parametrize("data", [b"[]", b"{", b'{"_payload": "?"}', b'{"_raw": 5}'])
-def test_what_the_recorder_never_wrote_is_refused(data: bytes) -> None:
-    with pytest.raises(MessageError, match="no message of the recorder"):
-        to_sample(Entry(Channel("a/key", None), data, 0, 0))
+def test_foreign_entries_are_rejected(data: bytes) -> None:
+    with pytest.raises(MessageError, match="not written by the recorder"):
+        decode_sample(Entry(Channel("a/key", None), data, 0, 0))

@@ -1,4 +1,4 @@
-"""Files, whole and cut at any place."""
+"""Reading of complete, truncated and damaged files."""
 
 from pathlib import Path
 
@@ -9,20 +9,20 @@ from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.messages import Odometry, Velocity
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Translator
-from services.recorder.reader import Reader, Recorded
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.reader import Reader, RecordedMessage
+from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
 
-TRANSLATOR = Translator(Vehicle())
+ENCODER = Encoder(Vehicle())
 CHUNKS, EACH = 5, 20
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A whole file of a few chunks."""
-    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {"robot": "001"})
+    """A complete file of a few chunks."""
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {"robot": "001"})
     for number in range(CHUNKS * EACH):
         made.write(
             sample("tel/bridge/velocity", samples.velocity(number, number), number / 50, b"frame")
@@ -33,12 +33,12 @@ def path(tmp_path: Path) -> Path:
     return made.path
 
 
-def read(path: Path) -> tuple[list[Recorded], Reader]:
+def read(path: Path) -> tuple[list[RecordedMessage], Reader]:
     with Reader(path) as reader:
         return list(reader), reader
 
 
-def test_what_was_written_is_read(path: Path) -> None:
+def test_read_what_was_written(path: Path) -> None:
     found, reader = read(path)
     assert [each.sample.raw for each in found] == [b"frame"] * CHUNKS * EACH
     assert [each.message for each in found] == [
@@ -52,8 +52,8 @@ def test_what_was_written_is_read(path: Path) -> None:
     assert (reader.cut, reader.damaged, reader.readable) == (False, 0, path.stat().st_size)
 
 
-def test_other_tools_find_an_index_and_drawn_topics(tmp_path: Path) -> None:
-    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+def test_files_have_an_index_and_view_topics(tmp_path: Path) -> None:
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
     made.write(sample("tel/odom/odometry", samples.odometry()))
     made.write(bare("tel/mine", b"\x80"))
     made.close()
@@ -77,7 +77,7 @@ def test_other_tools_find_an_index_and_drawn_topics(tmp_path: Path) -> None:
     assert found[1].message is None
 
 
-def test_wherever_it_is_cut_all_before_is_read(path: Path, tmp_path: Path) -> None:
+def test_a_truncated_file_is_readable_up_to_the_truncation(path: Path, tmp_path: Path) -> None:
     whole, part = path.read_bytes(), tmp_path / "part.mcap"
     counts = []
     for end in range(200, len(whole) - 8, 97):
@@ -92,7 +92,7 @@ def test_wherever_it_is_cut_all_before_is_read(path: Path, tmp_path: Path) -> No
     assert {0, EACH, CHUNKS * EACH} <= set(counts)
 
 
-def test_a_damaged_chunk_is_left_out(path: Path) -> None:
+def test_a_damaged_chunk_is_skipped(path: Path) -> None:
     whole = bytearray(path.read_bytes())
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
@@ -106,20 +106,20 @@ def test_a_damaged_chunk_is_left_out(path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP", b"no such file at all", b"\x00" * 99])
-def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_other_files_are_rejected(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
-    with pytest.raises(RobotError, match=r"x\.mcap: is no MCAP file"):
+    with pytest.raises(RobotError, match=r"x\.mcap: is not an MCAP file"):
         read(path)
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=r"gone\.mcap: cannot be read: No such file"):
         Reader(tmp_path / "gone.mcap")
 
 
-def test_the_time_of_a_file_does_not_jump_with_the_clock(tmp_path: Path) -> None:
-    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+def test_log_times_ignore_clock_steps(tmp_path: Path) -> None:
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
     first, second = (sample("tel/x", samples.velocity(), at_s) for at_s in (0.0, 1.0))
     made.write(first)
     stepped = {name: getattr(second, name) for name in second.__struct_fields__} | {"wall_ns": 5}
@@ -128,13 +128,13 @@ def test_the_time_of_a_file_does_not_jump_with_the_clock(tmp_path: Path) -> None
     assert [each.log_ns for each in read(made.path)[0]] == [BEGIN_NS, BEGIN_NS + NS_PER_S]
 
 
-def test_a_file_that_is_there_is_not_written_over(path: Path) -> None:
+def test_an_existing_file_is_not_overwritten(path: Path) -> None:
     with pytest.raises(FileExistsError):
-        Recording(path, TRANSLATOR, {})
+        RecordingWriter(path, ENCODER, {})
 
 
-def test_a_message_that_is_not_as_it_should_be_is_none(tmp_path: Path) -> None:
-    made = Recording(tmp_path / "a.mcap", TRANSLATOR, {})
+def test_an_invalid_message_is_none(tmp_path: Path) -> None:
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
     it = sample("tel/bridge/velocity", samples.velocity())
     made.write(bare("tel/bridge/velocity", b"\x80", it.encoding))
     made.close()

@@ -1,4 +1,4 @@
-"""Schemas that Foxglove's reader takes."""
+"""Schemas that Foxglove supports."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -8,14 +8,14 @@ import pytest
 
 from common.messages import Event, Health, Link, Message, SafetyState
 from services.recorder import schema
-from services.recorder.mcap_codec import KINDS
+from services.recorder.mcap_codec import MESSAGE_TYPES
 
-DRAWN = (schema.POSE, schema.ODOMETRY, schema.TRANSFORM, schema.SCAN, schema.LOG)
-ALL = [schema.of_message(kind) for kind in KINDS.values()] + list(DRAWN)
+VIEWS = (schema.POSE, schema.ODOMETRY, schema.TRANSFORM, schema.SCAN, schema.LOG)
+ALL = [schema.of_message(kind) for kind in MESSAGE_TYPES.values()] + list(VIEWS)
 
 
 def parts(table: dict[str, Any], inside: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield every schema within a schema, as the reader comes by them."""
+    """Yield every schema within a schema, depth first."""
     yield inside, table
     for name, part in table.get("properties", {}).items():
         yield from parts(part, f"{inside}.{name}")
@@ -24,7 +24,7 @@ def parts(table: dict[str, Any], inside: str = "") -> Iterator[tuple[str, dict[s
 
 
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
-def test_nothing_in_it_that_the_reader_refuses(one: schema.Schema) -> None:
+def test_schemas_use_only_what_foxglove_supports(one: schema.Schema) -> None:
     whole = msgspec.json.decode(one.data)
     assert whole["type"] == "object"
     for where, part in parts(whole):
@@ -35,19 +35,19 @@ def test_nothing_in_it_that_the_reader_refuses(one: schema.Schema) -> None:
 
 
 @pytest.mark.parametrize("kind", [SafetyState, Link, Health, Event])
-def test_every_field_is_in_it(kind: type[Message]) -> None:
+def test_schemas_contain_every_field(kind: type[Message]) -> None:
     whole = msgspec.json.decode(schema.of_message(kind).data)
     assert list(whole["properties"]) == [field.name for field in msgspec.structs.fields(kind)]
 
 
-def test_what_may_be_missing_is_said_to_be_what_it_is() -> None:
+def test_optional_fields_have_their_non_null_type() -> None:
     whole = msgspec.json.decode(schema.of_message(Link).data)
     assert whole["properties"]["round_trip"] == {"type": "number"}
     assert whole["properties"]["state"] == {"type": "string"}
 
 
-def test_drawn_ones_have_the_name_that_panels_look_for() -> None:
-    assert {one.name for one in DRAWN} == {
+def test_views_have_foxglove_schema_names() -> None:
+    assert {one.name for one in VIEWS} == {
         "foxglove.PoseInFrame", "foxglove.Odometry", "foxglove.FrameTransform",
         "foxglove.LaserScan", "foxglove.Log",
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""The recorder on a real bus: what it writes, when it stops, and what kill -9 leaves."""
+"""The recorder on a real bus: recordings, disk errors and SIGKILL."""
 
 import errno
 import shutil
@@ -21,9 +21,9 @@ from common.freshness import NS_PER_S
 from common.messages import Event
 from common.service import Node
 from services.recorder.config import MB, RecorderConfig
-from services.recorder.reader import Reader, Recorded
+from services.recorder.reader import Reader, RecordedMessage
 from services.recorder.recorder import Recorder
-from services.recorder.writer import Recording
+from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import Rig, until_heard
 from tests.recorder import samples
@@ -54,8 +54,8 @@ def recorder(rig: Rig, folder: Path, *more: str) -> Iterator[None]:
     node.bus.close()
 
 
-def told(rig: Rig) -> list[Event]:
-    """Return what the recorder tells, from now on and before."""
+def recorder_events(rig: Rig) -> list[Event]:
+    """Return the recorder's events, also earlier ones."""
     found: list[Event] = []
     rig.bus(
         lambda bus: bus.subscribe(
@@ -65,12 +65,12 @@ def told(rig: Rig) -> list[Event]:
     return found
 
 
-def read(folder: Path) -> list[Recorded]:
-    """Return what is in all files, in order."""
-    found: list[Recorded] = []
+def read(folder: Path) -> list[RecordedMessage]:
+    """Return the messages of all files, in order."""
+    found: list[RecordedMessage] = []
     for path in sorted(folder.glob("*.mcap")):
         if not path.stat().st_size:
-            continue  # begun this moment
+            continue  # just created
         with Reader(path) as reader:
             found += reader
     return found
@@ -82,11 +82,11 @@ def is_whole(path: Path) -> bool:
     return bool(found) and not reader.cut
 
 
-def paths(found: list[Recorded]) -> set[str]:
+def paths(found: list[RecordedMessage]) -> set[str]:
     return {each.key.split("/", 3)[3] for each in found}
 
 
-def test_every_key_is_recorded_raw_frames_too(rig: Rig, tmp_path: Path) -> None:
+def test_every_key_is_recorded_with_raw_frames(rig: Rig, tmp_path: Path) -> None:
     stranger = rig.session()
     root = f"t2/v1/{rig.robot}"
     with recorder(rig, tmp_path, "recorder.everything=true"):
@@ -108,8 +108,8 @@ def test_every_key_is_recorded_raw_frames_too(rig: Rig, tmp_path: Path) -> None:
     assert "t2/v1/another/tel/x" not in found
 
 
-def test_a_latch_writes_what_was_before_it(rig: Rig, tmp_path: Path) -> None:
-    events, numbers = told(rig), count()
+def test_a_latch_writes_the_black_box(rig: Rig, tmp_path: Path) -> None:
+    events, numbers = recorder_events(rig), count()
     latched: list[str] = []
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
@@ -135,8 +135,8 @@ def test_a_latch_writes_what_was_before_it(rig: Rig, tmp_path: Path) -> None:
     assert reader.about["why"] == "latch-contact"
 
 
-def test_no_room_is_told_and_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
-    events = told(rig)
+def test_without_room_nothing_is_written(rig: Rig, tmp_path: Path) -> None:
+    events = recorder_events(rig)
     latched: list[str] = []
     pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     all_of_it = "recorder.free=1000000"  # a terabyte
@@ -153,7 +153,7 @@ def test_no_room_is_told_and_nothing_is_written(rig: Rig, tmp_path: Path) -> Non
     assert "recorder.free is 1e+06" in full.text
 
 
-def test_an_incident_is_written_though_old_recordings_fill_the_disk(
+def test_an_incident_replaces_old_recordings_on_a_full_disk(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stem = f"{rig.robot}-2026"
@@ -167,7 +167,7 @@ def test_an_incident_is_written_though_old_recordings_fill_the_disk(
         return SimpleNamespace(free=15.5 * MB - used)
 
     monkeypatch.setattr(shutil, "disk_usage", usage)
-    events = told(rig)
+    events = recorder_events(rig)
     latched: list[str] = []
     pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     with recorder(rig, tmp_path, "recorder.free=12", "recorder.tail=1"):
@@ -181,12 +181,12 @@ def test_an_incident_is_written_though_old_recordings_fill_the_disk(
     left = {each.name for each in tmp_path.glob("*.mcap")} - {path.name}
     assert left == {old[2], old[3], old[5]}
     (removed,) = (each for each in events if each.name == "recordings_removed")
-    assert removed.text == "3 of the oldest recordings removed for 3 MB of room"
+    assert removed.text == "3 of the oldest recordings removed to free 3 MB"
     assert removed.about == {"first": old[0]}
     assert not {"disk_full", "black_box_lost"} & {each.name for each in events}
 
 
-def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
+def test_sigkill_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
     numbers = count(1)
     put: list[m.Velocity] = []
 
@@ -216,7 +216,7 @@ def test_kill_9_loses_at_most_a_second(rig: Rig, tmp_path: Path) -> None:
     assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * held_up_s
 
 
-def test_what_safety_says_wrongly_is_recorded_and_not_believed(rig: Rig, tmp_path: Path) -> None:
+def test_an_invalid_safety_state_is_recorded_and_ignored(rig: Rig, tmp_path: Path) -> None:
     stranger, key = rig.session(), keys.SAFETY.on(rig.robot)
     with recorder(rig, tmp_path, "recorder.everything=true"):
         until_heard(
@@ -227,18 +227,18 @@ def test_what_safety_says_wrongly_is_recorded_and_not_believed(rig: Rig, tmp_pat
     assert all(each.message is None for each in read(tmp_path) if each.key == key)
 
 
-def test_a_disk_that_refuses_ends_the_file_and_nothing_else(
+def test_a_disk_error_ends_the_file_and_nothing_else(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    events, numbers = told(rig), count()
+    events, numbers = recorder_events(rig), count()
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
 
-    def refuse(_: Recording) -> None:
+    def refuse(_: RecordingWriter) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with recorder(rig, tmp_path, "recorder.everything=true"):
         wait_until(lambda: read(tmp_path), "a recording")
-        monkeypatch.setattr(Recording, "flush", refuse)
+        monkeypatch.setattr(RecordingWriter, "flush", refuse)
         wait_until(lambda: "disk_full" in [each.name for each in events], "the event")
         monkeypatch.undo()
         (path,) = tmp_path.glob("*.mcap")
@@ -248,7 +248,7 @@ def test_a_disk_that_refuses_ends_the_file_and_nothing_else(
     assert "No space left on device" in full.text
 
 
-def test_t2_record_writes_whole_files_until_ctrl_c(rig: Rig, tmp_path: Path) -> None:
+def test_t2_record_completes_its_files_on_ctrl_c(rig: Rig, tmp_path: Path) -> None:
     numbers = count()
     pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     where = ["--set", f"bus.connect={rig.endpoint}", "--set", "recorder.free=1"]

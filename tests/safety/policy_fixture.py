@@ -23,7 +23,7 @@ from common.messages import (
 )
 from common.settings import Vehicle
 from services.safety.config import Safety
-from services.safety.inputs import Ask, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
 from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.report import state_message
@@ -51,7 +51,7 @@ def link(state: str = "up", armed: bool = True) -> Link:
     )
 
 
-class Scene:
+class PolicyFixture:
     """All streams come at every tick unless they are muted; the vehicle moves as commanded."""
 
     def __init__(self, settings: Safety | None = None) -> None:
@@ -73,11 +73,11 @@ class Scene:
         self.left_bits, self.right_bits = 0, 0
         self.switches = Switches(ultrasonic_brake=True, bumper_brake=True)
         self.link = link()
-        self.reader = True
+        self.estop_session_up = True
         self.decide()  # a service decides before anything has come
 
     def decide(self, event: Event | None = None) -> Verdict:
-        inputs = replace(self.inputs, reader=self.reader, event=event)
+        inputs = replace(self.inputs, estop_session_up=self.estop_session_up, event=event)
         self.state, self.verdict = self.policy.decide(self.state, inputs, self.now_ns)
         return self.verdict
 
@@ -128,7 +128,7 @@ class Scene:
             seq=self.driver_seq,
             boot=self.driver_boot,
         )
-        return self.decide(Ask(source, drive, self.now_ns))
+        return self.decide(DriveRequest(source, drive, self.now_ns))
 
     def drive(
         self,
@@ -137,20 +137,20 @@ class Scene:
         seconds: float = 0.2,
         source: str = "teleop",
     ) -> Verdict:
-        """Ask the same at every tick for a while."""
+        """DriveRequest the same at every tick for a while."""
         for _ in range(round(seconds / TICK_S)):
             self.tick()
             self.ask(linear, angular, source)
         return self.verdict
 
-    def ready(self) -> "Scene":
+    def ready(self) -> "PolicyFixture":
         """Come up and let the driver be neutral."""
         self.tick(40)
         self.drive()
         assert self.verdict.command == "run", self.state.latches
         return self
 
-    def running(self, linear: float = 0.5, angular: float = 0.0) -> "Scene":
+    def running(self, linear: float = 0.5, angular: float = 0.0) -> "PolicyFixture":
         """Come up and drive."""
         self.ready().drive(linear, angular, 2.0)
         assert self.verdict.command == "run", self.state.latches
@@ -166,7 +166,7 @@ class Scene:
         return tuple(self.state.latches[name].id for name in latched(self.state.latches))
 
     def reset(self, *causes: int, echo: int | None = None) -> str:
-        """Ask to reset these causes, all by default; return the reason of a refusal."""
+        """DriveRequest to reset these causes, all by default; return the reason of a refusal."""
         reply = self.decide(Reset(echo or self.echo, causes or self.latched())).reply
         assert reply
         return "" if reply.done else reply.text
@@ -182,7 +182,7 @@ class Scene:
         assert reply
         return "" if reply.done else reply.text
 
-    def tell(self) -> SafetyState:
+    def published(self) -> SafetyState:
         """Return the published state."""
         return state_message(self.policy, self.state, self.now_ns)
 
@@ -199,12 +199,12 @@ class Scene:
         self.ranges, self.status = tuple(ranges), tuple(status)
 
 
-def hit() -> Scene:
+def hit() -> PolicyFixture:
     """Drive forward into something and stand there, pressed."""
-    scene = Scene().running()
-    scene.pressed = True
-    scene.tick()
-    scene.linear = 0.0
-    scene.tick(40)
-    scene.linear = None
-    return scene
+    fixture = PolicyFixture().running()
+    fixture.pressed = True
+    fixture.tick()
+    fixture.linear = 0.0
+    fixture.tick(40)
+    fixture.linear = None
+    return fixture

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
-from services.safety.arbiter import RIVAL_NS, Arbiter, Channel
+from common.motion import Twist
+from services.safety.arbiter import CONFLICT_NS, Arbiter, Channel
 from services.safety.config import Safety
-from services.safety.inputs import Ask
-from services.safety.twist import Twist
+from services.safety.inputs import DriveRequest
 
 SOURCES = Safety().sources
 AGE_NS = 400_000_000
@@ -31,7 +31,7 @@ def ask(
     echo: int = 41,
 ) -> tuple[Arbiter, str]:
     drive = Drive(linear=linear, angular=0.0, echo=echo, seq=seq, boot=boot)
-    return arbiter.take(Ask(source, drive, now_ns), BEAT, AGE_NS, now_ns)
+    return arbiter.accept(DriveRequest(source, drive, now_ns), BEAT, AGE_NS, now_ns)
 
 
 def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: float = 0.0) -> Arbiter:
@@ -44,7 +44,7 @@ def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: floa
 def test_no_number_no_motion(linear: float) -> None:
     assert ask(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
     wrong = Drive(linear=0.0, angular=linear, echo=41)
-    assert Arbiter(SOURCES).take(Ask("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
+    assert Arbiter(SOURCES).accept(DriveRequest("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
 
 def test_unknown_sources_and_nonsense_are_refused() -> None:
     assert ask(Arbiter(SOURCES), 0, source="nobody") == (Arbiter(SOURCES), "unknown_source")
-    assert Arbiter(SOURCES).take(Ask("web", None), BEAT, AGE_NS, 0)[1] == "not_a_request"
+    assert Arbiter(SOURCES).accept(DriveRequest("web", None), BEAT, AGE_NS, 0)[1] == "not_a_request"
 
 
 def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
@@ -77,14 +77,14 @@ def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
     arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
     refused, reason = ask(arbiter, lease_ns, boot=2)
     assert reason == "second_publisher"
-    assert refused.rivals(lease_ns + RIVAL_NS - 1) == "teleop"
-    assert refused.rivals(lease_ns + RIVAL_NS) == ""
+    assert refused.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"
+    assert refused.conflicts(lease_ns + CONFLICT_NS) == ""
     taken, reason = ask(arbiter, lease_ns + 1, boot=2)
     assert reason == ""
     assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
     taken, reason = ask(refused, lease_ns + 1, boot=2)
     assert reason == ""
-    assert taken.rivals(lease_ns + RIVAL_NS - 1) == "teleop"  # the first may still be there
+    assert taken.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"  # the first may still be there
 
 
 @pytest.mark.parametrize("seq", [0, 1, 9])
@@ -98,14 +98,14 @@ def test_a_new_boot_counts_anew(seq: int) -> None:
 
 def test_the_wish_is_what_was_asked_for() -> None:
     arbiter, _ = ask(Arbiter(SOURCES), 0)
-    assert not arbiter.asks_to_move(0)
+    assert not arbiter.requests_motion(0)
     for linear, angular in ((0.1, -0.2), (0.0, 0.3), (0.4, 0.0)):
         drive = Drive(
             linear=linear, angular=angular, echo=41, boot=1, seq=arbiter.channels["teleop"].seq + 1
         )
-        arbiter, refused = arbiter.take(Ask("teleop", drive), BEAT, AGE_NS, 0)
-        assert (arbiter.channels["teleop"].wish, refused) == (Twist(linear, angular), "")
-        assert arbiter.asks_to_move(0)
+        arbiter, refused = arbiter.accept(DriveRequest("teleop", drive), BEAT, AGE_NS, 0)
+        assert (arbiter.channels["teleop"].requested, refused) == (Twist(linear, angular), "")
+        assert arbiter.requests_motion(0)
 
 
 def test_all_rivals_are_named() -> None:
@@ -113,17 +113,17 @@ def test_all_rivals_are_named() -> None:
     for source in ("teleop", "web"):
         arbiter = accepted(arbiter, 0, source)
         arbiter, _ = ask(arbiter, 0, source=source, boot=2)
-    assert arbiter.rivals(0) == "teleop, web"
+    assert arbiter.conflicts(0) == "teleop, web"
 
 
 def test_a_source_is_at_first_unheard() -> None:
     assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False, "")
-    assert RIVAL_NS == 500_000_000
+    assert CONFLICT_NS == 500_000_000
 
 
 def test_an_absent_driver_is_none() -> None:
-    assert Arbiter(SOURCES).driver(0) is None
-    assert Arbiter(SOURCES).rivals(0) == ""
+    assert Arbiter(SOURCES).in_control(0) is None
+    assert Arbiter(SOURCES).conflicts(0) == ""
 
 
 def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
@@ -134,22 +134,22 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
     arbiter = arbiter.disarmed()
     assert arbiter.channels["teleop"].neutral is False
     assert not arbiter.armed(NS_PER_S).channels["teleop"].neutral
-    assert arbiter.asks_to_move(0)
-    assert not arbiter.asks_to_move(NS_PER_S)
+    assert arbiter.requests_motion(0)
+    assert not arbiter.requests_motion(NS_PER_S)
 
 
 def test_a_lease_counts_from_the_reception() -> None:
     drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
     lease_ns, late_ns = round(SOURCES["teleop"].lease * NS_PER_S), 100_000_000
-    arbiter, _ = Arbiter(SOURCES).take(Ask("teleop", drive, 5), BEAT, AGE_NS, late_ns)
-    assert arbiter.driver(5 + lease_ns) == "teleop"
-    assert arbiter.driver(5 + lease_ns + 1) is None
+    arbiter, _ = Arbiter(SOURCES).accept(DriveRequest("teleop", drive, 5), BEAT, AGE_NS, late_ns)
+    assert arbiter.in_control(5 + lease_ns) == "teleop"
+    assert arbiter.in_control(5 + lease_ns + 1) is None
     assert not arbiter.armed(5 + lease_ns + 1).channels["teleop"].neutral
     # As does the time of a second publisher.
     other = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=2)
-    arbiter, refused = arbiter.take(Ask("teleop", other, 6), BEAT, AGE_NS, late_ns)
-    assert (refused, arbiter.rivals(6 + RIVAL_NS)) == ("second_publisher", "")
-    _, refused = arbiter.take(Ask("teleop", other, 6 + lease_ns), BEAT, AGE_NS, 7)
+    arbiter, refused = arbiter.accept(DriveRequest("teleop", other, 6), BEAT, AGE_NS, late_ns)
+    assert (refused, arbiter.conflicts(6 + CONFLICT_NS)) == ("second_publisher", "")
+    _, refused = arbiter.accept(DriveRequest("teleop", other, 6 + lease_ns), BEAT, AGE_NS, 7)
     assert refused == ""
 
 
@@ -192,12 +192,12 @@ def test_the_best_fresh_source_drives_whatever_comes(
         now_ns += pause_ms * 1_000_000
         beat = beat.beat(now_ns)
         drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
-        arbiter, refused = arbiter.take(Ask(source, drive, now_ns), beat, AGE_NS, now_ns)
+        arbiter, refused = arbiter.accept(DriveRequest(source, drive, now_ns), beat, AGE_NS, now_ns)
         assert refused == ("" if source in SOURCES else "unknown_source")
         if not refused:
             last[source] = (now_ns, linear)
         fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * NS_PER_S]
         best = max(fresh, key=lambda n: SOURCES[n].priority, default=None)
-        assert arbiter.driver(now_ns) == best
+        assert arbiter.in_control(now_ns) == best
         if best:
-            assert arbiter.channels[best].wish == Twist(last[best][1], 0.0)
+            assert arbiter.channels[best].requested == Twist(last[best][1], 0.0)

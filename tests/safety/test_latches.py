@@ -2,9 +2,12 @@
 
 import pytest
 
+from common.freshness import NS_PER_S
 from services.safety.causes import RULES, severity, wants_neutral
 from services.safety.latches import (
+    FAILURES,
     GOOD_SAMPLES,
+    FaultBudget,
     Held,
     Latches,
     Observation,
@@ -14,7 +17,7 @@ from services.safety.latches import (
     observe,
     ordered,
     reset,
-    still_there,
+    still_present,
 )
 
 SETTLE_NS = 500
@@ -51,13 +54,13 @@ def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
     assert GOOD_SAMPLES == 3
     held = see({}, "contact", True, 0, seq=1)
     for seq in range(2, 2 + GOOD_SAMPLES):
-        assert still_there(held) == ("contact",)
+        assert still_present(held) == ("contact",)
         held = see(held, "contact", False, seq, seq)
         held = see(held, "contact", False, seq, seq)  # the same sample again
-    assert still_there(held) == ()
+    assert still_present(held) == ()
     assert latched(held) == ("contact",)
     held = see(held, "contact", True, 99, seq=9)
-    assert still_there(held) == ("contact",)
+    assert still_present(held) == ("contact",)
 
 
 def test_the_sample_that_showed_a_cause_is_no_good_one() -> None:
@@ -80,7 +83,7 @@ def test_a_reset_leaves_what_is_not_gone() -> None:
     held = see(held, "driver_left", True, 0, seq=1)
     for seq in range(2, 2 + GOOD_SAMPLES):
         held = see(held, "estop", False, seq, seq)
-    assert still_there(held) == ("contact", "driver_left")
+    assert still_present(held) == ("contact", "driver_left")
     assert set(reset(held, [one.id for one in held.values()])) == {"contact", "driver_left"}
 
 
@@ -152,3 +155,14 @@ def test_only_passing_causes_go_without_a_neutral_request() -> None:
     assert wants_neutral("contact")
     assert wants_neutral("link")
     assert not wants_neutral("no_request")
+
+
+def test_credit_drains_faster_than_it_refills() -> None:
+    budget = FaultBudget()
+    for n in range(int(FAILURES)):
+        assert not budget.is_spent
+        budget = budget.updated((n + 1) * NS_PER_S, failed=True, good=False)
+    assert budget.is_spent
+    assert budget.updated(99 * NS_PER_S, failed=False, good=False).is_spent
+    assert budget.updated(6 * NS_PER_S, failed=False, good=True).remaining == pytest.approx(0.1)
+    assert FaultBudget().updated(99 * NS_PER_S, failed=False, good=True).remaining == FAILURES

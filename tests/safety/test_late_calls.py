@@ -69,7 +69,7 @@ def test_twenty_late_holds_and_a_late_reset_move_nothing(endpoint: str) -> None:
         assert all("allowed is 0.4 s" in text for text in answers), answers
         peers.touch(pressed=False)
         newer = peers.reset()
-        assert "not latched any more" in peers.call(
+        assert "no longer latched" in peers.call(
             keys.RESET, type(old)(echo=newer.echo, causes=old.causes)
         )
         assert peers.shows("contact")

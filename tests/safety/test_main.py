@@ -39,7 +39,7 @@ def scenario(endpoint: str) -> None:
         assert peers.motion.judged_boot == peers.bumper.last.boot
         assert 0 < peers.motion.judged <= peers.bumper.last.seq
         peers.asking = None
-        assert "Not gone yet" in peers.call(keys.RESET, peers.reset())
+        assert "Still present" in peers.call(keys.RESET, peers.reset())
         peers.pressed = False
         wait_until(
             lambda: peers.starved or peers.call(keys.RESET, peers.reset()) == "done",

@@ -7,7 +7,7 @@ from msgspec.structs import replace as with_fields
 from common.messages import Direction
 from services.safety.latches import latched
 from services.safety.report import motion_message
-from tests.safety.policy_fixture import Scene
+from tests.safety.policy_fixture import PolicyFixture
 
 OLD, OWN = 5, 6
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
@@ -17,59 +17,59 @@ UNKNOWN = (
 )
 
 
-def successor(latched_by: int | None) -> Scene:
+def successor(latched_by: int | None) -> PolicyFixture:
     """Start a service beside a bridge that remembers this."""
-    scene = Scene()
-    scene.inputs = replace(scene.inputs, boot=OWN)
-    scene.link = with_fields(scene.link, latched_by=latched_by)
-    return scene
+    fixture = PolicyFixture()
+    fixture.inputs = replace(fixture.inputs, boot=OWN)
+    fixture.link = with_fields(fixture.link, latched_by=latched_by)
+    return fixture
 
 
 def test_a_latch_is_told_until_it_is_reset() -> None:
-    scene = Scene().running()
-    assert not motion_message(scene.state, scene.inputs).latched
-    scene.estop()
-    assert motion_message(scene.state, scene.inputs).latched
-    scene.drive(0.0, seconds=1.0)
-    assert scene.reset() == ""
-    assert not motion_message(scene.state, scene.inputs).latched
+    fixture = PolicyFixture().running()
+    assert not motion_message(fixture.state, fixture.inputs).latched
+    fixture.estop()
+    assert motion_message(fixture.state, fixture.inputs).latched
+    fixture.drive(0.0, seconds=1.0)
+    assert fixture.reset() == ""
+    assert not motion_message(fixture.state, fixture.inputs).latched
 
 
 def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
-    scene = successor(latched_by=OLD)
-    scene.tick(100)
-    scene.drive(0.0)
-    assert scene.drive(0.5, seconds=1.0).command == "brake"
-    assert latched(scene.state.latches) == ("predecessor",)
-    motion = motion_message(scene.state, scene.inputs)
+    fixture = successor(latched_by=OLD)
+    fixture.tick(100)
+    fixture.drive(0.0)
+    assert fixture.drive(0.5, seconds=1.0).command == "brake"
+    assert latched(fixture.state.latches) == ("predecessor",)
+    motion = motion_message(fixture.state, fixture.inputs)
     assert (motion.latched, motion.predecessor) == (True, OLD)
-    assert scene.reset() == "Not gone yet: Safety started anew with a reset still due."
-    scene.link = with_fields(scene.link, latched_by=OWN)  # the bridge has heard of it from us
-    scene.tick(100)
-    assert scene.reset() == ""
-    scene.link = with_fields(scene.link, latched_by=None)
-    scene.drive(0.0)
-    assert scene.drive(0.5).command == "run"
+    assert fixture.reset() == "Still present: Safety restarted while a reset was due."
+    fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has heard of it from us
+    fixture.tick(100)
+    assert fixture.reset() == ""
+    fixture.link = with_fields(fixture.link, latched_by=None)
+    fixture.drive(0.0)
+    assert fixture.drive(0.5).command == "run"
 
 
 def test_a_motion_that_the_bridge_braked_alone_has_its_own_text() -> None:
-    scene = successor(latched_by=OLD)
-    scene.tick(10)
-    bridge = scene.inputs.link
+    fixture = successor(latched_by=OLD)
+    fixture.tick(10)
+    bridge = fixture.inputs.link
     assert bridge is not None
-    scene.link = with_fields(scene.link, latched_by=bridge.value.boot)
-    scene.tick(10)
-    assert scene.state.latches["predecessor"].text == (
+    fixture.link = with_fields(fixture.link, latched_by=bridge.value.boot)
+    fixture.tick(10)
+    assert fixture.state.latches["predecessor"].text == (
         "The vehicle moved without a command while safety was absent."
     )
 
 
 def test_a_successor_that_has_heard_nothing_names_no_predecessor() -> None:
-    scene = successor(latched_by=OLD)
-    scene.muted = {"link"}
-    scene.tick()
-    scene.estop()
-    motion = motion_message(scene.state, scene.inputs)
+    fixture = successor(latched_by=OLD)
+    fixture.muted = {"link"}
+    fixture.tick()
+    fixture.estop()
+    motion = motion_message(fixture.state, fixture.inputs)
     assert (motion.latched, motion.predecessor) == (True, None)
 
 
@@ -79,37 +79,37 @@ def test_without_a_latch_a_successor_needs_no_reset() -> None:
 
 @pytest.mark.parametrize("first", ["bumper", "link"])
 def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str) -> None:
-    scene = successor(latched_by=OLD)
-    scene.pressed = True
-    scene.muted = {"link" if first == "bumper" else "bumper"}
-    scene.tick(3)
-    scene.muted = set()
-    scene.tick(50)
-    assert latched(scene.state.latches) == ("contact", "predecessor")
-    scene.link = with_fields(scene.link, latched_by=OWN)
-    scene.tick(10)
-    assert scene.reset() == ""
-    assert scene.verdict.reply is not None
-    assert scene.verdict.reply.text == f"Reset all but this: The bumper was hit. {UNKNOWN}"
-    scene.tick()
+    fixture = successor(latched_by=OLD)
+    fixture.pressed = True
+    fixture.muted = {"link" if first == "bumper" else "bumper"}
+    fixture.tick(3)
+    fixture.muted = set()
+    fixture.tick(50)
+    assert latched(fixture.state.latches) == ("contact", "predecessor")
+    fixture.link = with_fields(fixture.link, latched_by=OWN)
+    fixture.tick(10)
+    assert fixture.reset() == ""
+    assert fixture.verdict.reply is not None
+    assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {UNKNOWN}"
+    fixture.tick()
     for direction in DIRECTIONS:
-        assert scene.hold(direction=direction) == UNKNOWN
-    told = scene.tell().release
+        assert fixture.hold(direction=direction) == UNKNOWN
+    told = fixture.published().release
     assert told is not None
     assert told.left == 0.0
-    assert scene.reset() == f"Not gone yet: The bumper was hit. {UNKNOWN}"
+    assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
 
 
 def test_the_next_contact_after_a_reset_has_a_release_again() -> None:
-    scene = successor(latched_by=OLD)
-    scene.pressed = True
-    scene.tick(50)
-    scene.link = with_fields(scene.link, latched_by=OWN)
-    scene.pressed = False
-    scene.tick(10)
-    assert scene.reset() == ""
-    assert latched(scene.state.latches) == ()
-    scene.pressed = True
-    scene.tick(5)
-    assert scene.hold() == ""
-    assert scene.tick(3).command == "run"
+    fixture = successor(latched_by=OLD)
+    fixture.pressed = True
+    fixture.tick(50)
+    fixture.link = with_fields(fixture.link, latched_by=OWN)
+    fixture.pressed = False
+    fixture.tick(10)
+    assert fixture.reset() == ""
+    assert latched(fixture.state.latches) == ()
+    fixture.pressed = True
+    fixture.tick(5)
+    assert fixture.hold() == ""
+    assert fixture.tick(3).command == "run"

@@ -3,10 +3,10 @@
 import pytest
 
 from common.freshness import NS_PER_S
+from common.motion import STILL, Twist
 from services.safety.latches import Held
 from services.safety.release import COAST_NS, Release, sweep
 from services.safety.trajectory import Counter, Trajectory
-from services.safety.twist import STILL, Twist
 
 REACH = 0.65
 BACK = Twist(-0.1)
@@ -45,8 +45,8 @@ def test_a_hold_is_a_lease() -> None:
 
 def test_the_end_of_a_hold_asks_for_a_newer_heartbeat() -> None:
     ended = Release().hold("forward", 0).end(12)
-    assert (ended.held_ns, ended.let_go) == (None, 12)
-    assert ended.end(11).let_go == 12
+    assert (ended.held_ns, ended.ended_echo) == (None, 12)
+    assert ended.end(11).ended_echo == 12
 
 
 @pytest.mark.parametrize(
@@ -104,8 +104,8 @@ def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
 
 
 def test_a_new_contact_has_everything_anew_but_the_end_of_the_last_hold() -> None:
-    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), held_ns=3, let_go=12)
-    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, let_go=12)
+    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), held_ns=3, ended_echo=12)
+    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, ended_echo=12)
 
 
 def held(good: int, occurrence: int = 40) -> Held:
@@ -127,10 +127,10 @@ def test_a_clear_bumper_ends_the_hold() -> None:
     ("later_ns", "forbidden"), [(COAST_NS, {"backward"}), (COAST_NS + 1, set())]
 )
 def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden: set[str]) -> None:
-    used = moving(Release(let_go=5).hold("backward", 0))
+    used = moving(Release(ended_echo=5).hold("backward", 0))
     after = used.after(held(1), TOUCHED, CAME, later_ns)
     assert after.forbidden == forbidden
-    assert (after.held_ns, after.let_go) == (None, 5)
+    assert (after.held_ns, after.ended_echo) == (None, 5)
     assert after.travelled == used.travelled
 
 

@@ -4,185 +4,187 @@ import pytest
 from msgspec.structs import replace
 
 from common.messages import Direction, Drive
-from services.safety.inputs import Ask, Estop, Event, Hold, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
 from services.safety.report import (
     motion_message,
-    notes,
     sentence,
     signature,
     state_message,
-    timed,
+    transitions,
+    with_times,
 )
-from tests.safety.policy_fixture import Scene, hit
+from tests.safety.policy_fixture import PolicyFixture, hit
 
 
-def noted(scene: Scene, event: Event | None = None) -> list[str]:
-    before = scene.state
-    scene.decide(event)
-    return [note.name for note in notes(before, scene.state, event)]
+def noted(fixture: PolicyFixture, event: Event | None = None) -> list[str]:
+    before = fixture.state
+    fixture.decide(event)
+    return [note.name for note in transitions(before, fixture.state, event)]
 
 
-def ticked(scene: Scene) -> list[str]:
-    before = scene.state
-    scene.tick()
-    return [note.name for note in notes(before, scene.state, None)]
+def ticked(fixture: PolicyFixture) -> list[str]:
+    before = fixture.state
+    fixture.tick()
+    return [note.name for note in transitions(before, fixture.state, None)]
 
 
 def test_the_state_tells_verdict_causes_and_limits() -> None:
-    scene = Scene().running()
-    scene.sonar(front=1.0)
-    scene.linear = 0.0
-    scene.drive(1.0)
-    state = state_message(scene.policy, scene.state, scene.now_ns + 500_000_000)
+    fixture = PolicyFixture().running()
+    fixture.sonar(front=1.0)
+    fixture.linear = 0.0
+    fixture.drive(1.0)
+    state = state_message(fixture.policy, fixture.state, fixture.now_ns + 500_000_000)
     assert (state.verdict, state.source, state.latched) == ("slow", "teleop", ())
     assert [cause.name for cause in state.causes] == ["obstacle"]
     assert state.causes[0].age >= 0.5
-    assert state.limits.forward == pytest.approx(scene.policy.planner.zones.allowed(1.0))
+    assert state.limits.forward == pytest.approx(fixture.policy.planner.zones.allowed(1.0))
     assert (state.limits.backward, state.limits.angular) == (1.0, 1.0)
-    assert state.heartbeat == scene.state.heartbeat.number
+    assert state.heartbeat == fixture.state.heartbeat.number
 
 
 def test_the_motion_tells_what_was_judged() -> None:
-    scene = Scene().running()
-    motion = motion_message(scene.state, scene.inputs)
+    fixture = PolicyFixture().running()
+    motion = motion_message(fixture.state, fixture.inputs)
     assert (motion.command, motion.source) == ("run", "teleop")
-    assert motion.linear == pytest.approx(scene.verdict.twist.linear)
-    assert (motion.judged_boot, motion.judged) == (scene.boot, scene.seq)
+    assert motion.linear == pytest.approx(fixture.verdict.twist.linear)
+    assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)
 
 
 REQUEST = Drive(linear=0.1, angular=0.0, echo=0, mono_ns=40)
 
 
-def timed_by(scene: Scene, ask: Ask) -> tuple[int, int, int]:
-    inputs = replace(scene.inputs, event=ask)
-    motion = timed(motion_message(scene.state, scene.inputs), scene.state, inputs)
-    assert (motion.command, motion.judged) == ("run", scene.seq)  # what was there stays
+def timed_by(fixture: PolicyFixture, request: DriveRequest) -> tuple[int, int, int]:
+    inputs = replace(fixture.inputs, event=request)
+    motion = with_times(motion_message(fixture.state, fixture.inputs), fixture.state, inputs)
+    assert (motion.command, motion.judged) == ("run", fixture.seq)  # what was there stays
     return motion.asked_ns, motion.heard_ns, motion.judged_ns
 
 
 def test_the_motion_carries_the_times_of_what_it_answers() -> None:
-    scene = Scene().running()
-    judged_ns = scene.now_ns
-    assert timed_by(scene, Ask("teleop", REQUEST, 50, True)) == (40, 50, judged_ns)
-    assert timed_by(scene, Ask("teleop", REQUEST, 50, False)) == (0, 50, judged_ns)
+    fixture = PolicyFixture().running()
+    judged_ns = fixture.now_ns
+    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, True)) == (40, 50, judged_ns)
+    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, False)) == (0, 50, judged_ns)
 
 
 def test_only_a_request_that_drives_is_answered() -> None:
-    scene = Scene().running()
-    assert timed_by(scene, Ask("web", REQUEST, 50, True))[:2] == (0, 0)
-    assert timed_by(scene, Ask("teleop", None, 50, True))[:2] == (0, 0)
-    scene.state = replace(scene.state, verdict=replace(scene.verdict, refused="late"))
-    assert timed_by(scene, Ask("teleop", REQUEST, 50, True))[:2] == (0, 0)
+    fixture = PolicyFixture().running()
+    assert timed_by(fixture, DriveRequest("web", REQUEST, 50, True))[:2] == (0, 0)
+    assert timed_by(fixture, DriveRequest("teleop", None, 50, True))[:2] == (0, 0)
+    fixture.state = replace(fixture.state, verdict=replace(fixture.verdict, refused="late"))
+    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, True))[:2] == (0, 0)
 
 
 def test_a_motion_that_answers_nothing_carries_no_times() -> None:
-    scene = Scene()
-    motion = timed(
-        motion_message(scene.state, scene.inputs), scene.state, replace(scene.inputs, event=Reset())
+    fixture = PolicyFixture()
+    motion = with_times(
+        motion_message(fixture.state, fixture.inputs),
+        fixture.state,
+        replace(fixture.inputs, event=Reset()),
     )
     assert (motion.asked_ns, motion.heard_ns, motion.judged_ns) == (0, 0, 0)
 
 
 def test_one_sentence_says_why() -> None:
-    scene = Scene()
-    assert sentence(scene.state).startswith("Waiting for the first sample of: velocity,")
-    scene.tick(40)
-    assert sentence(scene.state) == "Nobody asks to move."
-    scene.drive(0.5)
-    assert sentence(scene.state).startswith("Waiting for a neutral request")
-    scene.drive()
-    assert sentence(scene.state) == "Driving as teleop asks."
-    scene.sonar(front=0.5)
-    scene.drive(0.5)
+    fixture = PolicyFixture()
+    assert sentence(fixture.state).startswith("Waiting for the first sample of: velocity,")
+    fixture.tick(40)
+    assert sentence(fixture.state) == "No source requests motion."
+    fixture.drive(0.5)
+    assert sentence(fixture.state).startswith("Waiting for a neutral request")
+    fixture.drive()
+    assert sentence(fixture.state) == "teleop is in control."
+    fixture.sonar(front=0.5)
+    fixture.drive(0.5)
     assert (
-        sentence(scene.state) == "Slowed by an obstacle at 0.50 m (front). Driving as teleop asks."
+        sentence(fixture.state) == "Slowed by an obstacle at 0.50 m (front). teleop is in control."
     )
-    scene.pressed = True
-    scene.tick()
-    assert sentence(scene.state) == "The bumper was hit. It is not gone yet."
-    scene.pressed = False
-    scene.tick(5)
-    assert sentence(scene.state) == "The bumper was hit. Reset to go on."
+    fixture.pressed = True
+    fixture.tick()
+    assert sentence(fixture.state) == "The bumper was hit. It is still present."
+    fixture.pressed = False
+    fixture.tick(5)
+    assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
 
 
 def test_transitions_are_told_once() -> None:
-    scene = Scene().running()
-    assert ticked(scene) == []
-    scene.pressed = True
-    assert ticked(scene) == ["contact", "stop"]
-    scene.linear = 0.0
-    assert ticked(scene) == []
-    scene.left_bits = 3
-    assert ticked(scene) == ["driver_fault"]
-    assert noted(scene, Estop()) == ["estop"]
-    assert noted(scene, Reset()) == ["reset_refused"]
-    assert noted(scene, Hold(True)) == ["release_refused"]
-    scene.pressed, scene.left_bits = False, 0
-    scene.tick(30)
-    scene.pressed = True
-    assert ticked(scene) == ["contact"]  # another press, although the first is still latched
-    scene.pressed = False
-    scene.tick(30)
-    assert noted(scene, Reset(scene.echo, scene.latched())) == ["reset"]
-    assert noted(scene, Reset(scene.echo, (1,))) == ["reset_refused"]
+    fixture = PolicyFixture().running()
+    assert ticked(fixture) == []
+    fixture.pressed = True
+    assert ticked(fixture) == ["contact", "stop"]
+    fixture.linear = 0.0
+    assert ticked(fixture) == []
+    fixture.left_bits = 3
+    assert ticked(fixture) == ["driver_fault"]
+    assert noted(fixture, Estop()) == ["estop"]
+    assert noted(fixture, Reset()) == ["reset_refused"]
+    assert noted(fixture, Hold(True)) == ["release_refused"]
+    fixture.pressed, fixture.left_bits = False, 0
+    fixture.tick(30)
+    fixture.pressed = True
+    assert ticked(fixture) == ["contact"]  # another press, although the first is still latched
+    fixture.pressed = False
+    fixture.tick(30)
+    assert noted(fixture, Reset(fixture.echo, fixture.latched())) == ["reset"]
+    assert noted(fixture, Reset(fixture.echo, (1,))) == ["reset_refused"]
 
 
 def test_a_change_of_source_is_told() -> None:
-    scene = Scene().ready()
+    fixture = PolicyFixture().ready()
     for _ in range(15):
-        assert ticked(scene) == []
-    assert ticked(scene) == ["stop", "source"]
+        assert ticked(fixture) == []
+    assert ticked(fixture) == ["stop", "source"]
 
 
 def test_a_release_is_told_when_it_begins_and_ends() -> None:
-    scene = hit()
-    held = Hold(True, "backward", scene.echo)
-    assert noted(scene, held) == ["source", "release"]
-    assert noted(scene, held) == []
-    assert noted(scene, Hold(False)) == ["stop", "source", "release_end"]
+    fixture = hit()
+    held = Hold(True, "backward", fixture.echo)
+    assert noted(fixture, held) == ["source", "release"]
+    assert noted(fixture, held) == []
+    assert noted(fixture, Hold(False)) == ["stop", "source", "release_end"]
 
 
 def test_what_changes_is_told_at_once_and_distances_are_not_a_change() -> None:
-    scene = Scene().running()
-    scene.sonar(front=1.0)
-    scene.drive(1.0)
-    before = signature(scene.state)
-    scene.sonar(front=0.9)
-    scene.drive(1.0)
-    assert signature(scene.state) == before
-    scene.estop()
-    assert signature(scene.state) != before
-    before = signature(scene.state)
-    held = dict(scene.state.latches)
+    fixture = PolicyFixture().running()
+    fixture.sonar(front=1.0)
+    fixture.drive(1.0)
+    before = signature(fixture.state)
+    fixture.sonar(front=0.9)
+    fixture.drive(1.0)
+    assert signature(fixture.state) == before
+    fixture.estop()
+    assert signature(fixture.state) != before
+    before = signature(fixture.state)
+    held = dict(fixture.state.latches)
     held["estop"] = replace(held["estop"], id=1)
-    assert signature(replace(scene.state, latches=held)) != before
-    release = replace(scene.state.release, forbidden=frozenset({"forward"}))
-    assert signature(replace(scene.state, release=release)) != before
+    assert signature(replace(fixture.state, latches=held)) != before
+    release = replace(fixture.state.release, forbidden=frozenset({"forward"}))
+    assert signature(replace(fixture.state, release=release)) != before
 
 
 def test_causes_are_told_with_their_identities() -> None:
-    scene = hit()
-    scene.estop()
-    told = scene.tell()
+    fixture = hit()
+    fixture.estop()
+    told = fixture.published()
     assert {cause.name: cause.id for cause in told.causes} == {
-        name: one.id for name, one in scene.state.latches.items()
+        name: one.id for name, one in fixture.state.latches.items()
     }
     assert len({cause.id for cause in told.causes}) == len(told.causes)
 
 
 def test_what_is_known_of_a_way_off_is_told_while_a_contact_is_latched() -> None:
-    assert Scene().ready().tell().release is None
-    scene = hit()
-    first = scene.tell().release
+    assert PolicyFixture().ready().published().release is None
+    fixture = hit()
+    first = fixture.published().release
     assert first is not None
     assert (first.believed_free, first.forbidden) == ("backward", ())
-    scene.tick(50)
-    later = scene.tell().release
+    fixture.tick(50)
+    later = fixture.published().release
     assert later is not None
     assert first.age is not None
     assert later.age == pytest.approx(first.age + 1.0)
     forbid: frozenset[Direction] = frozenset({"backward", "forward"})
-    scene.state = replace(scene.state, release=replace(scene.state.release, forbidden=forbid))
-    told = scene.tell().release
+    fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
+    told = fixture.published().release
     assert told is not None
     assert (told.believed_free, told.forbidden) == (None, ("backward", "forward"))

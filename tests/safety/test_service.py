@@ -26,7 +26,7 @@ from common.operator import reset_request
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
-from services.safety.service import Ports, source_of
+from services.safety.service import SafetyService, source_of
 from verification.harness.support import at, bus_on, running, wait_until
 
 
@@ -39,7 +39,7 @@ def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
 def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
     node = make_node(endpoint, *sets)
     reader = node.open_bus()
-    Ports(node, reader)
+    SafetyService(node, reader)
     with running(node.loop):
         for bus in (node.bus, reader):
             bus.open()
@@ -127,8 +127,8 @@ def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> Non
             seen.answers.append,
         )
         wait_until(lambda: len(seen.answers) == 3, "three answers")
-        assert "Let go." in seen.answers
-        assert any("Not gone yet" in text for text in seen.answers)
+        assert "Release ended." in seen.answers
+        assert any("Still present" in text for text in seen.answers)
         wait_until(node.is_stopped, "rest")
         wait_until(
             lambda: any(c.name == "leaving" for state in seen.states[-1:] for c in state.causes),

@@ -6,15 +6,22 @@ import pytest
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import SONAR_NAMES, Ultrasonic
+from common.motion import Twist
 from common.settings import Vehicle
 from services.safety.config import Safety
 from services.safety.sonar import Rules
-from services.safety.sonar_array import Ears, Heard
-from services.safety.twist import Twist
+from services.safety.sonar_array import (
+    SHARED_SAMPLES,
+    SHOWN_NS,
+    Saturation,
+    SonarArray,
+    SonarFilter,
+    SonarOverrides,
+)
 from services.safety.zones import zones
 from tests.safety.policy_fixture import FREE, NO_ECHO
 
-EARS = Ears(zones(Vehicle(), Safety()), Rules(0.05, 0.5), age_s=0.3, creep_room=0.26)
+FILTER = SonarFilter(zones(Vehicle(), Safety()), Rules(0.05, 0.5), age_s=0.3, creep_room=0.26)
 STEP_NS = NS_PER_S // 20
 
 
@@ -26,65 +33,65 @@ def sample(seq: int, front: float | None = None, boot: int = 1) -> Latest[Ultras
     return Latest(message, seq * STEP_NS)
 
 
-def hear(count: int, front: float | None = None, linear: float = 0.0) -> Heard:
-    heard = Heard()
+def updated(count: int, front: float | None = None, linear: float = 0.0) -> SonarArray:
+    array = SonarArray()
     for seq in range(1, count + 1):
-        heard = EARS.hear(heard, sample(seq, front), Twist(linear), seq * STEP_NS)
-    return heard
+        array = FILTER.update(array, sample(seq, front), Twist(linear), seq * STEP_NS)
+    return array
 
 
 def test_three_samples_open_all_sectors() -> None:
-    assert hear(2).faults == "all silent"
-    assert hear(3).faults == ""
-    assert hear(3, 1.0).distances[2] == 1.0
+    assert updated(2).faults == "all silent"
+    assert updated(3).faults == ""
+    assert updated(3, 1.0).distances[2] == 1.0
 
 
 def test_one_sample_is_taken_once() -> None:
-    heard = hear(2)
+    array = updated(2)
     for _ in range(3):
-        heard = EARS.hear(heard, sample(2), Twist(), 2 * STEP_NS)
-    assert heard.faults == "all silent"
+        array = FILTER.update(array, sample(2), Twist(), 2 * STEP_NS)
+    assert array.faults == "all silent"
 
 
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
-    heard, old = hear(3), sample(3)
+    array, old = updated(3), sample(3)
     limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
-    assert EARS.hear(heard, old, Twist(), limit_ns).faults == ""
-    heard = EARS.hear(heard, old, Twist(), limit_ns + 1)
-    assert heard.distances == (0.0,) * 8
-    assert EARS.hear(heard, old, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
-    assert EARS.hear(heard, None, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
+    assert FILTER.update(array, old, Twist(), limit_ns).faults == ""
+    array = FILTER.update(array, old, Twist(), limit_ns + 1)
+    assert array.distances == (0.0,) * 8
+    assert FILTER.update(array, old, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
+    assert FILTER.update(array, None, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
 
 
 def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
-    assert hear(13, 2.0, linear=1.0).faults == "front suspect"
-    assert hear(13, 2.0, linear=0.5).faults == ""
-    heard = hear(13, 2.0, linear=1.0)
-    assert [math.isinf(one) for one in heard.distances].count(True) == 7
-    assert heard.distances[2] == 2.0
-    assert heard.unseen == frozenset()
-    assert heard.cautious[2] == 0.26
-    assert hear(2).unseen == frozenset(range(8))
+    assert updated(13, 2.0, linear=1.0).faults == "front suspect"
+    assert updated(13, 2.0, linear=0.5).faults == ""
+    array = updated(13, 2.0, linear=1.0)
+    assert [math.isinf(one) for one in array.distances].count(True) == 7
+    assert array.distances[2] == 2.0
+    assert array.unseen == frozenset()
+    assert array.cautious[2] == 0.26
+    assert updated(2).unseen == frozenset(range(8))
 
 
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
-    assert Heard().unseen == frozenset()
-    heard = EARS.hear(hear(2), sample(2), Twist(), NS_PER_S)
-    assert heard.faults == "all silent"
-    assert heard.unseen == frozenset()
+    assert SonarArray().unseen == frozenset()
+    array = FILTER.update(updated(2), sample(2), Twist(), NS_PER_S)
+    assert array.faults == "all silent"
+    assert array.unseen == frozenset()
 
 
-def drive(count: int, twist: Twist, **readings: float) -> Heard:
+def drive(count: int, twist: Twist, **readings: float) -> SonarArray:
     """Let sonars keep a reading for so many samples; the others hear no echo."""
-    heard = Heard()
+    array = SonarArray()
     ranges, status = list(FREE), list(NO_ECHO)
     for name, reading in readings.items():
         n = SONAR_NAMES.index(name)
         ranges[n], status[n] = reading, "ok"
     for seq in range(1, count + 1):
         message = Ultrasonic(ranges=tuple(ranges), status=tuple(status), seq=seq, boot=1)
-        heard = EARS.hear(heard, Latest(message, seq * STEP_NS), twist, seq * STEP_NS)
-    return heard
+        array = FILTER.update(array, Latest(message, seq * STEP_NS), twist, seq * STEP_NS)
+    return array
 
 
 AHEAD, BACK = Twist(0.5), Twist(-0.5)
@@ -119,9 +126,9 @@ def test_what_each_mount_predicts(twist: Twist, readings: dict[str, float], faul
 def test_the_sensors_greatest_reading_is_no_disagreement() -> None:
     near = {"left": 0.7, "right": 0.9, "rear": 1.2, "rear_left": 1.0, "rear_right": 1.1}
     fronts = {"front_left": 4.5, "front": 4.5, "front_right": 4.5}
-    heard = drive(60, AHEAD, **near, **fronts)
-    assert heard.saturation.reading == 4.5
-    assert "front" not in heard.faults
+    array = drive(60, AHEAD, **near, **fronts)
+    assert array.saturation.reading == 4.5
+    assert "front" not in array.faults
     assert drive(60, AHEAD, **fronts).saturation.reading is None  # others see farther
 
 
@@ -137,7 +144,88 @@ def test_a_parked_vehicle_makes_no_sonar_suspect(twist: Twist) -> None:
 
 
 def test_an_unknown_speed_is_no_motion() -> None:
-    heard = Heard()
+    array = SonarArray()
     for seq in range(1, 30):
-        heard = EARS.hear(heard, sample(seq, 2.0), None, seq * STEP_NS)
-    assert heard.faults == ""
+        array = FILTER.update(array, sample(seq, 2.0), None, seq * STEP_NS)
+    assert array.faults == ""
+
+
+# --- greatest range of the sensors ------------------------------------------------------------
+
+SHARED = (3.0, 0.5, 3.001, 0.0)
+
+
+def after(saturation: Saturation, *samples: tuple[float, ...], times: int = 1) -> Saturation:
+    for _ in range(times):
+        for sample in samples:
+            saturation = saturation.updated(sample)
+    return saturation
+
+
+KNOWN = after(Saturation(), SHARED, times=SHARED_SAMPLES)
+
+
+def test_it_takes_a_second_of_sharing() -> None:
+    assert after(Saturation(), SHARED, times=SHARED_SAMPLES - 1).reading is None
+    assert KNOWN.reading == 3.001
+    assert SHARED_SAMPLES == 20
+
+
+@pytest.mark.parametrize(
+    "other",
+    [(3.0, 0.5, 0.7, 0.0), (3.0, 0.5, 3.0, 4.0), (3.0, 3.0, 3.0, math.inf), (2.9, 2.9, 0.5, 0.5)],
+)
+def test_anything_else_begins_anew(other: tuple[float, ...]) -> None:
+    some = after(Saturation(), SHARED, times=SHARED_SAMPLES - 1)
+    assert after(some, other, SHARED).reading is None
+
+
+def test_it_explains_itself_and_nothing_else() -> None:
+    assert KNOWN.explains(3.0)
+    assert KNOWN.explains(3.002)
+    assert not KNOWN.explains(2.9995)
+    assert not KNOWN.explains(3.0026)
+    assert not Saturation().explains(3.0)
+
+
+def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
+    assert after(KNOWN, (1.0, 0.5, 0.7, 0.0), (2.0, 2.0, 0.0, 0.0)).reading == 3.001
+    assert after(KNOWN, (3.002, 0.5, 0.7, 0.0)).reading == 3.001
+    assert after(KNOWN, (3.1, 0.5, 0.7, 0.0)).reading is None
+    assert after(KNOWN, (1.0, 0.5, math.inf, 0.0)).reading is None
+
+
+# --- overrides of faulty sonars ---------------------------------------------------------------
+
+ALL: set[int] = {2, 3}
+
+
+def test_a_neutral_request_counts_once_the_fault_was_shown_for_a_second() -> None:
+    overrides = SonarOverrides().updated({2}, {"teleop"}, 5)
+    assert overrides.acknowledged_by("teleop") == frozenset()
+    assert (
+        overrides.updated({2}, {"teleop"}, 5 + SHOWN_NS - 1).acknowledged_by("teleop")
+        == frozenset()
+    )
+    overrides = overrides.updated({2}, {"teleop"}, 5 + SHOWN_NS)
+    assert overrides.acknowledged_by("teleop") == {2}
+    assert overrides.acknowledged_by("web") == overrides.acknowledged_by(None) == frozenset()
+    assert SHOWN_NS == NS_PER_S
+
+
+def test_it_is_known_until_the_sonar_is_back() -> None:
+    known = SonarOverrides().updated({2}, set(), 0).updated({2}, {"web"}, 2 * NS_PER_S)
+    assert known.updated({2}, set(), 60 * NS_PER_S).acknowledged_by("web") == {2}
+    again = known.updated(set(), set(), 3 * NS_PER_S).updated({2}, {"web"}, 4 * NS_PER_S)
+    assert again.acknowledged_by("web") == frozenset()
+
+
+def test_another_fault_has_to_be_known_as_well() -> None:
+    known = (
+        SonarOverrides()
+        .updated({2}, set(), 0)
+        .updated({2}, {"web"}, 2 * NS_PER_S)
+        .updated(ALL, {"web"}, 3 * NS_PER_S)
+    )
+    assert known.acknowledged_by("web") == {2}
+    assert known.updated(ALL, {"web"}, 4 * NS_PER_S).acknowledged_by("web") == ALL

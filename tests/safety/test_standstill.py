@@ -7,8 +7,8 @@ import pytest
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
+from common.motion import Twist
 from services.safety.standstill import Measured, Phase, Standstill, Supervisor, Velocities
-from services.safety.twist import Twist
 from tests.safety.policy_fixture import TICK_S
 
 TICK_NS = round(TICK_S * NS_PER_S)

@@ -14,17 +14,16 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Direction
+from common.motion import STILL, Command, Twist
 from services.safety.arbiter import Channel
 from services.safety.causes import RULES, Clears
-from services.safety.fault_budget import FaultBudget
 from services.safety.inputs import Estop, Event, Hold, Reset
-from services.safety.latches import Held, latched, ordered
+from services.safety.latches import FaultBudget, Held, latched, ordered
 from services.safety.release import Release
 from services.safety.runaway import Axis
 from services.safety.standstill import Phase, Standstill
 from services.safety.state import RELEASE, State, Verdict
-from services.safety.twist import STILL, Twist
-from tests.safety.policy_fixture import NO_ECHO, Scene
+from tests.safety.policy_fixture import NO_ECHO, PolicyFixture
 
 BRAKING = {
     "contact", "estop", "estop_reader", "predecessor", "runaway", "uncommanded_motion",
@@ -39,16 +38,16 @@ STANDSTILL, OTHERS = {"uncommanded_motion", "not_stopping"}, 3
 AHEAD = Twist(0.3, 0.0)
 HOUR_NS, STEP_NS = 3600 * NS_PER_S, NS_PER_S // 50
 
-Change = Callable[[Scene], None]
+Change = Callable[[PolicyFixture], None]
 
 
 def sample(name: str, **fields: object) -> Change:
     """Return what changes fields of the newest sample of a stream."""
 
-    def change(scene: Scene) -> None:
-        latest = getattr(scene.inputs, name)
+    def change(fixture: PolicyFixture) -> None:
+        latest = getattr(fixture.inputs, name)
         changed = replace(latest, value=replace(latest.value, **fields))
-        scene.inputs = replace(scene.inputs, **{name: changed})
+        fixture.inputs = replace(fixture.inputs, **{name: changed})
 
     return change
 
@@ -56,53 +55,53 @@ def sample(name: str, **fields: object) -> Change:
 def aged(name: str, age_s: float) -> Change:
     """Return what makes the newest sample of a stream that old."""
 
-    def change(scene: Scene) -> None:
+    def change(fixture: PolicyFixture) -> None:
         old = replace(
-            getattr(scene.inputs, name), received_ns=scene.now_ns - round(age_s * NS_PER_S)
+            getattr(fixture.inputs, name), received_ns=fixture.now_ns - round(age_s * NS_PER_S)
         )
-        scene.inputs = replace(scene.inputs, **{name: old})
+        fixture.inputs = replace(fixture.inputs, **{name: old})
 
     return change
 
 
-def missing(scene: Scene) -> None:
-    scene.inputs = replace(scene.inputs, ultrasonic=None)
+def missing(fixture: PolicyFixture) -> None:
+    fixture.inputs = replace(fixture.inputs, ultrasonic=None)
 
 
-def leaving(scene: Scene) -> None:
-    scene.inputs = replace(scene.inputs, leaving=True)
+def leaving(fixture: PolicyFixture) -> None:
+    fixture.inputs = replace(fixture.inputs, leaving=True)
 
 
-def spent(scene: Scene) -> None:
-    scene.state = replace(scene.state, credit=FaultBudget(0.0, scene.now_ns))
+def spent(fixture: PolicyFixture) -> None:
+    fixture.state = replace(fixture.state, fault_budget=FaultBudget(0.0, fixture.now_ns))
 
 
-def ran_away(scene: Scene) -> None:
-    scene.state = replace(scene.state, linear=Axis(bad_s=0.3))
-    sample("velocity", linear=2.0)(scene)
+def ran_away(fixture: PolicyFixture) -> None:
+    fixture.state = replace(fixture.state, linear=Axis(bad_s=0.3))
+    sample("velocity", linear=2.0)(fixture)
 
 
-def supervised(scene: Scene, standstill: Standstill) -> None:
-    verdict = replace(scene.state.verdict, command="stop", twist=STILL)
-    scene.state = replace(scene.state, standstill=standstill, verdict=verdict)
+def supervised(fixture: PolicyFixture, standstill: Standstill) -> None:
+    verdict = replace(fixture.state.verdict, command="stop", twist=STILL)
+    fixture.state = replace(fixture.state, standstill=standstill, verdict=verdict)
 
 
-def left_its_place(scene: Scene) -> None:
-    supervised(scene, Standstill(Phase.STANDING, counted=Twist(0.06)))
+def left_its_place(fixture: PolicyFixture) -> None:
+    supervised(fixture, Standstill(Phase.STANDING, counted=Twist(0.06)))
 
 
-def does_not_stop(scene: Scene) -> None:
-    sample("velocity", linear=2.0)(scene)
-    supervised(scene, Standstill(Phase.STOPPING, due_ns=scene.now_ns - 1))
+def does_not_stop(fixture: PolicyFixture) -> None:
+    sample("velocity", linear=2.0)(fixture)
+    supervised(fixture, Standstill(Phase.STOPPING, due_ns=fixture.now_ns - 1))
 
 
-def nobody_hears(scene: Scene) -> None:
-    scene.reader = False
+def nobody_hears(fixture: PolicyFixture) -> None:
+    fixture.estop_session_up = False
 
 
 RAISE: dict[str, Change] = {
     "contact": sample("bumper", pressed=True),
-    "estop": lambda scene: None,  # an event, not a sample
+    "estop": lambda fixture: None,  # an event, not a sample
     "estop_reader": nobody_hears,
     "predecessor": sample("link", latched_by=4711),
     "runaway": ran_away,
@@ -140,35 +139,35 @@ def crossed(names: set[str]) -> Iterator[set[str]]:
             yield from (others | {name} for name in sorted(names & STANDSTILL))
 
 
-def fresh(scene: Scene, state: State, wish: Twist | None, armed: bool) -> None:
-    """Give the scene a memory, all samples good and new, and one request or none."""
+def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: bool) -> None:
+    """Give the fixture a memory, all samples good and new, and one request or none."""
     channels = {}
-    if wish is not None:
-        channels["teleop"] = Channel(99, scene.driver_seq, wish, scene.now_ns, None, armed)
+    if requested is not None:
+        channels["teleop"] = Channel(99, fixture.driver_seq, requested, fixture.now_ns, None, armed)
     arbiter = replace(state.arbiter, channels=channels)
-    scene.state = replace(state, arbiter=arbiter, decided_ns=scene.now_ns - STEP_NS)
-    scene.reader = True
-    scene.inputs = replace(scene.inputs, leaving=False)
-    scene.seq = state.verdict.judged[1]  # no bumper sample was lost
-    scene.feed()
+    fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)
+    fixture.estop_session_up = True
+    fixture.inputs = replace(fixture.inputs, leaving=False)
+    fixture.seq = state.verdict.acked[1]  # no bumper sample was lost
+    fixture.feed()
 
 
 def test_every_set_of_causes_stops_and_latches_as_it_must() -> None:
-    scene = Scene().running(0.3)
-    before, walked = scene.state, 0
+    fixture = PolicyFixture().running(0.3)
+    before, walked = fixture.state, 0
     for raised in crossed(LATCHING | INHIBITING):
         if {"link", "unarmed"} <= raised:
             continue  # a link that is lost says nothing about arming
-        fresh(scene, before, AHEAD, armed=True)
+        fresh(fixture, before, AHEAD, armed=True)
         for name in raised:
-            RAISE[name](scene)
+            RAISE[name](fixture)
         if "starting" not in raised and "estop_reader" in raised:
             raised = raised | {"starting"}  # there is no emergency stop without its reader
-        verdict = scene.decide(Estop() if "estop" in raised else None)
+        verdict = fixture.decide(Estop() if "estop" in raised else None)
         walked += 1
-        assert set(scene.state.latches) - {"sonar", "blocked"} == raised
+        assert set(fixture.state.latches) - {"sonar", "blocked"} == raised
         check_action(verdict, raised)
-        later(scene, raised)
+        later(fixture, raised)
     tell(f"{walked} sets of causes, each with a request to drive, and an hour later")
     few = sum(math.comb(15, size) for size in range(OTHERS + 1))
     few_without_arming = sum(math.comb(13, size - 2) for size in range(2, OTHERS + 1))
@@ -183,19 +182,21 @@ def check_action(verdict: Verdict, raised: set[str]) -> None:
     assert (verdict.name == "inhibited") == bool(raised and not raised & (LATCHING | BRAKING))
 
 
-def later(scene: Scene, raised: set[str]) -> None:
+def later(fixture: PolicyFixture, raised: set[str]) -> None:
     """An hour later all is well again and somebody asks to drive: what latched still holds."""
-    scene.now_ns += HOUR_NS
-    state = replace(scene.state, decided_ns=scene.now_ns, linear=Axis(), credit=FaultBudget())
-    wished = {"teleop": replace(state.arbiter.channels["teleop"], received_ns=scene.now_ns)}
-    scene.state = replace(state, arbiter=replace(state.arbiter, channels=wished))
-    scene.reader = True
-    scene.inputs = replace(scene.inputs, leaving=False)
-    scene.feed()
-    verdict = scene.decide()
-    assert set(latched(scene.state.latches)) == raised & LATCHING
+    fixture.now_ns += HOUR_NS
+    state = replace(
+        fixture.state, decided_ns=fixture.now_ns, linear=Axis(), fault_budget=FaultBudget()
+    )
+    wished = {"teleop": replace(state.arbiter.channels["teleop"], received_ns=fixture.now_ns)}
+    fixture.state = replace(state, arbiter=replace(state.arbiter, channels=wished))
+    fixture.estop_session_up = True
+    fixture.inputs = replace(fixture.inputs, leaving=False)
+    fixture.feed()
+    verdict = fixture.decide()
+    assert set(latched(fixture.state.latches)) == raised & LATCHING
     assert (verdict.command == "run") == (not raised)
-    scene.now_ns -= HOUR_NS
+    fixture.now_ns -= HOUR_NS
 
 
 REQUESTS: dict[str, Twist | None] = {"none": None, "zero": STILL, "motion": AHEAD}
@@ -223,9 +224,9 @@ class Case:
         right = self.inhibited == "none" or self.call in RIGHT_CALLS
         return right and (self.pressed or self.way == "unused")
 
-    def prepare(self, scene: Scene, before: State) -> None:
+    def prepare(self, fixture: PolicyFixture, before: State) -> None:
         """Make it so."""
-        now_ns = scene.now_ns
+        now_ns = fixture.now_ns
         gone = Held(now_ns - NS_PER_S, now_ns - NS_PER_S, 3, (0, 0), "gone")
         latches = {name: replace(gone, id=IDS[name]) for name in self.held}
         if self.pressed and "contact" in self.held:
@@ -234,12 +235,12 @@ class Case:
             latches["link"] = replace(gone, bad_ns=now_ns)
         armed = not self.held and self.inhibited == "none"
         state = replace(before, latches=latches, release=self.release(now_ns))
-        fresh(scene, state, REQUESTS[self.asked], armed)
-        sample("velocity", linear=0.0)(scene)
+        fresh(fixture, state, REQUESTS[self.asked], armed)
+        sample("velocity", linear=0.0)(fixture)
         if self.pressed:
-            RAISE["contact"](scene)
+            RAISE["contact"](fixture)
         if self.inhibited == "there":
-            RAISE["link"](scene)
+            RAISE["link"](fixture)
 
     def release(self, now_ns: int) -> Release:
         """Return the memory of the release."""
@@ -301,14 +302,14 @@ IDS = {name: number for number, name in enumerate(sorted(LATCHING), 1)}
 
 
 def test_every_set_of_latches_under_every_request_and_call() -> None:
-    scene = Scene().running(0.3)
-    before, walked = replace(scene.state, verdict=Verdict()), 0
+    fixture = PolicyFixture().running(0.3)
+    before, walked = replace(fixture.state, verdict=Verdict()), 0
     axes = crossed(LATCHING), REQUESTS, CALLS, (False, True), WAYS, ("none", "due", "there")
     for case in filter(Case.is_telling, starmap(Case, product(*axes))):
-        case.prepare(scene, before)
-        verdict = scene.decide(case.event(scene.echo))
+        case.prepare(fixture, before)
+        verdict = fixture.decide(case.event(fixture.echo))
         walked += 1
-        check_reset(case, verdict, scene.state)
+        check_reset(case, verdict, fixture.state)
         check_run(case, verdict)
     tell(f"{walked} sets of latches with requests, calls, releases and inhibitions")
     few = sum(math.comb(8, size) for size in range(OTHERS + 1))
@@ -355,17 +356,22 @@ def test_every_set_of_blocked_sonars_under_every_way_to_move() -> None:
     walked = 0
     for bad in subsets(set(SONAR_NAMES)):
         for distance in (0.2, None):
-            scene = Scene().ready()
-            scene.status = NO_ECHO
-            scene.sonar(**dict.fromkeys(bad, distance))
-            scene.tick()
-            standing = scene.state
+            fixture = PolicyFixture().ready()
+            fixture.status = NO_ECHO
+            fixture.sonar(**dict.fromkeys(bad, distance))
+            fixture.tick()
+            standing = fixture.state
             for twist in TWISTS:
-                fresh(scene, replace(standing, verdict=Verdict("run", "run")), twist, armed=True)
-                verdict = scene.decide()
+                fresh(
+                    fixture,
+                    replace(standing, verdict=Verdict("run", Command.RUN)),
+                    twist,
+                    armed=True,
+                )
+                verdict = fixture.decide()
                 walked += 1
                 blocked = any(closes_in(name, twist) for name in bad)
-                assert ("blocked" in scene.state.latches) == blocked, (bad, twist)
+                assert ("blocked" in fixture.state.latches) == blocked, (bad, twist)
                 assert (verdict.command == "run") == (not blocked), (bad, twist)
     tell(f"{walked} sets of blocked or faulty sonars with ways to move")
     assert walked == 2**8 * 2 * len(TWISTS)

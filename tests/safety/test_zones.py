@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
+from common.motion import Twist
 from common.settings import Vehicle
 from common.vehicle import sonar_mounts
 from services.safety.config import Safety
-from services.safety.twist import Twist
 from services.safety.zones import GRAZING_MPS, Zones, zones
 
 FREE = (math.inf,) * 8

@@ -4,6 +4,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from common.motion import Twist
 from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
@@ -11,7 +12,6 @@ from common.wire.frame import Frame, Side
 from sim.board import BREAK, STOP, Board
 from sim.config import Sim
 from sim.sonar import Ranges
-from sim.vehicle import Twist
 
 CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
 LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)

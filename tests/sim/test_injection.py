@@ -5,6 +5,7 @@ import msgspec
 import pytest
 
 from common.freshness import NS_PER_S
+from common.motion import Command
 from common.wire import commands as c
 from common.wire import reports as r
 from sim import requests as q
@@ -174,7 +175,7 @@ def test_a_board_that_ignores_stop_drives_on_and_obeys_break() -> None:
     rig = Rig()
     rig.run(0.3)
     rig.after(1.0)
-    rig.do(q.Firmware(ignores=("stop",)))
+    rig.do(q.Firmware(ignores=(Command.STOP,)))
     rig.stop()
     rig.after(1.0)
     assert rig.truth.linear == pytest.approx(0.3)

@@ -23,7 +23,7 @@ def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
         c.MotionCommand(c.MotionKind.BREAK),
     )
     lines = [msgspec.to_builtins(line) for line in rig.of(t.Command)]
-    assert [line["kind"] for line in lines] == ["run", "stop", "break"]
+    assert [line["kind"] for line in lines] == ["run", "stop", "brake"]
     assert lines[0] == {
         "event": "command",
         "mono_ns": START_NS + NS_PER_S // 4,

@@ -4,11 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.motion import Twist
 from common.settings import Vehicle
 from common.wire.commands import MotionKind
 from sim.config import Drive
 from sim.geometry import Pose
-from sim.vehicle import Twist, go, moved, next_twist, wheels
+from sim.vehicle import go, moved, next_twist, wheels
 
 DRIVE = Drive()
 DT = 0.01

@@ -12,7 +12,7 @@ from common.config import Loaded
 from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.messages import Cause, Drive, Limits, Link, Message, Odometry, Release, SafetyState
-from common.operator import Twist
+from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller

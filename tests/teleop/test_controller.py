@@ -22,7 +22,8 @@ from common.messages import (
     SafetyState,
     Velocity,
 )
-from common.operator import ESTOP_TICKS, Twist
+from common.motion import Twist
+from common.operator import ESTOP_TICKS
 from services.teleop.controller import Controller
 from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick

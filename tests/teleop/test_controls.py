@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from common.operator import ZERO_TWIST, Twist
+from common.motion import STILL, Twist
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls
 from services.teleop.mapping import Deflection, Stick
@@ -40,7 +40,7 @@ def operator() -> Operator:
 def test_a_tap_is_a_zero_the_twist_and_three_zeros(operator: Operator) -> None:
     assert operator.ticks(2) == [None, None]
     operator.press("w")
-    assert operator.ticks(18) == [ZERO_TWIST] + [FIRST_GEAR] * 11 + [ZERO_TWIST] * 3 + [None] * 3
+    assert operator.ticks(18) == [STILL] + [FIRST_GEAR] * 11 + [STILL] * 3 + [None] * 3
     assert operator.controls.silent
 
 
@@ -56,7 +56,7 @@ def test_space_ends_a_hold_at_once(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(3)
     operator.press("space")
-    assert operator.ticks(5) == [ZERO_TWIST] * 3 + [None] * 2
+    assert operator.ticks(5) == [STILL] * 3 + [None] * 2
 
 
 @pytest.mark.parametrize("key", ["x", "enter", "6", "0", "e", ""])
@@ -96,7 +96,7 @@ def test_a_release_and_driving_exclude_each_other(
     operator.ticks(2)
     operator.press(key)
     assert operator.controls.released(operator.now_ns) == direction
-    assert operator.ticks(4) == [ZERO_TWIST] * 3 + [None]
+    assert operator.ticks(4) == [STILL] * 3 + [None]
     operator.press("w")
     assert operator.controls.released(operator.now_ns) is None
 
@@ -131,8 +131,8 @@ def test_muted_keys_count_again_after_a_pause(operator: Operator, key: str) -> N
 
 def test_a_gamepad_drives_while_its_deadman_is_down(operator: Operator) -> None:
     assert operator.ticks(2, UP) == [None, None]
-    assert operator.ticks(3, DOWN) == [ZERO_TWIST, FIRST_GEAR, FIRST_GEAR]
-    assert operator.ticks(4, UP) == [ZERO_TWIST] * 3 + [None]
+    assert operator.ticks(3, DOWN) == [STILL, FIRST_GEAR, FIRST_GEAR]
+    assert operator.ticks(4, UP) == [STILL] * 3 + [None]
 
 
 def test_a_gamepad_has_turbo_of_its_own(operator: Operator) -> None:
@@ -144,10 +144,10 @@ def test_a_gamepad_has_turbo_of_its_own(operator: Operator) -> None:
 def test_a_lost_gamepad_releases_and_its_return_moves_nothing(operator: Operator) -> None:
     operator.ticks(1, UP)
     operator.ticks(3, DOWN)
-    assert operator.ticks(4, None) == [ZERO_TWIST] * 3 + [None]
+    assert operator.ticks(4, None) == [STILL] * 3 + [None]
     assert operator.ticks(3, DOWN) == [None] * 3
     operator.ticks(1, UP)
-    assert operator.ticks(2, DOWN) == [ZERO_TWIST, FIRST_GEAR]
+    assert operator.ticks(2, DOWN) == [STILL, FIRST_GEAR]
 
 
 @pytest.mark.parametrize("key", ["space", "f", "b"])
@@ -184,7 +184,7 @@ def test_a_gamepad_that_freezes_while_it_drives_is_released(operator: Operator) 
         assert operator.ticks(1, pushed(event)) != [None]
     frozen = operator.ticks(100, pushed(59))
     driven = [twist for twist in frozen if twist]
-    assert driven == [driven[0]] * LIMIT_TICKS + [ZERO_TWIST] * 3
+    assert driven == [driven[0]] * LIMIT_TICKS + [STILL] * 3
     assert frozen[len(driven) :] == [None] * (100 - len(driven))
     assert operator.controls.gamepad_expired
 
@@ -202,13 +202,13 @@ def test_a_frozen_gamepad_that_recovers_needs_its_deadman_again(operator: Operat
 @pytest.mark.parametrize("linear", [0.0, 0.05])
 def test_a_stick_at_rest_needs_no_event(operator: Operator, linear: float) -> None:
     operator.ticks(1, pushed(0, deadman=False))
-    assert operator.ticks(400, pushed(1, linear)) == [ZERO_TWIST] * 400
-    assert operator.ticks(1, pushed(2)) != [ZERO_TWIST]  # its own movement is an event
+    assert operator.ticks(400, pushed(1, linear)) == [STILL] * 400
+    assert operator.ticks(1, pushed(2)) != [STILL]  # its own movement is an event
 
 
 def test_full_deflection_has_the_same_limit(operator: Operator) -> None:
     operator.ticks(1, pushed(0, deadman=False))
-    assert operator.ticks(LIMIT_TICKS + 3, pushed(1, 1.0))[-2:] == [ZERO_TWIST] * 2
+    assert operator.ticks(LIMIT_TICKS + 3, pushed(1, 1.0))[-2:] == [STILL] * 2
 
 
 def test_the_operator_is_asked_to_move_the_stick_in_time(operator: Operator) -> None:

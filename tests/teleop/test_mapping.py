@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.operator import Twist
+from common.motion import Twist
 from services.teleop.config import GEARS, Teleop
 from services.teleop.mapping import DIRECTIONS, Deflection, deflection, shaped, twist
 

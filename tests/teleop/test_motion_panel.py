@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Direction, Driver, Limits, Velocity
-from common.operator import Twist
+from common.motion import Twist
 from services.teleop.motion_panel import motion
 from services.teleop.view import View
 from tests.teleop.support import contact_state, link, odometry, safety_state, view

@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Bumper, Cause, Direction
-from common.operator import Twist
+from common.motion import Twist
 from services.teleop import panels
 from services.teleop.round_trip import UNKNOWN, multiplexer
 from services.teleop.view import Line
@@ -11,7 +11,7 @@ from tests.teleop.support import contact_state, link, release, safety_state, vie
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
-IDLE = Cause(name="no_request", action="stop", age=1.0, text="Nobody asks to move.")
+IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
 
 
 def test_the_header_shows_the_connections() -> None:

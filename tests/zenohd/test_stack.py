@@ -32,7 +32,7 @@ def test_it_drives_and_an_emergency_stop_stops_it(stack: Chain, stick: Stick) ->
     push(stack, stick)
     code, said = t2(stack, "estop")
     assert code == 0, said
-    wait_until(lambda: stack.last() == "break", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert not moves_since(stack, len(stack.trace().commands))
     stick.linear = 0.0
@@ -44,7 +44,7 @@ def test_the_routers_death_stops_it_and_the_next_one_takes_over(stack: Chain, st
     push(stack, stick)
     stack.kill("router")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
-    assert stack.last() in ("stop", "break")
+    assert stack.last() in ("stop", "brake")
     count = len(stack.trace().commands)
     stack.start("router")
     wait_until(lambda: t2(stack, "services")[0] == 0, "the services on the next router")

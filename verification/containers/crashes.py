@@ -126,7 +126,7 @@ def survived(stage: Stage, service: str, hurt: Callable[[], int], restart_s: flo
 
 def stands(stage: Stage, since_ns: int, witness: Witness, extra_s: float) -> tuple[float, float]:
     """Wait until the vehicle stands; return how long it was held to move, and what is allowed."""
-    wait_until(lambda: stage.holds() in ("stop", "break"), "STOP at the board", RESTART_S)
+    wait_until(lambda: stage.holds() in ("stop", "brake"), "STOP at the board", RESTART_S)
     wait_until(lambda: abs(stage.speed()) < STILL, "the vehicle stands")
     allowed_s = stage.config.bridge.lease + extra_s + witness.stop()
     took_s = held_run_s(stage.trace(), since_ns)

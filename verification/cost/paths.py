@@ -14,6 +14,7 @@ from common import messages as m
 from common.bus import bus as buses
 from common.config import Sources, load
 from common.freshness import NS_PER_S
+from common.motion import Command
 from common.service import Node
 from common.settings import Shared
 from common.wire import commands, reports
@@ -28,7 +29,7 @@ from services.bridge.translate import BumperFilter
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
-from services.safety.service import Ports
+from services.safety.service import SafetyService
 from verification.cost.stand_ins import BOOT, Cable, Clock, DroppedLines, Session
 
 MS = NS_PER_S // 1000
@@ -84,11 +85,11 @@ class BridgePaths:
                 "ultrasonic": reports.UltrasonicReport((2000,) * 8),
             }.items()
         }
-        for command in ("stop", "run"):
+        for command in (Command.STOP, Command.RUN):
             self.second(command)
         self._expect(MotionKind.RUN, 300)
 
-    def second(self, command: m.Command = "run") -> None:
+    def second(self, command: Command = Command.RUN) -> None:
         """All that a second brings: ticks, queries and answers, velocities, motions, the link."""
         for tick in range(100):
             self.clock.now_ns += 10 * MS
@@ -115,13 +116,13 @@ class BridgePaths:
         """Safety has judged the hit."""
         self._expect(MotionKind.BREAK)
         self._bridge._core._bumper = BumperFilter()
-        self._move("run", judged=self._bridge._publishers["bumper"].next_seq)
+        self._move(Command.RUN, judged=self._bridge._publishers["bumper"].next_seq)
         self._expect(MotionKind.RUN, 300)
 
     def motion(self) -> None:
         """A motion message to a RUN frame."""
         self.clock.now_ns += MOMENT_NS
-        self._move("run")
+        self._move(Command.RUN)
 
     def _come(self, name: str) -> None:
         for cable in self._cables:  # the board sends to both ports
@@ -132,11 +133,11 @@ class BridgePaths:
         self._come(name)
         self._bridge._read(self.clock.now_ns)
 
-    def _move(self, command: m.Command, judged: int = 0) -> None:
+    def _move(self, command: Command, judged: int = 0) -> None:
         self._seq += 1
         now_ns = self.clock.now_ns
         motion = m.Motion(
-            command=command, linear=0.3 if command == "run" else 0.0, source="teleop",
+            command=command, linear=0.3 if command is Command.RUN else 0.0, source="teleop",
             seq=self._seq, boot=BOOT - 1, t_ns=now_ns, mono_ns=now_ns, host=BOOT,
             asked_ns=now_ns, heard_ns=now_ns, judged_ns=now_ns, judged=judged, judged_boot=BOOT,
         )  # fmt: skip
@@ -156,14 +157,14 @@ class SafetyPaths:
         clock.install()
         self._node = node("safety", SafetyConfig)
         reader = self._node.open_bus()
-        Ports(self._node, reader)
+        SafetyService(self._node, reader)
         self._session = Session(self._node.bus, self._node.loop)
         self._link = Session(self._node.drive, self._node.loop)
         Session(reader, self._node.loop)
         self._seq: Counter[str] = Counter()
         for linear in (0.0, 0.3):
             self.second(linear)
-        assert self._motion().command == "run", "the replay does not drive any more: mend it"
+        assert self._motion().command is Command.RUN, "the replay does not drive any more: mend it"
 
     def second(self, linear: float = 0.3) -> None:
         """All that a second brings: samples and requests in, verdicts and states out."""

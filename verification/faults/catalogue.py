@@ -12,6 +12,7 @@ from typing import Literal, get_args
 from zenoh import CongestionControl
 
 from cli.settings import Everything
+from common.motion import Command
 from sim.requests import (
     Driver,
     Firmware,
@@ -58,7 +59,7 @@ class Fault:
     hold_s: float = 0.5  # how long the stick is held on after the fault
     harmless: bool = False  # no process may end by it
     needs: Need = "nothing"
-    stops: tuple[str, ...] = ("stop", "break")  # commands that end the fault's danger
+    stops: tuple[str, ...] = ("stop", "brake")  # commands that end the fault's danger
 
 
 def by_limit(limit: Callable[[Everything], float]) -> Budget:
@@ -251,9 +252,9 @@ FIRMWARE = [
           within(0.12 + 0.1), hold_s=HOLD_S),
     # While safety is dead nobody but the bridge sees that STOP does not stop it.
     Fault("safety SIGKILL, the board ignores STOP",
-          injectors.then(do(Firmware(ignores=("stop",))), kill("safety", signal.SIGKILL)),
+          injectors.then(do(Firmware(ignores=(Command.STOP,))), kill("safety", signal.SIGKILL)),
           (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
-          hold_s=2.0, stops=("break",)),
+          hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 
 # These take the machine's time as well.

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from common import codec, keys
 from common.bus.session import client_config
 from common.messages import Bumper, Motion, Velocity
+from common.motion import Command
 from verification.faults import injectors
 from verification.faults.stack_fixture import Lane, until
 from verification.harness.support import at
@@ -52,7 +53,7 @@ def forged(make: Callable[[Motion, Bumper], dict[str, bytes]]) -> Callable[[Lane
 
 def authority(motion: Motion, _: Bumper) -> dict[str, bytes]:
     """Command a motion in safety's name."""
-    run = replace(motion, command="run", linear=BACKWARD_MPS)
+    run = replace(motion, command=Command.RUN, linear=BACKWARD_MPS)
     return {keys.MOTION.on("001"): codec.encode(run)}
 
 

@@ -56,7 +56,7 @@ def strayed(commands: Sequence[Command]) -> bool:
 
 
 def first_stop_s(
-    commands: Sequence[Command], fault_ns: int, kinds: Collection[str] = ("stop", "break")
+    commands: Sequence[Command], fault_ns: int, kinds: Collection[str] = ("stop", "brake")
 ) -> float | None:
     """Return how long after the fault the first STOP or BREAK came; None if none came."""
     stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= fault_ns]

@@ -16,6 +16,7 @@ from msgspec import Struct
 from common import messages as m
 from common.codec import encode
 from common.config import DEFAULT_FILE
+from common.motion import Command
 from common.wire.frame import Frame
 from verification.fuzz.targets import COVERS, FRAMINGS, KINDS
 from verification.harness.frame_strategies import COMMANDS, REPORTS
@@ -48,7 +49,9 @@ EXAMPLES: tuple[Struct, ...] = (
              lateness=0.001, rss=2**26),
     m.Event(name="contact", level="error", text="hit", about={"a": 1, "b": None, "c": 0.5}),
     m.Drive(linear=math.nan, angular=math.inf, echo=7),
-    m.Motion(command="run", linear=0.5, angular=-0.5, source="teleop", judged=9, judged_boot=5),
+    m.Motion(
+        command=Command.RUN, linear=0.5, angular=-0.5, source="teleop", judged=9, judged_boot=5
+    ),
     m.SwitchesRequest(bumper_brake=True),
     m.LedRequest(channel=9, mode=1),
     m.ResetRequest(),

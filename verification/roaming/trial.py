@@ -107,7 +107,7 @@ def estop(it: Site) -> tuple[float | None, float | None]:
 
     def braked() -> list[int]:
         commands = it.lane.frames.follow().commands
-        return [c.mono_ns for c in commands if c.kind == "break" and c.mono_ns > pressed_ns]
+        return [c.mono_ns for c in commands if c.kind == "brake" and c.mono_ns > pressed_ns]
 
     def told() -> list[int]:
         return [note.at_ns for note in it.hears(STATE, pressed_ns) if note.latched]

@@ -26,30 +26,33 @@ from common.messages import (
     Switches,
     Velocity,
 )
+from common.motion import STILL, Command, Twist
 from common.settings import Vehicle, Wire
 from common.wire.commands import MotionKind
 from common.wire.reports import UltrasonicReport
 from services.bridge.translate import Translator
 from services.safety.config import Safety
-from services.safety.inputs import Ask, Event, Inputs
+from services.safety.inputs import DriveRequest, Event, Inputs
 from services.safety.policy import Policy
-from services.safety.twist import STILL
-from services.safety.twist import Twist as Asked
 from sim.config import Drive as Motors
 from sim.geometry import Rectangle, wrapped
 from sim.sonar import Sonars
-from sim.vehicle import Twist, go, next_twist
+from sim.vehicle import go, next_twist
 from sim.world import Plan, World
 
 OFFICE = Path(__file__).parents[2] / "sim/worlds/office.toml"
 TICK_NS, SONAR_TICKS, ASK_TICKS = NS_PER_S // 100, 5, 5
 BACK_TICKS = 100  # of the way that a contact takes back
-KINDS = {"run": MotionKind.RUN, "stop": MotionKind.STOP, "brake": MotionKind.BREAK}
+KINDS = {
+    Command.RUN: MotionKind.RUN,
+    Command.STOP: MotionKind.STOP,
+    Command.BRAKE: MotionKind.BREAK,
+}
 LINK = Link(
     state="up", board="", epoch=0, armed=True, waiting="", rates={}, rejected={}, round_trip=None
 )
 EVERY_WAY = [
-    Asked(linear, angular)
+    Twist(linear, angular)
     for linear in (0.3, -0.3, 0.0)
     for angular in (0.0, 0.4, -0.4)
     if linear or angular
@@ -74,20 +77,20 @@ class Walk:
         vehicle = Vehicle()
         self.world = World.of(plan).without("step")
         self.body = Rectangle(vehicle.length / 2, vehicle.width / 2)
-        self.pose, self.twist, self.contacts = plan.start.pose, Twist(), 0
+        self.pose, self.twist, self.contacts = plan.start.pose, STILL, 0
         sonars = replace(vehicle, sonar_max=saturation)
         self.sonars = Sonars(sonars, 0.5, noise, seed)
         self.random = random.Random(seed)
         self.policy = Policy(Safety(), vehicle)
         self.state = self.policy.start()
         self.translator = Translator(Wire(), vehicle, 1.0, 1.0)
-        self.inputs = Inputs(reader=True)
+        self.inputs = Inputs(estop_session_up=True)
         self.now_ns, self.ticks = 10 * NS_PER_S, 0
         self.distance = self.turn = self.metres = 0.0
         self.before = deque([self.pose], maxlen=BACK_TICKS)
         self.asked, self.until_ns, self.blocked_ns = STILL, 0, 0
 
-    def tick(self, asked: Asked | None) -> bool:
+    def tick(self, asked: Twist | None) -> bool:
         """Let 10 ms pass under a request; return whether the vehicle moves."""
         self.now_ns += TICK_NS
         self.ticks += 1
@@ -103,7 +106,7 @@ class Walk:
                 seq=self.ticks,
                 boot=1,
             )
-            self._decide(Ask("teleop", drive, self.now_ns))
+            self._decide(DriveRequest("teleop", drive, self.now_ns))
         return abs(self.twist.linear) > 0.02 or abs(self.twist.angular) > 0.05
 
     def wander(self, seconds: float) -> float:
@@ -120,7 +123,7 @@ class Walk:
                 return False
         return True
 
-    def _choose(self) -> Asked:
+    def _choose(self) -> Twist:
         """Keep the motion for a while; when blocked, choose another one soon."""
         blocked = "blocked" in self.state.latches
         self.blocked_ns = self.blocked_ns + TICK_NS if blocked else 0
@@ -128,7 +131,7 @@ class Walk:
             self.until_ns = self.now_ns + round(self.random.uniform(1.0, 4.0) * NS_PER_S)
             self.blocked_ns = 0
             linear = self.random.choice((0.7, 0.5, 0.3, 0.0, -0.3))
-            self.asked = Asked(linear, self.random.choice((0.0, self.random.uniform(-0.8, 0.8))))
+            self.asked = Twist(linear, self.random.choice((0.0, self.random.uniform(-0.8, 0.8))))
             return STILL
         return self.asked
 
@@ -138,13 +141,13 @@ class Walk:
         twist = next_twist(self.twist, KINDS[verdict.command], target, Motors(), dt)
         way = go(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
         self.before.append(self.pose)
-        self.pose, self.twist = way.pose, Twist() if way.held else twist
+        self.pose, self.twist = way.pose, STILL if way.held else twist
         self.distance += way.distance
         self.metres += abs(way.distance)
         self.turn += way.turn
         if self.world.contact(self.body, self.pose):
             self.contacts += 1
-            self.pose, self.twist = self.before[0], Twist()
+            self.pose, self.twist = self.before[0], STILL
 
     def _report(self) -> None:
         self._put("velocity", Velocity(linear=self.twist.linear, angular=self.twist.angular))

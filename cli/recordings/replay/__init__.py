@@ -1,1 +1,1 @@
-"""Recordings onto the bus again, or their raw frames to a bridge."""
+"""``t2 replay``: recordings onto the bus, or their raw frames to a bridge."""

@@ -1,4 +1,4 @@
-"""Where a recording is played to: the bus, a simulated vehicle's safety service, or a bridge."""
+"""Targets of a replay: the bus, the safety service of a simulated vehicle, or a bridge."""
 
 import ipaddress
 import secrets
@@ -22,37 +22,37 @@ from common.settings import Board
 
 
 class Target(Protocol):
-    """Takes one sample after the other; ``look`` raises ``RobotError`` once it must no more."""
+    """Plays samples; ``check`` raises ``RobotError`` when the replay must end."""
 
     def play(self, path: str, sample: Sample) -> bool:
-        """Play a sample of this key below the robot; tell whether there was something to play."""
+        """Play a sample of this key below the robot; return whether anything was sent."""
 
-    def look(self) -> None:
-        """See whether all is still as it has to be."""
+    def check(self) -> None:
+        """Check that the replay may continue."""
 
 
 class BusTarget:
-    """The keys of a robot that has no bridge and no safety service."""
+    """The keys of a robot without a running bridge or safety service."""
 
     def __init__(self, seat: Seat, robot: str) -> None:
-        """Raise ``RobotError`` when there is one."""
+        """Raise ``RobotError`` if one of them is running."""
         self._probe = seat.probe
         self._robot = robot
-        self.look()
+        self.check()
 
     def alive(self) -> set[str]:
-        """Return the services that are there, by name."""
+        """Return the names of the running services."""
         tokens = self._probe.alive(keys.live_key(self._robot, "*", "*"))
         return {token.split("/")[-2] for token in tokens}
 
-    def look(self) -> None:
-        """Raise ``RobotError`` when somebody has come whose word this would be."""
+    def check(self) -> None:
+        """Raise ``RobotError`` if a bridge or safety service has started."""
         why = refusal(self._robot, self.alive())
         if why:
             raise RobotError(why)
 
     def play(self, path: str, sample: Sample) -> bool:
-        """Put it again, to the byte."""
+        """Publish the original bytes."""
         if sample.deleted:
             return False
         self._put(path, sample.payload, sample.encoding, sample.raw)
@@ -66,50 +66,50 @@ class BusTarget:
 
 
 class SimulatorTarget(BusTarget):
-    """The safety service of a simulated vehicle: what was asked is asked again, as if now."""
+    """The safety service of a simulated vehicle: receives the drive requests with new headers."""
 
     def __init__(self, seat: Seat, robot: str) -> None:
-        """Raise ``RobotError`` when the vehicle is not a simulated one."""
+        """Raise ``RobotError`` if the vehicle is not simulated."""
         self._boot, self._host, self._seq = secrets.randbits(63), host_id(), 0
         self._heartbeat = 0
         check(keys.MOTION.on(robot), True, seat.probe)
         super().__init__(seat, robot)
         seat.probe.listen(keys.SAFETY.on(robot))
 
-    def look(self) -> None:
-        """Here the services have to be there, and safety decides."""
+    def check(self) -> None:
+        """Accept running services: safety decides about the requests."""
 
     def play(self, path: str, sample: Sample) -> bool:
-        """Ask again, with safety's own heartbeat of now; stop again."""
+        """Send a drive request with safety's current heartbeat, or an emergency stop."""
         if path == keys.ESTOP_PATH:
             self._probe.put(keys.estop_key(self._robot), b"", "", keys.ESTOP_CLASS)
             return True
         try:
-            asked = codec.decode(sample.payload, Drive)
+            request = codec.decode(sample.payload, Drive)
         except MessageError:
             return False
         self._seq += 1
         drive = replace(
-            asked, echo=self._newest_heartbeat(), seq=self._seq, boot=self._boot, host=self._host,
+            request, echo=self._newest_heartbeat(), seq=self._seq, boot=self._boot, host=self._host,
             t_ns=time.time_ns(), mono_ns=time.monotonic_ns(),
         )  # fmt: skip
         self._put(path, codec.encode(drive), codec.encoding(Drive), None)
         return True
 
     def _newest_heartbeat(self) -> int:
-        while heard := self._probe.take(0.0):
-            if heard.key == keys.SAFETY.on(self._robot):
-                self._heartbeat = codec.decode(heard.payload, SafetyState).heartbeat
+        while sample := self._probe.take(0.0):
+            if sample.key == keys.SAFETY.on(self._robot):
+                self._heartbeat = codec.decode(sample.payload, SafetyState).heartbeat
         return self._heartbeat
 
 
 class BoardTarget:
-    """A bridge on this host, which takes us for its board: the raw frames of the recording."""
+    """A bridge on this host: receives the raw frames as if from its board."""
 
     def __init__(self, board: Board) -> None:
-        """Raise ``RobotError`` when the board is not on this host, ``LinkError`` for its port."""
+        """Raise ``RobotError`` if the board is elsewhere, ``LinkError`` if its port is taken."""
         if not ipaddress.ip_address(board.address).is_loopback:
-            raise RobotError(f"--frames: the board is at {board.address}: a real one")
+            raise RobotError(f"--frames: the board at {board.address} is a real one")
         self._to = board.listen_address, board.listen_ports[0]
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -117,7 +117,7 @@ class BoardTarget:
         except OSError as error:
             self._socket.close()
             raise LinkError(
-                f"cannot be the board at {board.address}:{board.port}: {error.strerror}; "
+                f"cannot act as the board at {board.address}:{board.port}: {error.strerror}; "
                 "is a simulated one running?"
             ) from None
 
@@ -132,11 +132,11 @@ class BoardTarget:
     ) -> None:
         self._socket.close()
 
-    def look(self) -> None:
-        """Nothing can change."""
+    def check(self) -> None:
+        """Do nothing: no condition can change."""
 
     def play(self, path: str, sample: Sample) -> bool:
-        """Send the frame that stands beside a message."""
+        """Send the raw frame attached to a message."""
         if sample.raw is None:
             return False
         self._socket.sendto(sample.raw, self._to)

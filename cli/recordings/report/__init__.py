@@ -1,1 +1,1 @@
-"""``t2 report``: a recording as one page."""
+"""``t2 report``: an HTML report of a recording."""

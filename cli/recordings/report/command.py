@@ -1,13 +1,13 @@
-"""``t2 report FILE...``: each recording as one page that needs nothing else to be read.
+"""``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
-The path, speeds asked, allowed and measured, ranges, stops with their reasons, events, rates and
-gaps of each stream, reaction times. Needs the extra ``report``.
+It shows the path, the velocities (requested, allowed, measured), sonar ranges, stops with their
+reasons, events, rates and gaps of each stream, and reaction times. It needs the extra ``report``.
 """
 
 import argparse
 from pathlib import Path
 
-from cli.recordings.recorded import opened
+from cli.recordings.info import open_recording
 from common.errors import RobotError
 
 
@@ -15,33 +15,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings (.mcap)")
     parser.add_argument(
-        "--out", type=Path, metavar="HTML", help="the page of one FILE; else beside it, as .html"
+        "--out",
+        type=Path,
+        metavar="HTML",
+        help="output file, for one FILE; by default FILE with the suffix .html",
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a page for each and name it; raise ``RobotError`` for the first that cannot be."""
+    """Write a report for each file and print its path; raise ``RobotError`` on the first error."""
     files: list[Path] = options.files
     if options.out and len(files) > 1:
-        raise RobotError(f"--out names one page, and there are {len(files)} recordings")
+        raise RobotError(f"--out is for one recording, and there are {len(files)} recordings")
     for file in files:
-        print(written(file, options.out or file.with_suffix(".html")))
+        print(write_report(file, options.out or file.with_suffix(".html")))
     return 0
 
 
-def written(file: Path, out: Path) -> Path:
-    """Write the page of one recording, and return where it is."""
+def write_report(file: Path, out: Path) -> Path:
+    """Write the report of one recording, and return its path."""
     try:
-        from cli.recordings.report.page import page, told
+        from cli.recordings.report.page import page, timeline_of
     except ImportError as error:
-        raise RobotError(f"a report wants {error.name}: pip install -e '.[report]'") from None
+        raise RobotError(f"a report needs {error.name}: pip install -e '.[report]'") from None
     if out.exists() and file.exists() and out.samefile(file):
-        raise RobotError(f"{out}: is the recording itself; name another page with --out")
-    with opened(file) as reader:
-        story = told(reader)
-        if story.began_ns is None:
-            raise RobotError(f"{file}: holds no message of the bus")
-        text = page(story, reader)
+        raise RobotError(f"{out}: is the recording itself; choose another file with --out")
+    with open_recording(file) as reader:
+        timeline = timeline_of(reader)
+        if timeline.began_ns is None:
+            raise RobotError(f"{file}: contains no messages of the bus")
+        text = page(timeline, reader)
     try:
         out.write_text(text, encoding="utf-8")
     except OSError as error:

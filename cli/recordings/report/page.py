@@ -1,4 +1,4 @@
-"""A recording's story as one HTML page; what came from the bus is text there, never markup."""
+"""The report as one HTML page; all content from the bus is escaped."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,111 +8,110 @@ from jinja2 import Environment, StrictUndefined
 from cli.inspect.addressing import chunks
 from cli.latency import NAMES
 from cli.recordings.report import figures
-from cli.recordings.report.reactions import Reaction, reactions
-from cli.recordings.report.story import Story
-from cli.recordings.report.streams import Stream
+from cli.recordings.report.timeline import Timeline
+from cli.recordings.report.timing import Reaction, Stream, reactions
 from common.freshness import NS_PER_S
 from services.recorder.reader import Reader
 
 TEMPLATE = Path(__file__).with_name("page.html")
-EVENTS_MOST = 500
+EVENTS_MAX = 500
 
 
-def told(reader: Reader) -> Story:
-    """Return what a recording tells; raise ``RobotError`` when it is none."""
-    story = Story()
+def timeline_of(reader: Reader) -> Timeline:
+    """Return the timeline of a recording; raise ``RobotError`` if it is not a recording."""
+    timeline = Timeline()
     for recorded in reader:
-        story.hear(recorded.key, recorded.message, recorded.log_ns)
-    return story
+        timeline.add(recorded.key, recorded.message, recorded.log_ns)
+    return timeline
 
 
-def page(story: Story, reader: Reader) -> str:
-    """Return the page of a recording that was read to its end."""
-    streams = sorted(story.streams.values(), key=lambda stream: (order(stream), stream.key))
+def page(timeline: Timeline, reader: Reader) -> str:
+    """Return the page of a recording that has been read to its end."""
+    streams = sorted(timeline.streams.values(), key=lambda stream: (order(stream), stream.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters |= {"clock": clock, "figure": figure, "ms": ms}
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
-        story=story,
+        timeline=timeline,
         title=reader.path.name,
-        about=facts(story, reader),
-        warnings=warnings(story, reader),
+        about=summary(timeline, reader),
+        warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
-        reactions=[(words(one.name), "." in one.name, one) for one in measured(story)],
-        events=story.events[:EVENTS_MOST],
-        path=figures.path(story) if story.path else "",
-        speeds=figures.speeds(story),
-        ranges=figures.ranges(story) if any_range(story) else "",
-        arrivals=figures.arrivals(story, streams, names),
+        reactions=[(label(one.name), "." in one.name, one) for one in measured(timeline)],
+        events=timeline.events[:EVENTS_MAX],
+        path=figures.path(timeline) if timeline.path else "",
+        speeds=figures.speeds(timeline),
+        ranges=figures.ranges(timeline) if has_ranges(timeline) else "",
+        arrivals=figures.arrivals(timeline, streams, names),
     )
 
 
-def facts(story: Story, reader: Reader) -> dict[str, str]:
-    """Return what stands at the top, by name."""
-    began = datetime.fromtimestamp((story.began_ns or 0) / NS_PER_S, UTC)
-    robots = sorted({robot for key in story.streams if (robot := chunks(key)[0])})
-    versions = ", ".join(f"{name} {version}" for name, version in sorted(story.versions.items()))
+def summary(timeline: Timeline, reader: Reader) -> dict[str, str]:
+    """Return the summary at the top of the page, by name."""
+    began = datetime.fromtimestamp((timeline.began_ns or 0) / NS_PER_S, UTC)
+    robots = sorted({robot for key in timeline.streams if (robot := chunks(key)[0])})
+    versions = ", ".join(f"{name} {version}" for name, version in sorted(timeline.versions.items()))
+    while_driving = sum(stop.was_driving for stop in timeline.stops)
     return {
         "robot": ", ".join(robots),
-        "began": f"{began:%Y-%m-%d %H:%M:%NS_PER_S} UTC",
-        "lasted": clock(story.lasted_s),
-        "driven": f"{story.distance:.1f} m",
-        "stops": f"{len(story.stops)}, {sum(stop.was_driving for stop in story.stops)} of them "
-        "while driving",
-        "services": versions or "none told its health",
-        "messages": f"{sum(len(stream.times) for stream in story.streams.values())}"
-        f" on {len(story.streams)} keys",
+        "start": f"{began:%Y-%m-%d %H:%M:%S} UTC",
+        "duration": clock(timeline.lasted_s),
+        "distance": f"{timeline.distance:.1f} m",
+        "stops": f"{len(timeline.stops)}, {while_driving} while driving",
+        "services": versions or "no health messages",
+        "messages": f"{sum(len(stream.times) for stream in timeline.streams.values())}"
+        f" on {len(timeline.streams)} keys",
         "recorded": ", ".join(f"{name} {value}" for name, value in sorted(reader.about.items())),
     }
 
 
-def warnings(story: Story, reader: Reader) -> list[str]:
-    """Return what is missing of the recording, in words."""
+def warnings(timeline: Timeline, reader: Reader) -> list[str]:
+    """Return warnings about an incomplete recording."""
     found = []
     if reader.cut:
-        found.append("The file has no end: its writer was killed, or is still writing.")
+        found.append("The file is truncated: its writer was killed, or is still writing.")
     if reader.damaged:
-        found.append(f"{reader.damaged} damaged pieces of the file are left out.")
-    unread = sum(stream.unread for stream in story.streams.values())
-    if unread:
-        found.append(f"{unread} messages could not be read as what they say they are.")
-    if len(story.events) > EVENTS_MOST:
-        found.append(f"Of {len(story.events)} events the first {EVENTS_MOST} are listed.")
+        found.append(f"{reader.damaged} damaged chunks of the file are skipped.")
+    undecoded = sum(stream.undecoded for stream in timeline.streams.values())
+    if undecoded:
+        found.append(f"{undecoded} messages could not be decoded.")
+    if len(timeline.events) > EVENTS_MAX:
+        found.append(f"The first {EVENTS_MAX} of {len(timeline.events)} events are listed.")
     return found
 
 
-def measured(story: Story) -> list[Reaction]:
+def measured(timeline: Timeline) -> list[Reaction]:
     """Return the bridge's reaction times."""
-    return reactions(ends for (service, _), ends in story.healths.items() if service == "bridge")
+    return reactions(ends for (service, _), ends in timeline.healths.items() if service == "bridge")
 
 
-def words(name: str) -> str:
-    """Return the name of a reaction, or of a hop in one, for people."""
+def label(name: str) -> str:
+    """Return the display name of a reaction or of a hop."""
     last = name.rpartition(".")[2]
     return NAMES.get(last, last)
 
 
-def any_range(story: Story) -> bool:
-    """Tell whether the sonars were heard."""
-    return any(series.times for series in story.ranges.values())
+def has_ranges(timeline: Timeline) -> bool:
+    """Return whether the recording contains sonar ranges."""
+    return any(series.times for series in timeline.ranges.values())
 
 
 def order(stream: Stream) -> float:
-    """Return a sort key: the fastest first, what has no rate last."""
+    """Return a sort key: the fastest streams first, event-driven keys last."""
     return -stream.expected_hz
 
 
 def clock(seconds: float) -> str:
-    """Return a time in the recording, or a length, for people."""
+    """Format a time or a duration."""
     minutes, rest = divmod(seconds, 60)
     return f"{minutes:.0f} min {rest:04.1f} s" if minutes else f"{rest:.1f} s"
 
 
 def figure(value: float | None, form: str) -> str:
-    """Return a number, or nothing where there is none."""
+    """Format a number; empty for None."""
     return "" if value is None else format(value, form)
 
 
 def ms(seconds: float | None) -> str:
-    """Return a duration in milliseconds, or nothing."""
+    """Format a duration in milliseconds; empty for None."""
     return "" if seconds is None else f"{1000 * seconds:.1f}"

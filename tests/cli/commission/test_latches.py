@@ -6,7 +6,8 @@ import pytest
 
 from cli.commission.latches import PROMPT_S, Reset, Trip, judge_bumper, judge_estop
 from common.freshness import NS_PER_S, Latest
-from common.messages import Command, Motion, SafetyState
+from common.messages import Motion, SafetyState
+from common.motion import Command
 from tests.cli.demo.lap_fixture import safety
 
 T = 100 * NS_PER_S
@@ -27,7 +28,11 @@ def trip(cause: str = "estop") -> Trip:
         at_ns=T,
         gone=True,
         states=[state(-0.1), state(0.02, cause), state(0.07, cause)],
-        motions=[motion(-0.1, "stop"), motion(0.01, "brake"), motion(0.03, "brake")],
+        motions=[
+            motion(-0.1, Command.STOP),
+            motion(0.01, Command.BRAKE),
+            motion(0.03, Command.BRAKE),
+        ],
         reset=RESET,
     )
 
@@ -54,11 +59,17 @@ def test_a_state_that_overtakes_its_cause_took_no_time() -> None:
         ({"states": [state(0.02)]}, "Safety did not latch estop."),
         ({"states": [state(0.02, "contact")]}, "Safety did not latch estop."),
         ({"states": [state(PROMPT_S + 0.01, "estop")]}, "It took safety 0.51 s to latch estop"),
-        ({"motions": [motion(0.01, "stop")]}, "Safety did not command BREAK."),
+        ({"motions": [motion(0.01, Command.STOP)]}, "Safety did not command BREAK."),
         ({"motions": []}, "Safety did not command BREAK."),
-        ({"motions": [motion(0.6, "brake")]}, "It took safety 0.60 s to command BREAK"),
+        ({"motions": [motion(0.6, Command.BRAKE)]}, "It took safety 0.60 s to command BREAK"),
         (
-            {"motions": [motion(0.01, "brake"), motion(0.03, "run"), motion(0.05, "stop")]},
+            {
+                "motions": [
+                    motion(0.01, Command.BRAKE),
+                    motion(0.03, Command.RUN),
+                    motion(0.05, Command.STOP),
+                ]
+            },
             "safety sent RUN, STOP in place of BREAK",
         ),
         ({"reset": None}, "No reset was tried."),
@@ -73,12 +84,14 @@ def test_what_is_missing_is_named(change: dict[str, object], said: str) -> None:
 
 
 def test_it_is_in_time_to_the_last_moment() -> None:
-    late = replace(trip(), states=[state(PROMPT_S, "estop")], motions=[motion(PROMPT_S, "brake")])
+    late = replace(
+        trip(), states=[state(PROMPT_S, "estop")], motions=[motion(PROMPT_S, Command.BRAKE)]
+    )
     assert judge_estop(late).outcome == "passed"
 
 
 def test_what_is_sent_after_the_reset_is_none_of_it() -> None:
-    more = [*trip().motions, motion(2.01, "stop")]
+    more = [*trip().motions, motion(2.01, Command.STOP)]
     assert judge_estop(replace(trip(), motions=more)).outcome == "passed"
 
 

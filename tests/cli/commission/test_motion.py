@@ -19,7 +19,7 @@ from cli.commission.motion import (
 from cli.commission.verdict import Verdict
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, Velocity
-from services.safety.twist import Twist
+from common.motion import Command, Twist
 from tests.cli.demo.lap_fixture import safety
 
 FORWARD, LEFT = Twist(linear=0.1), Twist(angular=0.2)
@@ -56,7 +56,7 @@ class Vehicle:
             feedback=feedback,
             released_ns=end_ns,
             motions=[
-                Latest(Motion(command="run", linear=linear * on, angular=angular * on), t)
+                Latest(Motion(command=Command.RUN, linear=linear * on, angular=angular * on), t)
                 for t, on in zip(times, released, strict=True)
             ],
             velocities=[
@@ -202,7 +202,7 @@ def test_the_window_must_be_long_enough() -> None:
 
 def test_a_pause_in_between_is_not_measured_over() -> None:
     run = Vehicle().run(FORWARD)
-    pause = Latest(Motion(command="stop"), NS_PER_S)
+    pause = Latest(Motion(command=Command.STOP), NS_PER_S)
     motions = sorted([*run.motions, pause], key=lambda motion: motion.received_ns)
     assert measure(replace(run, motions=motions)) is None
 

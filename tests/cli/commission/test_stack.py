@@ -167,7 +167,7 @@ def test_ctrl_c_while_the_wheels_turn_stops_them(stack: Chain, tmp_path: Path) -
         it.signal(signal.SIGINT)
         assert it.end() == 1
         wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
-        wait_until(lambda: stack.last() in ("stop", "break"), "STOP at the board")
+        wait_until(lambda: stack.last() in ("stop", "brake"), "STOP at the board")
     text = report.read_text(encoding="utf-8")
     assert "Ended early: interrupted by the operator." in text
     assert "| Emergency stop | skipped | nobody \\| near the switch |" in text

@@ -43,7 +43,7 @@ class Vehicle:
 
     def is_braked(self) -> bool:
         made = self.commands()
-        return bool(made) and made[-1].kind == "break" and self.control.truth().linear == 0
+        return bool(made) and made[-1].kind == "brake" and self.control.truth().linear == 0
 
 
 @pytest.fixture

@@ -124,7 +124,7 @@ def test_a_board_that_falls_silent_in_the_silence_is_braked_at_once() -> None:
 
 def test_it_brakes_until_the_vehicle_stands_and_says_so() -> None:
     trial, sent = played(lambda now_ns, sent: LINEAR_MPS)
-    assert trial.phase == "break"
+    assert trial.phase == "brake"
     assert sent[-1][1] == BREAK
     assert sent[-1][0] > START_NS + 4.9 * NS_PER_S
     assert (
@@ -136,15 +136,15 @@ def test_a_board_that_is_silent_while_braked_never_counts_as_standing() -> None:
     def board(now_ns: int, sent: Sent) -> float | None:
         return None if sent[-1][1] == BREAK else LINEAR_MPS
 
-    assert played(board)[0].phase == "break"
-    assert replace(Trial(START_NS), phase="break").tick(START_NS + NS_PER_S)[0].phase == "break"
+    assert played(board)[0].phase == "brake"
+    assert replace(Trial(START_NS), phase="brake").tick(START_NS + NS_PER_S)[0].phase == "brake"
 
 
 @pytest.mark.parametrize("phase", ["run", "silence"])
 def test_an_end_from_outside_brakes_with_the_next_tick(phase: str) -> None:
     trial = replace(Trial(START_NS, sent_ns=START_NS), phase=phase)  # type: ignore[arg-type]
     ended, command = trial.end("ctrl-c", START_NS + 1).tick(START_NS + 2)
-    assert (ended.phase, command) == ("break", BREAK)
+    assert (ended.phase, command) == ("brake", BREAK)
     assert ended.end("again", START_NS + 3) == ended
     assert judge_trial(ended).text == "Ended early: ctrl-c"
 

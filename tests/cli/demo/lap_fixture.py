@@ -4,9 +4,12 @@ from typing import Any
 
 from cli.demo.score import Trace
 from cli.demo.script import View
+from common import motion
 from common.freshness import NS_PER_S
 from common.messages import Cause, Limits, Odometry, SafetyState
 from sim import trace as t
+
+RUN, STOP, BRAKE = motion.Command
 
 TICK_NS = NS_PER_S // 20  # the simulator writes down the truth 20 times a second
 
@@ -63,7 +66,7 @@ def truth(tick: int, **fields: Any) -> t.Truth:
         "contact": False,
         "pressed": False,
         "wheels": (0.0,) * 4,
-        "command": command(0, "stop"),
+        "command": command(0, STOP),
         "braking": False,
         "ultrasonic_brake": True,
         "bumper_brake": True,
@@ -72,7 +75,7 @@ def truth(tick: int, **fields: Any) -> t.Truth:
     return t.Truth(mono_ns=tick * TICK_NS, **(known | fields))
 
 
-def command(at_ns: int, kind: t.Kind, linear: float = 0.0) -> t.Command:
+def command(at_ns: int, kind: motion.Command, linear: float = 0.0) -> t.Command:
     """Return a command that the board took."""
     return t.Command(mono_ns=at_ns, kind=kind, linear=linear, angular=0.0)
 
@@ -84,8 +87,8 @@ def hit_lap(stands: bool = True, brakes: bool = True) -> Trace:
     still = [truth(51 + n, x=2.04, distance=2.04, linear=0.0, contact=True) for n in range(40)]
     on = [truth(51 + n, x=2.0 + n * 0.04, distance=2.0 + n * 0.04, linear=0.8) for n in range(40)]
     commands = [
-        command(0, "run", 0.8),
-        *([command(hit_ns + NS_PER_S // 50, "break")] if brakes else []),
+        command(0, RUN, 0.8),
+        *([command(hit_ns + NS_PER_S // 50, BRAKE)] if brakes else []),
     ]
     bumper = [
         t.BumperSent(mono_ns=0, pressed=False),

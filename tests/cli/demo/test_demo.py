@@ -56,7 +56,7 @@ def test_a_lap(tmp_path: Path) -> None:
     assert {file.name for file in out.iterdir()} == {"processes.log", "trace.jsonl"}
     trace = read(out / "trace.jsonl")
     assert any(hit.pressed for hit in trace.bumper)
-    assert {command.kind for command in trace.commands} == {"stop", "run", "break"}
+    assert {command.kind for command in trace.commands} == {"stop", "run", "brake"}
     assert '"event": "stopped"' in (out / "processes.log").read_text()
 
 

@@ -6,11 +6,12 @@ from typing import Any
 import pytest
 
 from cli.demo.driver import PRESS_NS, Driver
-from cli.demo.script import STILL, Lap, Step, View, lap, still
+from cli.demo.script import Lap, Step, View, lap, still
 from common import keys
 from common import messages as m
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
+from common.motion import STILL, Twist
 from tests.cli.demo.lap_fixture import odometry, safety
 from verification.harness.support import at
 
@@ -44,7 +45,7 @@ def never(_: View, __: m.Odometry) -> bool:
 
 RESET = Step("reset", still, lambda view, _: view.refusal is not None, "reset", latched=True)
 RELEASE = Step("release", still, never, "release", latched=True)
-DRIVE = Step("drive", lambda *_: (0.5, 0.1), never)
+DRIVE = Step("drive", lambda *_: Twist(0.5, 0.1), never)
 
 
 def driver_of(desk: Desk, *steps: Step) -> tuple[Driver, list[str]]:
@@ -78,7 +79,7 @@ def test_every_beat_asks_and_a_step_is_told_once(desk: Desk) -> None:
     request = asked_for(desk)
     assert request is not None
     assert (request.linear, request.angular, request.seq) == (0.5, 0.1, 3)
-    assert driver.asked == (0.5, 0.1)
+    assert driver.asked == Twist(0.5, 0.1)
     assert told == ["drive"]
     assert desk.asked == []
 

@@ -15,6 +15,7 @@ from cli.demo.show import Show
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.messages import Ultrasonic, Velocity
+from common.motion import Twist
 from common.settings import Vehicle
 from sim.files import load_plan
 from sim.geometry import Pose, Rectangle
@@ -49,7 +50,7 @@ def seen(driver: Driver) -> Driver:
         status=("ok", "ok", "ok", "fault", "no_echo", "too_near", "ok", "ok"),
     )
     driver.lap.index = 1
-    driver.asked = (0.5, 0.1)
+    driver.asked = Twist(0.5, 0.1)
     driver.answers.append(("drive on", "reset", False, "Not gone yet: [bumper] was hit."))
     return driver
 

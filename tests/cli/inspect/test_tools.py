@@ -12,6 +12,7 @@ from cli.inspect import info, measure
 from common import codec, keys
 from common.bus.bus import Bus
 from common.messages import Bumper, Event
+from common.motion import Command
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
 from tests.common.bus_fixture import Rig
@@ -191,7 +192,7 @@ def test_topic_info_of_nothing(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_services(rig: Rig, bridge: Bus, tool: Tool) -> None:
     pretend(rig, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
-    pretend(rig, "nav", {keys.MOTION: lambda: keys.MOTION.message(command="stop")})
+    pretend(rig, "nav", {keys.MOTION: lambda: keys.MOTION.message(command=Command.STOP)})
     found = {line["name"]: line for line in tool("services").lines}
     assert found.keys() >= {"bridge", "safety", "nav"}
     assert found["bridge"]["publishes"]["tel/bridge/bumper"] == ["safety"]

@@ -1,4 +1,4 @@
-"""Members of a small site, on a day of theirs."""
+"""Members of a small site at a fixed time."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -17,7 +17,7 @@ def member(
     revoked: bool = False,
     addresses: tuple[str, ...] = (),
 ) -> Member:
-    """Return one whose certificate is good for so many days."""
+    """Return a member whose certificate is valid for so many days."""
     return Member(
         common_name=f"{role}.{name}.{serial}", role=role, name=name,
         robots=("001",) if role in ("driver", "robot") else (), addresses=addresses,
@@ -26,5 +26,5 @@ def member(
 
 
 def members(*each: Member) -> Members:
-    """Return their list."""
+    """Return the member list."""
     return Members(site="berlin", members=each)

@@ -1,4 +1,4 @@
-"""Rights as rules: what each role is granted, without a router."""
+"""Access rules by role, without a router."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -21,14 +21,14 @@ def member(role: Role, name: str = "anna", robots: tuple[str, ...] = ()) -> Memb
     )
 
 
-def test_nobody_from_outside_may_speak_for_safety_to_the_wheels() -> None:
+def test_no_member_may_write_motion_commands() -> None:
     for role, given in ROLES.items():
         if role != "router of 001":
             assert not may(given, "write", keys.MOTION.on(MINE)), role
 
 
 @pytest.mark.parametrize("role", ["viewer", "fleet"])
-def test_who_only_watches_cannot_move_anything(role: str) -> None:
+def test_viewer_and_fleet_cannot_move_a_robot(role: str) -> None:
     given = ROLES[role]
     for key in (keys.DRIVE.on(MINE, source="x"), keys.DRIVE.on("*", source="*"), "**"):
         assert not may(given, "write", key)
@@ -36,11 +36,11 @@ def test_who_only_watches_cannot_move_anything(role: str) -> None:
         assert not may(given, "ask", call.on(MINE))
 
 
-def test_a_viewer_cannot_keep_a_robot_from_working() -> None:
+def test_a_viewer_cannot_stop_a_robot() -> None:
     assert not may(ROLES["viewer"], "write", keys.estop_key(MINE))
 
 
-def test_a_driver_has_the_robots_that_its_certificate_names() -> None:
+def test_a_driver_is_limited_to_its_robots() -> None:
     given = driver((MINE,))
     for wanted, robot in ((True, MINE), (False, OTHER), (False, "*")):
         assert may(given, "write", keys.DRIVE.on(robot, source="teleop")) is wanted
@@ -48,7 +48,7 @@ def test_a_driver_has_the_robots_that_its_certificate_names() -> None:
         assert all(may(given, "ask", call.on(robot)) is wanted for call in keys.CALLS)
 
 
-def test_a_driver_drives_as_the_sources_that_its_certificate_names() -> None:
+def test_a_driver_is_limited_to_its_sources() -> None:
     for sources, may_use in (
         (("teleop", "web"), {"teleop": True, "web": True, "nav": False, "*": False}),
         (("nav",), {"teleop": False, "nav": True, "*": False}),
@@ -62,7 +62,7 @@ def test_a_driver_drives_as_the_sources_that_its_certificate_names() -> None:
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
 @pytest.mark.parametrize("service", ON_BOARD)
-def test_a_member_never_speaks_for_a_service_on_board(role: str, service: str) -> None:
+def test_a_member_cannot_publish_as_an_on_board_service(role: str, service: str) -> None:
     given = ROLES[role]
     assert not may(given, "write", keys.HEALTH.on(MINE, service=service))
     assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
@@ -72,14 +72,14 @@ def test_a_member_never_speaks_for_a_service_on_board(role: str, service: str) -
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
 @pytest.mark.parametrize("verb", ["write", "serve", "live"])
-def test_what_a_member_says_has_keys_of_a_known_length(role: str, verb: Verb) -> None:
-    said = ROLES[role].get(verb, ())
-    assert said
-    assert not [expression for expression in said if "**" in expression]
+def test_members_write_only_keys_of_fixed_length(role: str, verb: Verb) -> None:
+    printed = ROLES[role].get(verb, ())
+    assert printed
+    assert not [expression for expression in printed if "**" in expression]
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
-def test_what_advanced_publishers_keep_is_asked_and_answered_where_it_is(role: str) -> None:
+def test_caches_of_advanced_publishers(role: str) -> None:
     given, kept = ROLES[role], f"{keys.EVENTS.on(MINE, service='dashboard')}/@adv"
     assert may(given, "read", f"{kept}/pub/**")  # as zenoh-ext subscribes
     assert may(given, "ask", f"{kept}/**")
@@ -90,13 +90,13 @@ def test_what_advanced_publishers_keep_is_asked_and_answered_where_it_is(role: s
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
-def test_every_key_that_is_published_can_be_watched(role: str) -> None:
+def test_members_can_read_every_published_key(role: str) -> None:
     for topic in keys.TOPICS:
         key = topic.on(MINE, service="x", side="left", source="x")
         assert may(ROLES[role], "read", key)
 
 
-def test_a_robots_router_speaks_for_its_robot_alone() -> None:
+def test_a_robots_router_writes_only_its_own_keys() -> None:
     given = rights(member("robot", OTHER))
     for topic in keys.TOPICS:
         names = {"service": "x", "side": "left", "source": "x"}
@@ -104,7 +104,7 @@ def test_a_robots_router_speaks_for_its_robot_alone() -> None:
         assert not may(given, "write", topic.on(MINE, **names))
 
 
-def test_rules_name_their_member_and_whoever_is_on_board_may_do_everything() -> None:
+def test_rules_by_member_and_full_access_on_board() -> None:
     made: dict[str, Any] = access_control(
         [member("viewer"), member("driver", "bo", (MINE,))], ["tcp", "unixsock-stream"]
     )
@@ -123,13 +123,13 @@ def test_rules_name_their_member_and_whoever_is_on_board_may_do_everything() -> 
     assert {flow for rule in onboard for flow in rule["flows"]} == {"ingress", "egress"}
 
 
-def test_without_a_plain_listener_nobody_is_on_board() -> None:
+def test_without_a_trusted_protocol_there_is_no_on_board_subject() -> None:
     made: dict[str, Any] = access_control([member("viewer")], [])
     assert [subject["id"] for subject in made["subjects"]] == ["viewer.anna.1"]
     assert all(rule["id"].startswith("viewer.anna.1 ") for rule in made["rules"])
 
 
-def test_every_verb_is_made_of_zenohs_messages() -> None:
+def test_verbs_cover_all_zenoh_messages() -> None:
     known = {
         "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",
         "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
@@ -138,7 +138,7 @@ def test_every_verb_is_made_of_zenohs_messages() -> None:
     assert used == known
 
 
-def test_the_table_has_a_cell_for_each_role_and_class() -> None:
+def test_every_role_has_rights_in_the_table() -> None:
     verbs = {role: {verb for verb in VERBS for key in CLASSES.values() if may(given, verb, key)}
              for role, given in ROLES.items()}  # fmt: skip
     assert all(found for found in verbs.values())

@@ -1,4 +1,4 @@
-"""What is in a certificate, read back; what is done about a key that does not fit."""
+"""Content of certificates, and keys that do not match."""
 
 from datetime import timedelta
 from ipaddress import ip_address
@@ -16,7 +16,7 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from cli.keys.ca import (
-    Authority,
+    CertificateAuthority,
     certificate_from,
     certificate_pem,
     key_pem,
@@ -30,19 +30,21 @@ DRIVER = profile("driver", "anna", ("001",), ())
 
 
 @pytest.fixture(scope="module")
-def authority() -> Authority:
-    return Authority.found("berlin", SPAN)
+def authority() -> CertificateAuthority:
+    return CertificateAuthority.create("berlin", SPAN)
 
 
-def issued(authority: Authority, who: Profile) -> x509.Certificate:
+def issued(authority: CertificateAuthority, who: Profile) -> x509.Certificate:
     return certificate_from(authority.issue(who, SPAN).certificate)
 
 
 def no_passphrase() -> bytes:
-    raise AssertionError("nobody should have been asked")
+    raise AssertionError("no passphrase expected")
 
 
-def test_the_authority_signs_certificates_and_no_other_authority(authority: Authority) -> None:
+def test_the_authority_signs_certificates_and_no_other_authority(
+    authority: CertificateAuthority,
+) -> None:
     found = authority.certificate
     basic = found.extensions.get_extension_for_class(x509.BasicConstraints)
     assert basic.critical
@@ -57,7 +59,7 @@ def test_the_authority_signs_certificates_and_no_other_authority(authority: Auth
 
 
 @pytest.mark.parametrize("who", [ROBOT, DRIVER])
-def test_every_certificate(authority: Authority, who: Profile) -> None:
+def test_every_certificate(authority: CertificateAuthority, who: Profile) -> None:
     made = authority.issue(who, SPAN)
     found = certificate_from(made.certificate)
     found.verify_directly_issued_by(authority.certificate)
@@ -75,7 +77,7 @@ def test_every_certificate(authority: Authority, who: Profile) -> None:
     assert key.public_key() == found.public_key()
 
 
-def test_the_list_names_what_the_certificate_names(authority: Authority) -> None:
+def test_the_list_entry_matches_the_certificate(authority: CertificateAuthority) -> None:
     made = authority.issue(DRIVER, SPAN)
     found = certificate_from(made.certificate)
     assert found.subject.rfc4514_string() == f"CN={made.member.common_name}"
@@ -84,20 +86,20 @@ def test_the_list_names_what_the_certificate_names(authority: Authority) -> None
     assert (made.member.role, made.member.name, made.member.robots) == ("driver", "anna", ("001",))
 
 
-def test_two_certificates_have_nothing_in_common(authority: Authority) -> None:
+def test_certificates_are_unique(authority: CertificateAuthority) -> None:
     one, two = authority.issue(DRIVER, SPAN), authority.issue(DRIVER, SPAN)
     assert one.member.common_name != two.member.common_name
     assert one.private_key != two.private_key
 
 
-def test_a_router_serves_and_dials_and_a_driver_only_dials(authority: Authority) -> None:
+def test_extended_key_usage(authority: CertificateAuthority) -> None:
     server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
     for who, expected in ((ROBOT, [server, client]), (DRIVER, [client])):
         usage = issued(authority, who).extensions.get_extension_for_class(x509.ExtendedKeyUsage)
         assert list(usage.value) == expected
 
 
-def test_a_routers_addresses_are_in_its_certificate(authority: Authority) -> None:
+def test_a_routers_addresses_are_in_its_certificate(authority: CertificateAuthority) -> None:
     found = issued(authority, ROBOT)
     names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     assert names.get_values_for_type(x509.IPAddress) == [
@@ -108,40 +110,40 @@ def test_a_routers_addresses_are_in_its_certificate(authority: Authority) -> Non
         issued(authority, DRIVER).extensions.get_extension_for_class(x509.SubjectAlternativeName)
 
 
-def test_a_routers_addresses_are_on_the_list(authority: Authority) -> None:
+def test_a_routers_addresses_are_on_the_list(authority: CertificateAuthority) -> None:
     assert authority.issue(ROBOT, SPAN).member.addresses == ROBOT.addresses
     assert authority.issue(DRIVER, SPAN).member.addresses == ()
 
 
-def test_it_is_read_back(authority: Authority) -> None:
+def test_load_an_authority(authority: CertificateAuthority) -> None:
     certificate = certificate_pem(authority.certificate)
-    loaded = Authority.load(certificate, key_pem(authority.key), no_passphrase)
+    loaded = CertificateAuthority.load(certificate, key_pem(authority.key), no_passphrase)
     assert loaded.certificate == authority.certificate
 
 
-def test_an_encrypted_key_wants_its_passphrase(authority: Authority) -> None:
+def test_an_encrypted_key_needs_its_passphrase(authority: CertificateAuthority) -> None:
     certificate = certificate_pem(authority.certificate)
     encrypted = key_pem(authority.key, b"correct horse")
     assert b"ENCRYPTED" in encrypted
-    Authority.load(certificate, encrypted, lambda: b"correct horse")
-    with pytest.raises(RobotError, match="a wrong passphrase, or no key"):
-        Authority.load(certificate, encrypted, lambda: b"wrong")
+    CertificateAuthority.load(certificate, encrypted, lambda: b"correct horse")
+    with pytest.raises(RobotError, match="wrong passphrase, or not a key"):
+        CertificateAuthority.load(certificate, encrypted, lambda: b"wrong")
 
 
-def test_keys_that_do_not_fit(authority: Authority) -> None:
+def test_invalid_keys(authority: CertificateAuthority) -> None:
     certificate = certificate_pem(authority.certificate)
-    stranger = Authority.found("berlin", SPAN)
-    with pytest.raises(RobotError, match="another one's than the certificate"):
-        Authority.load(certificate, key_pem(stranger.key), no_passphrase)
-    with pytest.raises(RobotError, match="cannot be read"):
-        Authority.load(certificate, b"no key", no_passphrase)
+    stranger = CertificateAuthority.create("berlin", SPAN)
+    with pytest.raises(RobotError, match="does not match the certificate"):
+        CertificateAuthority.load(certificate, key_pem(stranger.key), no_passphrase)
+    with pytest.raises(RobotError, match="cannot read"):
+        CertificateAuthority.load(certificate, b"no key", no_passphrase)
     other_kind = ed25519.Ed25519PrivateKey.generate().private_bytes(
         Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()
     )
-    with pytest.raises(RobotError, match="no key of `t2 keys init`"):
-        Authority.load(certificate, other_kind, no_passphrase)
+    with pytest.raises(RobotError, match="was not made by `t2 keys init`"):
+        CertificateAuthority.load(certificate, other_kind, no_passphrase)
 
 
-def test_what_is_no_certificate() -> None:
-    with pytest.raises(RobotError, match="this is no certificate"):
+def test_an_invalid_certificate() -> None:
+    with pytest.raises(RobotError, match="invalid certificate"):
         certificate_from(b"-----BEGIN")

@@ -1,4 +1,4 @@
-"""``t2 keys`` from the command line: the whole life of a certificate, and what is refused."""
+"""``t2 keys`` from the command line: life cycle of a certificate, and errors."""
 
 import json
 import os
@@ -19,20 +19,20 @@ from common.settings import Shared
 from tests.cli.processes import PATIENCE_S, t2
 
 
-class Desk:
-    """A folder, and what was said last."""
+class Keys:
+    """The command ``t2 keys`` on a folder."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.folder = folder
         self._capsys = capsys
 
-    def keys(self, *words: str, code: int = 0) -> str:
+    def run(self, *words: str, code: int = 0) -> str:
         assert main(["keys", *words, "--folder", str(self.folder)]) == code
-        said = self._capsys.readouterr()
-        return said.err if code else said.out
+        message = self._capsys.readouterr()
+        return message.err if code else message.out
 
     def states(self) -> dict[str, str]:
-        table = json.loads(self.keys("list", "--json"))
+        table = json.loads(self.run("list", "--json"))
         return {
             each["common_name"].rpartition(".")[0] + f".{place}": each["state"]
             for place, each in enumerate(table["certificates"])
@@ -44,81 +44,81 @@ class Desk:
 
 
 @pytest.fixture
-def desk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Desk:
-    made = Desk(tmp_path / "keys", capsys)
-    made.keys("init", "--site", "berlin")
+def keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Keys:
+    made = Keys(tmp_path / "keys", capsys)
+    made.run("init", "--site", "berlin")
     return made
 
 
-def test_the_life_of_a_certificate(desk: Desk) -> None:
-    assert "driver.anna." in desk.keys("issue", "driver", "anna", "--robot", "001")
-    assert desk.states() == {"driver.anna.0": "valid"}
-    first = (desk.folder / "driver.anna" / "private.key").read_bytes()
-    said = desk.keys("renew", "driver", "anna", "--days", "20")
-    assert f"t2 keys revoke driver anna --serial {desk.serials()[0]}" in said
-    assert (desk.folder / "driver.anna" / "private.key").read_bytes() != first
-    assert desk.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
-    assert "driver anna ends in 19 days" in desk.keys("list")
-    desk.keys("revoke", "driver", "anna", "--serial", desk.serials()[0])
-    assert desk.states() == {"driver.anna.0": "revoked", "driver.anna.1": "expires soon"}
-    desk.keys("revoke", "driver", "anna")
-    assert set(desk.states().values()) == {"revoked"}
-    desk.keys("issue", "driver", "anna", "--robot", "002")
-    assert desk.states()["driver.anna.2"] == "valid"
+def test_life_cycle_of_a_certificate(keys: Keys) -> None:
+    assert "driver.anna." in keys.run("issue", "driver", "anna", "--robot", "001")
+    assert keys.states() == {"driver.anna.0": "valid"}
+    first = (keys.folder / "driver.anna" / "private.key").read_bytes()
+    message = keys.run("renew", "driver", "anna", "--days", "20")
+    assert f"t2 keys revoke driver anna --serial {keys.serials()[0]}" in message
+    assert (keys.folder / "driver.anna" / "private.key").read_bytes() != first
+    assert keys.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
+    assert "driver anna expires in 19 days" in keys.run("list")
+    keys.run("revoke", "driver", "anna", "--serial", keys.serials()[0])
+    assert keys.states() == {"driver.anna.0": "revoked", "driver.anna.1": "expires soon"}
+    keys.run("revoke", "driver", "anna")
+    assert set(keys.states().values()) == {"revoked"}
+    keys.run("issue", "driver", "anna", "--robot", "002")
+    assert keys.states()["driver.anna.2"] == "valid"
 
 
-def test_a_driver_gets_the_sources_of_a_person_unless_told_and_keeps_them(desk: Desk) -> None:
-    assert "drives as teleop or web or checkout;" in desk.keys(
+def test_sources_of_a_driver(keys: Keys) -> None:
+    assert "drives as teleop or web or checkout;" in keys.run(
         "issue", "driver", "anna", "--robot", "001"
     )
-    desk.keys("issue", "driver", "planner", "--robot", "001", "--source", "nav")
-    desk.keys("renew", "driver", "planner")
-    listed = read(desk.folder / "members.json").members
+    keys.run("issue", "driver", "planner", "--robot", "001", "--source", "nav")
+    keys.run("renew", "driver", "planner")
+    listed = read(keys.folder / "members.json").members
     assert [each.sources for each in listed] == [("teleop", "web", "checkout"), ("nav",), ("nav",)]
-    desk.keys("issue", "viewer", "hall", "--source", "nav", code=EXIT_CONFIG)
+    keys.run("issue", "viewer", "hall", "--source", "nav", code=EXIT_CONFIG)
 
 
-def test_rights_and_addresses_are_kept_when_renewed(desk: Desk) -> None:
-    desk.keys("issue", "site", "berlin", "--address", "site.example", "--address", "10.0.0.9")
-    desk.keys("issue", "robot", "001")
-    desk.keys("issue", "driver", "anna", "--robot", "001", "--robot", "002")
+def test_renewal_keeps_rights_and_addresses(keys: Keys) -> None:
+    keys.run("issue", "site", "berlin", "--address", "site.example", "--address", "10.0.0.9")
+    keys.run("issue", "robot", "001")
+    keys.run("issue", "driver", "anna", "--robot", "001", "--robot", "002")
     for who in (("site", "berlin"), ("robot", "001"), ("driver", "anna")):
-        desk.keys("renew", *who)
-    members = read(desk.folder / "members.json")
+        keys.run("renew", *who)
+    members = read(keys.folder / "members.json")
     assert members.members[2].robots == members.members[5].robots == ("001", "002")
-    said = desk.keys("renew", "site", "berlin")
-    assert "found at site.example, 10.0.0.9, localhost, 127.0.0.1;" in said
-    assert "found at 10.1.1.1, localhost" in desk.keys(
+    message = keys.run("renew", "site", "berlin")
+    assert "addresses site.example, 10.0.0.9, localhost, 127.0.0.1;" in message
+    assert "addresses 10.1.1.1, localhost" in keys.run(
         "renew", "robot", "001", "--address", "10.1.1.1"
     )
 
 
-def test_a_router_is_known_when_its_folder_is_with_it(desk: Desk, tmp_path: Path) -> None:
-    desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
-    desk.keys("issue", "driver", "anna", "--robot", "002")
-    (desk.folder / "robot.002").rename(tmp_path / "away")
+def test_routers_are_known_without_their_folders(keys: Keys, tmp_path: Path) -> None:
+    keys.run("issue", "robot", "002", "--address", "192.168.1.2")
+    keys.run("issue", "driver", "anna", "--robot", "002")
+    (keys.folder / "robot.002").rename(tmp_path / "away")
     target = "192.168.1.2:/etc/t2/keys"
-    assert f"{target}/members.json  # robot 002\n" in desk.keys("revoke", "driver", "anna")
-    assert f"/robot.002/. {target}\n" in desk.keys("renew", "robot", "002")
+    assert f"{target}/members.json  # robot 002\n" in keys.run("revoke", "driver", "anna")
+    assert f"/robot.002/. {target}\n" in keys.run("renew", "robot", "002")
 
 
-def test_of_a_list_without_addresses_they_are_asked(desk: Desk) -> None:
-    desk.keys("issue", "robot", "002", "--address", "192.168.1.2")
-    listed = desk.folder / "members.json"
+def test_renewal_without_addresses_is_an_error(keys: Keys) -> None:
+    keys.run("issue", "robot", "002", "--address", "192.168.1.2")
+    listed = keys.folder / "members.json"
     table = json.loads(listed.read_bytes())
     del table["members"][0]["addresses"]
     listed.write_text(json.dumps(table), encoding="utf-8")
-    said = desk.keys("renew", "robot", "002", code=1)
-    assert "`t2 keys renew robot 002 --address HOST` says so" in said
-    desk.keys("renew", "robot", "002", "--address", "192.168.1.3")
-    assert "found at 192.168.1.3, localhost" in desk.keys("renew", "robot", "002")
+    message = keys.run("renew", "robot", "002", code=1)
+    assert "`t2 keys renew robot 002 --address HOST`" in message
+    keys.run("renew", "robot", "002", "--address", "192.168.1.3")
+    assert "addresses 192.168.1.3, localhost" in keys.run("renew", "robot", "002")
 
 
-def test_the_settings_are_valid_wherever_the_folder_is_put(
-    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_settings_are_independent_of_the_folder_path(
+    keys: Keys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk.keys("issue", "robot", "007")
-    (desk.folder / "robot.007").rename(tmp_path / "elsewhere")
+    keys.run("issue", "robot", "007")
+    (keys.folder / "robot.007").rename(tmp_path / "elsewhere")
     monkeypatch.chdir(tmp_path)
     bus = load(Shared, Sources(files=(Path("elsewhere/bus.toml"),), environ={})).config
     assert bus.robot.id == "007"
@@ -128,27 +128,27 @@ def test_the_settings_are_valid_wherever_the_folder_is_put(
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
-        (("init",), 1, "is there already: another CA would lock everybody out"),
-        (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is no name"),
+        (("init",), 1, "exists: another CA would invalidate all certificates"),
+        (("issue", "driver", "a b", "--robot", "1"), EXIT_CONFIG, "'a b' is not a name"),
         (("issue", "driver", "anna"), EXIT_CONFIG, "a driver needs --robot ID"),
-        (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router wants --address"),
+        (("issue", "site", "berlin"), EXIT_CONFIG, "a site's router needs --address"),
         (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
-        (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such is not there, and only it"),
+        (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such not found: it is needed"),
         (("renew", "driver", "ben"), 1, "driver ben has no certificate, or a revoked one"),
         (("revoke", "driver", "ben"), 1, "driver ben has no certificate that could be revoked"),
     ],
 )
-def test_refusals(desk: Desk, words: tuple[str, ...], code: int, said: str) -> None:
-    before = (desk.folder / "members.json").read_bytes()
-    assert said in desk.keys(*words, code=code)
-    assert (desk.folder / "members.json").read_bytes() == before
+def test_errors(keys: Keys, words: tuple[str, ...], code: int, message: str) -> None:
+    before = (keys.folder / "members.json").read_bytes()
+    assert message in keys.run(*words, code=code)
+    assert (keys.folder / "members.json").read_bytes() == before
 
 
-def test_nobody_gets_a_second_certificate_by_mistake(desk: Desk) -> None:
-    desk.keys("issue", "viewer", "guest")
-    assert "viewer guest has a certificate until" in desk.keys("issue", "viewer", "guest", code=1)
+def test_issue_refuses_a_second_certificate(keys: Keys) -> None:
+    keys.run("issue", "viewer", "guest")
+    assert "viewer guest has a certificate until" in keys.run("issue", "viewer", "guest", code=1)
 
 
 def test_an_unknown_role_is_named(capsys: pytest.CaptureFixture[str]) -> None:
@@ -158,13 +158,13 @@ def test_an_unknown_role_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert "invalid choice: 'pilot'" in capsys.readouterr().err
 
 
-def test_an_empty_serial_revokes_nothing(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
-    desk.keys("issue", "viewer", "guest")
+def test_an_empty_serial_revokes_nothing(keys: Keys, capsys: pytest.CaptureFixture[str]) -> None:
+    keys.run("issue", "viewer", "guest")
     with pytest.raises(SystemExit) as end:
-        desk.keys("revoke", "viewer", "guest", "--serial", "")
+        keys.run("revoke", "viewer", "guest", "--serial", "")
     assert end.value.code == 2
-    assert "--serial: it is empty; `t2 keys list` shows serials" in capsys.readouterr().err
-    assert desk.states() == {"viewer.guest.0": "valid"}
+    assert "--serial: is empty; `t2 keys list` shows serials" in capsys.readouterr().err
+    assert keys.states() == {"viewer.guest.0": "valid"}
 
 
 @pytest.mark.parametrize(
@@ -174,12 +174,12 @@ def test_an_empty_serial_revokes_nothing(desk: Desk, capsys: pytest.CaptureFixtu
 def test_without_an_authority(
     words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = Desk(tmp_path / "none", capsys).keys(*words, code=1)
-    assert "none has no CA; `t2 keys init` makes one" in said
+    message = Keys(tmp_path / "none", capsys).run(*words, code=1)
+    assert "none has no CA; `t2 keys init` creates one" in message
     assert not (tmp_path / "none").exists()
 
 
-def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_expired_authority(keys: Keys, monkeypatch: pytest.MonkeyPatch) -> None:
     later_s = time.time() + CA_DAYS * DAY_S
 
     class Later:
@@ -188,64 +188,64 @@ def test_an_authority_at_its_end(desk: Desk, monkeypatch: pytest.MonkeyPatch) ->
             return later_s
 
     monkeypatch.setattr("cli.keys.operations.time", Later)
-    assert "the CA has reached its end" in desk.keys("issue", "viewer", "v", code=1)
-    assert "the CA has ended: make another" in desk.keys("list")
+    assert "the CA has expired" in keys.run("issue", "viewer", "v", code=1)
+    assert "the CA has expired: create another" in keys.run("list")
 
 
-def test_a_list_that_is_none(desk: Desk) -> None:
-    (desk.folder / "members.json").write_text("[]", encoding="utf-8")
-    assert "is no list of members" in desk.keys("list", code=EXIT_CONFIG)
+def test_an_invalid_member_list(keys: Keys) -> None:
+    (keys.folder / "members.json").write_text("[]", encoding="utf-8")
+    assert "is no list of members" in keys.run("list", code=EXIT_CONFIG)
 
 
 # --- the passphrase -----------------------------------------------------------------------------
 
 
 def test_a_passphrase_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    desk = Desk(tmp_path / "keys", capsys)
+    keys = Keys(tmp_path / "keys", capsys)
     secret, wrong, empty = (tmp_path / name for name in ("secret", "wrong", "empty"))
     secret.write_text("correct horse\n", encoding="utf-8")
     wrong.write_text("battery\n", encoding="utf-8")
     empty.write_text("\n", encoding="utf-8")
-    assert "is empty" in desk.keys("init", "--passphrase-file", str(empty), code=EXIT_CONFIG)
-    assert not desk.folder.exists()
-    desk.keys("init", "--passphrase-file", str(secret))
-    assert b"ENCRYPTED" in (desk.folder / "ca.key").read_bytes()
+    assert "is empty" in keys.run("init", "--passphrase-file", str(empty), code=EXIT_CONFIG)
+    assert not keys.folder.exists()
+    keys.run("init", "--passphrase-file", str(secret))
+    assert b"ENCRYPTED" in (keys.folder / "ca.key").read_bytes()
     issue = ("issue", "viewer", "v", "--passphrase-file")
-    assert "a wrong passphrase" in desk.keys(*issue, str(wrong), code=1)
-    assert "cannot be read" in desk.keys(*issue, str(tmp_path / "none"), code=EXIT_CONFIG)
-    assert "viewer.v." in desk.keys(*issue, str(secret))
+    assert "wrong passphrase" in keys.run(*issue, str(wrong), code=1)
+    assert "cannot be read" in keys.run(*issue, str(tmp_path / "none"), code=EXIT_CONFIG)
+    assert "viewer.v." in keys.run(*issue, str(secret))
 
 
-def test_without_a_terminal_nobody_is_asked(tmp_path: Path) -> None:
+def test_no_passphrase_prompt_without_a_terminal(tmp_path: Path) -> None:
     asked = subprocess.run(
         t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys")),
         stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert asked.returncode == 1
-    assert "give --passphrase-file FILE" in asked.stderr
+    assert "use --passphrase-file FILE" in asked.stderr
     assert not (tmp_path / "keys").exists()
 
 
 @pytest.mark.parametrize(
-    ("typed", "code", "said"),
+    ("typed", "code", "message"),
     [
         ("horse\nhorse\n", 0, "holds the certificate authority"),
-        ("horse\nhouse\n", EXIT_CONFIG, "two different ones; nothing was made"),
-        ("\n", EXIT_CONFIG, "an empty one protects nothing"),
+        ("horse\nhouse\n", EXIT_CONFIG, "the two passphrases differ; nothing was created"),
+        ("\n", EXIT_CONFIG, "an empty passphrase does not protect the key"),
     ],
 )
-def test_a_passphrase_is_asked_twice_and_not_shown(
-    typed: str, code: int, said: str, tmp_path: Path
+def test_the_passphrase_prompt_repeats_and_hides_the_input(
+    typed: str, code: int, message: str, tmp_path: Path
 ) -> None:
     command = t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys"))
     got, shown = on_a_terminal(command, typed)
-    assert (got, said in shown) == (code, True), shown
+    assert (got, message in shown) == (code, True), shown
     assert "horse" not in shown
     assert (tmp_path / "keys").exists() is (code == 0)
 
 
 def on_a_terminal(command: list[str], typed: str) -> tuple[int, str]:
-    """Run a command on a terminal of its own; a line is typed each time that it asks."""
+    """Run a command on a pseudo-terminal, and type a line at each prompt."""
     terminal, theirs = pty.openpty()
     shown, lines = "", typed.splitlines(keepends=True)
     with subprocess.Popen(
@@ -263,7 +263,7 @@ def on_a_terminal(command: list[str], typed: str) -> tuple[int, str]:
 def _read(terminal: int) -> str:
     try:
         return os.read(terminal, 4096).decode()
-    except OSError:  # Linux's way to say that the other end is closed
+    except OSError:  # on Linux: the other end is closed
         return ""
 
 

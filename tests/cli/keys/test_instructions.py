@@ -1,4 +1,4 @@
-"""What is said after something was done: the commands to run next, with the paths as they are."""
+"""Instructions after an operation: next commands with actual paths."""
 
 import msgspec
 import pytest
@@ -14,81 +14,109 @@ ANNA = profile("driver", "anna", ("001", "002"), ())
 
 
 @pytest.mark.parametrize(
-    ("encrypted", "said"), [(False, "it has no passphrase"), (True, "with its passphrase")]
+    ("encrypted", "message"), [(False, "it is not encrypted"), (True, "it is encrypted")]
 )
-def test_a_new_authority(encrypted: bool, said: str) -> None:
-    told = "\n".join(instructions.founded("keys", "berlin", "2036-11-18", encrypted))
-    assert "keys holds the certificate authority of site berlin, until 2036-11-18" in told
-    assert said in told
-    assert "t2 keys issue robot 001" in told
+def test_a_new_authority(encrypted: bool, message: str) -> None:
+    printed = "\n".join(instructions.authority_created("keys", "berlin", "2036-11-18", encrypted))
+    assert "keys holds the certificate authority of site berlin, until 2036-11-18" in printed
+    assert message in printed
+    assert "t2 keys issue robot 001" in printed
 
 
 def test_a_robots_certificate() -> None:
-    told = list(instructions.issued(ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT, SITE]))
-    assert told[0] == "robot.001.00000001, until 2027-09-17"
-    assert "found at 192.168.201.1, 10.7.5.220, localhost, 127.0.0.1" in told[1]
-    assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in told
-    assert "     t2 router --config /etc/t2/keys/bus.toml" in told
+    printed = list(
+        instructions.certificate_issued(
+            ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT, SITE]
+        )
+    )
+    assert printed[0] == "robot.001.00000001, valid until 2027-09-17"
+    assert "addresses 192.168.201.1, 10.7.5.220, localhost, 127.0.0.1" in printed[1]
+    assert "     scp -rp keys/robot.001/. 192.168.201.1:/etc/t2/keys" in printed
+    assert "     t2 router --config /etc/t2/keys/bus.toml" in printed
     assert (
         "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin"
-        in told
+        in printed
     )
 
 
-def test_the_first_routers_folder_holds_all_that_there_is_to_know() -> None:
-    told = list(instructions.issued(ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT]))
-    assert not [line for line in told if "members.json" in line]
+def test_the_first_router_needs_no_list_update() -> None:
+    printed = list(
+        instructions.certificate_issued(ROBOT, member("robot", "001"), "keys/robot.001", [ROBOT])
+    )
+    assert not [line for line in printed if "members.json" in line]
 
 
 def test_a_drivers_certificate() -> None:
-    told = list(instructions.issued(ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]))
-    assert "  may move robot 001, robot 002" in told
-    assert "     t2 drive --config driver.anna/bus.toml" in told
+    printed = list(
+        instructions.certificate_issued(
+            ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]
+        )
+    )
+    assert "  may move robot 001, robot 002" in printed
+    assert "     t2 drive --config driver.anna/bus.toml" in printed
     assert (
         "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001"
-        in told
+        in printed
     )
 
 
 def test_a_drivers_sources() -> None:
     who = msgspec.structs.replace(member("driver", "anna"), sources=("nav",))
-    told = list(
-        instructions.issued(Profile("driver", "anna", ("001",), (), ("nav",)), who, "k/d", [])
+    printed = list(
+        instructions.certificate_issued(
+            Profile("driver", "anna", ("001",), (), ("nav",)), who, "k/d", []
+        )
     )
-    assert "  drives as nav; no other source is allowed" in told
-    told = list(instructions.issued(ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]))
-    assert not [line for line in told if "drives as" in line]
+    assert "  drives as nav; no other source is allowed" in printed
+    printed = list(
+        instructions.certificate_issued(
+            ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]
+        )
+    )
+    assert not [line for line in printed if "drives as" in line]
 
 
 def test_a_driver_of_every_robot() -> None:
     anna = msgspec.structs.replace(member("driver", "anna"), robots=("*",))
     who = Profile("driver", "anna", ("*",))
-    assert "  may move every robot" in list(instructions.issued(who, anna, "keys/driver.anna", []))
+    assert "  may move every robot" in list(
+        instructions.certificate_issued(who, anna, "keys/driver.anna", [])
+    )
 
 
-def test_a_viewers_certificate_before_there_is_a_router() -> None:
-    told = list(instructions.issued(Profile("viewer", "v"), member("viewer", "v"), "viewer.v", []))
-    assert "     t2 dashboard --config viewer.v/bus.toml" in told
-    assert "3. Each router wants ./members.json anew, and a restart." in told
+def test_a_viewers_certificate_without_routers() -> None:
+    printed = list(
+        instructions.certificate_issued(
+            Profile("viewer", "v"), member("viewer", "v"), "viewer.v", []
+        )
+    )
+    assert "     t2 dashboard --config viewer.v/bus.toml" in printed
+    assert "3. Copy ./members.json to each router and restart it." in printed
 
 
-def test_what_becomes_of_the_certificate_before() -> None:
-    told = list(instructions.renewed("driver", "anna", member("driver", "anna", "3f2a91bc", 10)))
-    assert "until 2026-12-01" in told[0]
-    assert told[1] == "     t2 keys revoke driver anna --serial 3f2a91bc"
+def test_the_previous_certificate() -> None:
+    printed = list(
+        instructions.certificate_renewed("driver", "anna", member("driver", "anna", "3f2a91bc", 10))
+    )
+    assert "until 2026-12-01" in printed[0]
+    assert printed[1] == "     t2 keys revoke driver anna --serial 3f2a91bc"
 
 
-def test_a_revocation_takes_hold_with_the_routers() -> None:
-    told = list(instructions.struck([member("driver", "anna")], "keys/driver.anna", [ROBOT]))
-    assert told[0] == "driver.anna.00000001 is revoked"
-    assert "nothing has changed" in told[1]
-    assert told[3].startswith("     scp -p keys/members.json ")
+def test_a_revocation_needs_every_router() -> None:
+    printed = list(
+        instructions.certificates_revoked([member("driver", "anna")], "keys/driver.anna", [ROBOT])
+    )
+    assert printed[0] == "driver.anna.00000001 is revoked"
+    assert "takes effect when every router" in printed[1]
+    assert printed[3].startswith("     scp -p keys/members.json ")
 
 
 @pytest.mark.parametrize("routers", [[], [ROBOT]])
-def test_a_router_in_a_container_learns_of_it_by_settings_made_anew(routers: list[Profile]) -> None:
-    told = list(instructions.struck([member("driver", "anna")], "keys/driver.anna", routers))
-    assert told[-1].strip() == instructions.IN_CONTAINERS
+def test_a_router_in_a_container_needs_new_settings(routers: list[Profile]) -> None:
+    printed = list(
+        instructions.certificates_revoked([member("driver", "anna")], "keys/driver.anna", routers)
+    )
+    assert printed[-1].strip() == instructions.IN_CONTAINERS
     compose = (DOCS.parent / "compose.yaml").read_text(encoding="utf-8")
     for service in instructions.IN_CONTAINERS.partition("--force-recreate ")[2].split():
         assert f"\n  {service}:\n" in compose
@@ -96,15 +124,21 @@ def test_a_router_in_a_container_learns_of_it_by_settings_made_anew(routers: lis
         assert instructions.IN_CONTAINERS in (DOCS.parent / page).read_text(encoding="utf-8"), page
 
 
-def test_a_router_that_is_nobody_knows_where_is_named() -> None:
+def test_a_router_without_an_address_is_named() -> None:
     lost = Profile("robot", "002")
-    told = list(instructions.struck([member("driver", "anna")], "keys/driver.anna", [ROBOT, lost]))
+    printed = list(
+        instructions.certificates_revoked(
+            [member("driver", "anna")], "keys/driver.anna", [ROBOT, lost]
+        )
+    )
     assert (
         "     scp -p keys/members.json HOST:/etc/t2/keys/members.json"
-        "  # robot 002; where it is, the list does not say"
-    ) in told
+        "  # robot 002; its address is not in the member list"
+    ) in printed
 
 
-def test_a_stolen_router_is_worse() -> None:
-    told = list(instructions.struck([member("robot", "001")], "keys/robot.001", []))
-    assert told[-1].startswith("A stolen router's certificate")
+def test_a_stolen_router_has_a_warning() -> None:
+    printed = list(
+        instructions.certificates_revoked([member("robot", "001")], "keys/robot.001", [])
+    )
+    assert printed[-1].startswith("Clients still accept")

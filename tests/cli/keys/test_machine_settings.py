@@ -1,4 +1,4 @@
-"""The settings that go to a machine: valid ones, and the way to its router."""
+"""Settings file of a machine."""
 
 import tomllib
 from pathlib import Path
@@ -19,19 +19,19 @@ ANNA = profile("driver", "anna", ("001",), ())
 FILES = {"ca": "ca.pem", "certificate": "certificate.pem", "private_key": "private.key"}
 
 
-def test_a_robots_router_listens_for_those_on_board_and_for_laptops() -> None:
+def test_a_robots_router_listens_on_socket_and_tls() -> None:
     assert tomllib.loads(bus_toml(ROBOT, [OTHER])) == {
         "robot": {"id": "001"},
         "bus": {"listen": [SOCKET, "tls/0.0.0.0:7447"], "members": "members.json", **FILES},
     }
 
 
-def test_a_robots_router_dials_its_sites() -> None:
+def test_a_robots_router_connects_to_its_sites() -> None:
     bus = tomllib.loads(bus_toml(ROBOT, [OTHER, SITE]))["bus"]
     assert bus["uplink"] == ["tls/site.example:7447"]
 
 
-def test_a_site_is_no_robot() -> None:
+def test_a_site_has_no_robot_id() -> None:
     table = tomllib.loads(bus_toml(SITE, [ROBOT]))
     assert "robot" not in table
     assert "uplink" not in table["bus"]
@@ -47,7 +47,7 @@ def test_a_site_is_no_robot() -> None:
         (Profile("viewer", "b"), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
     ],
 )
-def test_the_others_dial(who: Profile, routers: list[Profile], dialled: list[str]) -> None:
+def test_other_members_connect(who: Profile, routers: list[Profile], dialled: list[str]) -> None:
     text = bus_toml(who, routers)
     assert tomllib.loads(text)["bus"] == {"connect": dialled[:1], **FILES}
     assert [line for line in text.splitlines() if line.startswith("# or: ")] == [
@@ -59,12 +59,12 @@ def test_the_others_dial(who: Profile, routers: list[Profile], dialled: list[str
     ("robots", "chosen"),
     [(("001",), {"id": "001"}), (("001", "002"), None), (("*",), None), ((), None)],
 )
-def test_who_drives_one_robot_need_not_name_it(robots: tuple[str, ...], chosen: object) -> None:
+def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen: object) -> None:
     assert tomllib.loads(bus_toml(Profile("driver", "b", robots), [])).get("robot") == chosen
 
 
 @pytest.mark.parametrize(
-    ("sources", "told"),
+    ("sources", "expected"),
     [
         ((), {}),
         (("teleop", "web", "checkout"), {}),
@@ -72,25 +72,25 @@ def test_who_drives_one_robot_need_not_name_it(robots: tuple[str, ...], chosen: 
         (("nav", "x"), {"teleop": {"source": "nav"}, "dashboard": {"source": "nav"}}),
     ],
 )
-def test_screens_drive_as_a_source_that_the_certificate_may_use(
-    sources: tuple[str, ...], told: dict[str, object], tmp_path: Path
+def test_screens_use_an_allowed_source(
+    sources: tuple[str, ...], expected: dict[str, object], tmp_path: Path
 ) -> None:
     who = Profile("driver", "b", ("001",), (), sources)
     table = tomllib.loads(bus_toml(who, [ROBOT]))
-    assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == told
+    assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == expected
     file = tmp_path / "bus.toml"
     file.write_text(bus_toml(who, [ROBOT]))
     config = load(Everything, Sources(files=(file,))).config
-    assert config.teleop.source == (sources[0] if "teleop" in told else "teleop")
+    assert config.teleop.source == (sources[0] if "teleop" in expected else "teleop")
     load(Shared, Sources(files=(file,)))  # other programs accept it
 
 
-def test_a_router_that_names_this_host_alone_is_dialled_on_it() -> None:
+def test_a_local_router_is_reached_on_localhost() -> None:
     assert endpoints([profile("site", "x", (), ("127.0.0.1",))]) == ["tls/localhost:7447"]
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_it_says_whose_it_is(role: str) -> None:
+def test_the_first_line_names_the_member(role: str) -> None:
     who = next(each for each in (ROBOT, SITE, ANNA, Profile("viewer", "v"), Profile("fleet", "f"))
                if each.role == role)  # fmt: skip
-    assert bus_toml(who, []).startswith(f"# How {role} {who.name} gets on the bus")
+    assert bus_toml(who, []).startswith(f"# Bus settings of {role} {who.name}")

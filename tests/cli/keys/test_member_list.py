@@ -1,4 +1,4 @@
-"""The list of members, as it is changed."""
+"""Changes of the member list."""
 
 import pytest
 
@@ -15,7 +15,7 @@ SAME_NAME = member("viewer", "anna")
 SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
 
 
-def test_the_newest_is_the_last_that_is_not_revoked() -> None:
+def test_newest_skips_revoked_certificates() -> None:
     assert member_list.newest(SITE, "driver", "anna") is NEW
 
 
@@ -25,38 +25,40 @@ def test_nothing_to_renew(there: Members) -> None:
         member_list.newest(there, "driver", "anna")
 
 
-def test_a_name_is_free_while_nobody_has_a_good_certificate_of_it() -> None:
+def test_a_name_is_free_without_a_valid_certificate() -> None:
     ended = member("driver", "anna", days=-1)
     member_list.check_free(members(ended, GONE, OTHER, SAME_NAME), "driver", "anna", NOW_S)
     with pytest.raises(RobotError, match=r"has a certificate until 2027-09-17; `t2 keys renew dri"):
         member_list.check_free(SITE, "driver", "anna", NOW_S)
 
 
-def test_each_router_is_where_its_newest_certificate_says() -> None:
+def test_routers_have_the_addresses_of_their_latest_certificate() -> None:
     old, new = (member("robot", "002", serial, addresses=(where,))
                 for serial, where in (("1", "10.0.0.1"), ("2", "10.0.0.2")))  # fmt: skip
     gone, of_before = member("robot", "003", revoked=True), member("robot", "001")
     site = member("site", "berlin", addresses=("site.example",))
     found = member_list.routers(members(site, old, new, gone, of_before, OLD))
-    assert [(each.who, each.addresses) for each in found] == [
+    assert [(each.label, each.addresses) for each in found] == [
         ("robot.001", ()), ("robot.002", ("10.0.0.2",)), ("site.berlin", ("site.example",)),
     ]  # fmt: skip
 
 
-def test_no_router_is_renewed_for_an_address_that_nobody_named() -> None:
-    assert member_list.found_at(member("robot", "002", addresses=("10.0.0.1",))) == ("10.0.0.1",)
-    assert member_list.found_at(NEW) == ()
-    with pytest.raises(RobotError, match=r"not say where robot 002 is .*`t2 keys renew robot 002 "):
-        member_list.found_at(member("robot", "002"))
+def test_a_router_without_addresses_is_an_error() -> None:
+    assert member_list.addresses_of(member("robot", "002", addresses=("10.0.0.1",))) == (
+        "10.0.0.1",
+    )
+    assert member_list.addresses_of(NEW) == ()
+    with pytest.raises(RobotError, match=r"no address of robot 002.*`t2 keys renew robot 002 "):
+        member_list.addresses_of(member("robot", "002"))
 
 
-def test_one_more() -> None:
+def test_added() -> None:
     assert member_list.added(members(OLD), NEW) == members(OLD, NEW)
 
 
-def test_all_of_somebodys_are_revoked() -> None:
-    left, struck = member_list.revoked(SITE, "driver", "anna", None)
-    assert struck == [OLD, NEW]
+def test_revoke_all_certificates_of_a_member() -> None:
+    left, revoked = member_list.revoked(SITE, "driver", "anna", None)
+    assert revoked == [OLD, NEW]
     assert [each.common_name for each in left.welcome] == [
         "driver.ann.00000001",
         "viewer.anna.00000001",
@@ -64,14 +66,14 @@ def test_all_of_somebodys_are_revoked() -> None:
     assert len(left.members) == len(SITE.members)
 
 
-def test_one_of_somebodys_is_revoked() -> None:
-    left, struck = member_list.revoked(SITE, "driver", "anna", "00000001")
-    assert struck == [OLD]
+def test_revoke_one_certificate_of_a_member() -> None:
+    left, revoked = member_list.revoked(SITE, "driver", "anna", "00000001")
+    assert revoked == [OLD]
     assert left.welcome == (NEW, OTHER, SAME_NAME)
 
 
 @pytest.mark.parametrize(
-    ("name", "serial", "said"),
+    ("name", "serial", "message"),
     [
         ("ben", None, "driver ben has no certificate that could be revoked"),
         ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
@@ -79,6 +81,6 @@ def test_one_of_somebodys_is_revoked() -> None:
         ("anna", "", "has no certificate with the serial '' that could be"),
     ],
 )
-def test_nothing_to_revoke(name: str, serial: str | None, said: str) -> None:
-    with pytest.raises(RobotError, match=said):
+def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
+    with pytest.raises(RobotError, match=message):
         member_list.revoked(SITE, "driver", name, serial)

@@ -1,4 +1,4 @@
-"""What the list shows, and when it says that something has to be done."""
+"""Output of ``t2 keys list``."""
 
 import msgspec
 import pytest
@@ -57,7 +57,7 @@ def test_for_programs() -> None:
     }
 
 
-def test_what_ends_is_said_with_the_command_against_it() -> None:
+def test_advice_names_the_renewal_command() -> None:
     site = members(
         member("driver", "anna", days=12.5),
         member("driver", "ben", days=-1),
@@ -65,20 +65,20 @@ def test_what_ends_is_said_with_the_command_against_it() -> None:
         member("viewer", "gone", days=3, revoked=True),
     )
     assert list(report.advice(site, LONG_S, NOW_S)) == [
-        "driver anna ends in 12 days: `t2 keys renew driver anna`",
-        "driver ben has ended: `t2 keys renew driver ben`",
+        "driver anna expires in 12 days: `t2 keys renew driver anna`",
+        "driver ben has expired: `t2 keys renew driver ben`",
     ]
 
 
-def test_what_was_renewed_may_end() -> None:
+def test_renewed_certificates_need_no_advice() -> None:
     site = members(member("driver", "anna", days=-2), member("driver", "anna", "00000002"))
     assert list(report.advice(site, LONG_S, NOW_S)) == []
 
 
 @pytest.mark.parametrize(
-    ("left", "said"),
-    [(365, []), (364.5, ["the CA ends in 364 days"]), (-1, ["the CA has ended"])],
+    ("left", "message"),
+    [(365, []), (364.5, ["the CA expires in 364 days"]), (-1, ["the CA has expired"])],
 )
-def test_an_authority_that_outlives_no_new_certificate(left: float, said: list[str]) -> None:
+def test_advice_for_an_expiring_authority(left: float, message: list[str]) -> None:
     lines = list(report.advice(members(), NOW_S + left * DAY_S, NOW_S))
-    assert [line.partition(":")[0] for line in lines] == said
+    assert [line.partition(":")[0] for line in lines] == message

@@ -1,7 +1,7 @@
-"""Every cell of the table in ``docs/security.md``, tried with real certificates and sessions.
+"""Every cell of the table in ``docs/security.md``, with real certificates and sessions.
 
-What is denied leaves no trace. So each trial ends with something that is allowed, on the same
-session: once that has come, what did not come before it never will.
+A denied message leaves no trace. So each trial ends with an allowed message on the same session:
+once it has arrived, earlier messages that are missing were denied.
 """
 
 import threading
@@ -21,16 +21,16 @@ from verification.harness.certificates import Site, dialling
 from verification.harness.support import at, wait_until
 
 KEYS = tuple(CLASSES.values())
-PLAIN = tuple(key for key in KEYS if "*" not in key)  # that can be served, or hold a token
+PLAIN = tuple(key for key in KEYS if "*" not in key)  # usable for a queryable or a token
 SURE = keys.VELOCITY.on(MINE)  # every role may read it
-BLOCK = zenoh.CongestionControl.BLOCK  # a trial must not be lost for want of room
+BLOCK = zenoh.CongestionControl.BLOCK  # no message may be dropped by congestion
 TIMEOUT_S = 2.0
-EVERY = ("**", "**/@cmd/**", "**/@adv/**")  # what begins with @ is matched by itself alone
+EVERY = ("**", "**/@cmd/**", "**/@adv/**")  # `**` does not match chunks that begin with @
 
 
 @pytest.fixture(scope="module")
 def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, zenoh.Session]]:
-    """Open a session of each role at one router, and one on board."""
+    """Sessions of every role at one router, and one on board."""
     site = Site(tmp_path_factory.mktemp("site") / "keys")
     certified = {
         "viewer": site.member("viewer", "hall"),
@@ -58,17 +58,17 @@ def granted(role: str, verb: Verb, tried: tuple[str, ...] = KEYS) -> set[str]:
 def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
     came: list[tuple[str, str]] = []
 
-    def hear(sample: zenoh.Sample) -> None:
+    def receive(sample: zenoh.Sample) -> None:
         came.append((str(sample.key_expr), sample.payload.to_string()))
 
-    ears = [sessions["on board"].declare_subscriber(key, hear) for key in EVERY]
+    subscribers = [sessions["on board"].declare_subscriber(key, receive) for key in EVERY]
     mine, marker = sessions[role], next(iter(sorted(granted(role, "write"))))
 
     def passed() -> bool:
-        mine.put(marker, "are you there", congestion_control=BLOCK)
+        mine.put(marker, "ping", congestion_control=BLOCK)
         return bool(came)
 
-    wait_until(passed, "the ears on board are known")
+    wait_until(passed, "the subscribers on board")
     for kind in ("put", "delete"):
         came.clear()
         for key in KEYS:
@@ -78,37 +78,37 @@ def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
                 mine.delete(key, congestion_control=BLOCK)
         mine.put(marker, "end", congestion_control=BLOCK)
         wait_until(lambda: (marker, "end") in came, "the last put")
-        told = {key for key, text in came if text == (role if kind == "put" else "")}
-        assert told == granted(role, "write"), kind
-    for ear in ears:
-        ear.undeclare()
+        passed_keys = {key for key, text in came if text == (role if kind == "put" else "")}
+        assert passed_keys == granted(role, "write"), kind
+    for each in subscribers:
+        each.undeclare()
 
 
 @pytest.mark.parametrize("role", ROLES)
 def test_read(sessions: Mapping[str, zenoh.Session], role: str) -> None:
-    came: set[tuple[str, str]] = set()  # the key as it was subscribed to, and what came there
+    came: set[tuple[str, str]] = set()  # subscribed key and payload
 
-    def hearer(key: str) -> Any:
+    def receiver(key: str) -> Any:
         return lambda sample: came.add((key, sample.payload.to_string()))
 
-    ears = [sessions[role].declare_subscriber(key, hearer(key)) for key in KEYS]
+    subscribers = [sessions[role].declare_subscriber(key, receiver(key)) for key in KEYS]
     onboard = sessions["on board"]
 
     def put_all(text: str) -> None:
         for key in KEYS:
             onboard.put(key, text, congestion_control=BLOCK)
 
-    def heard() -> set[str]:
+    def received() -> set[str]:
         put_all("first")
         return {key for key, _ in came}
 
-    wait_until(lambda: heard() >= granted(role, "read"), "all that may be read")
+    wait_until(lambda: received() >= granted(role, "read"), "all that may be read")
     put_all("second")
     onboard.put(SURE, "end", congestion_control=BLOCK)
     wait_until(lambda: (SURE, "end") in came, "the last put")
     assert {key for key, _ in came} == granted(role, "read")
-    for ear in ears:
-        ear.undeclare()
+    for each in subscribers:
+        each.undeclare()
 
 
 @pytest.mark.parametrize("role", ROLES)
@@ -147,7 +147,7 @@ def answer(query: zenoh.Query) -> None:
 
 
 def asked(session: zenoh.Session, tried: tuple[str, ...]) -> set[str]:
-    """Return which of these keys somebody answers on, all asked at the same time."""
+    """Query all keys at the same time; return those with an answer."""
     answered: set[str] = set()
     ended = threading.Semaphore(0)
 
@@ -163,26 +163,28 @@ def asked(session: zenoh.Session, tried: tuple[str, ...]) -> set[str]:
 
 
 def alive(session: zenoh.Session) -> set[str]:
-    """Return the tokens that a session sees."""
+    """Return the liveliness tokens visible to a session."""
     return {str(reply.ok.key_expr) for key in EVERY
             for reply in session.liveliness().get(key, timeout=TIMEOUT_S) if reply.ok}  # fmt: skip
 
 
-@pytest.mark.parametrize(("speaker", "hearer"), [("on board", "viewer"), ("viewer", "on board")])
-def test_who_comes_late_gets_the_events_that_are_kept(
-    sessions: Mapping[str, zenoh.Session], speaker: str, hearer: str
+@pytest.mark.parametrize(
+    ("publisher", "subscriber"), [("on board", "viewer"), ("viewer", "on board")]
+)
+def test_late_subscribers_get_cached_events(
+    sessions: Mapping[str, zenoh.Session], publisher: str, subscriber: str
 ) -> None:
     key = keys.EVENTS.on(MINE, service="dashboard")
     cache = zenoh.ext.CacheConfig(max_samples=10)
     published = zenoh.ext.declare_advanced_publisher(
-        sessions[speaker], key, cache=cache, publisher_detection=True
+        sessions[publisher], key, cache=cache, publisher_detection=True
     )
     published.put("kept")
     came: list[str] = []
     history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
-    for _ in range(5):  # a query may be ahead of the declarations
+    for _ in range(5):  # a query may arrive before the declarations
         heard = zenoh.ext.declare_advanced_subscriber(
-            sessions[hearer],
+            sessions[subscriber],
             key,
             lambda s: came.append(s.payload.to_string()),
             history=history,

@@ -1,4 +1,4 @@
-"""The folder: who may read what, that a file is whole or not there, and that no member is lost."""
+"""The authority's folder: file modes, atomic writes and locking."""
 
 import os
 import stat
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.keys.ca import Authority
+from cli.keys.ca import CertificateAuthority
 from cli.keys.profile import DAY_S, Profile, Span, profile
 from cli.keys.store import Folder, locked
 from common.errors import RobotError
@@ -22,20 +22,22 @@ DRIVER = profile("driver", "anna", ("001",), ())
 
 
 def no_passphrase() -> bytes:
-    raise AssertionError("nobody should have been asked")
+    raise AssertionError("no passphrase expected")
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Folder:
     with locked(tmp_path / "keys", create=True) as made:
-        made.found(Authority.found("berlin", SPAN), Members(site="berlin"), b"")
+        made.create_authority(
+            CertificateAuthority.create("berlin", SPAN), Members(site="berlin"), b""
+        )
     return made
 
 
-def hand_out(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
+def create_machine(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
     issued = folder.authority(None, no_passphrase).issue(who, SPAN)
     listed = Members(site="berlin", members=(*folder.read().members, issued.member))
-    target = folder.hand_out(who, issued, listed, settings=settings)
+    target = folder.write_machine(who, issued, listed, settings=settings)
     folder.write(listed)
     return target
 
@@ -44,8 +46,8 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-def test_only_the_owner_reads_what_is_secret(folder: Folder) -> None:
-    target = hand_out(folder, ROBOT)
+def test_only_the_owner_can_read_secrets(folder: Folder) -> None:
+    target = create_machine(folder, ROBOT)
     assert (mode(folder.path), mode(target)) == (0o700, 0o700)
     assert mode(folder.ca_key) == mode(target / "private.key") == 0o600
     names = {"ca.pem", "certificate.pem", "private.key", "bus.toml", "members.json"}
@@ -54,62 +56,62 @@ def test_only_the_owner_reads_what_is_secret(folder: Folder) -> None:
         assert mode(target / name) == 0o644
 
 
-def test_a_loose_umask_changes_nothing(folder: Folder) -> None:
+def test_the_umask_has_no_effect(folder: Folder) -> None:
     before = os.umask(0)
     try:
-        target = hand_out(folder, DRIVER)
+        target = create_machine(folder, DRIVER)
     finally:
         os.umask(before)
     assert (mode(target), mode(target / "private.key")) == (0o700, 0o600)
     assert mode(folder.members) == 0o644
 
 
-def test_the_list_goes_to_routers_and_to_no_other(folder: Folder) -> None:
-    robot, driver = hand_out(folder, ROBOT), hand_out(folder, DRIVER)
+def test_only_routers_get_the_list(folder: Folder) -> None:
+    robot, driver = create_machine(folder, ROBOT), create_machine(folder, DRIVER)
     assert (robot / "members.json").read_bytes() == folder.members.read_bytes()
     assert not (driver / "members.json").exists()
 
 
-def test_a_router_that_was_struck_off_gets_no_list(folder: Folder) -> None:
-    robot = hand_out(folder, ROBOT)
+def test_a_revoked_router_gets_no_list(folder: Folder) -> None:
+    robot = create_machine(folder, ROBOT)
     folder.write(members(member("robot", "001", revoked=True)))
     assert (robot / "members.json").read_bytes() != folder.members.read_bytes()
 
 
-def test_settings_that_somebody_has_edited_stay(folder: Folder) -> None:
-    target = hand_out(folder, DRIVER)
+def test_renewal_keeps_edited_settings(folder: Folder) -> None:
+    target = create_machine(folder, DRIVER)
     (target / "bus.toml").write_text("# mine\n", encoding="utf-8")
-    hand_out(folder, DRIVER, settings=False)
+    create_machine(folder, DRIVER, settings=False)
     assert (target / "bus.toml").read_text(encoding="utf-8") == "# mine\n"
-    hand_out(folder, DRIVER, settings=True)
+    create_machine(folder, DRIVER, settings=True)
     assert "connect" in (target / "bus.toml").read_text(encoding="utf-8")
     (target / "bus.toml").unlink()
-    hand_out(folder, DRIVER, settings=False)
+    create_machine(folder, DRIVER, settings=False)
     assert (target / "bus.toml").exists()
 
 
 @pytest.mark.parametrize("name", ["ca.pem", "ca.key", "members.json"])
-def test_an_authority_is_never_written_over(folder: Folder, name: str) -> None:
+def test_an_authority_is_never_overwritten(folder: Folder, name: str) -> None:
     kept = (folder.path / name).read_bytes()
     for other in {"ca.pem", "ca.key", "members.json"} - {name}:
         (folder.path / other).unlink()
-    with pytest.raises(RobotError, match=f"{name} is there already: another CA would lock"):
-        folder.found(Authority.found("x", SPAN), Members(site="x"), b"")
+    with pytest.raises(RobotError, match=f"{name} exists: another CA would invalidate"):
+        folder.create_authority(CertificateAuthority.create("x", SPAN), Members(site="x"), b"")
     assert [file.name for file in folder.path.iterdir()] == [name]
     assert (folder.path / name).read_bytes() == kept
 
 
-def test_what_is_missing_is_said(folder: Folder) -> None:
+def test_missing_files_are_named(folder: Folder) -> None:
     folder.ca_key.unlink()
-    with pytest.raises(RobotError, match=r"ca.key is not there, and only it can sign.*--ca-key"):
+    with pytest.raises(RobotError, match=r"ca.key not found: it is needed to sign.*--ca-key"):
         folder.authority(None, no_passphrase)
     assert folder.read() == Members(site="berlin")  # the list needs no key
     folder.ca.unlink()
-    with pytest.raises(RobotError, match="has no CA; `t2 keys init` makes one"):
+    with pytest.raises(RobotError, match="has no CA; `t2 keys init` creates one"):
         folder.read()
 
 
-def test_the_key_may_lie_elsewhere(folder: Folder, tmp_path: Path) -> None:
+def test_the_key_may_be_stored_elsewhere(folder: Folder, tmp_path: Path) -> None:
     away = folder.ca_key.rename(tmp_path / "stick.key")
     assert (
         folder.authority(away, no_passphrase).certificate
@@ -117,40 +119,40 @@ def test_the_key_may_lie_elsewhere(folder: Folder, tmp_path: Path) -> None:
     )
 
 
-def test_no_folder_is_made_by_looking(tmp_path: Path) -> None:
+def test_a_missing_folder_is_not_created(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="keys has no CA"), locked(tmp_path / "keys"):
         pass
     assert not (tmp_path / "keys").exists()
 
 
 @pytest.mark.parametrize(
-    ("trouble", "raised", "said"),
+    ("trouble", "raised", "message"),
     [
         (OSError(28, "No space left"), RobotError, "members.json: No space left"),
         (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
     ],
 )
-def test_a_full_disk_or_ctrl_c_leaves_the_old_list_and_nothing_else(
+def test_a_full_disk_or_ctrl_c_keeps_the_old_list(
     trouble: BaseException,
     raised: type[BaseException],
-    said: str,
+    message: str,
     folder: Folder,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    hand_out(folder, ROBOT)
+    create_machine(folder, ROBOT)
     kept = folder.members.read_bytes()
 
     def stopped(_: int) -> None:
         raise trouble
 
     monkeypatch.setattr("cli.keys.store.os.fsync", stopped)
-    with pytest.raises(raised, match=said):
+    with pytest.raises(raised, match=message):
         folder.write(Members(site="berlin"))
     assert folder.members.read_bytes() == kept
     assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]
 
 
-def test_a_file_in_the_way_is_said(tmp_path: Path) -> None:
+def test_a_file_instead_of_the_folder_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "keys").write_text("", encoding="utf-8")
     with (
         pytest.raises(RobotError, match="keys: File exists"),
@@ -165,7 +167,7 @@ def in_a_thread(call: Callable[[], None]) -> threading.Thread:
     return thread
 
 
-def test_of_two_commands_at_once_the_second_waits(folder: Folder) -> None:
+def test_concurrent_commands_wait_for_the_lock(folder: Folder) -> None:
     entered: list[str] = []
 
     def second() -> None:
@@ -181,6 +183,6 @@ def test_of_two_commands_at_once_the_second_waits(folder: Folder) -> None:
 
 
 def waits_for_a_lock() -> bool:
-    """Tell whether somebody in this process waits for a lock on a file."""
+    """Return whether a thread of this process waits for a file lock."""
     lines = Path("/proc/locks").read_text(encoding="ascii").splitlines()
     return any("->" in line and f" {os.getpid()} " in line for line in lines)

@@ -1,4 +1,4 @@
-"""``t2 foxglove``: what a viewer gets over its web socket."""
+"""``t2 foxglove``: messages that a viewer receives over its WebSocket."""
 
 import json
 import struct
@@ -23,7 +23,7 @@ MESSAGE_DATA = 1
 
 
 class Viewer(threading.Thread):
-    """Asks for one topic, as soon as it is there, and keeps the first message of it."""
+    """Subscribes to one topic as soon as it is advertised, and keeps its first message."""
 
     def __init__(self, port: int, topic: str) -> None:
         super().__init__(daemon=True)
@@ -38,12 +38,12 @@ class Viewer(threading.Thread):
         assert socket is not None
         with socket:
             while not self.message:
-                said = socket.recv(PATIENCE_S)
-                if isinstance(said, str):
-                    self._on_text(socket, json.loads(said))
-                elif said[0] == MESSAGE_DATA:
+                printed = socket.recv(PATIENCE_S)
+                if isinstance(printed, str):
+                    self._on_text(socket, json.loads(printed))
+                elif printed[0] == MESSAGE_DATA:
                     # opcode, subscription, log time
-                    self.message = json.loads(said[struct.calcsize("<BIQ") :])
+                    self.message = json.loads(printed[struct.calcsize("<BIQ") :])
 
     def _connected(self) -> ClientConnection | None:
         try:
@@ -51,13 +51,13 @@ class Viewer(threading.Thread):
         except OSError:
             return None
 
-    def _on_text(self, socket: ClientConnection, said: dict[str, Any]) -> None:
-        for channel in said.get("channels", []):
+    def _on_text(self, socket: ClientConnection, printed: dict[str, Any]) -> None:
+        for channel in printed.get("channels", []):
             if channel["topic"] == self._topic:
                 self.channel = channel
                 self._ask(socket)
-        # The server tells of a channel a moment before it lets anybody subscribe to it.
-        if "Unknown channel" in said.get("message", ""):
+        # The server advertises a channel shortly before it accepts subscriptions.
+        if "Unknown channel" in printed.get("message", ""):
             self._ask(socket)
 
     def _ask(self, socket: ClientConnection) -> None:
@@ -72,7 +72,9 @@ class Viewer(threading.Thread):
         ("t2/v1/{robot}/tel/odom/odometry", "t2.v1.Odometry", "residual"),
     ],
 )
-def test_a_viewer_sees_it_live(rig: Rig, tool: Tool, topic: str, schema: str, field: str) -> None:
+def test_a_viewer_receives_live_messages(
+    rig: Rig, tool: Tool, topic: str, schema: str, field: str
+) -> None:
     port = free_port()
     pretend(rig, "odom", {keys.ODOMETRY: samples.odometry})
     viewer = Viewer(port, topic.format(robot=rig.robot))
@@ -85,7 +87,7 @@ def test_a_viewer_sees_it_live(rig: Rig, tool: Tool, topic: str, schema: str, fi
     assert field in json.loads(viewer.channel["schema"])["properties"]
 
 
-def test_a_taken_port_is_told(tool: Tool) -> None:
+def test_a_taken_port_is_an_error(tool: Tool) -> None:
     import socket
 
     with socket.socket() as taken:

@@ -1,4 +1,4 @@
-"""``t2 info``: whole files and cut ones, for people and for programs."""
+"""``t2 info``: complete and truncated files, as text and as JSON."""
 
 import json
 from pathlib import Path
@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from cli.__main__ import main
 from common.messages import Event, Health
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Translator
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 
@@ -19,7 +19,7 @@ from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     about = {"robot": "007", "version": "1.2.3", "why": "latch-contact"}
-    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), about)
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), about)
     health = Health(
         service="odom", version="1.2", uptime=0, rates={}, counters={}, lateness=0, rss=0
     )
@@ -37,27 +37,31 @@ def path(tmp_path: Path) -> Path:
 
 def as_json(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, dict[str, Any]]:
     code = main(["info", "-o", "json", str(path)])
-    told: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return code, told
+    printed: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return code, printed
 
 
-def test_for_programs(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, told = as_json(capsys, path)
+def test_json_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, printed = as_json(capsys, path)
     assert code == 0
-    assert told["keys"][f"{ROOT}/tel/bridge/velocity"] == {
+    assert printed["keys"][f"{ROOT}/tel/bridge/velocity"] == {
         "type": "Velocity", "count": 11, "hz": pytest.approx(10.0), "raw": 11, "faulty": 0,
     }  # fmt: skip
-    assert told["keys"][f"{ROOT}/tel/mine"]["type"] == ""
-    assert (told["cut"], told["damaged_chunks"], told["bytes"]) == (False, 0, told["readable"])
-    assert (told["begin_ns"], told["duration"], told["messages"]) == (BEGIN_NS, 2.0, 16)
-    assert told["about"]["robot"] == "007"
-    assert told["versions"] == {"odom": "1.2"}
+    assert printed["keys"][f"{ROOT}/tel/mine"]["type"] == ""
+    assert (printed["cut"], printed["damaged_chunks"], printed["bytes"]) == (
+        False,
+        0,
+        printed["readable"],
+    )
+    assert (printed["begin_ns"], printed["duration"], printed["messages"]) == (BEGIN_NS, 2.0, 16)
+    assert printed["about"]["robot"] == "007"
+    assert printed["versions"] == {"odom": "1.2"}
     event = {"at": 1.5, "who": "bridge", "level": "error", "text": "contact: hit"}
-    assert told["events"] == [event]
-    assert [each["text"] for each in told["latched"]] == ["contact"]
+    assert printed["events"] == [event]
+    assert [each["text"] for each in printed["latched"]] == ["contact"]
 
 
-def test_a_cut_file_is_told_as_far_as_it_goes(
+def test_a_truncated_file_is_summarized_up_to_its_end(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with path.open("rb") as file:
@@ -65,33 +69,33 @@ def test_a_cut_file_is_told_as_far_as_it_goes(
     assert summary is not None
     second = summary.chunk_indexes[1]
     path.write_bytes(path.read_bytes()[: second.chunk_start_offset + second.chunk_length // 2])
-    code, told = as_json(capsys, path)
+    code, printed = as_json(capsys, path)
     assert code == 1
-    assert told["cut"]
-    assert 0 < told["readable"] <= told["bytes"]
-    assert told["messages"] == 13
+    assert printed["cut"]
+    assert 0 < printed["readable"] <= printed["bytes"]
+    assert printed["messages"] == 13
     assert main(["info", "--text", str(path)]) == 1
-    assert f"cut short, {told['readable']} bytes can be read" in capsys.readouterr().out
+    assert f"truncated, {printed['readable']} bytes are readable" in capsys.readouterr().out
 
 
-def test_for_people(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "--text", str(path)]) == 0
     shown = capsys.readouterr().out
-    for said in (
-        "whole", "robot 007, recorded by T2 1.2.3", "because of: latch-contact",
+    for message in (
+        "complete", "robot 007, recorded by T2 1.2.3", "reason: latch-contact",
         "16 messages in 2.0 s",
         "versions: odom 1.2", "001/tel/bridge/velocity", "10.0", "latched:", "contact: hit",
     ):  # fmt: skip
-        assert said in shown, said
+        assert message in shown, message
 
 
 def test_an_empty_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), {})
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
     made.close()
     assert main(["info", "--text", str(made.path)]) == 0
     assert "no messages" in capsys.readouterr().out
 
 
-def test_no_such_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(tmp_path / "gone.mcap")]) == 1
     assert "gone.mcap: cannot be read: No such file" in capsys.readouterr().err

@@ -1,1 +1,1 @@
-"""Tests of the stack's supervisor and router."""
+"""Tests of supervisor, router and installation."""

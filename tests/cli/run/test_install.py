@@ -1,4 +1,4 @@
-"""``t2 install`` into a folder: what it writes, keeps, refuses and takes away."""
+"""``t2 install`` into a folder: files written, kept, rejected and removed."""
 
 from configparser import ConfigParser
 from pathlib import Path
@@ -21,22 +21,20 @@ def t2_install(root: Path, *words: str) -> int:
 
 
 def files(root: Path) -> dict[str, str]:
-    """Return every file under a folder, by its name there."""
+    """Return the text of every file in a folder, by relative path."""
     found = (path for path in root.rglob("*") if path.is_file())
     return {str(path.relative_to(root)): path.read_text() for path in found}
 
 
 def unit(text: str) -> ConfigParser:
-    """Read a unit; of a key that is given more than once the last counts."""
+    """Parse a unit; the last value of a repeated key counts."""
     parser = ConfigParser(strict=False, interpolation=None, delimiters=("=",))
     parser.optionxform = str  # type: ignore[assignment, method-assign]
     parser.read_string(text)
     return parser
 
 
-def test_all_but_the_simulator_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert t2_install(tmp_path) == 0
     written = files(tmp_path)
     services = {Path(name).name for name in written if name.endswith(".service")}
@@ -48,12 +46,12 @@ def test_all_but_the_simulator_is_written(
         in (written[f"{UNITS}/t2-safety.service"])
     )
     assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
-    said = capsys.readouterr().out
-    assert "write   /etc/t2/t2.toml" in said
-    assert said.endswith("systemctl enable --now t2.target\n")
+    message = capsys.readouterr().out
+    assert "write   /etc/t2/t2.toml" in message
+    assert message.endswith("systemctl enable --now t2.target\n")
 
 
-def test_the_settings_are_the_vehicles_and_valid(tmp_path: Path) -> None:
+def test_initial_settings_are_valid(tmp_path: Path) -> None:
     t2_install(tmp_path)
     sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
     config = load(Everything, sources).config
@@ -62,7 +60,7 @@ def test_the_settings_are_the_vehicles_and_valid(tmp_path: Path) -> None:
     assert config.recorder.folder == "/var/lib/t2/recordings"
 
 
-def test_keys_that_are_there_are_used(tmp_path: Path) -> None:
+def test_existing_keys_are_used(tmp_path: Path) -> None:
     keys = tmp_path / "etc/t2/keys/bus.toml"
     keys.parent.mkdir(parents=True)
     keys.write_text('[bus]\nlisten = ["unixsock-stream//run/t2/bus.sock", "tcp/127.0.0.1:7447"]\n')
@@ -71,7 +69,7 @@ def test_keys_that_are_there_are_used(tmp_path: Path) -> None:
     assert command.endswith(" --config /etc/t2/t2.toml --config /etc/t2/keys/bus.toml")
 
 
-def test_a_link_to_this_environment_is_named_instead(
+def test_the_link_to_this_environment_is_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     version = tmp_path / "1.0"
@@ -85,7 +83,7 @@ def test_a_link_to_this_environment_is_named_instead(
     assert install.here() == tmp_path / "current"
 
 
-def test_a_simulated_vehicle_stays_one_until_it_is_uninstalled(tmp_path: Path) -> None:
+def test_a_simulated_vehicle_stays_until_uninstall(tmp_path: Path) -> None:
     t2_install(tmp_path, "--sim")
     assert f"{UNITS}/t2-sim.service" in files(tmp_path)
     sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
@@ -94,7 +92,7 @@ def test_a_simulated_vehicle_stays_one_until_it_is_uninstalled(tmp_path: Path) -
     assert f"{UNITS}/t2-sim.service" in files(tmp_path)
 
 
-def test_a_second_time_changes_nothing_and_an_edit_is_kept(
+def test_install_again_keeps_edited_settings(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     t2_install(tmp_path)
@@ -104,14 +102,14 @@ def test_a_second_time_changes_nothing_and_an_edit_is_kept(
     capsys.readouterr()
     assert t2_install(tmp_path) == 0
     assert files(tmp_path) == before
-    said = capsys.readouterr().out
-    assert "keep    /etc/t2/t2.toml" in said
-    assert "write" not in said
-    assert "replace" not in said
-    assert "systemctl restart t2.target" in said
+    message = capsys.readouterr().out
+    assert "keep    /etc/t2/t2.toml" in message
+    assert "write" not in message
+    assert "replace" not in message
+    assert "systemctl restart t2.target" in message
 
 
-def test_an_older_unit_is_replaced_and_what_cannot_run_is_removed(
+def test_old_units_are_replaced_and_unusable_ones_removed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     t2_install(tmp_path)
@@ -119,15 +117,15 @@ def test_an_older_unit_is_replaced_and_what_cannot_run_is_removed(
     monkeypatch.setattr(install, "find_spec", lambda name: None if name == "uvicorn" else True)
     capsys.readouterr()
     t2_install(tmp_path)
-    said = capsys.readouterr().out
-    assert "without t2-dashboard.service: uvicorn is not installed" in said
-    assert f"remove  /{UNITS}/t2-dashboard.service" in said
-    assert f"replace /{UNITS}/t2-odom.service" in said
+    message = capsys.readouterr().out
+    assert "without t2-dashboard.service: uvicorn is not installed" in message
+    assert f"remove  /{UNITS}/t2-dashboard.service" in message
+    assert f"replace /{UNITS}/t2-odom.service" in message
     assert f"{UNITS}/t2-dashboard.service" not in files(tmp_path)
 
 
 @pytest.mark.parametrize("words", [(), ("--uninstall",)])
-def test_what_another_version_wrote_goes_and_what_somebody_else_wrote_stays(
+def test_units_of_other_versions_are_removed_foreign_ones_stay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
 ) -> None:
     t2_install(tmp_path)
@@ -146,9 +144,7 @@ def test_what_another_version_wrote_goes_and_what_somebody_else_wrote_stays(
     assert f"remove  /{UNITS}/t2-lamp.service" in capsys.readouterr().out
 
 
-def test_settings_that_will_not_do_are_said_before_anything_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_invalid_settings_write_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = tmp_path / "etc/t2/t2.toml"
     settings.parent.mkdir(parents=True)
     settings.write_text("[bus]\nlaese = 1.0\n")
@@ -163,9 +159,7 @@ def test_a_dry_run_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert f"write   /{UNITS}/t2.target" in capsys.readouterr().out
 
 
-def test_uninstalled_it_leaves_settings_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_uninstall_keeps_the_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     t2_install(tmp_path, "--sim")
     enabled = tmp_path / "etc/systemd/system/multi-user.target.wants/t2.target"
     enabled.parent.mkdir(parents=True)
@@ -180,7 +174,7 @@ def test_uninstalled_it_leaves_settings_alone(
 
 
 @pytest.mark.parametrize("prefix", [f"{place}/t2" for place in install.HIDDEN])
-def test_a_place_that_services_do_not_see_is_refused(
+def test_a_hidden_prefix_is_rejected(
     tmp_path: Path, prefix: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["install", "--root", str(tmp_path), "--prefix", prefix]) == 1
@@ -188,24 +182,24 @@ def test_a_place_that_services_do_not_see_is_refused(
     assert files(tmp_path) == {}
 
 
-def test_without_rights_it_says_so(
+def test_install_needs_root(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.geteuid", lambda: 1000)
     assert main(["install", "--prefix", PREFIX]) == 1
-    assert "wants root" in capsys.readouterr().err
+    assert "needs root" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("said", "version"),
+    ("message", "version"),
     [("systemd 252 (252.39-1)\n+PAM", 252), ("systemd 257~rc1", 257), ("busybox", 0)],
 )
-def test_the_backoff_is_written_for_a_systemd_that_knows_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, version: int
+def test_the_backoff_needs_a_recent_systemd(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, version: int
 ) -> None:
     tool = tmp_path / "bin" / "systemctl"
     tool.parent.mkdir()
-    tool.write_text(f"#!/bin/sh\necho '{said}'\n")
+    tool.write_text(f"#!/bin/sh\necho '{message}'\n")
     tool.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tool.parent}:/bin")
     assert install.systemd_version() == version
@@ -223,26 +217,26 @@ REAL = [name for name in SERVICES if name != install.SIM]
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_every_service_belongs_to_the_target(name: str) -> None:
+def test_the_target_wants_every_service(name: str) -> None:
     wanted = [line for line in install.template("t2.target").splitlines() if "Wants=" in line]
     assert name in " ".join(wanted)
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_every_service_is_watched(name: str) -> None:
+def test_every_service_has_a_watchdog(name: str) -> None:
     service = unit(install.template(name))["Service"]
     assert service["Type"] == "notify"
-    assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # these machines hold processes up
+    assert int(service["WatchdogSec"].removesuffix("s")) >= 2  # hosts with scheduling stalls
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_the_bridge_alone_can_reach_the_boards_cable(name: str) -> None:
+def test_only_the_bridge_can_reach_the_board(name: str) -> None:
     denied = unit(install.template(name))["Service"].get("IPAddressDeny", "").split()
     cable = {"10.7.5.0/24", "255.255.255.255", "multicast"}  # as in deploy/nftables/t2.nft
     assert bool({"any"} & {*denied} or cable <= {*denied}) == (name != "t2-bridge.service")
 
 
-def test_the_bridge_is_the_last_to_start_and_the_first_to_stop() -> None:
+def test_the_bridge_starts_last_and_stops_first() -> None:
     after = unit(install.template("t2-bridge.service"))["Unit"]["After"].split()
     assert {"network.target", "t2-router.service", "t2-safety.service", "t2-sim.service"} == {
         *after
@@ -252,21 +246,21 @@ def test_the_bridge_is_the_last_to_start_and_the_first_to_stop() -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_who_stands_before_the_wheels_alone_may_go_ahead(name: str) -> None:
+def test_only_the_control_chain_has_realtime_priority(name: str) -> None:
     service = unit(install.template(name))["Service"]
     ahead = name in ("t2-router.service", "t2-safety.service", "t2-bridge.service")
     assert service.get("LimitRTPRIO") == (str(realtime.GUARD) if ahead else None)
     assert service.get("RestrictRealtime") == (None if ahead else "yes")
 
 
-def test_the_common_part_overrides_nothing_of_a_services_own() -> None:
+def test_the_common_drop_in_overrides_no_service() -> None:
     common = unit(install.template("t2-.service.d/10-t2.conf"))["Service"]
     for name in SERVICES:
         assert not common.keys() & unit(install.template(name))["Service"].keys(), name
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_the_drive_link_is_open_to_bridge_and_safety_alone(name: str) -> None:
+def test_only_bridge_and_safety_can_use_the_drive_link(name: str) -> None:
     service = unit(install.template(name))["Service"]
     hidden = service.get("InaccessiblePaths") == "/run/t2-drive"
     assert hidden == (name not in ("t2-bridge.service", "t2-safety.service"))

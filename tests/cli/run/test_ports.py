@@ -1,4 +1,4 @@
-"""What ``t2 up`` listens on: which ports those are, and that nothing starts while one is taken."""
+"""Ports of ``t2 up``, and the check that they are free."""
 
 import contextlib
 import socket
@@ -43,10 +43,10 @@ def tcp(number: int) -> Port:
     return Port("tcp", "127.0.0.1", number, "router", "bus.listen")
 
 
-# --- which ---------------------------------------------------------------------------------------
+# --- ports by process ----------------------------------------------------------------------------
 
 
-def test_each_process_has_its_own() -> None:
+def test_ports_by_process() -> None:
     config = Everything()
     owners = [port.owner for port in wanted(config, ALL)]
     assert owners == ["router", "bridge", "bridge", "sim"]
@@ -54,7 +54,7 @@ def test_each_process_has_its_own() -> None:
     assert wanted(config, ["safety"]) == []
 
 
-def test_a_routers_endpoints_in_every_form() -> None:
+def test_router_endpoints() -> None:
     listen = ("tcp/127.0.0.1:7447", "tls/[::1]:7448#iface=lo", "quic/localhost:9?a=b",
               "unixsock-stream//run/t2/bus.sock")  # fmt: skip
     bus = settings.BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
@@ -70,23 +70,26 @@ def test_a_routers_endpoints_in_every_form() -> None:
 
 
 @pytest.mark.parametrize(("kind", "of"), [(socket.SOCK_STREAM, tcp), (socket.SOCK_DGRAM, udp)])
-def test_a_taken_port_is_named_with_what_to_do(
+def test_a_taken_port_is_named_with_advice(
     kind: socket.SocketKind, of: Callable[[int], Port]
 ) -> None:
     with held(kind) as number:
         port = of(number)
         with pytest.raises(LinkError) as raised:
             claimed([port], 0.0)
-    said = str(raised.value)
-    assert f"127.0.0.1:{number} ({port.setting}): another program has it" in said
-    assert "is a stack running already?" in said
-    claimed([port], 0.0).close()  # and now it is free
+    message = str(raised.value)
+    assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
+    assert "is a stack already running?" in message
+    claimed([port], 0.0).close()  # free again
 
 
-def test_a_unix_socket_that_answers_is_taken_and_a_stale_one_is_not(tmp_path: Path) -> None:
+def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
     path = str(tmp_path / "bus.sock")
     port = Port("unix", path, 0, "router", "bus.listen")
-    with router(listening(f"unixsock-stream/{path}")), pytest.raises(LinkError, match="another"):
+    with (
+        router(listening(f"unixsock-stream/{path}")),
+        pytest.raises(LinkError, match="used by another"),
+    ):
         claimed([port], 0.0)
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(f"{path}.2")
@@ -94,18 +97,18 @@ def test_a_unix_socket_that_answers_is_taken_and_a_stale_one_is_not(tmp_path: Pa
         pass
 
 
-def test_an_address_of_another_host_says_so() -> None:
+def test_an_address_of_another_host_is_an_error() -> None:
     with pytest.raises(LinkError, match=r"192\.0\.2\.1:4002 .*cannot be bound: .*assign"):
         claimed([Port("udp", "192.0.2.1", 4002, "bridge", "board.listen_ports")], 0.0)
 
 
-def test_two_that_start_at_once_do_not_both_go_on() -> None:
+def test_of_two_concurrent_starts_one_continues() -> None:
     port = udp(free_port(socket.SOCK_DGRAM))
-    with claimed([port], 0.0), pytest.raises(LinkError, match="another program has it"):
+    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
         claimed([port], 0.0)
 
 
-def test_what_a_killed_one_has_left_is_waited_for() -> None:
+def test_ports_of_a_killed_stack_are_awaited() -> None:
     with contextlib.ExitStack() as leaving:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
@@ -114,7 +117,7 @@ def test_what_a_killed_one_has_left_is_waited_for() -> None:
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
 
 
-def test_one_that_is_refused_keeps_no_claim_on_the_others() -> None:
+def test_a_failed_claim_releases_the_others() -> None:
     free = udp(free_port(socket.SOCK_DGRAM))
     with held(socket.SOCK_DGRAM) as number, pytest.raises(LinkError):
         claimed([free, udp(number)], 0.0)
@@ -124,7 +127,7 @@ def test_one_that_is_refused_keeps_no_claim_on_the_others() -> None:
 # --- a whole stack -------------------------------------------------------------------------------
 
 
-def test_a_second_stack_starts_nothing_and_the_first_goes_on(tmp_path: Path) -> None:
+def test_a_second_stack_starts_nothing(tmp_path: Path) -> None:
     log, words = tmp_path / "log", [*own_ports(), "log.format=json"]
     words = sets(*words, f"recorder.folder={tmp_path}")
     with running(t2("up", *words), log):
@@ -132,13 +135,13 @@ def test_a_second_stack_starts_nothing_and_the_first_goes_on(tmp_path: Path) -> 
         for more in ([], ["--no-sim"], ["--no-router"]):
             second = ran("up", *words, *more)
             assert second.returncode == EXIT_LINK
-            assert "another program has it; is a stack running already?" in second.stderr
+            assert "used by another program; is a stack already running?" in second.stderr
             assert "started" not in second.stderr
             assert "Traceback" not in second.stderr
         assert starts(log, "safety") == 1
 
 
-def test_the_shipped_ports_are_what_the_services_bind() -> None:
+def test_default_ports() -> None:
     config = replace(Everything(), bus=settings.BusSettings())
     assert [str(port) for port in wanted(config, ALL)] == [
         "TCP 127.0.0.1:7447 (bus.listen)",

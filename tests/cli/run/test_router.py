@@ -1,4 +1,4 @@
-"""``t2 router``: it listens or says why not, and leaves when told."""
+"""``t2 router``: start, errors, printed configuration and exit."""
 
 import json
 import signal
@@ -16,7 +16,7 @@ from tests.cli.processes import PATIENCE_S, ran, sets
 from verification.harness.support import at, free_port, router_process, wait_until
 
 
-def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
+def test_a_taken_port_is_an_error_and_ctrl_c_exits_cleanly() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with router_process(endpoint) as first:
         second = ran("router", *sets(f"bus.listen={endpoint}"))
@@ -28,7 +28,7 @@ def test_a_taken_port_is_a_sentence_and_ctrl_c_a_clean_end() -> None:
         assert first.wait(PATIENCE_S) == 0
 
 
-def test_dead_links_leave_it_threads_to_read_the_others() -> None:
+def test_the_router_has_threads_for_dead_links() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with router_process(endpoint) as router, zenoh.open(client_config(at(endpoint))):
         tasks = Path(f"/proc/{router.pid}/task")
@@ -40,30 +40,30 @@ def test_dead_links_leave_it_threads_to_read_the_others() -> None:
         wait_until(lambda: readers() >= 32, "threads that read")
 
 
-def test_an_address_of_another_host_is_a_sentence() -> None:
+def test_an_address_of_another_host_is_an_error() -> None:
     result = ran("router", "--insecure", *sets("bus.listen=tcp/192.0.2.1:7447"))
     assert result.returncode == EXIT_LINK
     assert result.stderr.startswith("t2 router: the router cannot listen on tcp/192.0.2.1:7447: ")
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_it_does_not_open_a_robot_to_its_network_by_itself(
+def test_an_open_network_endpoint_needs_insecure(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["router", *sets("bus.listen=tcp/0.0.0.0:7447")]) == EXIT_CONFIG
-    said = capsys.readouterr().err
-    assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in said
-    assert "--insecure lets in all" in said
+    message = capsys.readouterr().err
+    assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in message
+    assert "--insecure lets in all" in message
 
 
-def test_it_prints_its_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) -> None:
+def test_print_the_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["router", "--print", "--insecure", *sets("bus.listen=tcp/0.0.0.0:7447")]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["mode"], printed["listen"]) == ("router", {"endpoints": ["tcp/0.0.0.0:7447"]})
-    zenoh.Config.from_json5(json.dumps(printed))  # which refuses what it does not know
+    zenoh.Config.from_json5(json.dumps(printed))  # rejects unknown settings
 
 
-def test_it_writes_its_configuration_where_there_is_no_shell(
+def test_write_the_configuration_to_a_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["router", "--print", str(tmp_path / "router.json5")]) == 0
@@ -73,7 +73,7 @@ def test_it_writes_its_configuration_where_there_is_no_shell(
     assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
 
 
-def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+def test_defaults(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["router", "--print"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["listen"] == {"endpoints": ["tcp/127.0.0.1:7447"]}
@@ -84,7 +84,7 @@ def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
     ("bus", "words"),
     [
         (BusSettings(), "every program on this machine"),
-        (BusSettings(insecure=True), "everybody on the network, without a certificate"),
+        (BusSettings(insecure=True), "everyone on the network, without a certificate"),
         (
             BusSettings(
                 listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"
@@ -93,11 +93,11 @@ def test_it_wants_no_options(capsys: pytest.CaptureFixture[str]) -> None:
         ),
         (
             BusSettings(uplink=("tcp/127.0.0.1:1",)),
-            "every program on this machine, and whom the router tcp/127.0.0.1:1 lets in",
+            "every program on this machine, and clients of the router tcp/127.0.0.1:1",
         ),
     ],
 )
-def test_it_says_whom_it_lets_in(bus: BusSettings, words: str) -> None:
+def test_open_to_describes_the_clients(bus: BusSettings, words: str) -> None:
     assert open_to(bus) == words
 
 
@@ -107,7 +107,7 @@ def test_it_says_whom_it_lets_in(bus: BusSettings, words: str) -> None:
      ("{}", "is no list of members: Object missing required field `site`"),
      ("[", "is no list of members: ")],
 )  # fmt: skip
-def test_a_list_of_members_that_is_none(
+def test_an_invalid_member_list(
     text: str | None, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     listed = tmp_path / "members.json"
@@ -119,7 +119,7 @@ def test_a_list_of_members_that_is_none(
 
 @pytest.mark.parametrize("setting", ["listen", "uplink"])
 @pytest.mark.parametrize("endpoint", ["router", "tcp/", "/127.0.0.1:7447"])
-def test_what_is_no_endpoint_is_refused_before_anything_opens(
+def test_invalid_endpoints_are_rejected(
     endpoint: str, setting: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["router", *sets(f"bus.{setting}={endpoint}")]) == EXIT_CONFIG

@@ -1,4 +1,4 @@
-"""When a router counts as hung: attempts and their ends on a clock of the test's."""
+"""Hang detection with a simulated clock."""
 
 from cli.run.router_attempts import MISSES, STALL_NS, Attempts
 
@@ -7,8 +7,8 @@ DEADLINE_NS = 1_000_000_000
 PERIOD_NS = DEADLINE_NS // 2
 
 
-def looked(attempts: Attempts, begin_ns: int, end_ns: int) -> int | None:
-    """Check at every tick, begin due attempts; return when the router counts as hung."""
+def hung_at(attempts: Attempts, begin_ns: int, end_ns: int) -> int | None:
+    """Check at every tick, begin due attempts; return the time of the detected hang."""
     for now_ns in range(begin_ns, end_ns, TICK_NS):
         attempts.begin(now_ns)
         if attempts.hung(now_ns):
@@ -16,7 +16,7 @@ def looked(attempts: Attempts, begin_ns: int, end_ns: int) -> int | None:
     return None
 
 
-def test_an_attempt_begins_every_period_whatever_became_of_those_before() -> None:
+def test_an_attempt_begins_every_period() -> None:
     attempts = Attempts(7, DEADLINE_NS)
     assert attempts.begin(7) == 1
     assert attempts.begin(7 + PERIOD_NS - 1) is None
@@ -25,14 +25,14 @@ def test_an_attempt_begins_every_period_whatever_became_of_those_before() -> Non
     assert attempts.begin(7 + 4 * PERIOD_NS - 1) is None
 
 
-def test_no_answer_at_all_is_a_hang_within_two_seconds() -> None:
+def test_no_answer_is_a_hang_within_two_seconds() -> None:
     attempts = Attempts(0, DEADLINE_NS)
-    hung_ns = looked(attempts, 0, 10 * DEADLINE_NS)
+    hung_ns = hung_at(attempts, 0, 10 * DEADLINE_NS)
     assert hung_ns == DEADLINE_NS + (MISSES - 1) * PERIOD_NS
     assert hung_ns + PERIOD_NS <= 2_000_000_000  # the hang may begin right after an attempt
 
 
-def test_one_miss_is_noise() -> None:
+def test_one_miss_is_not_a_hang() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     attempts.begin(0)
     attempts.begin(PERIOD_NS)
@@ -46,7 +46,7 @@ def test_one_miss_is_noise() -> None:
     assert not attempts.hung(DEADLINE_NS + PERIOD_NS)
 
 
-def test_refusals_count_as_soon_as_they_come() -> None:
+def test_refusals_count_at_once() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     for number in range(1, MISSES + 1):
         assert not attempts.hung(0)
@@ -60,14 +60,14 @@ def test_refusals_count_as_soon_as_they_come() -> None:
     assert attempts.hung(PERIOD_NS)
 
 
-def test_an_answer_after_its_deadline_is_none() -> None:
+def test_a_late_answer_does_not_count() -> None:
     attempts = Attempts(0, DEADLINE_NS)
-    looked(attempts, 0, DEADLINE_NS + 1)
+    hung_at(attempts, 0, DEADLINE_NS + 1)
     assert not attempts.end(1, True)
     assert not attempts.end(99, True)
 
 
-def test_the_deadline_is_met_on_the_dot() -> None:
+def test_the_deadline_is_exact() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     attempts.begin(0)
     attempts.end(1, False)
@@ -78,7 +78,7 @@ def test_the_deadline_is_met_on_the_dot() -> None:
     assert attempts.hung(PERIOD_NS + DEADLINE_NS)
 
 
-def test_a_probe_that_was_held_up_gives_the_router_one_more_chance() -> None:
+def test_a_stalled_probe_forgives_once() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     attempts.begin(0)
     attempts.begin(PERIOD_NS)
@@ -86,10 +86,10 @@ def test_a_probe_that_was_held_up_gives_the_router_one_more_chance() -> None:
     after_ns = PERIOD_NS + STALL_NS + DEADLINE_NS
     assert not attempts.hung(after_ns)
     assert not attempts.end(1, True), "begun before the stall: it counts neither way"
-    assert looked(attempts, after_ns, after_ns + 10 * DEADLINE_NS) is not None
+    assert hung_at(attempts, after_ns, after_ns + 10 * DEADLINE_NS) is not None
 
 
-def test_a_probe_that_is_starved_acts_all_the_same() -> None:
+def test_a_starved_probe_still_acts() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     hung_ns = None
     for now_ns in range(0, 20 * DEADLINE_NS, STALL_NS + 1):
@@ -101,7 +101,7 @@ def test_a_probe_that_is_starved_acts_all_the_same() -> None:
     assert hung_ns < 4 * DEADLINE_NS
 
 
-def test_an_answer_earns_the_next_chance() -> None:
+def test_an_answer_allows_the_next_forgiveness() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     attempts.hung(STALL_NS + 1)
     attempts.begin(STALL_NS + 1)
@@ -113,7 +113,7 @@ def test_an_answer_earns_the_next_chance() -> None:
     assert not attempts.hung(2 * STALL_NS + 2 + STALL_NS)
 
 
-def test_looks_that_are_only_just_often_enough_forgive_nothing() -> None:
+def test_checks_at_the_stall_limit_forgive_nothing() -> None:
     attempts = Attempts(0, DEADLINE_NS)
     for turn in range(1, MISSES + 1):
         attempts.begin(turn * STALL_NS)
@@ -121,9 +121,9 @@ def test_looks_that_are_only_just_often_enough_forgive_nothing() -> None:
         assert attempts.hung(turn * STALL_NS) is (turn == MISSES)
 
 
-def test_a_longer_deadline_means_fewer_attempts_and_more_patience() -> None:
+def test_a_longer_deadline() -> None:
     attempts = Attempts(0, 10 * DEADLINE_NS)
     assert attempts.begin(0) == 1
     assert attempts.begin(10 * PERIOD_NS - 1) is None
-    hung_ns = looked(attempts, TICK_NS, 30 * DEADLINE_NS)
+    hung_ns = hung_at(attempts, TICK_NS, 30 * DEADLINE_NS)
     assert hung_ns == 15 * DEADLINE_NS

@@ -1,4 +1,4 @@
-"""Processes that belong together: restarts on an injected clock, real ends of real processes."""
+"""Supervisor: restarts with a simulated clock, and the stop of real processes."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ SLEEP = ["sleep", "1000"]
 
 @pytest.fixture
 def supervised() -> Iterator[list[Supervisor]]:
-    """Collect supervisors and end what they have started."""
+    """Collects supervisors and kills their processes at the end."""
     made: list[Supervisor] = []
     yield made
     for supervisor in made:
@@ -39,7 +39,7 @@ def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]
 
 
 def kill(child: Child) -> None:
-    """Kill the child's process, without a look of the supervisor's."""
+    """Kill the child's process and reap it."""
     process = child.process
     assert process is not None
     process.kill()
@@ -49,7 +49,7 @@ def kill(child: Child) -> None:
 # --- restarts ---------------------------------------------------------------------------------
 
 
-def test_a_crash_restarts_at_once_and_then_ever_later(supervised: list[Supervisor]) -> None:
+def test_restarts_follow_the_backoff(supervised: list[Supervisor]) -> None:
     supervisor, child = one(supervised, *SLEEP)
     now_s = 100.0
     for wait_s in (*BACKOFF_S, BACKOFF_S[-1]):
@@ -65,7 +65,9 @@ def test_a_crash_restarts_at_once_and_then_ever_later(supervised: list[Superviso
 
 
 @pytest.mark.parametrize("code", [EXIT_CONFIG, EXIT_LINK])
-def test_a_hopeless_one_ends_all_with_its_code(supervised: list[Supervisor], code: int) -> None:
+def test_a_hopeless_process_stops_all_with_its_code(
+    supervised: list[Supervisor], code: int
+) -> None:
     supervisor = Supervisor([("calm", SLEEP), ("hopeless", ["sh", "-c", f"exit {code}"])])
     supervised.append(supervisor)
     assert supervisor.run() == code
@@ -76,7 +78,7 @@ def test_a_hopeless_one_ends_all_with_its_code(supervised: list[Supervisor], cod
     assert hopeless.returncode == code
 
 
-def test_killed_from_outside_is_a_crash_and_not_the_end(supervised: list[Supervisor]) -> None:
+def test_a_killed_process_is_restarted(supervised: list[Supervisor]) -> None:
     supervisor, child = one(supervised, *SLEEP)
     supervisor.look(0.0)
     assert child.process is not None
@@ -88,23 +90,23 @@ def test_killed_from_outside_is_a_crash_and_not_the_end(supervised: list[Supervi
     assert child.process.pid != first
 
 
-def test_a_supervisor_that_was_stopped_starts_nothing(supervised: list[Supervisor]) -> None:
+def test_a_stopped_supervisor_starts_nothing(supervised: list[Supervisor]) -> None:
     supervisor, child = one(supervised, *SLEEP)
     supervisor.stop()
     assert supervisor.run() == 0
     assert child.process is None
 
 
-# --- the end ----------------------------------------------------------------------------------
+# --- stop ----------------------------------------------------------------------------------
 
 
 def reporter(name: str, file: Path, on_term: str = "exit 0") -> tuple[str, list[str]]:
-    """Return a process that writes down its start and its SIGTERM."""
+    """Return a process that logs its start and its SIGTERM."""
     script = f'trap "echo -{name} >> {file}; {on_term}" TERM; echo +{name} >> {file}; '
     return name, ["sh", "-c", script + "while :; do sleep 0.05; done"]
 
 
-def test_the_last_one_is_ended_first(tmp_path: Path, supervised: list[Supervisor]) -> None:
+def test_processes_stop_in_reverse_order(tmp_path: Path, supervised: list[Supervisor]) -> None:
     file = tmp_path / "order"
     supervisor = Supervisor([reporter(name, file) for name in "abc"])
     supervised.append(supervisor)
@@ -114,7 +116,7 @@ def test_the_last_one_is_ended_first(tmp_path: Path, supervised: list[Supervisor
     assert file.read_text().split()[3:] == ["-c", "-b", "-a"]
 
 
-def test_one_that_ignores_sigterm_is_killed(
+def test_a_process_that_ignores_sigterm_is_killed(
     tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "PATIENCE_S", 0.2)
@@ -129,8 +131,8 @@ def test_one_that_ignores_sigterm_is_killed(
     assert process.returncode == -signal.SIGKILL
 
 
-def test_a_child_is_in_a_group_of_its_own(supervised: list[Supervisor]) -> None:
-    # Ctrl-c goes to the terminal's group: it must not reach the bridge before its turn.
+def test_a_child_has_its_own_process_group(supervised: list[Supervisor]) -> None:
+    # Ctrl-C goes to the terminal's process group and must not reach the bridge directly.
     supervisor, child = one(supervised, *SLEEP)
     supervisor.look(0.0)
     assert child.process is not None
@@ -139,12 +141,12 @@ def test_a_child_is_in_a_group_of_its_own(supervised: list[Supervisor]) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
-def test_a_child_whose_parent_died_before_it_could_say_so_does_not_run() -> None:
+def test_a_child_of_a_dead_parent_does_not_run() -> None:
     made = subprocess.Popen(SLEEP, preexec_fn=partial(module._die_with_parent, 1))
     assert made.wait(5.0) == 1
 
 
-def test_output_goes_to_the_file(tmp_path: Path, supervised: list[Supervisor]) -> None:
+def test_output_is_written_to_the_file(tmp_path: Path, supervised: list[Supervisor]) -> None:
     file = tmp_path / "log"
     with file.open("wb") as output:
         supervisor = Supervisor(
@@ -180,7 +182,7 @@ def test_children_end_with_their_parent(number: signal.Signals, code: int, tmp_p
         wait_gone(pids)
 
 
-def test_a_command_that_is_not_there_is_an_error(supervised: list[Supervisor]) -> None:
+def test_a_missing_command_is_an_error(supervised: list[Supervisor]) -> None:
     supervisor = Supervisor([("calm", SLEEP), ("none", ["/no/such/program"])])
     supervised.append(supervisor)
     with pytest.raises((OSError, subprocess.SubprocessError)):

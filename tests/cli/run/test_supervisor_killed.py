@@ -1,4 +1,4 @@
-"""A killed ``t2 up`` at speed: the frames that the board received after it, which outlives it."""
+"""A killed ``t2 up`` at speed: the frames that the board receives afterwards."""
 
 import contextlib
 import os
@@ -25,7 +25,7 @@ UP_S = 60.0
 
 @contextlib.contextmanager
 def driven(folder: Path) -> Iterator[tuple[int, Frames]]:
-    """Drive a stack of ``t2 up`` on a board of its own; yield the supervisor and the frames."""
+    """Drive a stack of ``t2 up`` on a separate board; yield the supervisor's pid and the frames."""
     board, first, second = (free_port(socket.SOCK_DGRAM) for _ in range(3))
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     words = sets(
@@ -92,7 +92,7 @@ WAYS: dict[str, Callable[[int], None]] = {
 @pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
 @pytest.mark.parametrize("way", WAYS)
-def test_no_run_follows_a_kill_of(way: str, tmp_path: Path) -> None:
+def test_no_run_after_a_kill_of(way: str, tmp_path: Path) -> None:
     with driven(tmp_path) as (pid, frames):
         frames.forget()
         at_ns = time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""``t2 up`` as a process: it comes up, mends itself, and leaves nothing behind."""
+"""``t2 up`` as a process: start, restart of killed services, and clean exit."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from cli.run.up import chosen, commands
+from cli.run.up import commands, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
@@ -17,7 +17,7 @@ from tests.cli.stack import STACK, ports, starts
 from verification.harness.support import wait_until
 
 
-def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
+def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with running(
         t2("up", *sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")), log
@@ -26,7 +26,7 @@ def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
         first = children(up.pid)
         assert set(first) == STACK
 
-        # The router's port and the bridge's two come back though their holders were killed.
+        # The ports of the killed router and bridge are bound again.
         for victim in ("router", "bridge"):
             os.kill(first[victim], signal.SIGKILL)
         wait_until(lambda: starts(log, "router") == starts(log, "bridge") == 2, "both", PATIENCE_S)
@@ -39,15 +39,15 @@ def test_from_the_start_to_ctrl_c(tmp_path: Path) -> None:
         up.send_signal(signal.SIGINT)
         assert up.wait(PATIENCE_S) == 0
         wait_gone(list(second.values()))
-    said = log.read_text()
-    assert "Traceback" not in said
-    # In reverse order: the bridge stops the vehicle while its board is still there.
-    assert said.rindex('"service": "odom", "event": "stopped"') < said.rindex(
+    message = log.read_text()
+    assert "Traceback" not in message
+    # In reverse order: the bridge stops the vehicle while the board still runs.
+    assert message.rindex('"service": "odom", "event": "stopped"') < message.rindex(
         '"service": "bridge", "event": "stopped"'
     )
 
 
-def test_a_taken_port_ends_it_all_with_a_sentence(tmp_path: Path) -> None:
+def test_a_taken_port_starts_nothing(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
@@ -55,24 +55,24 @@ def test_a_taken_port_ends_it_all_with_a_sentence(tmp_path: Path) -> None:
         words = sets(*ports(), f"board.listen_ports={port}", f"recorder.folder={tmp_path}")
         with running(t2("up", "--no-sim", *words), log) as up:
             assert up.wait(PATIENCE_S) == EXIT_LINK
-    said = log.read_text()
-    assert f"127.0.0.1:{port}" in said
-    assert "another program has it" in said
-    assert "Traceback" not in said
-    assert '"started"' not in said, "nothing may start before all ports are free"
+    message = log.read_text()
+    assert f"127.0.0.1:{port}" in message
+    assert "used by another program" in message
+    assert "Traceback" not in message
+    assert '"started"' not in message, "nothing may start before all ports are free"
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (sets("board.port=0"), "board.port = 0"),
         (sets("safety.margin=0"), "margin"),
         (["--config", "no/such.toml"], "no/such.toml"),
     ],
 )
-def test_a_bad_setting_opens_nothing(
+def test_an_invalid_setting_starts_nothing(
     words: list[str],
-    said: str,
+    message: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -80,17 +80,17 @@ def test_a_bad_setting_opens_nothing(
     assert main(["up", *words]) == EXIT_CONFIG
     error = capsys.readouterr().err
     assert error.startswith("t2 up: ")
-    assert said in error
+    assert message in error
 
 
-# --- what is run ------------------------------------------------------------------------------
+# --- commands ---------------------------------------------------------------------------------
 
 
 def options(**given: object) -> Namespace:
     return Namespace(**({"no_sim": False, "world": None, "config": None, "sets": []} | given))
 
 
-def test_later_ones_stand_on_earlier_ones() -> None:
+def test_processes_in_order_of_dependency() -> None:
     names = [name for name, _ in commands(options())]
     assert names == ["router", "sim", "bridge", "safety", "odom"]
 
@@ -100,12 +100,12 @@ def test_without_the_simulated_vehicle() -> None:
     assert names == ["router", "bridge", "safety", "odom"]
 
 
-def test_on_a_router_that_is_running() -> None:
+def test_with_a_running_router() -> None:
     names = [name for name, _ in commands(options(no_router=True))]
     assert names == ["sim", "bridge", "safety", "odom"]
 
 
-def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
+def test_settings_sources_are_passed_to_all_processes() -> None:
     files = [Path("a.toml"), Path("b.toml")]
     made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))
     passed = [
@@ -124,9 +124,9 @@ def test_all_are_given_the_same_sources_and_the_simulator_its_world() -> None:
     assert " ".join(made["router"][1:5]) == "-P -m cli router"
 
 
-def test_one_of_them_alone() -> None:
+def test_only_one_process() -> None:
     everything = commands(options())
-    assert chosen(everything, None) == everything
-    assert [name for name, _ in chosen(everything, "bridge")] == ["bridge"]
-    with pytest.raises(ConfigError, match="--only brigde: no such process; there are router, sim"):
-        chosen(everything, "brigde")
+    assert selected(everything, None) == everything
+    assert [name for name, _ in selected(everything, "bridge")] == ["bridge"]
+    with pytest.raises(ConfigError, match="--only brigde: no such process; available: router, sim"):
+        selected(everything, "brigde")

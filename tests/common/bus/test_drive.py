@@ -12,6 +12,7 @@ from common.bus.drive import DriveLink, DriveOpener, LinkWatch
 from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Motion
+from common.motion import Command
 from common.settings import BusSettings as Settings
 from tests.common.bus_fixture import Rig, rising, until_heard
 from verification.harness.support import Lines, at, wait_until
@@ -47,7 +48,7 @@ class Ends:
     def linked(self) -> None:
         wait_until(lambda: self.bridge.connected and self.safety.connected, "the link")
         until_heard(
-            lambda: (self.motion.put(Motion(command="stop")), self.bumper.put(CLEAR)),
+            lambda: (self.motion.put(Motion(command=Command.STOP)), self.bumper.put(CLEAR)),
             lambda: self.motions and self.bumpers,
             "both ways",
         )
@@ -79,9 +80,9 @@ def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends
 def test_who_looks_on_the_bus_sees_each_message_once(ends: Ends) -> None:
     seen: list[Arrival[Motion]] = []
     ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, seen.append, depth=100))
-    until_heard(lambda: ends.motion.put(Motion(command="stop")), lambda: seen, "a motion")
+    until_heard(lambda: ends.motion.put(Motion(command=Command.STOP)), lambda: seen, "a motion")
     for _ in range(50):
-        ends.motion.put(Motion(command="stop"))
+        ends.motion.put(Motion(command=Command.STOP))
         time.sleep(0.002)
     wait_until(lambda: seen[-1].message.seq == ends.motion.next_seq - 1, "the last")
     assert rising(arrival.message.seq for arrival in seen)
@@ -91,7 +92,7 @@ def test_nothing_of_a_burst_is_lost(ends: Ends) -> None:
     first = ends.motion.next_seq
     for _ in range(50):
         for _ in range(8):
-            ends.motion.put(Motion(command="stop"))
+            ends.motion.put(Motion(command=Command.STOP))
         time.sleep(0.01)
     wait_until(lambda: ends.motions and ends.motions[-1].message.seq == first + 399, "the last")
     seqs = [arrival.message.seq for arrival in ends.motions]
@@ -100,7 +101,7 @@ def test_nothing_of_a_burst_is_lost(ends: Ends) -> None:
 
 def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
     stranger = ends.rig.session()
-    copied = Motion(command="run", linear=0.9, seq=10**6, boot=ends.safetys_bus.boot)
+    copied = Motion(command=Command.RUN, linear=0.9, seq=10**6, boot=ends.safetys_bus.boot)
     pressed = Bumper(pressed=True, seq=10**6, boot=ends.bridges_bus.boot)
     witnessed: list[Arrival[Motion]] = []
     ends.rig.bus(lambda bus: bus.subscribe(keys.MOTION, witnessed.append, depth=100))
@@ -112,7 +113,7 @@ def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
         lambda: any(arrival.message.linear for arrival in witnessed),
         "the forged motion, at a client of the router",
     )
-    ends.motion.put(Motion(command="brake"))
+    ends.motion.put(Motion(command=Command.BRAKE))
     wait_until(lambda: ends.motions[-1].message.command == "brake", "what came behind it")
     assert not any(arrival.message.linear for arrival in ends.motions)
     assert not any(arrival.message.pressed for arrival in ends.bumpers)
@@ -184,7 +185,7 @@ def test_a_link_that_never_opened_closes(rig: Rig) -> None:
     bus = Bus(at(rig.endpoint), rig.robot, rig.loop.post)
     publisher = DriveLink(bus, listens=False).publisher(keys.MOTION)
     bus.close()
-    publisher.put(Motion(command="stop"))
+    publisher.put(Motion(command=Command.STOP))
 
 
 def test_an_end_that_dials_says_nothing_by_itself(rig: Rig) -> None:

@@ -11,6 +11,7 @@ from common import keys
 from common.bus.publisher import Publisher, qos
 from common.keys import ClassOfService
 from common.messages import Bumper, Motion
+from common.motion import Command
 
 
 def test_it_numbers_and_stamps_even_without_a_bus() -> None:
@@ -64,14 +65,14 @@ def test_a_motion_never_waits_for_a_bus() -> None:
     counts: Counter[str] = Counter()
     publisher = Publisher(keys.MOTION, "k", 77, counts)
     session = Session()
-    publisher.put(Motion(command="run", linear=1.0))
+    publisher.put(Motion(command=Command.RUN, linear=1.0))
     publisher.declare(cast(zenoh.Session, session))
     assert session.sent == []
-    publisher.put(Motion(command="stop"), b"raw")
+    publisher.put(Motion(command=Command.STOP), b"raw")
     assert [(sent["seq"], sent["command"], sent["raw"]) for sent in session.sent] == [
         (2, "stop", b"raw")
     ]
     publisher.withdraw()
-    publisher.put(Motion(command="run"))
+    publisher.put(Motion(command=Command.RUN))
     publisher.declare(cast(zenoh.Session, session))
     assert counts["k"] == len(session.sent) == 1

@@ -6,11 +6,14 @@ from pathlib import Path
 import pytest
 
 from cli.demo.score import Trace
-from sim.trace import Command, Kind
+from common import motion
+from sim.trace import Command
 from verification.containers import __main__ as command
 from verification.containers import engine
 from verification.containers.stack_fixture import held_run_s, override
 from verification.containers.table import Row, markdown
+
+RUN, STOP, BRAKE = motion.Command
 
 
 def test_without_an_engine_it_says_that_it_did_not_run(
@@ -39,7 +42,7 @@ def test_settings_become_variables_of_each_container() -> None:
     assert services["sim"]["volumes"][0]["source"] == "/t"
 
 
-def commands(*kinds: tuple[int, Kind, float]) -> Trace:
+def commands(*kinds: tuple[int, motion.Command, float]) -> Trace:
     made = [Command(mono_ns=at, kind=kind, linear=v, angular=0.0) for at, kind, v in kinds]
     return Trace([], made, [])
 
@@ -47,9 +50,22 @@ def commands(*kinds: tuple[int, Kind, float]) -> Trace:
 @pytest.mark.parametrize(
     ("trace", "held_s"),
     [
-        (commands((1, "run", 0.3), (2_000_000_001, "stop", 0.0)), 1.0),  # held, nothing new came
-        (commands((1, "run", 0.3), (1_500_000_000, "run", 0.3), (3_000_000_001, "break", 0)), 2.0),
-        (commands((1, "stop", 0.0), (2_000_000_001, "run", 0.0)), 0.0),  # never told to move
+        (
+            commands((1, RUN, 0.3), (2_000_000_001, STOP, 0.0)),
+            1.0,
+        ),  # held, nothing new came
+        (
+            commands(
+                (1, RUN, 0.3),
+                (1_500_000_000, RUN, 0.3),
+                (3_000_000_001, BRAKE, 0),
+            ),
+            2.0,
+        ),
+        (
+            commands((1, STOP, 0.0), (2_000_000_001, RUN, 0.0)),
+            0.0,
+        ),  # never told to move
     ],
 )
 def test_how_long_the_board_held_a_command_to_move(trace: Trace, held_s: float) -> None:

@@ -5,13 +5,21 @@ from dataclasses import replace
 
 import pytest
 
-from sim.trace import Command, Kind
+from common import motion
+from sim.trace import Command
 from verification.faults.frames import first_stop_s, last_move_s, strayed
 from verification.faults.table import Row, markdown, rank, renewed, times, verdict
 from verification.faults.trial import Sample
 
+RUN, STOP, BRAKE = motion.Command
 
-def command(ms: float, kind: Kind = "run", linear: float = 0.8, angular: float = 0.0) -> Command:
+
+def command(
+    ms: float,
+    kind: motion.Command = RUN,
+    linear: float = 0.8,
+    angular: float = 0.0,
+) -> Command:
     return Command(mono_ns=round(ms * 1e6), kind=kind, linear=linear, angular=angular)
 
 
@@ -26,8 +34,8 @@ def row(*samples: Sample, budget_s: float | None = 0.02, held_up_s: float = 0.0)
 
 def test_the_first_stop_and_the_last_move_after_a_fault() -> None:
     made = [
-        command(0, "stop", 0), command(90), command(100), command(110), command(120, "break", 0),
-        command(130), command(140, "stop", 0), command(150, linear=0.0),
+        command(0, STOP, 0), command(90), command(100), command(110), command(120, BRAKE, 0),
+        command(130), command(140, STOP, 0), command(150, linear=0.0),
     ]  # fmt: skip
     assert first_stop_s(made, round(100e6)) == pytest.approx(0.020)
     assert last_move_s(made, round(100e6)) == pytest.approx(0.030)
@@ -40,7 +48,7 @@ def test_the_first_stop_and_the_last_move_after_a_fault() -> None:
     [
         (command(0), False),
         (command(0, linear=0.0), False),
-        (command(0, "stop", -1.0), False),
+        (command(0, STOP, -1.0), False),
         (command(0, linear=0.82), True),
         (command(0, linear=-0.1), True),
         (command(0, angular=0.1), True),

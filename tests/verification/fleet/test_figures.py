@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from common import motion
 from sim.trace import Command
 from verification.fleet.figures import (
     Asked,
@@ -19,11 +20,13 @@ from verification.fleet.gauges import parsed, since
 from verification.fleet.page import scale, units
 from verification.fleet.plot import save
 
+RUN, STOP, BRAKE = motion.Command
+
 MS = 1_000_000
 
 
-def run(at_ms: int, linear: float, kind: str = "run") -> Command:
-    return Command(mono_ns=at_ms * MS, kind=kind, linear=linear, angular=0.0)  # type: ignore[arg-type]
+def run(at_ms: int, linear: float, kind: motion.Command = RUN) -> Command:
+    return Command(mono_ns=at_ms * MS, kind=kind, linear=linear, angular=0.0)
 
 
 def asked(at_ms: int, linear: float) -> Asked:
@@ -38,7 +41,13 @@ def test_an_answer_is_the_first_frame_of_the_speed_that_was_asked() -> None:
 
 @pytest.mark.parametrize(
     "commands",
-    [[], [run(0, 0.301)], [run(5, 0.302)], [run(5, 0.301, "stop")], [run(1002, 0.301)]],
+    [
+        [],
+        [run(0, 0.301)],
+        [run(5, 0.302)],
+        [run(5, 0.301, STOP)],
+        [run(1002, 0.301)],
+    ],
 )
 def test_what_answers_nothing(commands: list[Command]) -> None:
     assert answers_s([asked(1, 0.301)], commands) == [None]

@@ -87,14 +87,14 @@ def test_the_death_of_any_part_stops_the_vehicle(stack: Chain, hand: Hand, victi
     drives(stack, hand)
     witness = Witness()
     killed_ns = stack.kill(victim)
-    wait_until(lambda: stack.last() in ("stop", "break"), "STOP at the board")
+    wait_until(lambda: stack.last() in ("stop", "brake"), "STOP at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     held_up_s = witness.stop()
     took_s = until_still_s(stack.trace(), killed_ns)
     assert took_s < stack.config.bridge.lease + REST_S + held_up_s, (
         f"the machine held processes up for {held_up_s:.3f} s"
     )
-    assert stack.last() in ("stop", "break")
+    assert stack.last() in ("stop", "brake")
 
 
 def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(
@@ -127,7 +127,7 @@ def test_a_safety_that_comes_back_is_not_driven_by_what_is_still_asked(
 def test_a_hit_is_latched_until_a_reset_whatever_is_asked(stack: Chain, stick: Stick) -> None:
     push(stack, stick)
     stack.control.do(Bumper(pressed=True))
-    wait_until(lambda: stack.last() == "break", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
     stack.control.do(Bumper(pressed=False))
     stick.linear = 0.0
     count = len(stack.trace().commands)

@@ -5,13 +5,16 @@ from dataclasses import replace
 
 import pytest
 
+from common import motion
 from common.freshness import NS_PER_S
-from sim.trace import Command, Kind
+from sim.trace import Command
 from verification.roaming import figures, page
 from verification.roaming.conditions import Outage
 from verification.roaming.figures import ASKED, BUMPER, MOTION, Chain, Stream
 from verification.roaming.notes import Note
 from verification.roaming.trial import Back
+
+RUN, STOP, BRAKE = motion.Command
 
 MS = NS_PER_S // 1000
 GOOD = Stream(50.0, 0.02, (0.001, 0.002), 0)
@@ -21,7 +24,7 @@ def note(key: str, at_ms: int, seq: int = 1, **rest: int) -> Note:
     return Note(key=key, at_ns=at_ms * MS, sent_ns=(at_ms - 2) * MS, seq=seq, **rest)  # type: ignore[arg-type]
 
 
-def command(at_ms: int, kind: Kind = "run", linear: float = 0.8) -> Command:
+def command(at_ms: int, kind: motion.Command = RUN, linear: float = 0.8) -> Command:
     return Command(mono_ns=at_ms * MS, kind=kind, linear=linear, angular=0.0)
 
 
@@ -46,7 +49,7 @@ def test_a_stream_that_did_not_come_is_never_there() -> None:
 def test_a_request_counts_once_its_verdict_tells_of_it() -> None:
     robot = [note(MOTION, 100, heard_ns=99 * MS), note(MOTION, 120), note(BUMPER, 130)]
     laptop = [note(ASKED, 90), note(ASKED, 140)]
-    drive = figures.drive(robot, laptop, [command(100), command(300, "stop", 0.0)], 0, NS_PER_S)
+    drive = figures.drive(robot, laptop, [command(100), command(300, STOP, 0.0)], 0, NS_PER_S)
     assert (drive.asked, drive.taken, drive.stops) == (2, 1, 1)
     assert drive.gap_s == pytest.approx(0.901)
 
@@ -54,8 +57,8 @@ def test_a_request_counts_once_its_verdict_tells_of_it() -> None:
 def test_stopping_twice_is_two_stops_and_standing_is_none() -> None:
     made = [
         command(1),
-        command(2, "stop", 0.0),
-        command(3, "stop", 0.0),
+        command(2, STOP, 0.0),
+        command(3, STOP, 0.0),
         command(4),
         command(5, linear=0.0),
     ]

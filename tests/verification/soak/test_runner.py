@@ -14,6 +14,7 @@ import pytest
 from cli.run.supervisor import Supervisor
 from common.errors import LinkError
 from common.freshness import NS_PER_S
+from common.motion import Command
 from sim import trace as t
 from sim.control import Control
 from sim.requests import Asked, Driver
@@ -70,7 +71,7 @@ class Scene:
 
     def runs(self) -> None:
         """Let the board take a command that moves the vehicle, now."""
-        line = t.Command(mono_ns=time.monotonic_ns(), kind="run", linear=0.5, angular=0.0)
+        line = t.Command(mono_ns=time.monotonic_ns(), kind=Command.RUN, linear=0.5, angular=0.0)
         with self.trace.open("ab") as file:
             file.write(msgspec.json.encode(line) + b"\n")
 

@@ -3,10 +3,13 @@
 import pytest
 
 from cli.demo.score import Result
+from common import motion
 from common.freshness import NS_PER_S
 from sim import trace as t
 from verification.soak.record import Life, Progress, Record, Sample, Window
 from verification.soak.verdict import GROWTH_MAX, Limits, good, growth, moves, results, too_late
+
+RUN, STOP, BRAKE = motion.Command
 
 MB = 2**20
 LIMITS = Limits(warm_up_s=60.0, lap_s=120.0, stuck_s=75.0)
@@ -182,7 +185,7 @@ def test_what_broke_down_is_wrong() -> None:
 
 
 def command(
-    at_s: float, kind: t.Kind = "run", linear: float = 0.5, angular: float = 0
+    at_s: float, kind: motion.Command = RUN, linear: float = 0.5, angular: float = 0
 ) -> t.Command:
     return t.Command(mono_ns=round(at_s * NS_PER_S), kind=kind, linear=linear, angular=angular)
 
@@ -193,8 +196,8 @@ def command(
         (command(0), True),
         (command(0, linear=0, angular=-0.1), True),
         (command(0, linear=0), False),
-        (command(0, kind="stop"), False),
-        (command(0, kind="break"), False),
+        (command(0, kind=STOP), False),
+        (command(0, kind=BRAKE), False),
     ],
 )
 def test_what_moves(one: t.Command, moving: bool) -> None:

@@ -12,9 +12,10 @@ from cli.recordings.replay import targets
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.motion import Command
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Translator
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import Rig
 from tests.recorder import samples
@@ -31,13 +32,13 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A recording of five seconds, with all that must not be played."""
-    made = Recording(tmp_path / "a.mcap", Translator(Vehicle()), {})
+    """A recording of five seconds, with every kind of message that must not be played."""
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
     for second in range(5):
         made.write(
             sample("tel/bridge/velocity", samples.velocity(second), second, raw=b"%d" % second)
         )
-        made.write(sample("@cmd/motion", m.Motion(command="run", linear=1.0), second))
+        made.write(sample("@cmd/motion", m.Motion(command=Command.RUN, linear=1.0), second))
         made.write(
             sample("@cmd/drive/demo", m.Drive(linear=second / 10, angular=0, echo=1), second)
         )
@@ -51,7 +52,7 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def came(rig: Rig) -> Iterator[list[zenoh.Sample]]:
-    """All that comes for the robot."""
+    """All samples that arrive on the robot's keys."""
     found: list[zenoh.Sample] = []
     session = rig.session()
     declared = [
@@ -74,7 +75,7 @@ def shown(came: list[zenoh.Sample]) -> list[tuple[str, bytes, bytes]]:
     ]
 
 
-def test_it_comes_to_the_byte_without_what_moves(
+def test_replay_publishes_the_original_bytes_without_actuation(
     path: Path, came: list[zenoh.Sample], tool: Tool
 ) -> None:
     result = tool("replay", str(path), *FAST)
@@ -97,43 +98,43 @@ def test_it_comes_to_the_byte_without_what_moves(
         (["--from", "4", "--only", "tel/bridge/**", "--only", "tel/mine"], 2),
     ],
 )
-def test_what_is_asked_for(path: Path, tool: Tool, words: list[str], played: int) -> None:
+def test_selection_options(path: Path, tool: Tool, words: list[str], played: int) -> None:
     result = tool("replay", str(path), *words, *FAST)
     assert (result.code, result.err) == (0, f"played {played} messages\n")
 
 
-def test_nothing_to_play_is_a_failure(path: Path, tool: Tool) -> None:
+def test_nothing_to_play_is_an_error(path: Path, tool: Tool) -> None:
     result = tool("replay", str(path), "--only", "@cmd/**", *FAST)
     assert (result.code, result.err) == (1, "played 0 messages\n")
 
 
 @pytest.mark.parametrize("service", ["bridge", "safety"])
-def test_not_while_somebody_acts(
+def test_refused_while_bridge_or_safety_run(
     path: Path, came: list[zenoh.Sample], rig: Rig, tool: Tool, service: str
 ) -> None:
     pretend(rig, service, {})
     result = tool("replay", str(path), *FAST)
     assert result.code == 1
-    assert f"{service} of robot {rig.robot} is there" in result.err
+    assert f"{service} of robot {rig.robot} is running" in result.err
     assert tool("replay", str(path), *FAST, robot="nobody").code == 0
     assert came == []
 
 
-def test_somebody_who_comes_meanwhile_ends_it(
+def test_a_service_that_starts_ends_the_replay(
     path: Path, rig: Rig, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     play = targets.BusTarget.play
 
-    def and_then(self: targets.BusTarget, path: str, it: Any) -> bool:
+    def start_safety(self: targets.BusTarget, path: str, it: Any) -> bool:
         if path == "tel/bridge/velocity":
             pretend(rig, "safety", {})
             monkeypatch.setattr(targets.BusTarget, "play", play)
         return play(self, path, it)
 
-    monkeypatch.setattr(targets.BusTarget, "play", and_then)
+    monkeypatch.setattr(targets.BusTarget, "play", start_safety)
     result = tool("replay", str(path), "--rate", "0.5")
     assert result.code == 1
-    assert f"safety of robot {rig.robot} is there" in result.err
+    assert f"safety of robot {rig.robot} is running" in result.err
 
 
 def link(board: str) -> m.Link:
@@ -151,11 +152,11 @@ def state(heartbeat: int) -> Callable[[], m.SafetyState]:
 
 
 @pytest.mark.parametrize(
-    ("board", "said"),
+    ("board", "printed"),
     [(None, "no bridge of robot"), ("10.7.5.224:4002", "is at 10.7.5.224:4002: a real one")],
 )
-def test_a_real_vehicle_is_not_asked_to_move(
-    path: Path, rig: Rig, tool: Tool, board: str | None, said: str
+def test_a_real_vehicle_is_refused(
+    path: Path, rig: Rig, tool: Tool, board: str | None, printed: str
 ) -> None:
     asked: list[m.Drive] = []
     rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
@@ -163,11 +164,11 @@ def test_a_real_vehicle_is_not_asked_to_move(
         pretend(rig, "bridge", {keys.LINK: lambda: link(board)})
     result = tool("replay", str(path), "--simulator", *FAST)
     assert result.code == 1
-    assert said in result.err
+    assert printed in result.err
     assert asked == []
 
 
-def test_a_simulated_vehicle_is_asked_as_if_now(path: Path, rig: Rig, tool: Tool) -> None:
+def test_a_simulated_vehicle_receives_current_requests(path: Path, rig: Rig, tool: Tool) -> None:
     asked: list[m.Drive] = []
     moved: list[Arrival[m.Motion]] = []
     stops: list[int] = []
@@ -190,22 +191,22 @@ def test_a_simulated_vehicle_is_asked_as_if_now(path: Path, rig: Rig, tool: Tool
     assert moved == []
 
 
-def test_frames_go_to_no_real_board_s_bridge(path: Path, tool: Tool) -> None:
+def test_frames_are_refused_for_a_real_board(path: Path, tool: Tool) -> None:
     result = tool("replay", str(path), "--frames", "--set", "board.address=10.7.5.224")
     assert result.code == 1
-    assert "--frames: the board is at 10.7.5.224: a real one" in result.err
+    assert "--frames: the board at 10.7.5.224 is a real one" in result.err
 
 
-def test_a_recording_that_is_cut_is_played_as_far_as_it_goes(path: Path, tool: Tool) -> None:
+def test_a_truncated_recording_is_played_up_to_its_end(path: Path, tool: Tool) -> None:
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) - 20])
     result = tool("replay", str(path), *FAST)
     assert result.code == 0
-    assert "the recording is cut short" in result.err
+    assert "the recording is truncated" in result.err
 
 
 @pytest.mark.parametrize(
     "words", [["--rate", "0"], ["--from", "-1"], ["--only", "//"], ["--skip", "tel//x"]]
 )
-def test_a_bad_command_line(path: Path, tool: Tool, words: list[str]) -> None:
+def test_invalid_arguments(path: Path, tool: Tool, words: list[str]) -> None:
     assert tool("replay", str(path), *words).code == 2

@@ -1,4 +1,4 @@
-"""``t2 replay --simulator`` before the real stack: the vehicle goes the way that it went."""
+"""``t2 replay --simulator`` on the real stack: the vehicle repeats its drive."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ MOVING_MPS = 0.1
 pytestmark = pytest.mark.campaign
 
 
-def test_a_simulated_vehicle_drives_as_it_was_driven(tmp_path: Path) -> None:
+def test_a_simulated_vehicle_repeats_the_drive(tmp_path: Path) -> None:
     with chain(tmp_path, "office") as stack:
         wait_until(lambda: '"service": "safety"' in stack.log.read_text(), "safety")
         words = ["replay", str(LAP), "--simulator", "--set", f"bus.connect={stack.endpoint}"]

@@ -1,21 +1,22 @@
-"""A drive as the bus would tell it: ten seconds, one contact, one reset."""
+"""A recorded drive of ten seconds with one contact and one reset."""
 
 from collections.abc import Iterator
 
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.keys import ROOT
+from common.motion import Command
 
 BEGIN_NS = 1_700_000_000 * NS_PER_S
 HIT_S, RESET_S, END_S = 4.0, 7.0, 10.0
 CONTACT = m.Cause(name="contact", action="brake", age=0.0, text="The bumper was hit.")
-IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="Nobody asks to move.")
+IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="No source requests motion.")
 
-Told = tuple[str, m.Message, int]  # key, message, time of its arrival
+Arrival = tuple[str, m.Message, int]  # key, message, arrival time in ns
 
 
-def drive() -> Iterator[Told]:
-    """Yield everything in the order of its arrival."""
+def drive() -> Iterator[Arrival]:
+    """Yield all messages in the order of their arrival."""
     for number in range(round(END_S * 20)):
         at_s = number / 20
         held = HIT_S <= at_s < RESET_S
@@ -35,13 +36,13 @@ def drive() -> Iterator[Told]:
             yield at("tel/bridge/health", health(number // 20), at_s)
 
 
-def at(path: str, message: m.Message, at_s: float) -> Told:
-    """Return a message as it came so many seconds after the beginning."""
+def at(path: str, message: m.Message, at_s: float) -> Arrival:
+    """Return a message with its arrival time, in seconds since the start."""
     return f"{ROOT}/001/{path}", message, BEGIN_NS + round(at_s * NS_PER_S)
 
 
 def state(held: bool, number: int = 0) -> m.SafetyState:
-    """Return a verdict: braked by a contact that is latched, or on its way."""
+    """Return a safety state: braked by a latched contact, or driving."""
     return m.SafetyState(
         seq=number, boot=3, verdict="brake" if held else "run",
         latched=("contact",) if held else (), causes=(CONTACT,) if held else (), source="teleop",
@@ -50,10 +51,10 @@ def state(held: bool, number: int = 0) -> m.SafetyState:
 
 
 def motion(held: bool, number: int) -> m.Motion:
-    """Return what safety lets through."""
+    """Return safety's motion command."""
     if held:
-        return m.Motion(seq=number, boot=3, command="brake", latched=True)
-    return m.Motion(seq=number, boot=3, command="run", linear=0.5, angular=0.1)
+        return m.Motion(seq=number, boot=3, command=Command.BRAKE, latched=True)
+    return m.Motion(seq=number, boot=3, command=Command.RUN, linear=0.5, angular=0.1)
 
 
 def ultrasonic(number: int) -> m.Ultrasonic:
@@ -64,7 +65,7 @@ def ultrasonic(number: int) -> m.Ultrasonic:
 
 
 def odometry(number: int, epoch: int = 0) -> m.Odometry:
-    """Return a pose on the way along x, 2 cm further each time."""
+    """Return a pose on the x axis, 2 cm further each time."""
     return m.Odometry(
         seq=number, boot=4, x=0.02 * number, y=0.0, heading=0.0, linear=0.4, angular=0.0,
         pose_covariance=(0.0,) * 9, twist_covariance=(0.0,) * 4, epoch=epoch, residual=None,

@@ -1,4 +1,4 @@
-"""The page itself: whole, of itself, and without trust in what came from the bus."""
+"""The HTML page: complete, self-contained, and with escaped content."""
 
 import re
 from html.parser import HTMLParser
@@ -11,15 +11,15 @@ from common import codec
 from common.keys import ROOT
 from common.sample import Sample
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Translator
-from services.recorder.writer import Recording
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """A recording of the scene's drive, and of a key that is none of ours."""
-    made = Recording(tmp_path / "lap.mcap", Translator(Vehicle()), {"robot": "001"})
+    """A recording of the drive, and of an unknown key."""
+    made = RecordingWriter(tmp_path / "lap.mcap", Encoder(Vehicle()), {"robot": "001"})
     for key, message, at_ns in drive():
         payload, encoding = codec.encode(message), codec.encoding(type(message))
         made.write(Sample(key, payload, encoding, False, None, at_ns, at_ns))
@@ -29,7 +29,7 @@ def file(tmp_path: Path) -> Path:
 
 
 class Page(HTMLParser):
-    """Collects what a browser would fetch, and the ids that are given twice."""
+    """Collects the URLs that a browser would load, and all ids."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -48,19 +48,20 @@ class Page(HTMLParser):
                 self.ids.append(value)
 
 
-def test_a_report_shows_it_all(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(file)]) == 0
     out = file.with_suffix(".html")
     assert capsys.readouterr().out == f"{out}\n"
     text = out.read_text()
     for word in (
-        "asked by teleop", "allowed by safety", "measured", "The bumper was hit.", "front left",
+        "requested by teleop", "allowed by safety", "measured", "The bumper was hit.", "front left",
         "tel/bridge/velocity", "request → frame", "latched", "bridge 0.1.0", "4.0 m", "a reset",
+        "2023-11-14 22:13:20 UTC",
     ):  # fmt: skip
         assert word in text, word
 
 
-def test_a_page_fetches_nothing_and_runs_nothing(file: Path) -> None:
+def test_the_page_loads_nothing_and_has_no_script(file: Path) -> None:
     main(["report", str(file)])
     page = Page(file.with_suffix(".html").read_text())
     assert page.fetched == []
@@ -68,7 +69,7 @@ def test_a_page_fetches_nothing_and_runs_nothing(file: Path) -> None:
     assert page.tags.count("svg") == 4
 
 
-def test_what_came_from_the_bus_is_no_markup(file: Path) -> None:
+def test_content_from_the_bus_is_escaped(file: Path) -> None:
     main(["report", str(file)])
     text = file.with_suffix(".html").read_text()
     assert "The &lt;b&gt;bumper&lt;/b&gt; was hit." in text
@@ -76,7 +77,7 @@ def test_what_came_from_the_bus_is_no_markup(file: Path) -> None:
     assert "tel/&lt;i&gt;" in text
 
 
-def test_the_figures_do_not_share_what_they_refer_to(file: Path) -> None:
+def test_figures_have_unique_ids(file: Path) -> None:
     main(["report", str(file)])
     text = file.with_suffix(".html").read_text()
     named = [re.findall(r'<clipPath id="([^"]+)"', each) for each in text.split("<svg")[1:]]
@@ -85,24 +86,24 @@ def test_the_figures_do_not_share_what_they_refer_to(file: Path) -> None:
     assert len(flat) == len(set(flat))
 
 
-def test_a_recording_that_was_cut_says_so(file: Path) -> None:
+def test_a_truncated_recording_has_a_warning(file: Path) -> None:
     file.write_bytes(file.read_bytes()[:-200])
     assert main(["report", str(file), "--out", str(file.parent / "cut.html")]) == 0
-    assert "The file has no end" in (file.parent / "cut.html").read_text()
+    assert "The file is truncated" in (file.parent / "cut.html").read_text()
 
 
 @pytest.mark.parametrize(
     ("name", "arguments", "sentence"),
     [
         ("none.mcap", [], "none.mcap: cannot be read: No such file"),
-        ("text.mcap", [], "text.mcap: is no MCAP file"),
-        ("empty.mcap", [], "empty.mcap: holds no message of the bus"),
+        ("text.mcap", [], "text.mcap: is not an MCAP file"),
+        ("empty.mcap", [], "empty.mcap: contains no messages of the bus"),
         ("lap.mcap", ["--out", "{folder}/lap.mcap"], "is the recording itself"),
         ("lap.mcap", ["--out", "{folder}/no/lap.html"], "cannot be written: No such file"),
         ("lap.mcap", ["{folder}/a.mcap", "--out", "a.html"], "and there are 2 recordings"),
     ],
 )
-def test_what_is_wrong_is_said(
+def test_error_messages(
     file: Path,
     capsys: pytest.CaptureFixture[str],
     name: str,
@@ -111,7 +112,7 @@ def test_what_is_wrong_is_said(
 ) -> None:
     folder = file.parent
     (folder / "text.mcap").write_text("These are words. " * 9)
-    Recording(folder / "empty.mcap", Translator(Vehicle()), {}).close()
+    RecordingWriter(folder / "empty.mcap", Encoder(Vehicle()), {}).close()
     before = file.read_bytes()
     words = [word.format(folder=folder) for word in arguments]
     assert main(["report", str(folder / name), *words]) == 1

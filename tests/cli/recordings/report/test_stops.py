@@ -1,7 +1,6 @@
-"""When safety stopped the vehicle, and why."""
+"""Stops commanded by safety, and their reasons."""
 
-from cli.recordings.report.phases import Phase, Phases
-from cli.recordings.report.stops import stops
+from cli.recordings.report.stops import Phase, Phases, stops
 from common.messages import Cause, SafetyState, Verdict
 from tests.cli.recordings.report.drive_fixture import CONTACT, IDLE, state
 
@@ -9,23 +8,23 @@ LINK = Cause(name="link", action="stop", age=0.0, text="The link to the board is
 SLOWED = Cause(name="obstacle", action="slow", age=0.0, text="Slowed by an obstacle.")
 
 
-def told(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[Phase[SafetyState]]:
+def phases_of(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[Phase[SafetyState]]:
     """Return phases from begin, end, verdict and causes."""
     made = []
     for begins_s, ends_s, verdict, causes in steps:
         latched = tuple(cause.name for cause in causes if cause is CONTACT)
         known = state(False)
-        it = SafetyState(
+        made_state = SafetyState(
             verdict=verdict, latched=latched, causes=causes, source=None, limits=known.limits,
             heartbeat=1, text="",
         )  # fmt: skip
-        made.append(Phase(begins_s, ends_s, it))
+        made.append(Phase(begins_s, ends_s, made_state))
     return made
 
 
-def test_a_contact_while_driving_that_was_reset() -> None:
+def test_a_contact_while_driving_with_a_reset() -> None:
     (stop,) = stops(
-        told((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
+        phases_of((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
     )
     assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
     assert (stop.was_driving, stop.verdict, stop.over) == (True, "brake", True)
@@ -33,33 +32,33 @@ def test_a_contact_while_driving_that_was_reset() -> None:
     assert list(stop.latched) == ["contact"]
 
 
-def test_reasons_that_follow_each_other_are_one_stop() -> None:
+def test_consecutive_reasons_are_one_stop() -> None:
     (stop,) = stops(
-        told((0, 1, "inhibited", (LINK,)), (1, 2, "brake", (CONTACT, LINK)), (2, 3, "run", ()))
+        phases_of((0, 1, "inhibited", (LINK,)), (1, 2, "brake", (CONTACT, LINK)), (2, 3, "run", ()))
     )
     assert list(stop.reasons) == ["link", "contact"]
     assert (stop.verdict, stop.ends_s, stop.was_driving) == ("inhibited", 2, False)
 
 
-def test_one_that_stands_because_nobody_asks_is_not_stopped() -> None:
-    assert stops(told((0, 5, "stop", (IDLE,)), (5, 9, "slow", (SLOWED,)))) == []
+def test_an_idle_vehicle_is_not_a_stop() -> None:
+    assert stops(phases_of((0, 5, "stop", (IDLE,)), (5, 9, "slow", (SLOWED,)))) == []
 
 
-def test_a_stop_that_is_not_over() -> None:
-    (stop,) = stops(told((0, 1, "run", ()), (1, 2, "inhibited", (LINK,))))
+def test_a_stop_at_the_end_is_not_over() -> None:
+    (stop,) = stops(phases_of((0, 1, "run", ()), (1, 2, "inhibited", (LINK,))))
     assert not stop.over
 
 
-def test_safety_falling_silent_ends_what_is_known_of_it() -> None:
-    first, second = stops(told((0, 1, "inhibited", (LINK,)), (4, 5, "inhibited", (LINK,))))
+def test_a_gap_in_the_safety_state_ends_a_stop() -> None:
+    first, second = stops(phases_of((0, 1, "inhibited", (LINK,)), (4, 5, "inhibited", (LINK,))))
     assert (first.ends_s, first.over) == (1, False)
     assert (second.begins_s, second.over) == (4, False)
 
 
-def test_phases_last_until_another_is_told_or_nobody_tells() -> None:
+def test_phases_end_with_the_next_state_or_a_gap() -> None:
     phases: Phases[str] = Phases(gap_s=0.5)
     for at_s, word in ((0.0, "a"), (0.3, "a"), (0.6, "b"), (2.0, "b"), (2.1, "b")):
-        phases.take(at_s, word, word)
+        phases.add(at_s, word, word)
     found = [(phase.begins_s, phase.ends_s, phase.state) for phase in phases.done]
     assert found == [(0.0, 0.6, "a"), (0.6, 0.6, "b"), (2.0, 2.1, "b")]
     assert phases.done[0].lasts_s == 0.6

@@ -1,4 +1,4 @@
-"""``t2 config``: values, origins, and what is refused."""
+"""``t2 config``: values, sources, and invalid settings."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ def as_json(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, dict[s
     return table
 
 
-def test_every_section_is_there_with_its_origin(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_section_has_its_source(capsys: pytest.CaptureFixture[str]) -> None:
     table = as_json(capsys)
     sections = {path.split(".")[0] for path in table}
     assert sections == {
@@ -34,11 +34,11 @@ def test_every_section_is_there_with_its_origin(capsys: pytest.CaptureFixture[st
     assert table["safety.sources.demo.priority"]["value"] == 15
 
 
-def test_every_default_is_written_down(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_default_is_in_the_default_file(capsys: pytest.CaptureFixture[str]) -> None:
     assert [path for path, row in as_json(capsys).items() if row["origin"] == "default"] == []
 
 
-def test_the_later_origin_wins(
+def test_the_later_source_wins(
     file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["--config", str(file)]
@@ -54,9 +54,7 @@ def test_the_later_origin_wins(
     }
 
 
-def test_the_table_has_a_line_a_setting_in_columns(
-    file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_has_a_line_per_setting(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--config", str(file), "--set", "robot.id=007"]
     paths = list(as_json(capsys, *words))
     assert main(["config", *words]) == 0
@@ -70,7 +68,7 @@ def test_the_table_has_a_line_a_setting_in_columns(
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--set", "board.port=0"], "board.port = 0"),
         (["--set", "board.prot=1"], "did you mean 'port'?"),
@@ -82,11 +80,11 @@ def test_the_table_has_a_line_a_setting_in_columns(
         (["--config", "no/such.toml"], "no/such.toml: cannot be read"),
     ],
 )
-def test_what_is_refused_is_named(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_settings_are_named(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["config", *words]) == EXIT_CONFIG
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err.startswith("t2 config: ")
-    assert said in shown.err
+    assert message in shown.err

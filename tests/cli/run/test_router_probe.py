@@ -1,4 +1,4 @@
-"""``t2 router`` and its probe: ready when it answers, killed when it hangs."""
+"""``t2 router`` and its probe: readiness, watchdog, and the kill of a hung router."""
 
 import contextlib
 import os
@@ -13,7 +13,7 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from cli.run.router_watch import Watch
+from cli.run.router_probe import RouterProbe
 from common.bus import answering
 from common.bus.session import client_config, router
 from common.settings import BusSettings, Log
@@ -21,7 +21,7 @@ from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
 from verification.harness.support import at, free_port, listening, router_process, wait_until
 
-# Matching these two takes Zenoh 1.10.2 a minute: long enough to be found, and it ends by itself.
+# Zenoh 1.10.2 needs a minute to match these two: longer than the deadline, but finite.
 EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"
 LONG = "t2/v1/001/evt/dashboard/@adv/" + "/".join("a" * 40)
 DEADLINE_S = 1.0
@@ -43,13 +43,13 @@ def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Manager
 
 
 def probe_of(router: "subprocess.Popen[bytes]") -> int:
-    """Return the process of a router's probe, once there is one."""
+    """Wait for the probe of a router and return its process id."""
     path = Path(f"/proc/{router.pid}/task/{router.pid}/children")
     return int(wait_until(lambda: path.read_text().split(), "a probe")[0])
 
 
 def successor(router: "subprocess.Popen[bytes]", first: int) -> int:
-    """Return the process of a router's next probe; 0 while there is none, or a dead one."""
+    """Return the process id of the next probe; 0 while there is none or it is dead."""
     probe = probe_of(router)
     return probe if probe != first and alive(probe) else 0
 
@@ -61,7 +61,7 @@ def explode(endpoint: str) -> None:
         zenoh.open(client_config(at(endpoint))) as writer,
     ):
         reader.declare_subscriber(EXPLODES, lambda _: None)
-        time.sleep(0.2)  # the router knows it
+        time.sleep(0.2)  # until the router has the declaration
         writer.put(LONG, b"")
         time.sleep(0.1)
 
@@ -69,9 +69,7 @@ def explode(endpoint: str) -> None:
 # --- a router that works ------------------------------------------------------------------------
 
 
-def test_it_is_ready_when_it_answers_and_beats_from_then_on(
-    manager: Manager, endpoint: str
-) -> None:
+def test_ready_and_watchdog_beats_follow_answers(manager: Manager, endpoint: str) -> None:
     with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
         wait_until(lambda: manager.beats() > 2, "beats")
         assert manager.told[0] == "READY=1"
@@ -80,7 +78,7 @@ def test_it_is_ready_when_it_answers_and_beats_from_then_on(
     assert manager.hear()[-1] == "STOPPING=1"
 
 
-def test_a_probe_that_ends_is_started_again_and_ends_with_its_router(endpoint: str) -> None:
+def test_the_probe_is_restarted_and_ends_with_its_router(endpoint: str) -> None:
     with router_process(endpoint) as process:
         first = probe_of(process)
         os.kill(first, signal.SIGKILL)
@@ -91,7 +89,7 @@ def test_a_probe_that_ends_is_started_again_and_ends_with_its_router(endpoint: s
         wait_gone([second])
 
 
-def test_ctrl_c_reaches_the_probe_and_does_not_end_it(endpoint: str) -> None:
+def test_the_probe_ignores_ctrl_c(endpoint: str) -> None:
     with router_process(endpoint) as process:
         probe = probe_of(process)
         ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -114,8 +112,8 @@ def _command(pid: int) -> bytes:
     return Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
-def test_a_router_that_dials_its_sites_answers_too(endpoint: str) -> None:
-    where = listening(endpoint, "tcp/127.0.0.1:1")  # and no router there
+def test_a_router_with_an_uplink_answers(endpoint: str) -> None:
+    where = listening(endpoint, "tcp/127.0.0.1:1")  # without a router there
     with router(where):
         assert answering.answers(answering.router_at(where))
 
@@ -123,25 +121,25 @@ def test_a_router_that_dials_its_sites_answers_too(endpoint: str) -> None:
 # --- a router that hangs ------------------------------------------------------------------------
 
 
-def test_one_that_hangs_on_key_matching_is_killed(endpoint: str) -> None:
+def test_a_router_that_hangs_on_key_matching_is_killed(endpoint: str) -> None:
     with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
         wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
         explode(endpoint)
         assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
 
 
-def test_one_that_is_frozen_is_killed(endpoint: str) -> None:
+def test_a_frozen_router_is_killed(endpoint: str) -> None:
     with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
         wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
         process.send_signal(signal.SIGSTOP)
         assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
 
 
-def test_nobody_there_is_no_answer(endpoint: str) -> None:
+def test_no_router_no_answer(endpoint: str) -> None:
     assert not answering.answers(at(endpoint))
 
 
-def test_the_router_itself_is_dialled_whatever_services_dial() -> None:
+def test_the_probe_connects_to_the_routers_own_endpoint() -> None:
     bus = BusSettings(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
               insecure=True)  # fmt: skip
     assert answering.router_at(bus).endpoints == ("tcp/127.0.0.1:1",)
@@ -150,10 +148,10 @@ def test_the_router_itself_is_dialled_whatever_services_dial() -> None:
     assert answering.router_at(tls).endpoints == ("unixsock-stream//x",)
 
 
-def test_a_probe_that_cannot_be_started_does_not_end_the_router(
+def test_the_router_continues_without_a_probe(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    watch = Watch(BusSettings(), Log())
+    probe = RouterProbe(BusSettings(), Log())
     tried = threading.Event()
 
     def refused(*_: object, **__: object) -> None:
@@ -161,9 +159,9 @@ def test_a_probe_that_cannot_be_started_does_not_end_the_router(
         raise OSError(12, "Cannot allocate memory")
 
     monkeypatch.setattr(subprocess, "Popen", refused)
-    thread = threading.Thread(target=watch.run, args=(lambda: None,))
+    thread = threading.Thread(target=probe.run, args=(lambda: None,))
     thread.start()
     assert tried.wait(PATIENCE_S)
-    watch.stop()
+    probe.stop()
     thread.join(PATIENCE_S)
     assert not thread.is_alive()

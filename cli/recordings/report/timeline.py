@@ -1,0 +1,211 @@
+"""Timeline of a recording: time series, path, phases and events for the plots. Pure.
+
+Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
+NaN in a gap, so that no line is drawn through it.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import singledispatchmethod
+from itertools import pairwise
+
+from cli.recordings.report.stops import Phases, Stop, stops
+from cli.recordings.report.timing import Stream
+from common.freshness import NS_PER_S
+from common.messages import (
+    SONAR_NAMES,
+    Bumper,
+    Drive,
+    Event,
+    Health,
+    Message,
+    Motion,
+    Odometry,
+    SafetyState,
+    Ultrasonic,
+    Velocity,
+)
+
+NAN = math.nan
+GAP_S = 0.5  # the slowest plotted stream has 20 Hz
+
+
+@dataclass(slots=True)
+class Series:
+    """A time series."""
+
+    times: list[float] = field(default_factory=list)  # s
+    values: list[float] = field(default_factory=list)
+
+    def add(self, at_s: float, value: float | None) -> None:
+        """Add a value; mark a gap before it with NaN."""
+        if self.times and at_s - self.times[-1] > GAP_S:
+            self.times.append(self.times[-1])
+            self.values.append(NAN)
+        self.times.append(at_s)
+        self.values.append(NAN if value is None else value)
+
+
+@dataclass(slots=True)
+class VelocitySeries:
+    """One component of the velocity: requested, allowed and measured; m/s or rad/s."""
+
+    requested: dict[str, Series] = field(default_factory=dict)  # by source
+    allowed: Series = field(default_factory=Series)  # by safety
+    measured: Series = field(default_factory=Series)
+    upper: Series = field(default_factory=Series)  # safety's limits
+    lower: Series = field(default_factory=Series)
+
+
+@dataclass(slots=True)
+class PathSegment:
+    """The path of one odometry epoch, in ``odom``; m."""
+
+    epoch: tuple[int, int]
+    times: list[float] = field(default_factory=list)
+    xs: list[float] = field(default_factory=list)
+    ys: list[float] = field(default_factory=list)
+
+    @property
+    def length(self) -> float:
+        """Return its length in metres."""
+        points = list(zip(self.xs, self.ys, strict=True))
+        return sum(math.dist(before, after) for before, after in pairwise(points))
+
+
+@dataclass(frozen=True, slots=True)
+class TimedEvent:
+    """An event with its time and its service."""
+
+    at_s: float
+    service: str
+    event: Event
+
+
+@dataclass
+class Timeline:
+    """Everything that a report shows, updated message by message."""
+
+    began_ns: int | None = None
+    lasted_s: float = 0.0
+    linear: VelocitySeries = field(default_factory=VelocitySeries)
+    angular: VelocitySeries = field(default_factory=VelocitySeries)
+    path: list[PathSegment] = field(default_factory=list)
+    ranges: dict[str, Series] = field(
+        default_factory=lambda: {name: Series() for name in SONAR_NAMES}
+    )
+    pressed: Phases[bool] = field(default_factory=lambda: Phases(GAP_S))
+    verdicts: Phases[SafetyState] = field(default_factory=lambda: Phases(GAP_S))
+    events: list[TimedEvent] = field(default_factory=list)
+    streams: dict[str, Stream] = field(default_factory=dict)  # by key
+    # First and last health of each process, by service and boot.
+    healths: dict[tuple[str, int], tuple[Health, Health]] = field(default_factory=dict)
+
+    def add(self, key: str, message: Message | None, log_ns: int) -> None:
+        """Add a message of a key; None for one that could not be decoded."""
+        self.began_ns = log_ns if self.began_ns is None else self.began_ns
+        at_s = (log_ns - self.began_ns) / NS_PER_S
+        self.lasted_s = max(self.lasted_s, at_s)
+        self.streams.setdefault(key, Stream(key)).add(at_s, message)
+        if message is not None:
+            self._add(message, key, at_s)
+
+    @property
+    def distance(self) -> float:
+        """Return the distance driven in metres, by odometry."""
+        return sum(segment.length for segment in self.path)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Return the latest version of each service, from its health messages."""
+        return {service: last.version for (service, _), (_, last) in self.healths.items()}
+
+    @property
+    def stops(self) -> list[Stop]:
+        """Return the stops commanded by safety."""
+        return stops(self.verdicts.done)
+
+    @singledispatchmethod
+    def _add(self, message: Message, key: str, at_s: float) -> None:
+        """Add a message by its type; other types are only counted."""
+
+    @_add.register
+    def _(self, message: Drive, key: str, at_s: float) -> None:
+        source = key.rpartition("/")[2]
+        self.linear.requested.setdefault(source, Series()).add(at_s, message.linear)
+        self.angular.requested.setdefault(source, Series()).add(at_s, message.angular)
+
+    @_add.register
+    def _(self, message: Motion, key: str, at_s: float) -> None:
+        self.linear.allowed.add(at_s, message.linear)
+        self.angular.allowed.add(at_s, message.angular)
+
+    @_add.register
+    def _(self, message: Velocity, key: str, at_s: float) -> None:
+        self.linear.measured.add(at_s, message.linear)
+        self.angular.measured.add(at_s, message.angular)
+
+    @_add.register
+    def _(self, message: Odometry, key: str, at_s: float) -> None:
+        epoch = (message.boot, message.epoch)
+        if not self.path or self.path[-1].epoch != epoch:
+            self.path.append(PathSegment(epoch))
+        segment = self.path[-1]
+        segment.times.append(at_s)
+        segment.xs.append(message.x)
+        segment.ys.append(message.y)
+
+    @_add.register
+    def _(self, message: Ultrasonic, key: str, at_s: float) -> None:
+        for name, distance in zip(SONAR_NAMES, message.ranges, strict=True):
+            self.ranges[name].add(at_s, distance)
+
+    @_add.register
+    def _(self, message: Bumper, key: str, at_s: float) -> None:
+        self.pressed.add(at_s, message.pressed, message.pressed)
+
+    @_add.register
+    def _(self, message: SafetyState, key: str, at_s: float) -> None:
+        self.linear.upper.add(at_s, message.limits.forward)
+        self.linear.lower.add(at_s, -message.limits.backward)
+        self.angular.upper.add(at_s, message.limits.angular)
+        self.angular.lower.add(at_s, -message.limits.angular)
+        value = message.verdict, message.latched, tuple(cause.name for cause in message.causes)
+        self.verdicts.add(at_s, value, message)
+
+    @_add.register
+    def _(self, message: Event, key: str, at_s: float) -> None:
+        self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
+
+    @_add.register
+    def _(self, message: Health, key: str, at_s: float) -> None:
+        process = key.split("/")[-2], message.boot
+        first, _ = self.healths.get(process, (message, message))
+        self.healths[process] = first, message
+
+
+def downsampled(
+    times: Sequence[float], values: Sequence[float], limit: int = 4000
+) -> tuple[list[float], list[float]]:
+    """Return about ``limit`` points at most, with every peak, dip and gap at its place."""
+    if len(times) <= limit:
+        return list(times), list(values)
+    # Up to four points of each block are kept.
+    length = math.ceil(4 * len(times) / limit)
+    kept = [
+        index
+        for begin in range(0, len(times), length)
+        for index in _extremes(values, range(begin, min(begin + length, len(times))))
+    ]
+    return [times[index] for index in kept], [values[index] for index in kept]
+
+
+def _extremes(values: Sequence[float], block: range) -> Iterator[int]:
+    known = [index for index in block if not math.isnan(values[index])]
+    chosen = [index for index in block if math.isnan(values[index])][:1]
+    if known:
+        chosen += [
+            min(known, key=values.__getitem__), max(known, key=values.__getitem__), known[-1]
+        ]  # fmt: skip
+    yield from sorted(set(chosen))

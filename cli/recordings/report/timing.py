@@ -1,0 +1,119 @@
+"""Timing statistics of a recording: regularity of streams, reaction times of the bridge. Pure.
+
+The bridge publishes histograms since its start, so the counts before the recording are subtracted.
+The worst value belongs to the recording only if it rose meanwhile. Otherwise the bound of the
+slowest bucket replaces it.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from cli.inspect.addressing import topic_of
+from cli.inspect.stream_stats import quantile as sample_quantile
+from common.messages import Durations, Health, Message, Timing
+from services.bridge.timing import quantile
+
+MISSED = 3.0  # a gap is longer than this many periods
+EMPTY = Timing(bounds=(), durations={}, not_counted={})
+
+
+@dataclass(slots=True)
+class Stream:
+    """The samples of a key, by arrival time in s."""
+
+    key: str
+    times: list[float] = field(default_factory=list)
+    lost: int = 0  # missing numbers in ``seq``
+    restarts: int = 0  # of its publisher
+    undecoded: int = 0  # samples that are not valid messages
+    _last: Message | None = None
+
+    def add(self, at_s: float, message: Message | None) -> None:
+        """Count a sample."""
+        self.times.append(at_s)
+        if message is None:
+            self.undecoded += 1
+            return
+        last, self._last = self._last, message
+        if last is None:
+            return
+        if last.boot != message.boot:
+            self.restarts += 1
+        else:
+            self.lost += max(0, message.seq - last.seq - 1)
+
+    @property
+    def expected_hz(self) -> float:
+        """Return the nominal rate; 0 for an event-driven key."""
+        topic = topic_of(self.key)
+        return topic.rate_hz if topic else 0.0
+
+    @property
+    def hz(self) -> float | None:
+        """Return the mean rate from the first to the last sample."""
+        span_s = self.times[-1] - self.times[0] if self.times else 0.0
+        return (len(self.times) - 1) / span_s if span_s > 0 else None
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Return begin and end of each gap, in s."""
+        if not self.expected_hz:
+            return []
+        longest_s = MISSED / self.expected_hz
+        return [(a, b) for a, b in pairwise(self.times) if b - a > longest_s]
+
+    def interval_s(self, share: float) -> float | None:
+        """Return a quantile of the interval between samples."""
+        return sample_quantile(sorted(b - a for a, b in pairwise(self.times)), share)
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """A reaction or one of its hops; durations in s, None if nothing was measured."""
+
+    name: str
+    count: int
+    p50: float | None
+    p99: float | None
+    worst: float | None
+
+
+def reactions(processes: Iterable[tuple[Health, Health]]) -> list[Reaction]:
+    """Return the sum over all bridge processes, from the first and last health of each."""
+    bounds: tuple[float, ...] = ()
+    sums: dict[str, Counter[int]] = {}
+    worst: dict[str, float] = {}
+    for first, last in processes:
+        early, late = first.timing or EMPTY, last.timing or EMPTY
+        bounds = late.bounds or bounds
+        for name, each in late.durations.items():
+            before = early.durations.get(name)
+            counts = _since(before, each)
+            sums.setdefault(name, Counter()).update(dict(enumerate(counts)))
+            if before is None or each.worst > before.worst:
+                worst[name] = max(worst.get(name, 0.0), each.worst)
+    return [_reaction(name, bounds, counts, worst.get(name)) for name, counts in sums.items()]
+
+
+def _since(before: Durations | None, now: Durations) -> list[int]:
+    if before is None:
+        return list(now.counts)
+    return [late - early for early, late in zip(before.counts, now.counts, strict=True)]
+
+
+def _reaction(
+    name: str, bounds: tuple[float, ...], counts: Counter[int], worst: float | None
+) -> Reaction:
+    total = sum(counts.values())
+    if not total:
+        return Reaction(name, 0, None, None, None)
+    slowest = max(bucket for bucket, count in counts.items() if count)
+    bound = bounds[slowest] if slowest < len(bounds) else bounds[-1]
+    durations = Durations(
+        counts=tuple(counts[bucket] for bucket in range(len(bounds) + 1)),
+        worst=worst if worst is not None else bound,
+    )
+    p50, p99 = (quantile(bounds, durations, share) for share in (0.5, 0.99))
+    return Reaction(name, total, p50, p99, durations.worst)

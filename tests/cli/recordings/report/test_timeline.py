@@ -1,0 +1,82 @@
+"""Timeline of a recorded drive."""
+
+import math
+
+import pytest
+
+from cli.recordings.report.timeline import Series, Timeline, downsampled
+from common.freshness import NS_PER_S
+from tests.cli.recordings.report import drive_fixture
+from tests.cli.recordings.report.drive_fixture import BEGIN_NS, HIT_S, RESET_S, drive
+
+
+@pytest.fixture
+def timeline() -> Timeline:
+    """The timeline of the recorded drive."""
+    made = Timeline()
+    for arrival in drive():
+        made.add(*arrival)
+    return made
+
+
+def test_requested_allowed_and_measured_velocity(timeline: Timeline) -> None:
+    assert set(timeline.linear.requested) == {"teleop"}
+    assert set(timeline.linear.requested["teleop"].values) == {0.5}
+    allowed = zip(timeline.linear.allowed.times, timeline.linear.allowed.values, strict=True)
+    assert all((value == 0.0) == (HIT_S <= at_s < RESET_S) for at_s, value in allowed)
+    assert set(timeline.angular.measured.values) == {0.1}
+    assert (set(timeline.linear.upper.values), set(timeline.linear.lower.values)) == ({0.8}, {-0.5})
+
+
+def test_stop_with_reason_and_event(timeline: Timeline) -> None:
+    (stop,) = timeline.stops
+    assert (stop.begins_s, stop.ends_s) == (HIT_S, RESET_S)
+    assert (list(stop.reasons), stop.over, stop.was_driving) == (["contact"], True, True)
+    assert [(each.at_s, each.service) for each in timeline.events] == [(HIT_S, "safety")]
+
+
+def test_path_ranges_bumper_and_versions(timeline: Timeline) -> None:
+    assert timeline.distance == pytest.approx(199 * 0.02)
+    assert math.isnan(timeline.ranges["front_left"].values[0])
+    assert timeline.ranges["left"].values[0] == 1.0
+    assert [phase.lasts_s for phase in timeline.pressed.done if phase.state] == [pytest.approx(1.0)]
+    assert timeline.versions == {"bridge": "0.1.0"}
+    assert timeline.lasted_s == pytest.approx(9.95)
+
+
+def test_a_new_odometry_epoch_starts_a_new_segment() -> None:
+    timeline = Timeline()
+    for number in range(4):
+        message = drive_fixture.odometry(number % 2, epoch=number // 2)
+        timeline.add(*drive_fixture.at("tel/odom/odometry", message, number / 50))
+    assert [len(segment.xs) for segment in timeline.path] == [2, 2]
+    assert timeline.distance == pytest.approx(0.04)
+
+
+def test_a_gap_is_marked_with_nan() -> None:
+    series = Series()
+    for at_s in (0.0, 0.1, 2.0):
+        series.add(at_s, 1.0)
+    assert series.times == [0.0, 0.1, 0.1, 2.0]
+    assert math.isnan(series.values[2])
+
+
+def test_downsampling_keeps_peaks_and_gaps() -> None:
+    times = [float(number) for number in range(10_000)]
+    values = [0.0] * 10_000
+    values[1234], values[5678], values[9000] = 7.0, -7.0, math.nan
+    fewer_times, fewer = downsampled(times, values, limit=400)
+    assert len(fewer) <= 400
+    assert dict(zip(fewer_times, fewer, strict=True))[1234.0] == 7.0
+    assert (max(fewer), min(fewer)) == (7.0, -7.0)
+    assert any(math.isnan(value) for value in fewer)
+    assert fewer_times == sorted(fewer_times)
+    assert all(map(math.isnan, downsampled(times, [math.nan] * 10_000, limit=400)[1]))
+    assert downsampled(times[:5], values[:5]) == (times[:5], values[:5])
+
+
+def test_time_starts_at_the_first_message() -> None:
+    timeline = Timeline()
+    timeline.add("t2/v1/001/tel/mine", None, BEGIN_NS)
+    timeline.add("t2/v1/001/tel/mine", None, BEGIN_NS + 3 * NS_PER_S)
+    assert (timeline.lasted_s, timeline.streams["t2/v1/001/tel/mine"].times) == (3.0, [0.0, 3.0])

@@ -1,0 +1,70 @@
+"""Recordings without a bus: a folder of files, and samples at a given second."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.freshness import NS_PER_S
+from common.sample import Sample
+from common.settings import Vehicle
+from services.recorder.config import MB, Recorder
+from services.recorder.mcap_codec import Encoder
+from services.recorder.reader import Reader
+from services.recorder.retention import StoredFile
+from services.recorder.storage import Storage
+from services.recorder.writer import RecordingWriter
+from tests.recorder import samples
+from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
+
+SETTINGS = Recorder(roll_size=1.0, roll_time=10.0, black_box=10.0, tail=2.0)
+OLD, MIDDLE, NEW = "001-20260101-000000", "001-20260201-000000", "001-20260301-000000"
+CONTINUOUS = [f"{stamp}.mcap" for stamp in (OLD, MIDDLE, NEW)]
+INCIDENTS = [f"{stamp}-latch-contact.mcap" for stamp in (OLD, MIDDLE, NEW)]
+
+
+class Files:
+    """Opens recordings and lists the closed ones."""
+
+    def __init__(self, folder: Path) -> None:
+        self.storage = Storage(folder, 0)
+        self.closed: list[Path] = []
+
+    def open(self, first: Sample, reason: str) -> RecordingWriter:
+        path = self.storage.new_path("001", first.wall_ns, reason)
+        return RecordingWriter(path, Encoder(Vehicle()), {"why": reason})
+
+    def close(self, recording: RecordingWriter) -> None:
+        recording.close()
+        self.closed.append(recording.path)
+
+    def read(self) -> list[list[float]]:
+        """Return the times of the messages in each file, in seconds."""
+        return [list(times(path)) for path in self.closed]
+
+
+def times(path: Path) -> Iterator[float]:
+    with Reader(path) as reader:
+        yield from ((each.log_ns - BEGIN_NS) / NS_PER_S for each in reader)
+    assert not reader.cut
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Files:
+    return Files(tmp_path)
+
+
+def at(second: float) -> Sample:
+    return sample("tel/bridge/velocity", samples.velocity(), second)
+
+
+def ns(second: float) -> int:
+    return MONO_NS + round(second * NS_PER_S)
+
+
+def stored(*names: str, kept: tuple[str, ...] = ()) -> list[StoredFile]:
+    return [StoredFile(name, MB, name in kept) for name in names]
+
+
+def names(files: list[StoredFile]) -> list[str]:
+    return [file.name for file in files]

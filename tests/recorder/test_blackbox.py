@@ -1,0 +1,131 @@
+"""Ring buffer, latch detection and dumps of the black box."""
+
+from common.freshness import NS_PER_S
+from services.recorder.blackbox import OVERHEAD, SLICE, BlackBox, LatchDetector, RingBuffer
+from tests.recorder import samples
+from tests.recorder.files_fixture import SETTINGS, Files, at, ns
+from tests.recorder.samples import bare
+
+
+def kept(buffer: RingBuffer) -> list[bytes]:
+    return [each.payload for each in buffer.samples()]
+
+
+def test_old_samples_are_dropped() -> None:
+    buffer = RingBuffer(2 * NS_PER_S, 1_000_000)
+    for second in range(5):
+        buffer.add(bare("tel/x", b"%d" % second, at_s=second))
+    assert kept(buffer) == [b"2", b"3", b"4"]
+    assert buffer.size == 3 * (1 + OVERHEAD)
+
+
+def test_the_oldest_samples_are_dropped_above_the_size_limit() -> None:
+    buffer = RingBuffer(100 * NS_PER_S, 3 * (OVERHEAD + 10))
+    for number in range(9):
+        buffer.add(bare("tel/x", b"12345", raw=b"%05d" % number))
+    assert [each.raw for each in buffer.samples()] == [b"00006", b"00007", b"00008"]
+
+
+def test_a_sample_larger_than_the_buffer_is_dropped() -> None:
+    buffer = RingBuffer(100 * NS_PER_S, OVERHEAD + 10)
+    buffer.add(bare("tel/x", bytes(11)))
+    assert (kept(buffer), buffer.size) == ([], 0)
+    buffer.add(bare("tel/x", bytes(10)))
+    assert kept(buffer) == [bytes(10)]
+
+
+def test_returned_samples_do_not_change() -> None:
+    buffer = RingBuffer(100 * NS_PER_S, 1_000_000)
+    buffer.add(bare("tel/x", b"1"))
+    given = buffer.samples()
+    buffer.add(bare("tel/x", b"2"))
+    assert len(given) == 1
+
+
+def test_only_new_latches_are_reported() -> None:
+    latches = LatchDetector()
+    states: tuple[list[str], ...] = (
+        [],
+        ["contact"],
+        ["contact"],
+        ["estop", "contact"],
+        [],
+        ["contact"],
+    )
+    found = [latches.update(samples.state(*names)) for names in states]
+    assert found == [[], ["contact"], [], ["estop"], [], ["contact"]]
+
+
+def test_latches_of_the_first_state_are_ignored() -> None:
+    latches = LatchDetector()
+    assert latches.update(samples.state("estop")) == []
+    assert latches.update(samples.state("estop", "contact")) == ["contact"]
+
+
+def test_a_dump_holds_the_buffered_time_and_the_tail(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.write(ns(0))
+    for second in range(30):
+        box.add(at(second))
+        if second == 20:
+            box.trigger(["contact"], ns(20))
+        box.write(ns(second))
+        box.flush()
+    assert [path.name for path in files.closed] == ["001-20231114-221330-latch-contact.mcap"]
+    assert files.read() == [[float(second) for second in range(10, 23)]]
+
+
+def test_further_latches_extend_a_dump_up_to_a_limit(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    for second in range(30):
+        box.add(at(second))
+        if second >= 5:
+            box.trigger(["contact"], ns(second))
+            if files.closed:
+                break
+        box.write(ns(second))
+    assert files.read() == [[float(second) for second in range(16)]]
+
+
+def test_a_dump_is_written_in_slices(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    for _ in range(3 * SLICE):
+        box.add(at(0))
+    box.trigger(["contact"], ns(0))
+    for _ in range(3):
+        assert files.closed == []
+        box.write(ns(5))
+    assert [len(each) for each in files.read()] == [3 * SLICE]
+
+
+def test_close_writes_all_pending_samples(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.close()
+    for second in range(3):
+        box.add(at(second))
+    box.trigger(["estop", "contact"], ns(2))
+    box.close()
+    assert files.read() == [[0.0, 1.0, 2.0]]
+    assert files.closed[0].name.endswith("-latch-estop-contact.mcap")
+
+
+def test_abort_discards_pending_samples(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.abort()
+    for _ in range(SLICE + 5):
+        box.add(at(0))
+    box.trigger(["contact"], ns(0))
+    box.write(ns(0))
+    box.abort()
+    assert [len(each) for each in files.read()] == [SLICE]
+    box.write(ns(9))
+    assert len(files.closed) == 1
+
+
+def test_a_dump_without_samples_writes_no_file(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.trigger(["contact"], ns(0))
+    box.flush()
+    for second in (1, 5):
+        box.write(ns(second))
+    assert files.closed == []

@@ -1,0 +1,154 @@
+"""File names, free space and removal of old recordings."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from common.settings import Vehicle
+from services.recorder.config import MB
+from services.recorder.mcap_codec import Encoder
+from services.recorder.storage import RETRY_NS, Storage
+from services.recorder.writer import RecordingWriter
+from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, names
+from tests.recorder.samples import BEGIN_NS
+
+
+def test_a_missing_folder_is_created(tmp_path: Path) -> None:
+    storage = Storage(tmp_path / "a" / "b", 0)
+    storage.check(0)
+    assert storage.has_room
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_file_names_hold_robot_time_and_reason(tmp_path: Path) -> None:
+    storage = Storage(tmp_path, 0)
+    first = storage.new_path("007", BEGIN_NS)
+    assert first.name == "007-20231114-221320.mcap"
+    first.touch()
+    assert storage.new_path("007", BEGIN_NS).name == "007-20231114-221320-1.mcap"
+    assert storage.new_path("007", BEGIN_NS, "latch-x").name == "007-20231114-221320-latch-x.mcap"
+
+
+def test_free_space_limit_has_a_hysteresis(tmp_path: Path) -> None:
+    left = [0]
+    storage = Storage(tmp_path, 100 * MB, lambda _: left[0])
+    found = []
+    for free in (101, 100, 99, 100, 109, 111, 101):
+        left[0] = free * MB
+        storage.check(0)
+        found.append(storage.has_room)
+    assert found == [True, True, False, False, False, True, True]
+    assert storage.problem == "109 MB are left, recorder.free is 100"
+
+
+def test_retry_after_a_disk_error(tmp_path: Path) -> None:
+    storage = Storage(tmp_path, 0)
+    storage.on_error(OSError(28, "No space left on device"), 0)
+    storage.check(RETRY_NS - 1)
+    assert not storage.has_room
+    assert storage.problem.endswith(": No space left on device")
+    storage.check(RETRY_NS)
+    assert storage.has_room
+
+
+def test_no_room_if_the_folder_cannot_be_created(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    storage = Storage(tmp_path / "file" / "folder", 0)
+    storage.check(0)
+    assert not storage.has_room
+    assert "file/folder" in storage.problem
+
+
+class Disk:
+    """A folder with so many bytes for recordings."""
+
+    def __init__(self, folder: Path, room: int, *files: str) -> None:
+        self.folder, self.room = folder, room
+        for name in files:
+            (folder / name).write_bytes(bytes(MB))
+
+    def free(self, folder: Path) -> int:
+        return self.room - sum(path.stat().st_size for path in folder.iterdir())
+
+    def names(self) -> list[str]:
+        return sorted(path.name for path in self.folder.iterdir())
+
+
+def test_room_is_made_with_hysteresis(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS, *INCIDENTS)
+    storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
+    assert names(storage.check(0)) == CONTINUOUS[:2]
+    assert storage.has_room
+    assert storage.check(0) == []
+    disk.room -= 2 * MB
+    assert names(storage.check(0)) == INCIDENTS[:2]
+    assert storage.has_room
+    assert disk.names() == sorted([CONTINUOUS[2], INCIDENTS[2]])
+    disk.room -= 3 * MB
+    assert storage.check(0) == []
+    assert not storage.has_room
+
+
+def test_room_below_the_hysteresis_is_enough_after_a_removal(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS)
+    storage = Storage(tmp_path, 14 * MB, disk.free, robot="001")
+    storage.has_room = False
+    assert names(storage.check(0)) == CONTINUOUS[:2]
+    assert storage.has_room
+
+
+def test_a_file_with_a_keep_mark_stays(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 12 * MB, *INCIDENTS)
+    (tmp_path / f"{INCIDENTS[0]}.keep").touch()
+    Storage(tmp_path, 10 * MB, disk.free, robot="001").check(0)
+    assert disk.names() == sorted([INCIDENTS[0], INCIDENTS[2], f"{INCIDENTS[0]}.keep"])
+
+
+def test_an_open_file_stays(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
+    writing = RecordingWriter(tmp_path / CONTINUOUS[0], Encoder(Vehicle()), {})
+    Storage(tmp_path, 10.5 * MB, disk.free, robot="001").check(0)
+    assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]
+    writing.close()
+
+
+def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 12 * MB, *INCIDENTS)
+    storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
+    began = storage.new_path("001", 0, "latch-estop")  # a clock at 1970
+    began.write_bytes(bytes(MB))
+    storage.check(0)
+    assert began.exists()
+    assert disk.names() == sorted([began.name, INCIDENTS[2]])
+
+
+def test_without_a_robot_nothing_is_removed(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS, *INCIDENTS)
+    storage = Storage(tmp_path, 10 * MB, disk.free)
+    assert storage.check(0) == []
+    assert not storage.has_room
+
+
+def test_no_room_if_files_cannot_be_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS)
+
+    def refuse(_: Path, *, missing_ok: bool) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
+    assert storage.check(0) == []
+    assert not storage.has_room
+    assert disk.names() == CONTINUOUS
+
+
+def test_a_file_that_vanishes_is_skipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / CONTINUOUS[0]).symlink_to("nowhere")
+    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=9 * MB))
+    assert names(Storage(tmp_path, 10 * MB, robot="001").check(0)) == CONTINUOUS[1:2]
+    assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]
