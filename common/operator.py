@@ -1,14 +1,191 @@
-"""Operator calls: built from the displayed safety state, and checked for their effect."""
+"""Requests and calls of an operator: what teleop and the dashboard send, and when.
+
+**Drive requests.** On every tick, 20 times a second, at most one request is sent:
+
+========== =================== =========================================
+phase      tick with a twist   tick without a twist
+========== =================== =========================================
+SILENT     zero; DRIVING       nothing
+DRIVING    the twist           zero; RELEASING, two zeros remain
+RELEASING  zero; DRIVING       zero; SILENT after the last one
+========== =================== =========================================
+
+The zero before a drive is the neutral request that arms safety and the bridge. ``stop`` leads to
+RELEASING with three zeros from any phase.
+
+**Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. After
+``ESTOP_TICKS`` it counts as not confirmed.
+
+**Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
+
+======== ================================ =====================================
+phase    event                            outcome
+======== ================================ =====================================
+sent     refusal, or no answer            refused, with the reason
+sent     answer                           wait for a state, at most ``CONFIRM_S``
+answered a state that confirms            confirmed
+answered ``CONFIRM_S`` without such state not confirmed
+======== ================================ =====================================
+
+**Release off a pressed bumper.** The call is repeated while a direction is held, one at a time. It
+ends when the direction is released or changes. Safety refuses a hold whose echo is not newer than
+the end, so the next hold waits for a newer state.
+"""
+
+from enum import Enum
 
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Direction, ReleaseRequest, ResetDone, ResetRequest, SafetyState
+from common.motion import STILL, Twist
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
 MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
+ZEROS = 3  # requests after a drive: one may be lost
+ESTOP_TICKS = 60  # 3 s at 20 Hz
+NO_ECHO = (0, -1)  # boot and heartbeat before any
+
+
+class Phase(Enum):
+    """The state that the last tick left."""
+
+    SILENT = "silent"
+    DRIVING = "driving"
+    RELEASING = "releasing"
+
+
+class DriveRequests(Struct):
+    """The sequence of drive requests, one tick at a time."""
+
+    phase: Phase = Phase.SILENT
+    zeros: int = 0  # left to send while RELEASING
+
+    def tick(self, requested: Twist | None) -> Twist | None:
+        """Return the request to send now, or None; ``requested`` is None without a held control."""
+        if requested is not None:
+            first = self.phase is not Phase.DRIVING
+            self.phase = Phase.DRIVING
+            return STILL if first else requested
+        if self.phase is Phase.DRIVING:
+            self.stop()
+        if self.phase is Phase.SILENT:
+            return None
+        self.zeros -= 1
+        if self.zeros == 0:
+            self.phase = Phase.SILENT
+        return STILL
+
+    def stop(self) -> None:
+        """Send the final zeros in the next ticks, from any phase."""
+        self.phase, self.zeros = Phase.RELEASING, ZEROS
+
+
+class EstopStep(Enum):
+    """The action of one tick of an emergency stop."""
+
+    NONE = "none"
+    REPEAT = "repeat"
+    LAST = "last"  # repeat it for the last time and report that it is not confirmed
+
+
+class EstopRepetition(Struct):
+    """An emergency stop that is repeated until safety has latched it."""
+
+    ticks: int = 0  # left; 0 when no stop is pending
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether the stop is still repeated."""
+        return self.ticks > 0
+
+    def start(self) -> None:
+        """Start, or start again, after the first stop was sent."""
+        self.ticks = ESTOP_TICKS
+
+    def tick(self, state: SafetyState | None) -> EstopStep:
+        """Return the action of this tick; ``state`` is None without a fresh state of safety."""
+        if not self.ticks:
+            return EstopStep.NONE
+        if state is not None and "estop" in state.latched:
+            self.ticks = 0
+            return EstopStep.NONE
+        self.ticks -= 1
+        return EstopStep.REPEAT if self.ticks else EstopStep.LAST
+
+
+class ResetCheck:
+    """A reset under way, from its request to the state that confirms it."""
+
+    def __init__(self, seen: SafetyState) -> None:
+        self._seen = seen
+        self._done: ResetDone | None = None
+        self._until_ns: int | None = None
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether the answer was received, so that only safety's state is missing."""
+        return self._done is not None
+
+    def answer(self, done: ResetDone) -> None:
+        """Store the answer; ``outcome`` then waits for the state that confirms it."""
+        self._done = done
+
+    def outcome(self, state: SafetyState | None, now_ns: int) -> bool | None:
+        """Return whether the reset is confirmed; None while this is open."""
+        if self._done is None:
+            return None
+        if state is not None and confirms(self._seen, self._done, state):
+            return True
+        if self._until_ns is None:
+            self._until_ns = now_ns + round(CONFIRM_S * NS_PER_S)
+        return False if now_ns > self._until_ns else None
+
+
+class ReleaseCalls(Struct):
+    """The calls of a release that an operator holds, one tick at a time."""
+
+    direction: Direction | None = None  # held in the last tick
+    is_pending: bool = False  # a hold waits for its answer
+    ended: tuple[int, int] = NO_ECHO  # boot and heartbeat that the last end echoed
+    reported: str = ""  # the last result of this release
+
+    def tick(
+        self, direction: Direction | None, seen: SafetyState | None, newest: SafetyState | None
+    ) -> list[ReleaseRequest]:
+        """Return the calls to make now: the end of a release, a hold, or both.
+
+        ``seen`` is the state that the operator saw, which a hold echoes; an end echoes ``newest``.
+        """
+        calls = []
+        if self.direction is not None and direction != self.direction:
+            self.ended = (newest.boot, newest.heartbeat) if newest else NO_ECHO
+            self.reported = ""
+            calls.append(release_request(newest, None, held=False))
+        self.direction = direction
+        if direction is not None and seen is not None and self._may_hold(seen):
+            self.is_pending = True
+            calls.append(release_request(seen, direction, held=True))
+        return calls
+
+    def answered(self) -> None:
+        """Note that the pending hold was answered or has timed out; the next one may follow."""
+        self.is_pending = False
+
+    def is_new(self, result: str) -> bool:
+        """Return whether to report this result: once per release, and only while it is held."""
+        is_new = self.direction is not None and result != self.reported
+        if is_new:
+            self.reported = result
+        return is_new
+
+    def _may_hold(self, seen: SafetyState) -> bool:
+        if self.is_pending:
+            return False
+        boot, heartbeat = self.ended
+        return seen.boot != boot or seen.heartbeat > heartbeat
 
 
 class Echoes(Struct, frozen=True):
@@ -23,14 +200,14 @@ class Echoes(Struct, frozen=True):
         return Echoes(state.boot, heartbeat.noted(state.heartbeat, now_ns))
 
     def refusal(self, echo: int | None, now_ns: int) -> str:
-        """Return why a call with this echo is refused, as text; empty if accepted.
+        """Return why a call with this echo is refused, as text; empty if it is accepted.
 
-        A state may reach the operator's program before it arrives here: an echo slightly
-        ahead counts as the newest number.
+        A state may reach the operator's program before it comes here: an echo slightly ahead
+        counts as the newest number, and has its age.
         """
         newest = self.heartbeat.number
-        if echo is not None and newest < echo <= newest + AHEAD:
-            echo = newest
+        if echo is not None and echo <= newest + AHEAD:
+            echo = min(echo, newest)
         return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)
 
 
@@ -43,7 +220,7 @@ def reset_request(seen: SafetyState) -> ResetRequest:
 def release_request(
     seen: SafetyState | None, direction: Direction | None, *, held: bool
 ) -> ReleaseRequest:
-    """Return the request to move off the bumper in a direction, or to end that."""
+    """Return the request to move off the bumper in a direction, or to end the release."""
     echo = seen.heartbeat if seen else None
     return ReleaseRequest(held=held, direction=direction, echo=echo)
 
@@ -52,9 +229,8 @@ def confirms(seen: SafetyState, done: ResetDone, state: SafetyState) -> bool:
     """Return whether ``state`` shows the effect of the reset that ``done`` claims.
 
     ``seen`` is the state that the request was built from. The answer must come from the safety
-    service that publishes the state, it must name causes that were latched in ``seen``, and none of
-    those may be left. A program that gets no such state within ``CONFIRM_S`` reports "not
-    confirmed".
+    service that publishes the state. It must name causes that were latched in ``seen``, and none of
+    these may remain. A program without such a state within ``CONFIRM_S`` reports "not confirmed".
     """
     if not done.boot == seen.boot == state.boot or state.heartbeat < done.heartbeat:
         return False

@@ -1,6 +1,6 @@
-"""``python -m tools.pictures``: the README's pictures of both operator's screens, while they drive.
+"""``python -m tools.pictures``: screenshots of the terminal and the dashboard for the docs.
 
-The real ones, before the real services and the simulated vehicle; chromium takes the pictures.
+Both drive the simulated vehicle through the real services; chromium takes the screenshots.
 """
 
 import asyncio
@@ -13,24 +13,24 @@ from playwright.sync_api import Browser, sync_playwright
 from common.config import Sources, load
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.controller import Desk
-from services.teleop.event_log import Logbook
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
 from sim.requests import Place
 from verification.harness.bus import running
 from verification.harness.dashboard import dashboard
-from verification.harness.dashboard_page import CHROMIUM, opened, takes
+from verification.harness.dashboard_page import CHROMIUM, open_page, take_control
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.teleop_app import LocalTerminalApp
 from verification.harness.waiting import wait_until
 
 IMAGES = Path("docs/images")
 COLUMNS, ROWS = 104, 34
-GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # that many presses of W; ms
+GEAR, REPEAT_S, HELD, HELD_MS = "4", 0.05, 32, 2000  # presses of W; ms
 
 
 def main() -> None:
-    """Make them anew."""
+    """Renew both screenshots."""
     with tempfile.TemporaryDirectory() as folder, running_stack(Path(folder), "office") as stack:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
@@ -45,17 +45,17 @@ def main() -> None:
 
 
 async def terminal_screen(stack: RunningStack) -> str:
-    """Drive from a terminal, and return what it shows then, as SVG."""
+    """Drive from a terminal and return its screen as SVG."""
     sets = [f"bus.connect={stack.endpoint}", "teleop.gamepad=false"]
     node = Node("teleop", load(TeleopConfig, Sources(sets=sets)))
-    desk = Desk(node, Logbook())
+    controller = Controller(node, EventLog())
     node.announce()
-    desk.plug(find(node.config.teleop))
-    app = LocalTerminalApp(desk, node.loop.post, lambda: False, node.config.teleop)
+    controller.use_gamepad(find(node.config.teleop))
+    app = LocalTerminalApp(controller, node.loop.post, lambda: False, node.config.teleop)
     with running(node.loop):
         node.bus.open()
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
-            while desk.view.safety is None or desk.view.safety.verdict == "inhibited":
+            while controller.view.safety is None or controller.view.safety.verdict == "inhibited":
                 await pilot.pause(REPEAT_S)
             await pilot.press(GEAR)
             for _ in range(HELD):
@@ -63,11 +63,11 @@ async def terminal_screen(stack: RunningStack) -> str:
                 await pilot.pause(REPEAT_S)
             screen = app.export_screenshot(title="t2 drive")
         node.bus.close()
-    return re.sub(r"@font-face \{.*?\}", "", screen, flags=re.DOTALL)  # they lie elsewhere
+    return re.sub(r"@font-face \{.*?\}", "", screen, flags=re.DOTALL)  # the fonts are remote
 
 
 def picture_terminal(screen: str, browser: Browser) -> None:
-    """Keep what a terminal shows."""
+    """Save the screenshot of the terminal."""
     page = browser.new_page(viewport={"width": 1300, "height": 900})
     page.set_content(screen)
     page.locator("svg").screenshot(path=IMAGES / "drive.png", omit_background=True)
@@ -75,14 +75,14 @@ def picture_terminal(screen: str, browser: Browser) -> None:
 
 
 def picture_dashboard(stack: RunningStack, browser: Browser, folder: Path) -> None:
-    """Drive by the page's keys, and keep what it shows then."""
-    with dashboard(stack.endpoint, folder) as site:
+    """Drive with the page's keys and save its screenshot."""
+    with dashboard(stack.endpoint, folder) as server:
         page = browser.new_page(viewport={"width": 1440, "height": 900}, locale="en-GB")
-        opened(page, site)
-        takes(page)
+        open_page(page, server)
+        take_control(page)
         page.keyboard.press(GEAR)
         page.keyboard.down("w")
-        wait_until(lambda: stack.speed() > 0.1, "it drives")
+        wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
         page.keyboard.down("a")
         page.wait_for_timeout(HELD_MS)
         page.screenshot(path=IMAGES / "dashboard.png")

@@ -23,16 +23,16 @@ class ServiceCommand:
 
 def dashboard() -> ServiceCommand:
     """Return ``t2 dashboard``."""
-    from services.dashboard import life
+    from services.dashboard import __main__ as service
 
-    return ServiceCommand(life.add_arguments, life.run)
+    return ServiceCommand(service.add_arguments, service.run)
 
 
 def drive() -> ServiceCommand:
     """Return ``t2 drive``."""
-    from services.teleop import life
+    from services.teleop import __main__ as service
 
-    return ServiceCommand(life.add_arguments, life.drive)
+    return ServiceCommand(service.add_arguments, service.drive)
 
 
 def sim() -> ServiceCommand:
@@ -44,7 +44,7 @@ def sim() -> ServiceCommand:
 
 def metrics() -> ServiceCommand:
     """Return ``t2 metrics``."""
-    from services.metrics import life
+    from services.metrics import __main__ as service
 
     options = {
         "--host HOST": ("metrics.host", "address to listen on; only this machine by default"),
@@ -53,19 +53,19 @@ def metrics() -> ServiceCommand:
             "metrics.robots", "robots to export: an id, a site as 'berlin-$*', or '*' for all",
         ),
     }  # fmt: skip
-    return _with_settings(life.main, options)
+    return _with_settings(service.main, options)
 
 
 def record() -> ServiceCommand:
     """Return ``t2 record``."""
-    from services.recorder import life
+    from services.recorder import __main__ as service
 
     options = {
         "--folder DIR": ("recorder.folder", "folder for the files; recorder.folder by default"),
         "--robot ROBOT": ("robot.id", "which robot, such as 001"),
     }
     defaults, fixed = ["recorder.make_room=false"], ["recorder.everything=true"]
-    return _with_settings(life.main, options, defaults, fixed)
+    return _with_settings(service.main, options, defaults, fixed)
 
 
 def _with_settings(

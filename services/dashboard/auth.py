@@ -1,7 +1,7 @@
-"""Authentication of the web server: every request passes the gate or gets the token page.
+"""Authentication middleware of the web server: valid credentials, or the token page.
 
-Every answer carries the headers that keep other pages and scripts out, and ends its connection: a
-connection has one request and one deadline.
+Every response carries the headers that exclude other pages and scripts. It also closes its
+connection: a connection serves one request within one deadline.
 """
 
 import asyncio
@@ -17,18 +17,18 @@ from starlette.responses import HTMLResponse, PlainTextResponse, RedirectRespons
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from services.dashboard.admission import Place
-from services.dashboard.credentials import COOKIE, Gate
+from services.dashboard.credentials import COOKIE, Credentials
 from services.dashboard.i18n import TEXTS
 from services.dashboard.listener import Connection
 
-WRONG_S = 1.0  # what a wrong token costs
+WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
-SAFE = ("GET", "HEAD")
+SAFE_METHODS = ("GET", "HEAD")
 ESTOP = "/estop/"
 STYLE = """body{font:18px system-ui,sans-serif;background:#0d1117;color:#f0f6fc;display:grid;
 place-content:center;min-height:90vh;gap:12px;text-align:center}input,button{font:inherit;
 padding:12px;border-radius:8px;border:1px solid #57606a;width:100%;box-sizing:border-box}
-button{background:#1f6feb;color:#fff;margin-top:12px}"""  # of the page that asks for the token
+button{background:#1f6feb;color:#fff;margin-top:12px}"""  # of the token page
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
@@ -43,22 +43,24 @@ HEADERS = {
     "connection": "close",
 }
 
-Find = Callable[[tuple[str, int] | None], Connection | None]
+FindConnection = Callable[[tuple[str, int] | None], Connection | None]
 
 
-class Door:
-    """Lets through to the application what the gate lets in."""
+class AuthMiddleware:
+    """Passes requests with valid credentials to the application."""
 
-    def __init__(self, app: ASGIApp, gate: Gate, find: Find, secure: bool) -> None:
+    def __init__(
+        self, app: ASGIApp, credentials: Credentials, find: FindConnection, secure: bool
+    ) -> None:
         self.app = app
-        self._gate = gate
+        self._credentials = credentials
         self._find = find
         self._secure = secure
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request or connection."""
+        """Serve one request or WebSocket."""
         connection = self._find(scope["client"])
-        send = _guarded(connection, send)
+        send = _with_headers(connection, send)
         is_socket = scope["type"] == "websocket"
         if _is_reserved(connection) and not scope["path"].startswith(ESTOP):
             await _refuse(is_socket, "too many connections; only E-STOP is served")(
@@ -68,31 +70,39 @@ class Door:
         headers = {
             name.decode("latin1"): value.decode("latin1") for name, value in scope["headers"]
         }
-        acts = is_socket or scope["method"] not in SAFE
-        if self._gate.lets_act(headers) if acts else self._gate.lets_in(headers):
+        acts = is_socket or scope["method"] not in SAFE_METHODS
+        if self._is_allowed(headers, acts=acts):
             await self.app(scope, receive, send)
         elif is_socket:
             await _refuse(is_socket, "")(scope, receive, send)
         else:
-            answer = await self._ask(Request(scope, receive))
+            answer = await self._authenticate(Request(scope, receive))
             await answer(scope, receive, send)
 
-    async def _ask(self, request: Request) -> Response:
-        if not self._gate.token:
+    def _is_allowed(self, headers: dict[str, str], *, acts: bool) -> bool:
+        credentials = self._credentials
+        return credentials.may_act(headers) if acts else credentials.may_view(headers)
+
+    async def _authenticate(self, request: Request) -> Response:
+        if not self._credentials.token:
             name = f"{request.url.scheme}://localhost:{request.scope['server'][1]}"
             return PlainTextResponse(f"Open the dashboard as {name}\n", status_code=403)
-        token = await self._given(request)
-        if self._gate.knows(token):
+        token = await self._submitted(request)
+        if self._credentials.is_token(token):
             answer = RedirectResponse("/", status_code=303)
             answer.set_cookie(
-                COOKIE, self._gate.badge, httponly=True, samesite="strict", secure=self._secure
+                COOKIE,
+                self._credentials.cookie,
+                httponly=True,
+                samesite="strict",
+                secure=self._secure,
             )
             return answer
         if token:
-            await asyncio.sleep(WRONG_S)
-        return HTMLResponse(asking(wrong=bool(token)), status_code=401)
+            await asyncio.sleep(WRONG_TOKEN_DELAY_S)
+        return HTMLResponse(token_page(wrong=bool(token)), status_code=401)
 
-    async def _given(self, request: Request) -> str:
+    async def _submitted(self, request: Request) -> str:
         if request.method != "POST":
             return request.query_params.get("token", "")
         body = b""
@@ -107,28 +117,28 @@ def _is_reserved(connection: Connection | None) -> bool:
     return connection is not None and connection.place is Place.RESERVE
 
 
-def _guarded(connection: Connection | None, send: Send) -> Send:
-    """Return ``send`` with our headers; a WebSocket that is accepted loses its deadline."""
+def _with_headers(connection: Connection | None, send: Send) -> Send:
+    """Return ``send`` with the response headers; an accepted WebSocket has no deadline."""
 
-    async def guarded(message: Message) -> None:
+    async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             MutableHeaders(scope=message).update(HEADERS)
         elif message["type"] == "websocket.accept" and connection is not None:
-            connection.settle()
+            connection.lift_deadline()
         await send(message)
 
-    return guarded
+    return send_with_headers
 
 
-def _refuse(is_socket: bool, why: str) -> ASGIApp:
+def _refuse(is_socket: bool, reason: str) -> ASGIApp:
     async def close(_: Scope, __: Receive, send: Send) -> None:
         await send({"type": "websocket.close", "code": 1008})
 
-    return close if is_socket else PlainTextResponse(f"{why}\n", 503, {"retry-after": "1"})
+    return close if is_socket else PlainTextResponse(f"{reason}\n", 503, {"retry-after": "1"})
 
 
-def asking(wrong: bool) -> str:
-    """Return the page that asks for the token."""
+def token_page(wrong: bool) -> str:
+    """Return the HTML of the token page."""
     lines = [html.escape(text) for text in TEXTS["token_wrong" if wrong else "token_ask"]]
     return f"""<!doctype html><meta charset=utf-8><title>T2</title>
 <meta name=viewport content="width=device-width, initial-scale=1">

@@ -1,7 +1,7 @@
-"""What a browser may say, as tagged JSON; what is not one of these is refused.
+"""Messages from the browser, as tagged JSON; any other message is refused.
 
 ``n`` is the number of the snapshot that a message answers: see ``driver_lock.py`` for a hold and
-``snapshot_log.py`` for a reset or a switch.
+``snapshot.SentSnapshots`` for a reset or a switch.
 """
 
 from typing import Annotated
@@ -15,31 +15,31 @@ ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
 ROBOT_OR_NONE = r"^[A-Za-z0-9_.-]{0,64}\Z"
 
 
-class Word(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_unknown_fields=True):
-    """One thing that a viewer says."""
+class ClientMessage(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_unknown_fields=True):
+    """A message from a viewer."""
 
 
-class Look(Word, frozen=True):
-    """Look at this robot from now on, under this name."""
+class Look(ClientMessage, frozen=True):
+    """Select a robot, and set the viewer's name."""
 
     robot: Annotated[str, Meta(pattern=ROBOT)]
     name: Annotated[str, Meta(max_length=24)] = ""
 
 
-class Take(Word, frozen=True):
-    """Take the wheel; with force from somebody else, too."""
+class Take(ClientMessage, frozen=True):
+    """Take the driver lock; with ``force`` also from another viewer."""
 
     force: bool = False
 
 
-class Leave(Word, frozen=True):
-    """Leave the wheel."""
+class Leave(ClientMessage, frozen=True):
+    """Free the driver lock."""
 
 
-class Hold(Word, frozen=True):
-    """The controls that are held, in answer to picture ``n``; x is forward, y counter-clockwise.
+class Hold(ClientMessage, frozen=True):
+    """The held controls, in answer to snapshot ``n``; x is forward, y counter-clockwise.
 
-    With ``release`` the vehicle moves slowly off a pressed bumper instead, in that direction.
+    With ``release`` the vehicle moves slowly off a pressed bumper instead, in this direction.
     """
 
     n: int
@@ -48,39 +48,39 @@ class Hold(Word, frozen=True):
     release: Direction | None = None
 
 
-class Free(Word, frozen=True):
-    """The hand is off."""
+class Free(ClientMessage, frozen=True):
+    """All controls are released."""
 
 
-class Gear(Word, frozen=True):
+class Gear(ClientMessage, frozen=True):
     """Change the gear."""
 
     gear: Annotated[int, Meta(ge=1, le=GEARS)]
 
 
-class Estop(Word, frozen=True):
-    """Stop a robot, and latch it; any viewer may. Without a robot: the one that is looked at."""
+class Estop(ClientMessage, frozen=True):
+    """Emergency stop, latched, from any viewer; without a robot: the selected one."""
 
     robot: Annotated[str, Meta(pattern=ROBOT_OR_NONE)] = ""
 
 
-class Reset(Word, frozen=True):
-    """Request a reset of the causes that are latched in picture ``n``."""
+class Reset(ClientMessage, frozen=True):
+    """Reset the causes that are latched in snapshot ``n``."""
 
-    n: int = 0  # not the number of a picture
+    n: int = 0  # not the number of a snapshot
 
 
-class Switch(Word, frozen=True):
-    """Set the board's emergency brakes, as an operator who saw picture ``n``."""
+class Switch(ClientMessage, frozen=True):
+    """Set the board's emergency brakes, as an operator who saw snapshot ``n``."""
 
     to: SwitchesRequest
     n: int = 0
 
 
-class Lamp(Word, frozen=True):
+class Lamp(ClientMessage, frozen=True):
     """Set one lamp channel."""
 
     to: LedRequest
 
 
-AnyWord = Look | Take | Leave | Hold | Free | Gear | Estop | Reset | Switch | Lamp
+AnyMessage = Look | Take | Leave | Hold | Free | Gear | Estop | Reset | Switch | Lamp

@@ -12,15 +12,15 @@ GEARS = 5
 
 
 class Dashboard(settings.Section, frozen=True, kw_only=True):
-    """Where the page is served, and how fast its gears are.
+    """Settings of the web server and of driving.
 
-    A reverse proxy and Docker's port forwarding have one address for everybody: give
-    ``connections_per_address`` the value of ``connections`` behind these.
+    A reverse proxy and Docker's port forwarding use one address for all clients. Behind these, set
+    ``connections_per_address`` to the value of ``connections``.
 
-    A token stands in a file and not among the settings, because these are answered on the bus.
+    The token is in a file and not in the settings, because the settings are published on the bus.
     """
 
-    host: str = "127.0.0.1"  # 0.0.0.0 for everybody on the network, who then need a token
+    host: str = "127.0.0.1"  # 0.0.0.0 for the whole network, which then needs a token
     port: settings.Port = 8080
     token_file: str = ""  # one line; empty: a new token at each start, which is printed
     certificate: str = ""  # PEM files for https; both or none
@@ -28,7 +28,7 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "web"
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
-    round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a browser's later echo lets go
+    round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a hold with a longer one lapses
     call_round_trip: Annotated[float, Meta(ge=0.2, le=2.0)] = 1.0  # s; of a reset or a switch
     messages_per_second: Annotated[float, Meta(ge=30.0, le=500.0)] = 60.0  # of one browser
     connections: Annotated[int, Meta(ge=8, le=512)] = 128
@@ -45,11 +45,11 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
             if len(gears) != GEARS or list(gears) != sorted(gears):
                 raise ValueError(f"{name} {list(gears)} should be {GEARS} rising speeds")
         if bool(self.certificate) != bool(self.private_key):
-            raise ValueError("certificate and private_key belong together: give both or none")
+            raise ValueError("certificate and private_key must be set together: set both or none")
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can reach the page."""
+        """Whether only this host can open the page."""
         return ip_address(self.host).is_loopback
 
 

@@ -1,8 +1,8 @@
-"""Who may come in: the browser's own page only, and beyond this machine only with the token.
+"""Credentials of a request: the dashboard's own page only, and from other hosts with the token.
 
-A web page of anybody's, open in the same browser, can reach ``localhost``, too. It cannot lie about
-its origin, so that has to be ours; and where no token is asked for, the host has to be this machine
-by name, so that a name that somebody else bends to 127.0.0.1 opens nothing.
+Any web page that is open in the same browser can send requests to ``localhost``, too. It cannot
+forge its origin, so the origin must be the dashboard's. Without a token the host name must be a
+name of this host: DNS rebinding, which points another name to 127.0.0.1, is refused.
 """
 
 import hashlib
@@ -18,36 +18,36 @@ LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
 
 
 @dataclass(frozen=True, slots=True)
-class Gate:
-    """The rule; an empty token lets in whoever is on this machine."""
+class Credentials:
+    """The rules for a request; an empty token admits all programs of this host."""
 
     token: str = ""
 
-    def knows(self, token: str) -> bool:
-        """Tell whether this is the token, in a time that does not tell how much of it is right."""
+    def is_token(self, token: str) -> bool:
+        """Return whether this is the token; compared in constant time."""
         return hmac.compare_digest(token.encode(), self.token.encode())
 
     @property
-    def badge(self) -> str:
-        """What the cookie holds: it proves the token and does not show it."""
+    def cookie(self) -> str:
+        """The value of the cookie: a hash of the token."""
         return hashlib.sha256(f"t2 dashboard {self.token}".encode()).hexdigest()
 
-    def lets_in(self, headers: Mapping[str, str]) -> bool:
-        """Tell whether a request may see the page, by its cookie or by where it comes from."""
+    def may_view(self, headers: Mapping[str, str]) -> bool:
+        """Return whether a request may view the page, by its cookie or by its host."""
         if not self.token:
             return host_name(headers.get("host", "")) in LOCAL_NAMES
         pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
-        badge = next((value for name, _, value in pairs if name == COOKIE), "")
-        return hmac.compare_digest(badge.encode(), self.badge.encode())
+        cookie = next((value for name, _, value in pairs if name == COOKIE), "")
+        return hmac.compare_digest(cookie.encode(), self.cookie.encode())
 
-    def lets_act(self, headers: Mapping[str, str]) -> bool:
-        """Tell whether it may drive and stop, too: it has to come from our own page."""
+    def may_act(self, headers: Mapping[str, str]) -> bool:
+        """Return whether a request may drive and stop: it must come from the dashboard's page."""
         origin = headers.get("origin", "").partition("://")[2]
-        return self.lets_in(headers) and bool(origin) and origin == headers.get("host")
+        return self.may_view(headers) and bool(origin) and origin == headers.get("host")
 
 
 def host_name(host: str) -> str:
-    """Return a Host header's name, without its port; empty when it is none."""
+    """Return the name in a Host header, without its port; empty if it is invalid."""
     try:
         return urlsplit(f"//{host}").hostname or ""
     except ValueError:
@@ -55,5 +55,5 @@ def host_name(host: str) -> str:
 
 
 def new_token() -> str:
-    """Return a token that nobody guesses."""
+    """Return a random token."""
     return secrets.token_urlsafe(12)

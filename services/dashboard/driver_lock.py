@@ -1,22 +1,22 @@
-"""Who of the viewers drives, and whether what they hold still counts.
+"""The driver lock: which viewer drives a robot, and whether its hold is still valid.
 
-One viewer has the wheel; the others watch. To take it from somebody takes a second word, ``force``.
+One viewer has the driver lock; the others watch. Another viewer takes it over with ``force``.
 
-A browser may hang, be put in the background, or sit behind a network that delivers late. So a
-hold is never taken on trust: every picture that goes out has a number, the browser answers each
-with what is held, and the hold counts only while the picture that it answers to is younger than
-the round trip that is allowed:
+A browser may hang, run in the background, or sit behind a network that delivers late. So every
+snapshot that is sent has a number, and the browser answers each one with the controls that it
+holds. A hold is valid only while the snapshot that it answers is younger than the allowed round
+trip:
 
-========= ===================== ============================== ====================
-state     hold, young picture   hold, old or unknown picture   no hold in time
-========= ===================== ============================== ====================
-FREE      HELD                  FREE, refused                  FREE
-HELD      HELD                  HELD, refused                  LAPSED
-LAPSED    LAPSED, refused       LAPSED, refused                LAPSED
-========= ===================== ============================== ====================
+========= ===================== =============================== ====================
+state     hold, young snapshot  hold, old or unknown snapshot   no hold in time
+========= ===================== =============================== ====================
+FREE      HELD                  FREE, refused                   FREE
+HELD      HELD                  HELD, refused                   LAPSED
+LAPSED    LAPSED, refused       LAPSED, refused                 LAPSED
+========= ===================== =============================== ====================
 
-``let_go`` leads to FREE from everywhere. After a lapse it is wanted before a hold counts again:
-what comes back after a gap is an old wish.
+``let_go`` leads to FREE from any state. After a lapse it is required before the next hold: a hold
+that returns after a gap is an old request.
 """
 
 from collections import deque
@@ -28,11 +28,11 @@ from common.freshness import NS_PER_S
 from common.messages import Direction
 from common.motion import clamp
 
-PICTURES = 64  # whose times are kept, 3 s of them; an older one is too old for any setting
+SNAPSHOTS_KEPT = 64  # 3 s; an older one is too old for any setting
 
 
-class Grip(Enum):
-    """What the driver's hand does."""
+class HoldState(Enum):
+    """The state of the driver's hold."""
 
     FREE = "free"
     HELD = "held"
@@ -41,28 +41,28 @@ class Grip(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """How far the driver pushes, -1..1: forward and counter-clockwise positive."""
+    """The driver's deflection, -1..1: forward and counter-clockwise positive."""
 
     linear: float = 0.0
     angular: float = 0.0
-    release: Direction | None = None  # off a pressed bumper that way, instead of driving
+    release: Direction | None = None  # off a pressed bumper in this direction, instead of driving
 
 
 @dataclass
-class Wheel:
-    """The one wheel of one robot on this dashboard."""
+class DriverLock:
+    """The driver lock of one robot on this dashboard."""
 
     round_trip_s: float
     driver: str | None = None  # a viewer
-    grip: Grip = Grip.FREE
+    state: HoldState = HoldState.FREE
     push: Push = field(default_factory=Push)
     gear: int = 1
-    answered: int = 0  # the newest picture that a hold answered to
-    _sent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=PICTURES))
-    _seen_ns: int = 0  # when the newest picture that was answered had been sent
+    answered: int = 0  # the newest snapshot that a hold answered
+    _sent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT))
+    _answered_ns: int = 0  # when the newest answered snapshot was sent
 
     def take(self, viewer: str, force: bool) -> bool:
-        """Give the wheel to a viewer, unless another one has it and it is not forced."""
+        """Give the lock to a viewer, unless another one has it and ``force`` is not set."""
         if self.driver not in (None, viewer) and not force:
             return False
         if self.driver != viewer:
@@ -71,45 +71,47 @@ class Wheel:
         return True
 
     def leave(self, viewer: str) -> None:
-        """Take the wheel away from a viewer who leaves it, or who is gone."""
+        """Free the lock if this viewer has it."""
         if self.driver == viewer:
             self.let_go(viewer)
             self.driver = None
 
-    def sent(self, picture: int, now_ns: int) -> None:
-        """Note that a picture goes out to the viewers now."""
-        self._sent.append((picture, now_ns))
+    def sent(self, number: int, now_ns: int) -> None:
+        """Note that a snapshot is sent to the viewers now."""
+        self._sent.append((number, now_ns))
 
-    def hold(self, viewer: str, picture: int, push: Push, now_ns: int) -> bool:
-        """Take what a browser holds in answer to a picture; tell whether it counts."""
-        sent_ns = next((at_ns for number, at_ns in self._sent if number == picture), None)
+    def hold(self, viewer: str, snapshot: int, push: Push, now_ns: int) -> bool:
+        """Handle a browser's hold in answer to a snapshot; return whether it is valid."""
+        sent_ns = next((at_ns for number, at_ns in self._sent if number == snapshot), None)
         if viewer != self.driver or not finite(push.linear, push.angular) or sent_ns is None:
             return False
-        if self.grip is Grip.LAPSED or now_ns - sent_ns > self.round_trip_s * NS_PER_S:
+        if self.state is HoldState.LAPSED or now_ns - sent_ns > self.round_trip_s * NS_PER_S:
             return False
-        if self.grip is Grip.HELD and sent_ns < self._seen_ns:
-            return False  # overtaken by a newer one
-        self.grip, self._seen_ns, self.answered = Grip.HELD, sent_ns, picture
+        if self.state is HoldState.HELD and sent_ns < self._answered_ns:
+            return False  # reordered: a newer one was received before
+        self.state, self._answered_ns, self.answered = HoldState.HELD, sent_ns, snapshot
         self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
         return True
 
     def let_go(self, viewer: str) -> None:
-        """Take the hand off the wheel."""
+        """End the driver's hold."""
         if viewer == self.driver:
-            self.grip, self.push = Grip.FREE, Push()
+            self.state, self.push = HoldState.FREE, Push()
 
     def lapse(self) -> None:
-        """Let go, and want it let go by hand, too."""
-        if self.grip is Grip.HELD:
-            self.grip, self.push = Grip.LAPSED, Push()
+        """End the hold and require ``let_go`` before the next one."""
+        if self.state is HoldState.HELD:
+            self.state, self.push = HoldState.LAPSED, Push()
 
     def held(self, now_ns: int) -> Push | None:
-        """Return what is held now; a hold whose round trip is overdue lapses."""
-        if self.grip is Grip.HELD and now_ns - self._seen_ns > self.round_trip_s * NS_PER_S:
+        """Return the valid hold, or None; a hold whose round trip is overdue lapses."""
+        if self.state is HoldState.HELD and (
+            now_ns - self._answered_ns > self.round_trip_s * NS_PER_S
+        ):
             self.lapse()
-        return self.push if self.grip is Grip.HELD else None
+        return self.push if self.state is HoldState.HELD else None
 
     def shift(self, viewer: str, gear: int) -> None:
-        """Change the gear."""
+        """Change the gear, as the driver."""
         if viewer == self.driver:
             self.gear = gear

@@ -1,7 +1,7 @@
-"""The robots that are there and the viewers that look at them; everything in the node's loop.
+"""All robots and their viewers; in the node's loop.
 
-The web server lives in another thread. It posts what its viewers say, and takes what they are to
-see: a picture is encoded once and goes to all who look at that robot.
+The web server runs in another thread. It posts the viewers' messages to this loop and receives what
+they are to show. A snapshot is encoded once and sent to all viewers of its robot.
 """
 
 import re
@@ -19,20 +19,20 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.messages import Level, SafetyState
 from common.service import Node
-from services.dashboard import client_messages as w
-from services.dashboard import snapshot
+from services.dashboard import client_messages as client
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import Push
 from services.dashboard.robot import Robot
+from services.dashboard.snapshot import event_lines, fast_snapshot, slow_snapshot
 
 PERIOD_S = 0.05
-REST_TICKS = 10  # between two pictures of what stands still
-UNWANTED_S = 30.0  # after which a robot that nobody looks at is let go
-ROBOTS_MAX = 16  # that may be looked at; each has a session of its own
+SLOW_TICKS = 10  # between two slow snapshots
+IDLE_S = 30.0  # after which a robot without viewers is closed
+ROBOTS_MAX = 16  # open at the same time; each has a session of its own
 
-# Takes the viewers, the text, and whether a newer one may take its place while it waits.
-Show = Callable[[Collection[str], bytes, bool], None]
+# Takes the viewers, the text, and whether it replaces an older one that still waits.
+Send = Callable[[Collection[str], bytes, bool], None]
 
 
 @dataclass
@@ -41,75 +41,75 @@ class Viewer:
 
     name: str
     robot: str
-    told: int = -1  # events of that robot which it has been shown
-    greeted: bool = False  # whether it has been shown where that robot was
+    events_sent: int = -1  # the robot's event count when they were last sent
+    has_trail: bool = False
 
 
 class Fleet:
-    """Takes in what viewers say and draws their pictures."""
+    """Handles the viewers' messages and sends their snapshots."""
 
-    def __init__(self, node: Node[DashboardConfig], show: Show) -> None:
+    def __init__(self, node: Node[DashboardConfig], send: Send) -> None:
         self._node = node
         self._settings = node.config.dashboard
         self._vehicle = node.config.vehicle
-        self._show = show
+        self._send_text = send
         self._viewers: dict[str, Viewer] = {}
         self._robots: dict[str, Robot] = {}
         self._alive: dict[str, set[str]] = {node.config.robot.id: set()}
-        # Random start: a message to an earlier dashboard matches no picture of this one.
+        # Random start: a message to an earlier dashboard matches no snapshot of this one.
         self._number = secrets.randbits(31)
-        self._newcomers = 0
+        self._joined = 0
         self._leaving = False
         node.bus.watch_live(keys.live_key("*", "*", "*"), self._note_alive)
         node.loop.every(PERIOD_S, self.tick)
 
-    # --- what the server calls, posted ----------------------------------------------------------
+    # --- called by the server, posted -----------------------------------------------------------
 
     def join(self, viewer: str) -> None:
-        """Take a browser in; it looks at the settings' robot until it says otherwise."""
-        self._newcomers += 1
-        self._viewers[viewer] = Viewer(f"{self._newcomers}", self._node.config.robot.id)
+        """Add a browser; it shows the robot of the settings until it selects another one."""
+        self._joined += 1
+        self._viewers[viewer] = Viewer(f"{self._joined}", self._node.config.robot.id)
 
     def leave(self, viewer: str) -> None:
-        """Let a browser go, and the wheel that it has."""
+        """Remove a browser and free its driver lock."""
         gone = self._viewers.pop(viewer, None)
         if gone and gone.robot in self._robots:
-            self._robots[gone.robot].wheel.leave(viewer)
+            self._robots[gone.robot].driver_lock.leave(viewer)
 
-    def take_in(self, viewer: str, word: w.AnyWord) -> None:
-        """Do what a viewer says."""
+    def handle(self, viewer: str, message: client.AnyMessage) -> None:
+        """Handle a viewer's message."""
         if viewer not in self._viewers or self._leaving:
             return
-        if isinstance(word, w.Look):
-            self._look(viewer, word)
+        if isinstance(message, client.Look):
+            self._select(viewer, message)
             return
-        if isinstance(word, w.Estop):
-            self._estop(viewer, word.robot or self._viewers[viewer].robot)
+        if isinstance(message, client.Estop):
+            self._estop(viewer, message.robot or self._viewers[viewer].robot)
             return
         robot = self._robot_of(viewer)
-        if isinstance(word, w.Take):
-            self._take(viewer, robot, word.force)
-        elif robot.wheel.driver == viewer:
-            self._drive(viewer, robot, word)
-        elif not isinstance(word, w.Hold | w.Free | w.Leave):
-            self._tell(viewer, "warning", "take_first")
+        if isinstance(message, client.Take):
+            self._take(viewer, robot, message.force)
+        elif robot.driver_lock.driver == viewer:
+            self._drive(viewer, robot, message)
+        elif not isinstance(message, client.Hold | client.Free | client.Leave):
+            self._notify(viewer, "warning", "take_first")
 
-    def estop(self, robot: str, who: str) -> None:
-        """Stop a robot that ``knows`` accepts; needs no viewer's connection."""
+    def estop(self, robot: str, requested_by: str) -> None:
+        """Stop a robot that ``knows`` accepts; needs no viewer."""
         if robot == self._node.config.robot.id:
             self._node.bus.estop()  # at once: this session is always open
-        self._open(robot).estop(who)
+        self._open(robot).estop(requested_by)
 
-    # --- what the server asks, from its own thread ----------------------------------------------
+    # --- called by the server in its own thread -------------------------------------------------
 
     def knows(self, robot: str) -> bool:
-        """Return whether it is the settings' robot, was seen alive, or is looked at."""
+        """Return whether the robot is in the settings, was alive before, or has viewers."""
         return robot in self._alive or robot in self._robots
 
     # --- the loop -------------------------------------------------------------------------------
 
     def tick(self, now_ns: int) -> None:
-        """Draw what is looked at, and let every robot ask what is due."""
+        """Send the requests of all robots and the snapshots to all viewers."""
         self._number += 1
         for robot in self._robots.values():
             robot.tick(now_ns)
@@ -118,17 +118,17 @@ class Fleet:
                 self._node.loop.stop()
             return
         for name in {viewer.robot for viewer in self._viewers.values()}:
-            self._draw(name, self._open(name), now_ns)
+            self._send_snapshots(name, self._open(name), now_ns)
         for name, robot in list(self._robots.items()):
-            if now_ns - robot.wanted_ns > UNWANTED_S * NS_PER_S and robot.silent:
-                self._forget(name, robot)
+            if now_ns - robot.used_ns > IDLE_S * NS_PER_S and robot.silent:
+                self._close(name, robot)
 
-    def _draw(self, name: str, robot: Robot, now_ns: int) -> None:
+    def _send_snapshots(self, name: str, robot: Robot, now_ns: int) -> None:
         here = {key: viewer for key, viewer in self._viewers.items() if viewer.robot == name}
         names = {key: viewer.name for key, viewer in here.items()}
-        moving = snapshot.now(
-            robot.heard,
-            robot.wheel,
+        fast = fast_snapshot(
+            robot.telemetry,
+            robot.driver_lock,
             now_ns,
             number=self._number,
             names=names,
@@ -136,46 +136,51 @@ class Fleet:
             vehicle=self._vehicle,
             protection=robot.protection,
         )
-        robot.wheel.sent(self._number, now_ns)
-        robot.snapshots.sent(self._number, robot.heard.newest(keys.SAFETY, now_ns), now_ns)
-        robot.wanted_ns = now_ns
-        self._send(here, moving, newer_wins=True)
-        if self._number % REST_TICKS == 0:
-            robot.heard.count(now_ns)
+        robot.driver_lock.sent(self._number, now_ns)
+        robot.snapshots.sent(self._number, robot.telemetry.newest(keys.SAFETY, now_ns), now_ns)
+        robot.used_ns = now_ns
+        self._send(here, fast, replaces=True)
+        if self._number % SLOW_TICKS == 0:
+            robot.telemetry.update_rates(now_ns)
             robots = sorted({*self._alive, *self._robots})
             alive = {each: bool(self._alive.get(each)) for each in robots}
-            still = snapshot.rest(robot.heard, alive, names, robot.protection, now_ns)
-            self._send(here, still, newer_wins=True)
-        if not robot.said_path:
-            robot.said_path = True
-            self._send_path(here, robot)
-        late = [key for key, viewer in here.items() if viewer.told != robot.heard.told]
-        if late and self._number % REST_TICKS == 1:
-            self._send(late, {"k": "events", "lines": snapshot.told(robot.heard)})
+            slow = slow_snapshot(robot.telemetry, alive, names, robot.protection, now_ns)
+            self._send(here, slow, replaces=True)
+        if not robot.trail_sent:
+            robot.trail_sent = True
+            self._send_trail(here, robot)
+        if self._number % SLOW_TICKS == 1:
+            self._send_events(here, robot)
+
+    def _send_events(self, here: dict[str, Viewer], robot: Robot) -> None:
+        count = robot.telemetry.event_count
+        late = [key for key, viewer in here.items() if viewer.events_sent != count]
+        if late:
+            self._send(late, {"k": "events", "lines": event_lines(robot.telemetry)})
             for key in late:
-                here[key].told = robot.heard.told
+                here[key].events_sent = count
 
     def end(self) -> None:
-        """Let every wheel go; the loop stops after the last zeros."""
+        """Free all driver locks; the loop stops after the final zeros."""
         self._leaving = True
         for robot in self._robots.values():
-            robot.rest()
+            robot.release_driver()
 
     def close(self) -> None:
-        """End every robot's session."""
+        """Close every robot's session."""
         for robot in self._robots.values():
             robot.bus.close()
 
     # --- viewers --------------------------------------------------------------------------------
 
-    def _look(self, viewer: str, word: w.Look) -> None:
+    def _select(self, viewer: str, message: client.Look) -> None:
         one = self._viewers[viewer]
-        if word.robot not in self._robots and len(self._robots) >= ROBOTS_MAX:
-            self._tell(viewer, "warning", "too_many_robots")
-        elif one.robot != word.robot:
-            self._robot_of(viewer).wheel.leave(viewer)
-            one.robot, one.greeted = word.robot, False
-        one.name = word.name.strip() or one.name
+        if message.robot not in self._robots and len(self._robots) >= ROBOTS_MAX:
+            self._notify(viewer, "warning", "too_many_robots")
+        elif one.robot != message.robot:
+            self._robot_of(viewer).driver_lock.leave(viewer)
+            one.robot, one.has_trail = message.robot, False
+        one.name = message.name.strip() or one.name
         robot = self._robot_of(viewer)
         hello = {
             "k": "hello",
@@ -186,71 +191,71 @@ class Fleet:
             "gears": self._settings.gears_linear,
         }
         self._send([viewer], hello)
-        if not one.greeted:  # a new name alone brings back no trail that was cleared
-            one.greeted, one.told = True, -1
-            self._send_path([viewer], robot)
+        if not one.has_trail:  # a new name alone restores no trail that the viewer has cleared
+            one.has_trail, one.events_sent = True, -1
+            self._send_trail([viewer], robot)
 
     def _take(self, viewer: str, robot: Robot, force: bool) -> None:
-        before = robot.wheel.driver
-        if not robot.wheel.take(viewer, force):
-            who = self._viewers[before].name if before in self._viewers else ""
-            self._send([viewer], {"k": "ask", "who": who})
+        before = robot.driver_lock.driver
+        if not robot.driver_lock.take(viewer, force):
+            name = self._viewers[before].name if before in self._viewers else ""
+            self._send([viewer], {"k": "taken", "by": name})
         elif before not in (None, viewer):
-            self._tell(str(before), "warning", "taken_over")
+            self._notify(str(before), "warning", "taken_over")
 
     def _estop(self, viewer: str, robot: str) -> None:
         if self.knows(robot):
             self.estop(robot, self._viewers[viewer].name)
         else:
-            self._tell(viewer, "error", "estop_unknown")
+            self._notify(viewer, "error", "estop_unknown")
 
-    def _drive(self, viewer: str, robot: Robot, word: w.AnyWord) -> None:
-        wheel = robot.wheel
-        match word:
-            case w.Hold(n, x, y, release):
-                wheel.hold(viewer, n, Push(x, y, release), time.monotonic_ns())
-            case w.Free():
-                wheel.let_go(viewer)
-            case w.Leave():
-                wheel.leave(viewer)
-            case w.Gear(gear):
-                wheel.shift(viewer, gear)
+    def _drive(self, viewer: str, robot: Robot, message: client.AnyMessage) -> None:
+        lock = robot.driver_lock
+        match message:
+            case client.Hold(n, x, y, release):
+                lock.hold(viewer, n, Push(x, y, release), time.monotonic_ns())
+            case client.Free():
+                lock.let_go(viewer)
+            case client.Leave():
+                lock.leave(viewer)
+            case client.Gear(gear):
+                lock.shift(viewer, gear)
             case _:
-                self._call(viewer, robot, word)
+                self._call(viewer, robot, message)
 
-    def _call(self, viewer: str, robot: Robot, word: w.AnyWord) -> None:
-        tell = partial(self._tell, viewer)
-        match word:
-            case w.Reset(n):
+    def _call(self, viewer: str, robot: Robot, message: client.AnyMessage) -> None:
+        notify = partial(self._notify, viewer)
+        match message:
+            case client.Reset(n):
                 if seen := self._seen(viewer, robot, n):
-                    robot.reset(seen, tell)
-            case w.Switch(to, n):
+                    robot.reset(seen, notify)
+            case client.Switch(to, n):
                 if seen := self._seen(viewer, robot, n):
-                    robot.switch(seen, to, tell)
-            case w.Lamp(to):
-                robot.call(keys.SET_LED, to, tell)
+                    robot.switch(seen, to, notify)
+            case client.Lamp(to):
+                robot.call(keys.SET_LED, to, notify)
 
     def _seen(self, viewer: str, robot: Robot, number: int) -> SafetyState | None:
-        """Return what the viewer saw of safety; refuse a late command, with a message."""
+        """Return the state of safety that the viewer saw; refuse a late command with a notice."""
         limit_s = self._settings.call_round_trip
         seen = robot.snapshots.seen(number, time.monotonic_ns(), limit_s)
         if seen is None:
-            self._tell(viewer, "warning", "too_late")
+            self._notify(viewer, "warning", "too_late")
         return seen
 
-    def _tell(self, viewer: str, level: Level, text: str) -> None:
-        self._send([viewer], {"k": "told", "level": level, "text": text})
+    def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
+        self._send([viewer], notice(level, text, about))
 
-    def _broadcast(self, robot: str, level: Level, text: str) -> None:
+    def _broadcast(self, robot: str, level: Level, text: str, about: str = "") -> None:
         here = [key for key, viewer in self._viewers.items() if viewer.robot == robot]
-        self._send(here, {"k": "told", "level": level, "text": text})
+        self._send(here, notice(level, text, about))
 
-    def _send_path(self, viewers: Collection[str], robot: Robot) -> None:
+    def _send_trail(self, viewers: Collection[str], robot: Robot) -> None:
         self._send(viewers, {"k": "path", "points": list(robot.trail.points)})
 
-    def _send(self, viewers: Collection[str], what: object, newer_wins: bool = False) -> None:
+    def _send(self, viewers: Collection[str], message: object, replaces: bool = False) -> None:
         if viewers:
-            self._show(list(viewers), msgspec.json.encode(what), newer_wins)
+            self._send_text(list(viewers), msgspec.json.encode(message), replaces)
 
     # --- robots ---------------------------------------------------------------------------------
 
@@ -262,21 +267,26 @@ class Fleet:
             node = self._node
             bus = Bus(node.config.bus, name, node.loop.post)
             broadcast = partial(self._broadcast, name)
-            self._robots[name] = Robot(bus, self._settings, broadcast, self._tell)
+            self._robots[name] = Robot(bus, self._settings, broadcast, self._notify)
             bus.open()
-        self._robots[name].wanted_ns = time.monotonic_ns()
+        self._robots[name].used_ns = time.monotonic_ns()
         return self._robots[name]
 
-    def _forget(self, name: str, robot: Robot) -> None:
+    def _close(self, name: str, robot: Robot) -> None:
         if not robot.bus.connected:
-            return  # it may be given its session this moment; no router, no harm
+            return  # its session may be opening at this moment; without a router it costs nothing
         del self._robots[name]
-        # Aside: to end a session takes its time, and others are being driven.
+        # In a thread: closing a session takes time while other robots are being driven.
         threading.Thread(target=robot.bus.close, name=f"close {name}").start()
 
     def _note_alive(self, key: str, alive: bool) -> None:
         robot = key.split("/")[2]
         if not re.match(ROBOT, robot):
-            return  # no viewer could ask for it
+            return  # no viewer could select it
         tokens = self._alive.setdefault(robot, set())
         (tokens.add if alive else tokens.discard)(key)
+
+
+def notice(level: Level, text: str, about: str) -> dict[str, str]:
+    """Return a notice: a text or its key in ``i18n``, and the key of the result it explains."""
+    return {"k": "notice", "level": level, "text": text, "about": about}

@@ -1,7 +1,7 @@
 """The dashboard's process: the node's loop in a thread of its own, the web server in the main one.
 
-So a slow browser never delays a zero. The end of either ends the other: a signal ends the server,
-then the loop comes to rest with zeros; an error of ours in the loop ends the server, too.
+A slow browser therefore never delays a zero request. The end of either ends the other: a signal
+stops the server, then the loop sends its final zeros; an exception in the loop stops the server.
 """
 
 import signal
@@ -16,47 +16,47 @@ from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
 from services.dashboard.config import Dashboard, DashboardConfig
-from services.dashboard.credentials import TOKEN_MIN, Gate, new_token
+from services.dashboard.credentials import TOKEN_MIN, Credentials, new_token
 from services.dashboard.fleet import Fleet
 from services.dashboard.server import listen, reachable, serving
-from services.dashboard.websocket_hub import Viewers
+from services.dashboard.websocket_hub import WebSocketHub
 
 
 class Host:
-    """One run of the dashboard."""
+    """The dashboard's process: node, fleet and web server."""
 
     def __init__(self, loaded: Loaded[DashboardConfig]) -> None:
         settings = loaded.config.dashboard
-        self._gate = Gate(token(settings))
+        self._credentials = Credentials(token(settings))
         check_certificate(settings)
         self._socket = listen(settings)
         log.configure(loaded.config.log, "dashboard")
         self._node = node = Node("dashboard", loaded)
-        # Counted by the server's thread and read by the node's: all names exist from the start.
+        # The server's thread counts, the node's reads: all names exist from the start.
         node.counters = self._socket.counters
-        viewers = Viewers(node.loop.post, settings.messages_per_second, node.counters)
-        self._fleet = viewers.fleet = Fleet(node, viewers.show)
+        hub = WebSocketHub(node.loop.post, settings.messages_per_second, node.counters)
+        self._fleet = hub.fleet = Fleet(node, hub.send)
         node.announce()
         self._systemd = Systemd()
         self._server = serving(
             settings,
             loaded.config.robot.id,
-            self._gate,
-            viewers,
+            self._credentials,
+            hub,
             self._socket,
             alive=self._alive,
         )
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._serve, name="fleet")
 
-    def lead(self) -> int:
-        """Run the server in front of the loop, and return the exit code."""
+    def run(self) -> int:
+        """Run the server in the main thread and return the exit code."""
         for number in (signal.SIGINT, signal.SIGTERM):
-            # The server takes the signal, and passes it on to here when it has ended.
+            # The server handles the signal and raises it again when it has ended.
             signal.signal(number, lambda *_: None)
         self._node.bus.open()
         self._thread.start()
-        self._say_where()
+        self._log_address()
         try:
             self._server.run(sockets=[self._socket])
         finally:
@@ -68,7 +68,7 @@ class Host:
         return 0
 
     def _alive(self) -> None:
-        """Tell systemd by way of both loops, the server's and the node's: both must work."""
+        """Notify systemd through both loops, the server's and the node's: both must work."""
         self._node.loop.post(lambda: self._systemd.ready(time.monotonic_ns()))
 
     def _serve(self) -> None:
@@ -82,17 +82,17 @@ class Host:
         self._node.loop.close()
         self._node.log.info("stopped")
 
-    def _say_where(self) -> None:
+    def _log_address(self) -> None:
         settings = self._node.config.dashboard
         scheme = "https" if settings.certificate else "http"
-        where = f"{scheme}://{reachable(settings.host)}:{settings.port}/"
-        if self._gate.token and not settings.token_file:
-            where += f"?token={self._gate.token}"
-        self._node.log.info("started", robot=self._node.config.robot.id, open=where)
+        url = f"{scheme}://{reachable(settings.host)}:{settings.port}/"
+        if self._credentials.token and not settings.token_file:
+            url += f"?token={self._credentials.token}"
+        self._node.log.info("started", robot=self._node.config.robot.id, open=url)
 
 
 def token(settings: Dashboard) -> str:
-    """Return the token to ask for: none on this machine alone, else the file's or a new one."""
+    """Return the required token: none for this host alone, else the file's or a new one."""
     if not settings.token_file:
         return "" if settings.is_local else new_token()
     try:
@@ -102,13 +102,13 @@ def token(settings: Dashboard) -> str:
     if len(given) < TOKEN_MIN:
         raise ConfigError(
             f"dashboard.token_file {settings.token_file}: the token has {len(given)} characters, "
-            f"at least {TOKEN_MIN} are wanted"
+            f"at least {TOKEN_MIN} are required"
         )
     return given
 
 
 def check_certificate(settings: Dashboard) -> None:
-    """Raise ``ConfigError`` when the files for https cannot be used."""
+    """Raise ``ConfigError`` if the files for https cannot be used."""
     if not settings.certificate:
         return
     try:

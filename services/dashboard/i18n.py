@@ -1,18 +1,20 @@
-"""Every word on the page, in English and in Chinese; a test finds what is missing.
+"""Catalogue of all texts on the page, in English and in Chinese; a test checks that it is complete.
 
-What a service says in a sentence of its own (a cause with its figures, an event) is English on the
-bus. In Chinese the cause's name is translated here, and the sentence stands below it.
+Services publish their texts (a cause with its figures, an event, a refusal) in English. In Chinese
+the page shows the entry of the cause's or event's name, and the service's text below it.
 """
 
-TEXTS: dict[str, tuple[str, str]] = {
-    # --- head ---------------------------------------------------------------------------------
+from services.dashboard.i18n_events import EVENTS
+
+PAGE: dict[str, tuple[str, str]] = {
+    # --- header -------------------------------------------------------------------------------
     "estop": ("E-STOP", "急停"),
     "robot": ("Robot", "机器人"),
     "language": ("中文", "English"),
     "theme": ("Light or dark", "浅色或深色"),
     "your_name": ("Your name", "您的名字"),
-    "viewer": ("Viewer", "观众"),
-    "nobody_drives": ("Nobody drives", "无人驾驶"),
+    "viewer": ("Viewer", "观看者"),
+    "nobody_drives": ("No driver", "无人驾驶"),
     "you_drive": ("You drive", "您在驾驶"),
     "drives": ("drives", "正在驾驶"),
     "watching": ("watching", "人在观看"),
@@ -25,31 +27,31 @@ TEXTS: dict[str, tuple[str, str]] = {
     "verdict.none": ("NO SAFETY", "安全服务无响应"),
     "verdict.lost": ("NO CONNECTION", "连接中断"),
     "text.none": (
-        "Safety is not heard. What the vehicle does is not known here.",
-        "收不到安全服务，无法得知车辆状态。",
+        "No state of safety is received. The state of the vehicle is unknown.",
+        "未收到安全服务的状态，车辆状态未知。",
     ),
     "text.lost": (
-        "The dashboard does not answer. To stop the vehicle, use its own switch.",
-        "仪表板没有响应。如需停车，请使用车身上的急停开关。",
+        "The dashboard does not respond. To stop the vehicle, use its own switch.",
+        "仪表板无响应。如需停车，请使用车身上的急停开关。",
     ),
-    "text.no_router": ("The dashboard finds no router.", "仪表板找不到路由器。"),
-    "text.run": ("Driving as asked.", "按请求行驶。"),
-    "reset_due": ("Reset to go on.", "复位后方可继续。"),
-    "take_to_reset": ("Take the wheel to reset.", "请先开始驾驶，再复位。"),
+    "text.no_router": ("The dashboard is not connected to a router.", "仪表板未连接到路由器。"),
+    "text.run": ("Driving as requested.", "按请求行驶。"),
+    "reset_due": ("Reset before driving.", "复位后方可行驶。"),
+    "take_to_reset": ("Take control to reset.", "请先取得控制权，再复位。"),
     "since": ("for", "已持续"),
     "latched": ("latched", "已锁定"),
     "speed": ("m/s", "米/秒"),
     "turn": ("rad/s", "弧度/秒"),
     "link.up": ("Board: up", "主板：在线"),
     "link.lost": ("Board: LOST", "主板：失联"),
-    "link.never": ("Board: never heard", "主板：从未收到"),
-    "link.none": ("Bridge: silent", "网桥：无响应"),
+    "link.never": ("Board: never seen", "主板：从未连接"),
+    "link.none": ("Bridge: no data", "桥接服务：无数据"),
     "bumper.true": ("BUMPER PRESSED", "防撞条被压下"),
     "bumper.false": ("Bumper: clear", "防撞条：正常"),
     "bumper.none": ("Bumper: unknown", "防撞条：未知"),
     # --- causes, by the names of safety's table -------------------------------------------------
     "cause.contact": ("The bumper was hit.", "防撞条被碰撞。"),
-    "cause.estop": ("Emergency stop.", "紧急停车。"),
+    "cause.estop": ("Emergency stop.", "急停。"),
     "cause.estop_reader": ("The emergency stop cannot be received.", "无法接收急停信号。"),
     "cause.predecessor": (
         "Safety restarted while a reset was due.", "安全服务已重启，仍需复位。"),
@@ -69,7 +71,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "The board's emergency brakes are not verified.", "主板的紧急制动尚未确认。"),
     "cause.bumper": ("The bumper is not being read.", "读不到防撞条。"),
     "cause.silent": ("An input is too old.", "输入数据过旧。"),
-    "cause.unarmed": ("The bridge is not armed yet.", "网桥尚未就绪。"),
+    "cause.unarmed": ("The bridge is not armed yet.", "桥接服务尚未就绪。"),
     "cause.two_publishers": ("Two publishers use one source.", "同一来源有两个发布者。"),
     "cause.neutral": (
         "Waiting for a neutral request: release the controls, then drive.",
@@ -82,14 +84,14 @@ TEXTS: dict[str, tuple[str, str]] = {
     "cause.sonar": ("A sonar cannot be trusted.", "有超声波传感器不可信。"),
     # --- driving ------------------------------------------------------------------------------
     "drive": ("Drive", "驾驶"),
-    "take": ("Take the wheel", "开始驾驶"),
-    "leave": ("Leave the wheel", "结束驾驶"),
-    "take_over": ("Take over?", "接管驾驶？"),
-    "take_over_from": ("is driving. Take the wheel away?", "正在驾驶。要接管吗？"),
+    "take": ("Take control", "取得控制权"),
+    "leave": ("Release control", "释放控制权"),
+    "take_over": ("Take over?", "接管控制权？"),
+    "take_over_from": ("is driving. Take over control?", "正在驾驶。是否接管控制权？"),
     "yes": ("Yes", "是"),
     "no": ("No", "否"),
-    "taken_over": ("Somebody else has taken the wheel.", "驾驶已被他人接管。"),
-    "take_first": ("Take the wheel first.", "请先点击“开始驾驶”。"),
+    "taken_over": ("Another viewer has taken over control.", "控制权已被其他用户接管。"),
+    "take_first": ("Take control first.", "请先取得控制权。"),
     "gear": ("Gear", "挡位"),
     "reset": ("Reset", "复位"),
     "release": ("Move off the bumper, while held", "按住：缓慢脱离碰撞"),
@@ -101,9 +103,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "moved_backward": ("the last motion was backward", "最近一次运动为后退"),
     "ago": ("ago", "前"),
     "release_unknown": (
-        "No motion is known: look which way is free.", "没有运动记录：请目视确认可脱离的方向。"),
+        "No earlier motion is known: look at the vehicle to find the free direction.",
+        "没有运动记录：请目视确认可脱离的方向。",
+    ),
     "release_left": ("Distance left until a reset", "复位前剩余距离"),
-    "release_no_contact": ("There is no contact to move off.", "当前没有碰撞，无需脱离。"),
+    "release_no_contact": ("There is no contact.", "当前没有碰撞。"),
     "release_forbidden_forward": (
         "Forward is forbidden until a reset: the bumper was pressed that way.",
         "复位前禁止前进：向前时防撞条再次被压下。",
@@ -113,22 +117,22 @@ TEXTS: dict[str, tuple[str, str]] = {
         "复位前禁止后退：向后时防撞条再次被压下。",
     ),
     "release_used_up": (
-        "The distance for moving off is used up: reset first.", "脱离距离已用完：请先复位。"),
+        "The release distance is used up: reset first.", "脱离距离已用完：请先复位。"),
     "reset_unconfirmed": (
-        "RESET NOT CONFIRMED: safety's state does not show it. Look, then repeat it.",
-        "复位未被确认：安全服务的状态没有变化。请查看后重试。",
+        "RESET NOT CONFIRMED: safety's state shows no effect. Check the screen and repeat.",
+        "复位未被确认：安全服务的状态没有变化。请查看画面后重试。",
     ),
     "too_late": (
-        "Not done: the command answers an old picture of the robot. Look, then repeat it.",
-        "未执行：该指令对应的画面已过期。请查看后重试。",
+        "Refused: the command refers to an old state of the robot. Check the screen and repeat.",
+        "已拒绝：该指令对应的状态已过期。请查看画面后重试。",
     ),
     "hint": (
-        "Hold to drive: the stick, W A S D, or a gamepad with its left shoulder. Space stops.",
-        "按住才行驶：摇杆、W A S D 键，或按住手柄左肩键。空格键急停。",
+        "Hold to drive: stick, W A S D, or gamepad with the left shoulder button. Space: E-STOP.",
+        "按住行驶：摇杆、W A S D 键，或按住手柄左肩键。空格键：急停。",
     ),
     "hold.free": ("Released", "已松开"),
-    "hold.held": ("Held: asking to drive", "已按住：正在请求行驶"),
-    "hold.lapsed": ("Released: let go, then hold again.", "已松开：请放手后重新按住。"),
+    "hold.held": ("Held: driving is requested", "已按住：正在请求行驶"),
+    "hold.lapsed": ("Expired: release, then hold again.", "已失效：请松开后重新按住。"),
     "gamepad": ("Gamepad", "手柄"),
     "gamepad_unusable": (
         "This gamepad cannot drive: the browser does not know its buttons",
@@ -143,19 +147,19 @@ TEXTS: dict[str, tuple[str, str]] = {
         "急停未被确认：请使用车身上的急停开关！",
     ),
     "estop_unknown": (
-        "EMERGENCY STOP NOT SENT: no robot of this name is known here. Use its own switch!",
-        "急停未发送：此处没有该名称的机器人。请使用车身上的急停开关！",
+        "EMERGENCY STOP NOT SENT: the robot is unknown to the dashboard. Use its own switch!",
+        "急停未发送：仪表板中没有该机器人。请使用车身上的急停开关！",
     ),
-    "estop_asked": ("Emergency stop asked.", "已请求急停。"),
-    "too_many_robots": ("Too many robots at once.", "同时查看的机器人过多。"),
+    "estop_asked": ("Emergency stop requested.", "已请求急停。"),
+    "too_many_robots": ("Too many robots are open.", "同时打开的机器人过多。"),
     "done": ("Done.", "完成。"),
     # --- drawings -----------------------------------------------------------------------------
     "around": ("Around the vehicle", "车辆周围"),
     "trail": ("Trajectory", "轨迹"),
     "follow": ("Follow", "跟随"),
     "clear": ("Clear", "清除"),
-    "charts": ("Asked, allowed, measured", "请求、允许、实测"),
-    "asked": ("asked", "请求"),
+    "charts": ("Requested, allowed, measured", "请求、允许、实测"),
+    "requested": ("requested", "请求"),
     "allowed": ("allowed", "允许"),
     "measured": ("measured", "实测"),
     "chart.speed": ("Speed m/s", "速度 米/秒"),
@@ -165,7 +169,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "near": ("near!", "过近"),
     # --- panels -------------------------------------------------------------------------------
     "why": ("Why", "原因"),
-    "no_causes": ("Nothing is in the way.", "没有限制。"),
+    "no_causes": ("No restriction.", "没有限制。"),
     "limits": ("Allowed now", "当前允许"),
     "forward": ("forward", "前进"),
     "backward": ("backward", "后退"),
@@ -179,22 +183,23 @@ TEXTS: dict[str, tuple[str, str]] = {
     "fault.over_current": (
         "Over-current: a wheel is blocked, or a phase is shorted.", "过流：车轮卡住或相线短路。"),
     "fault.over_voltage": (
-        "Over-voltage: braking fed more back than the battery takes.",
+        "Over-voltage: braking fed back more than the battery can absorb.",
         "过压：制动回馈超出电池承受。",
     ),
     "fault.encoder": ("Encoder: its cable or the sensor is faulty.", "编码器：线缆或传感器故障。"),
     "fault.under_voltage": ("Under-voltage: charge the battery.", "欠压：请给电池充电。"),
     "fault.overload": (
-        "Overload: the motor was pushed for too long.", "过载：电机长时间负荷过大。"),
-    "fault.reserved": ("Not in the manual: ask the maker.", "手册未定义：请咨询厂家。"),
+        "Overload: high load for too long.", "过载：电机长时间负荷过大。"),
+    "fault.reserved": (
+        "Not in the manual: contact the manufacturer.", "手册未定义：请联系制造商。"),
     "switches": ("The board's emergency brakes", "主板紧急制动"),
     "ultrasonic_brake": ("Sonar brake", "超声波制动"),
     "bumper_brake": ("Bumper brake", "防撞条制动"),
     "on": ("on", "开"),
     "off": ("off", "关"),
     "switch_off": (
-        "Switch this brake off? Safety will not let the vehicle move.",
-        "要关闭此制动吗？安全服务将不允许车辆移动。",
+        "Switch this brake off? Safety then inhibits all motion.",
+        "是否关闭此制动？关闭后安全服务将禁止车辆移动。",
     ),
     "lights": ("Lights", "灯光"),
     "channel": ("Channel", "通道"),
@@ -207,24 +212,25 @@ TEXTS: dict[str, tuple[str, str]] = {
     "services": ("Services", "服务"),
     "service": ("Service", "服务"),
     "alive": ("alive", "在线"),
-    "gone": ("gone", "离线"),
+    "gone": ("offline", "离线"),
     "silent": ("silent", "无心跳"),
     "version": ("Version", "版本"),
     "uptime": ("Uptime", "运行时间"),
-    "lateness": ("Late", "延迟"),
+    "lateness": ("Delay", "延迟"),
     "memory": ("Memory", "内存"),
-    "troubles": ("Counters", "计数"),
+    "counters": ("Counters", "计数"),
     "streams": ("Streams", "数据流"),
     "key": ("Key", "键"),
     "rate": ("Hz", "赫兹"),
     "age": ("Age", "时效"),
     "events": ("Events", "事件"),
-    "no_events": ("Nothing yet.", "暂无。"),
-    # --- the door -----------------------------------------------------------------------------
-    "token_ask": ("The token, please.", "请输入令牌。"),
-    "token_wrong": ("That is not the token.", "令牌不正确。"),
+    "no_events": ("No events.", "暂无事件。"),
+    # --- token page -----------------------------------------------------------------------------
+    "token_ask": ("Enter the token.", "请输入令牌。"),
+    "token_wrong": ("The token is wrong.", "令牌不正确。"),
 }  # fmt: skip
 
+TEXTS = PAGE | EVENTS
 LANGUAGES = ("en", "zh")
 
 

@@ -1,7 +1,7 @@
-"""Listening socket with limits: connections, time for a request, bytes received.
+"""Listening socket with limits: connections, time of a request, bytes received.
 
-The limits apply before TLS and HTTP, so that a handshake or a header that never ends is bounded
-like anything else. asyncio accepts, receives and closes by these methods; uvloop would not.
+The limits apply before TLS and HTTP, so that an endless handshake or header is bounded, too.
+asyncio accepts, receives and closes through these methods; uvloop does not.
 """
 
 import asyncio
@@ -13,15 +13,20 @@ from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from services.dashboard.admission import Admission, Place, network_of
+from services.dashboard.admission import (
+    Admission,
+    Place,
+    RateLimit,
+    Verdict,
+    network_of,
+)
 from services.dashboard.config import Dashboard
-from services.dashboard.rate_limit import RateLimit, Verdict
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 RESERVE = 32  # connections
-CHUNK = 1024  # bytes received at once: others have their turn in between
+CHUNK = 1024  # bytes received at once, so that connections take turns
 BYTES_RATE, BYTES_BURST = 8_192, 20_480  # per second; a driving browser sends 2 kB/s
 # Of all connections, in the health message.
 COUNTERS = (
@@ -31,7 +36,7 @@ COUNTERS = (
 
 
 class Connection(socket.socket):
-    """An accepted connection; it has a deadline until it is a WebSocket."""
+    """An accepted connection, with a deadline until it becomes a WebSocket."""
 
     def __init__(
         self, fileno: int, place: Place, counters: Counter[str], on_close: Callable[[], None]
@@ -44,32 +49,32 @@ class Connection(socket.socket):
         self._bytes = RateLimit(BYTES_RATE, BYTES_BURST)
 
     def recv(self, size: int, flags: int = 0, /) -> bytes:
-        """Receive a chunk; an abusive peer is disconnected."""
+        """Receive a chunk; disconnect an abusive peer."""
         data = super().recv(min(size, CHUNK), flags)
         self._meter(len(data))
         return data
 
     def recv_into(self, buffer: "Buffer", nbytes: int = 0, flags: int = 0, /) -> int:
-        """Receive a chunk, as TLS does; an abusive peer is disconnected."""
+        """Receive a chunk, as TLS does; disconnect an abusive peer."""
         room = min(nbytes or memoryview(buffer).nbytes, CHUNK)
         count = super().recv_into(buffer, room, flags)
         self._meter(count)
         return count
 
-    def settle(self) -> None:
-        """Lift the deadline: the connection has become a WebSocket."""
+    def lift_deadline(self) -> None:
+        """Cancel the deadline: the connection has become a WebSocket."""
         if self.deadline is not None:
             self.deadline.cancel()
 
-    def expire(self) -> None:
-        """End the connection, whatever it is doing."""
+    def disconnect(self) -> None:
+        """Shut down the connection in any state."""
         with contextlib.suppress(OSError):
             self.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close, and give the place back."""
+        """Close the connection and free its place."""
         super().close()
-        self.settle()
+        self.lift_deadline()
         self._on_close()
 
     def _meter(self, count: int) -> None:
@@ -79,7 +84,7 @@ class Connection(socket.socket):
 
 
 class Listener(socket.socket):
-    """A listening socket that admits connections by ``Admission``."""
+    """A listening socket that admits connections through ``Admission``."""
 
     def __init__(self, family: int, settings: Dashboard) -> None:
         super().__init__(family, socket.SOCK_STREAM)
@@ -91,13 +96,13 @@ class Listener(socket.socket):
         self._by_peer: dict[tuple[str, int], Connection] = {}
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """Accept a connection; one that has to end for it is ended."""
+        """Accept a connection; disconnect one that must make room for it."""
         accepted, address = super().accept()
         number, peer = next(self._numbers), address[:2]
         place, ended = self._admission.admit(number, network_of(address[0]))
         if ended is not None:
             self.counters["connections_refused"] += 1
-            self._open[ended].expire()
+            self._open[ended].disconnect()
         connection = Connection(
             accepted.detach(), place, self.counters, lambda: self._forget(number, peer)
         )
@@ -108,12 +113,12 @@ class Listener(socket.socket):
         return connection, address
 
     def connection(self, client: tuple[str, int] | None) -> Connection | None:
-        """Return the connection from a client's address and port."""
+        """Return the connection of a client's address and port."""
         return self._by_peer.get(client) if client else None
 
     def _overdue(self, connection: Connection) -> None:
         self.counters["requests_timed_out"] += 1
-        connection.expire()
+        connection.disconnect()
 
     def _forget(self, number: int, peer: tuple[str, int]) -> None:
         self._admission.release(number)

@@ -1,16 +1,16 @@
-"""What the eight sonars mean to safety, and how the wheels stand: the vehicle as it is drawn.
+"""The vehicle as it is drawn: the tones of the eight sonar sectors, and the wheel angles.
 
-A sector's tone says what safety makes of its reading, by safety's own formula and settings: the
+A sector's tone shows the effect of its reading on safety, by safety's own formula and settings: the
 speed allowed toward a reading d is the v for which v * react + v^2 / (2 a) = d - margin.
 
 ====== ====================================================================================
 tone   when
 ====== ====================================================================================
-dark   nothing was heard lately
+dark   no fresh message
 fault  the sonar is faulty, or safety does not trust it
-stop   within the margin, too near to measure, or safety names it as what blocks the way
-slow   nearer than full speed allows, or safety names it as what slows the vehicle
-clear  else
+stop   within the margin, too near to measure, or safety names it as blocking
+slow   nearer than full speed allows, or safety names it as slowing the vehicle
+clear  otherwise
 ====== ====================================================================================
 """
 
@@ -29,11 +29,11 @@ Number = Annotated[float, Meta(gt=0)]
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
 OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
 OF_CAUSE: dict[str, Tone] = {"obstacle": "slow", "blocked": "stop", "sonar": "fault"}
-CREEPING_MPS = 0.02  # a wheel that is slower has no direction worth drawing
+CREEPING_MPS = 0.02  # a slower wheel is drawn straight
 
 
 class Protection(Struct, frozen=True, kw_only=True):
-    """What safety reckons with; as shipped until the running service has answered."""
+    """Safety's settings for sonar; the defaults until the running service has answered."""
 
     margin: float = 0.20  # m
     react: float = 0.25  # s
@@ -48,23 +48,23 @@ class Protection(Struct, frozen=True, kw_only=True):
 
 
 def tones(
-    heard: Ultrasonic | None, causes: Sequence[Cause], protection: Protection
+    ultrasonic: Ultrasonic | None, causes: Sequence[Cause], protection: Protection
 ) -> tuple[Tone, ...]:
     """Return the tone of each sector, in the manual's order of sonars."""
-    if heard is None:
+    if ultrasonic is None:
         return tuple("dark" for _ in SONAR_NAMES)
     own: list[Tone] = [
         OF_STATUS.get(status) or _by_range(reading, protection)
-        for status, reading in zip(heard.status, heard.ranges, strict=True)
+        for status, reading in zip(ultrasonic.status, ultrasonic.ranges, strict=True)
     ]
     for cause in causes:
-        for index in named(cause.text) if cause.name in OF_CAUSE else ():
+        for index in sonars_named(cause.text) if cause.name in OF_CAUSE else ():
             own[index] = max(own[index], OF_CAUSE[cause.name], key=WORST.index)
     return tuple(own)
 
 
-def named(text: str) -> list[int]:
-    """Return the sonars that a sentence of safety's names; "front left" is not "front"."""
+def sonars_named(text: str) -> list[int]:
+    """Return the sonars named in a text of safety; "front left" does not name "front"."""
     found = []
     for name in sorted(SONAR_NAMES, key=len, reverse=True):
         words = name.replace("_", " ")
@@ -75,10 +75,10 @@ def named(text: str) -> list[int]:
 
 
 def wheel_angles(linear: float, angular: float, vehicle: Vehicle) -> tuple[float, ...]:
-    """Return how the wheels stand in a motion (m/s, rad/s), in radians, counter-clockwise.
+    """Return the wheel angles of a motion (m/s, rad/s), in radians, counter-clockwise.
 
-    Front left, front right, rear left, rear right. The board tells no angles; these are the only
-    ones that let all four wheels roll.
+    Front left, front right, rear left, rear right. The board reports no angles; these are the only
+    ones at which all four wheels roll.
     """
     front, left = vehicle.wheelbase / 2, vehicle.track / 2
     places = ((front, left), (front, -left), (-front, left), (-front, -left))
@@ -88,7 +88,7 @@ def wheel_angles(linear: float, angular: float, vehicle: Vehicle) -> tuple[float
 def _angle(ahead: float, aside: float) -> float:
     if math.hypot(ahead, aside) < CREEPING_MPS:
         return 0.0
-    # A wheel that rolls backward points forward all the same.
+    # A wheel that rolls backward points forward, too.
     return math.atan2(aside, ahead) if ahead >= 0 else math.atan2(-aside, -ahead)
 
 

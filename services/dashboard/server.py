@@ -1,9 +1,12 @@
-"""The web server: the page, E-STOP and the browsers' WebSocket, in the main thread."""
+"""The web server: page, E-STOP and WebSocket, in the main thread."""
 
+import json
 import re
 import socket
 from collections.abc import Callable
 from ipaddress import ip_address
+from pathlib import Path
+from string import Template
 
 import uvicorn
 from starlette.applications import Starlette
@@ -12,32 +15,34 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
 from common.errors import LinkError
-from services.dashboard import assets
-from services.dashboard.auth import Door
+from services.dashboard.auth import AuthMiddleware
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
-from services.dashboard.credentials import Gate
+from services.dashboard.credentials import Credentials
+from services.dashboard.i18n import table
 from services.dashboard.listener import Listener
-from services.dashboard.websocket_hub import WORD_MAX, Viewers
+from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
 
-END_S = 1  # that browsers get to hang up
+SHUTDOWN_S = 1  # for browsers to disconnect
+STATIC = Path(__file__).parent / "static"
+MEDIA_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 HEADER_MAX = 16_384  # bytes
-BACKLOG = 256  # connections that wait to be accepted
-RECEIVE_BUFFER = 16_384  # bytes in the kernel per connection: bounds the lead of a flood
-# Addresses for documentation (RFC 5737, RFC 3849): nobody has them, the way out leads there.
-ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
+BACKLOG = 256  # connections that are not yet accepted
+RECEIVE_BUFFER = 16_384  # bytes in the kernel per connection: bounds a flood
+# Documentation addresses (RFC 5737, RFC 3849), which route to the default gateway.
+REMOTE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
 
 
 def serving(
     settings: Dashboard,
     robot: str,
-    gate: Gate,
-    viewers: Viewers,
+    credentials: Credentials,
+    hub: WebSocketHub,
     listener: Listener,
     *,
     alive: Callable[[], None],
 ) -> uvicorn.Server:
-    """Return the server, ready to run; it calls ``alive`` from its own loop, once a second."""
+    """Return the server, ready to run; it calls ``alive`` in its own loop, once a second."""
 
     async def tick() -> None:
         alive()
@@ -45,23 +50,23 @@ def serving(
     secure = bool(settings.certificate)
     return uvicorn.Server(
         uvicorn.Config(
-            Door(_site(robot, viewers), gate, listener.connection, secure),
-            loop="asyncio",  # the listener's limits work with this one
+            AuthMiddleware(_application(robot, hub), credentials, listener.connection, secure),
+            loop="asyncio",  # the listener's limits need asyncio
             http="h11",
             h11_max_incomplete_event_size=HEADER_MAX,
             backlog=BACKLOG,
             lifespan="off",
-            proxy_headers=False,  # limits use the address of the connection, which cannot be forged
+            proxy_headers=False,  # limits use the peer's address, which cannot be forged
             server_header=False,
             log_level="error",
             access_log=False,
-            # Small frames, many of them: deflating costs more than it saves.
+            # Many small frames: compression costs more than it saves.
             ws_per_message_deflate=False,
             ws="websockets-sansio",
-            ws_max_size=WORD_MAX,
+            ws_max_size=MESSAGE_MAX,
             ws_ping_interval=5.0,
             ws_ping_timeout=5.0,
-            timeout_graceful_shutdown=END_S,
+            timeout_graceful_shutdown=SHUTDOWN_S,
             callback_notify=tick,
             timeout_notify=0,
             ssl_certfile=settings.certificate or None,
@@ -70,40 +75,56 @@ def serving(
     )
 
 
-def _site(robot: str, viewers: Viewers) -> Starlette:
-    """Return what stands behind the door."""
-    page, files = assets.page(robot), assets.files()
+def _application(robot: str, hub: WebSocketHub) -> Starlette:
+    """Return the application behind the authentication."""
+    html, files = page(robot), assets()
 
     async def index(_: Request) -> Response:
-        return HTMLResponse(page)
+        return HTMLResponse(html)
 
     async def file(request: Request) -> Response:
         if (found := files.get(request.path_params["name"])) is None:
-            return PlainTextResponse("there is no such file\n", status_code=404)
+            return PlainTextResponse("file not found\n", status_code=404)
         return Response(found[0], media_type=found[1])
 
-    # Beside the socket: one tap must get through when that is congested or gone.
+    # Besides the WebSocket: a stop must arrive when that is congested or closed.
     async def stop(request: Request) -> Response:
-        host = request.client.host if request.client else "somebody"
+        host = request.client.host if request.client else "unknown"
         robot = request.path_params["robot"]
-        if not re.match(ROBOT, robot) or not viewers.estop(robot, host):
+        if not re.match(ROBOT, robot) or not hub.estop(robot, host):
             return PlainTextResponse(
-                f"no robot {robot!r} is known here; nothing was sent\n", status_code=404
+                f"robot {robot!r} is unknown; no stop was sent\n", status_code=404
             )
-        return PlainTextResponse("asked\n")
+        return PlainTextResponse("requested\n")
 
     return Starlette(
         routes=[
             Route("/", index),
             Route("/t2/{name}", file),
             Route("/estop/{robot}", stop, methods=["POST"]),
-            WebSocketRoute("/live", viewers.serve),
+            WebSocketRoute("/live", hub.serve),
         ]
     )
 
 
+def page(robot: str) -> str:
+    """Return the page, which opens with this robot."""
+    texts = json.dumps(table(), ensure_ascii=False).replace("<", "\\u003c")
+    template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
+    return template.substitute(robot=robot, texts=texts)
+
+
+def assets() -> dict[str, tuple[bytes, str]]:
+    """Return content and media type of the page's files, by name; requests read no disk."""
+    return {
+        path.name: (path.read_bytes(), MEDIA_TYPES[path.suffix])
+        for path in STATIC.iterdir()
+        if path.suffix in MEDIA_TYPES
+    }
+
+
 def listen(settings: Dashboard) -> Listener:
-    """Return a bound socket; raise ``LinkError`` when the port is taken."""
+    """Return a bound socket; raise ``LinkError`` if the port is in use."""
     host, port = settings.host, settings.port
     sock = Listener(socket.AF_INET6 if ":" in host else socket.AF_INET, settings)
     try:
@@ -113,23 +134,23 @@ def listen(settings: Dashboard) -> Listener:
     except OSError as error:
         sock.close()
         raise LinkError(
-            f"dashboard.port = {port}: {host} cannot be listened on: {error.strerror}; "
-            "another program may have it, name another port"
+            f"dashboard.port = {port}: cannot listen on {host}: {error.strerror}; "
+            "if another program uses the port, set another one"
         ) from None
     return sock
 
 
 def reachable(host: str) -> str:
-    """Return where a browser elsewhere finds what listens here, as a URL names it.
+    """Return the host part of the URL for browsers on other hosts.
 
-    For "every address" (0.0.0.0, ::) that is the address of the way out; without one, this host's
-    name. Nothing is sent.
+    For the unspecified address (0.0.0.0, ::) this is the address of the default route, or without
+    one this host's name. Nothing is sent.
     """
     if ip_address(host).is_unspecified:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as sock:
-                sock.connect((ELSEWHERE[family], 9))
+                sock.connect((REMOTE[family], 9))
                 host = sock.getsockname()[0]
         except OSError:
             return socket.gethostname()

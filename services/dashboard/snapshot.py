@@ -1,25 +1,28 @@
-"""What is shown: everything about one robot at one moment, made of what was heard.
+"""Snapshots of one robot: the state that the browsers show, made from its telemetry.
 
-Two pictures go to the browsers as JSON, each encoded once for all: ``Now``, 20 times a second, of
-what moves; ``Rest``, twice a second, of what does not. None and empty mean that nothing fresh, or
-no number, is known. Distances are metres, angles radians, times seconds.
+Two snapshots are sent to the browsers as JSON, each encoded once for all viewers:
+``FastSnapshot``, 20 times a second, and ``SlowSnapshot``, twice a second. None and empty mean that
+there is no fresh message, or no finite number. Distances are metres, angles radians, times seconds.
 """
 
+from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from msgspec import Struct
 
 from common import keys
 from common.codec import finite
-from common.messages import Cause, Driver, Event, Limits, Link, Release, Switches
+from common.freshness import NS_PER_S
+from common.messages import Cause, Driver, Limits, Link, Release, SafetyState, Switches
 from common.settings import Vehicle
-from services.dashboard.driver_lock import Grip, Wheel
+from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
-from services.dashboard.telemetry_cache import Heard
+from services.dashboard.telemetry_cache import TelemetryCache
 
 
 class State(Struct, frozen=True):
-    """What safety says."""
+    """The state of safety."""
 
     verdict: str
     text: str
@@ -30,22 +33,22 @@ class State(Struct, frozen=True):
     release: Release | None
 
 
-class Hands(Struct, frozen=True):
-    """Who has the wheel of this dashboard, and what the hand does."""
+class DriverState(Struct, frozen=True):
+    """The viewer with the driver lock, and its hold."""
 
     id: str | None
     name: str
-    grip: Grip
+    hold: HoldState
     gear: int
 
 
-class Now(Struct, frozen=True, tag_field="k", tag="now"):
-    """What moves."""
+class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
+    """The values that change with the motion."""
 
-    n: int  # the picture's number, which a hold answers to
+    n: int  # the snapshot's number, which a hold answers
     connected: bool  # to a router
     measured: tuple[float, ...] | None  # linear and angular, as the next two
-    asked: tuple[float, ...] | None
+    requested: tuple[float, ...] | None
     allowed: tuple[float, ...] | None
     pose: tuple[float, ...] | None  # x, y and heading
     epoch: int
@@ -55,11 +58,11 @@ class Now(Struct, frozen=True, tag_field="k", tag="now"):
     bumper: bool | None
     link: str | None
     safety: State | None
-    hands: Hands
+    driver: DriverState
 
 
 class Service(Struct, frozen=True):
-    """A service, as its tokens and its health tell."""
+    """A service, by its liveliness tokens and its health."""
 
     name: str
     instances: int
@@ -67,18 +70,18 @@ class Service(Struct, frozen=True):
     uptime: float | None = None
     lateness: float | None = None
     rss: int | None = None
-    troubles: dict[str, int] = {}  # its counters that are not zero
+    counters: dict[str, int] = {}  # those that are not zero
 
 
 class Stream(Struct, frozen=True):
-    """A key, how often it comes here and how old its last message is."""
+    """A key with its rate (Hz) and the age of its last message."""
 
     key: str
     rate: float
     age: float
 
 
-class Told(Struct, frozen=True):
+class EventLine(Struct, frozen=True):
     """An event."""
 
     t: float  # s, the sender's wall clock
@@ -88,10 +91,10 @@ class Told(Struct, frozen=True):
     text: str
 
 
-class Rest(Struct, frozen=True, tag_field="k", tag="rest"):
-    """What stands still."""
+class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
+    """The values that change rarely."""
 
-    robots: dict[str, bool]  # whether anything of it is alive
+    robots: dict[str, bool]  # whether any of its services is alive
     viewers: dict[str, str]  # names by id
     services: tuple[Service, ...]
     streams: tuple[Stream, ...]
@@ -102,9 +105,9 @@ class Rest(Struct, frozen=True, tag_field="k", tag="rest"):
     protection: Protection
 
 
-def now(
-    heard: Heard,
-    wheel: Wheel,
+def fast_snapshot(
+    telemetry: TelemetryCache,
+    driver_lock: DriverLock,
     now_ns: int,
     *,
     number: int,
@@ -112,25 +115,27 @@ def now(
     connected: bool,
     vehicle: Vehicle,
     protection: Protection,
-) -> Now:
-    """Return what moves, at this moment."""
-    velocity = heard.newest(keys.VELOCITY, now_ns)
-    odometry = heard.newest(keys.ODOMETRY, now_ns)
-    sonar = heard.newest(keys.ULTRASONIC, now_ns)
-    bumper = heard.newest(keys.BUMPER, now_ns)
-    motion = heard.newest(keys.MOTION, now_ns)
-    link = heard.newest(keys.LINK, now_ns)
-    state = _state(heard, now_ns)
+) -> FastSnapshot:
+    """Return the fast snapshot at this time."""
+    velocity = telemetry.newest(keys.VELOCITY, now_ns)
+    odometry = telemetry.newest(keys.ODOMETRY, now_ns)
+    sonar = telemetry.newest(keys.ULTRASONIC, now_ns)
+    bumper = telemetry.newest(keys.BUMPER, now_ns)
+    motion = telemetry.newest(keys.MOTION, now_ns)
+    link = telemetry.newest(keys.LINK, now_ns)
+    state = _state(telemetry, now_ns)
     drive = (
-        heard.newest(keys.DRIVE, now_ns, source=state.source) if state and state.source else None
+        telemetry.newest(keys.DRIVE, now_ns, source=state.source)
+        if state and state.source
+        else None
     )
     measured = _numbers(velocity.linear, velocity.angular) if velocity else None
     linear, angular = measured or (0.0, 0.0)
-    return Now(
+    return FastSnapshot(
         n=number,
         connected=connected,
         measured=measured,
-        asked=_numbers(drive.linear, drive.angular) if drive else None,
+        requested=_numbers(drive.linear, drive.angular) if drive else None,
         allowed=_numbers(motion.linear, motion.angular) if motion else None,
         pose=_numbers(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
@@ -140,35 +145,72 @@ def now(
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
         safety=state,
-        hands=Hands(wheel.driver, names.get(wheel.driver or "", ""), wheel.grip, wheel.gear),
+        driver=_driver(driver_lock, names),
     )
 
 
-def rest(
-    heard: Heard,
+def slow_snapshot(
+    telemetry: TelemetryCache,
     robots: Mapping[str, bool],
     names: Mapping[str, str],
     protection: Protection,
     now_ns: int,
-) -> Rest:
-    """Return what stands still, at this moment."""
-    ages = heard.ages_s(now_ns)
-    return Rest(
+) -> SlowSnapshot:
+    """Return the slow snapshot at this time."""
+    ages = telemetry.ages_s(now_ns)
+    return SlowSnapshot(
         robots=dict(robots),
         viewers=dict(names),
-        services=tuple(_service(heard, name, now_ns) for name in heard.services()),
-        streams=tuple(Stream(key, heard.rates.get(key, 0.0), age) for key, age in ages.items()),
-        left=heard.newest(keys.DRIVER, now_ns, side="left"),
-        right=heard.newest(keys.DRIVER, now_ns, side="right"),
-        switches=heard.newest(keys.SWITCHES, now_ns),
-        link=heard.newest(keys.LINK, now_ns),
+        services=tuple(_service(telemetry, name, now_ns) for name in telemetry.services()),
+        streams=tuple(Stream(key, telemetry.rates.get(key, 0.0), age) for key, age in ages.items()),
+        left=telemetry.newest(keys.DRIVER, now_ns, side="left"),
+        right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
+        switches=telemetry.newest(keys.SWITCHES, now_ns),
+        link=telemetry.newest(keys.LINK, now_ns),
         protection=protection,
     )
 
 
-def told(heard: Heard) -> list[Told]:
+def event_lines(telemetry: TelemetryCache) -> list[EventLine]:
     """Return the events, the newest last."""
-    return [Told(line.event.t_ns / 1e9, line.service, *_words(line.event)) for line in heard.events]
+    return [
+        EventLine(
+            line.event.t_ns / 1e9,
+            line.service,
+            line.event.name,
+            line.event.level,
+            line.event.text,
+        )
+        for line in telemetry.events
+    ]
+
+
+@dataclass
+class SentSnapshots:
+    """The last fast snapshots of one robot, with safety's state in each.
+
+    A reset, a switch and a release answer a snapshot by its number. The call carries the echo and
+    the causes of that snapshot, so that a delayed click has no effect on anything newer.
+    """
+
+    _sent: deque[tuple[int, int, SafetyState | None]] = field(
+        default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT)
+    )
+
+    def sent(self, number: int, state: SafetyState | None, now_ns: int) -> None:
+        """Note that a snapshot is sent now."""
+        self._sent.append((number, now_ns, state))
+
+    def seen(self, number: int, now_ns: int, limit_s: float) -> SafetyState | None:
+        """Return safety's state in a snapshot; None if it is unknown, too old or had none."""
+        for known, sent_ns, state in reversed(self._sent):
+            if known == number:
+                return state if now_ns - sent_ns <= limit_s * NS_PER_S else None
+        return None
+
+
+def _driver(lock: DriverLock, names: Mapping[str, str]) -> DriverState:
+    return DriverState(lock.driver, names.get(lock.driver or "", ""), lock.state, lock.gear)
 
 
 def _numbers(*values: float) -> tuple[float, ...] | None:
@@ -179,12 +221,8 @@ def _number(value: float | None) -> float | None:
     return value if value is not None and finite(value) else None
 
 
-def _words(event: Event) -> tuple[str, str, str]:
-    return event.name, event.level, event.text
-
-
-def _state(heard: Heard, now_ns: int) -> State | None:
-    safety = heard.newest(keys.SAFETY, now_ns)
+def _state(telemetry: TelemetryCache, now_ns: int) -> State | None:
+    safety = telemetry.newest(keys.SAFETY, now_ns)
     if safety is None:
         return None
     return State(
@@ -198,9 +236,9 @@ def _state(heard: Heard, now_ns: int) -> State | None:
     )
 
 
-def _service(heard: Heard, name: str, now_ns: int) -> Service:
-    instances = len(heard.alive.get(name, ()))
-    health = heard.newest(keys.HEALTH, now_ns, service=name)
+def _service(telemetry: TelemetryCache, name: str, now_ns: int) -> Service:
+    instances = len(telemetry.alive.get(name, ()))
+    health = telemetry.newest(keys.HEALTH, now_ns, service=name)
     if health is None:
         return Service(name, instances)
     return Service(
@@ -210,5 +248,5 @@ def _service(heard: Heard, name: str, now_ns: int) -> Service:
         health.uptime,
         health.lateness,
         health.rss,
-        {what: count for what, count in health.counters.items() if count},
+        {name: count for name, count in health.counters.items() if count},
     )

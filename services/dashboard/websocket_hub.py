@@ -1,8 +1,9 @@
-"""The browsers' end: a web socket for each, and what waits to be sent to it.
+"""WebSocket hub: one WebSocket per browser, with bounded queues in both directions.
 
-A browser that reads slowly gets fewer pictures, never older ones: a newer picture takes the place
-of the one that still waits. One that does not read at all is closed. One that sends faster than
-its limit has messages dropped, and is closed when it goes on; an emergency stop is never dropped.
+A slow browser gets fewer snapshots, never older ones: a new snapshot replaces the one that still
+waits. A browser that does not read at all is disconnected. One that sends faster than its limit
+loses messages and is disconnected if it continues. An emergency stop is never dropped, and is
+handled before all calls that wait.
 """
 
 import asyncio
@@ -10,50 +11,92 @@ import contextlib
 import itertools
 import time
 from collections import Counter, deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import partial
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from services.dashboard.client_messages import AnyWord, Estop
+from services.dashboard.admission import RateLimit, Verdict
+from services.dashboard.client_messages import AnyMessage, Estop
 from services.dashboard.fleet import Fleet
-from services.dashboard.inbox import Inbox, Post, Queue
-from services.dashboard.rate_limit import RateLimit, Verdict
 
-WAITING_MAX = 64
-WORD_MAX = 4096  # bytes
+OUTBOX_MAX = 64  # messages to one viewer
+CALLS_MAX = 32  # messages of one viewer that the fleet has not handled
+MESSAGE_MAX = 4096  # bytes
 BURST_S = 4.0  # of messages at the full rate, after a network delay
 ESTOP = '"estop"'  # in the text of every such message
 
+Call = Callable[[], None]
+Post = Callable[[Call], None]
+
+
+class CallQueue:
+    """The calls of one viewer that wait for the fleet's thread."""
+
+    def __init__(self) -> None:
+        self.calls: deque[Call] = deque()
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the next message must be dropped."""
+        return len(self.calls) >= CALLS_MAX
+
+
+class Inbox:
+    """Posts calls to the fleet's thread, emergency stops first."""
+
+    def __init__(self, post: Post) -> None:
+        self._post = post
+        self._stops: dict[str, Call] = {}
+
+    def stop(self, robot: str, call: Call) -> None:
+        """Make this call before others; it replaces a waiting one for the same robot."""
+        self._stops[robot] = call
+        self._post(self._make_stops)
+
+    def put(self, queue: CallQueue, call: Call) -> None:
+        """Make this call after those in the same queue."""
+        queue.calls.append(call)
+        self._post(lambda: self._make(queue))
+
+    def _make(self, queue: CallQueue) -> None:
+        self._make_stops()
+        queue.calls.popleft()()
+
+    def _make_stops(self) -> None:
+        while self._stops:
+            _, call = self._stops.popitem()
+            call()
+
 
 class Outbox:
-    """What waits to be sent to one browser, in order."""
+    """The messages to one browser, in order."""
 
     def __init__(self) -> None:
         self._texts: deque[tuple[bytes, str]] = deque()
-        self._some = asyncio.Event()
+        self._has_text = asyncio.Event()
         self.full = False
 
-    def put(self, text: bytes, newer_wins: bool) -> None:
-        """Add a text; one that is replaced by newer ones of its kind is told by its beginning."""
-        kind = text[:12].decode(errors="replace") if newer_wins else ""
+    def put(self, text: bytes, replaces: bool) -> None:
+        """Add a message; with ``replaces`` instead of a waiting one with the same first bytes."""
+        kind = text[:12].decode(errors="replace") if replaces else ""
         if kind:
             self._texts = deque(waiting for waiting in self._texts if waiting[1] != kind)
         self._texts.append((text, kind))
-        self.full = len(self._texts) > WAITING_MAX
-        self._some.set()
+        self.full = len(self._texts) > OUTBOX_MAX
+        self._has_text.set()
 
     async def take(self) -> bytes:
-        """Wait for the next text."""
+        """Wait for the next message."""
         while not self._texts:
-            self._some.clear()
-            await self._some.wait()
+            self._has_text.clear()
+            await self._has_text.wait()
         return self._texts.popleft()[0]
 
 
-class Viewers:
-    """All browsers; lives in the server's thread and posts to the fleet's."""
+class WebSocketHub:
+    """All WebSockets; runs in the server's thread and posts to the fleet's."""
 
     def __init__(self, post: Post, rate: float, counters: Counter[str]) -> None:
         self.fleet: Fleet | None = None
@@ -64,25 +107,25 @@ class Viewers:
         self._outboxes: dict[str, Outbox] = {}
         self._ids = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._words: msgspec.json.Decoder[AnyWord] = msgspec.json.Decoder(AnyWord)
+        self._decoder: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)
 
-    def show(self, viewers: Collection[str], text: bytes, newer_wins: bool) -> None:
-        """Send a text to some of them; from any thread."""
+    def send(self, viewers: Collection[str], text: bytes, replaces: bool) -> None:
+        """Send a message to these viewers; from any thread."""
         loop = self._loop
         if loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
-                loop.call_soon_threadsafe(self._put, viewers, text, newer_wins)
+                loop.call_soon_threadsafe(self._put, viewers, text, replaces)
 
-    def estop(self, robot: str, who: str) -> bool:
-        """Stop a robot ahead of everything that waits; return whether it is known."""
+    def estop(self, robot: str, requested_by: str) -> bool:
+        """Stop a robot before all waiting calls; return whether the robot is known."""
         fleet = self.fleet
         if fleet is None or not fleet.knows(robot):
             return False
-        self._inbox.stop(robot, lambda: fleet.estop(robot, who))
+        self._inbox.stop(robot, lambda: fleet.estop(robot, requested_by))
         return True
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve one browser until it is gone."""
+        """Serve one browser until it disconnects."""
         assert self.fleet is not None
         self._loop = asyncio.get_running_loop()
         fleet, viewer, outbox = self.fleet, str(next(self._ids)), Outbox()
@@ -98,17 +141,17 @@ class Viewers:
             sender.cancel()
 
     async def _receive(self, socket: WebSocket, viewer: str, fleet: Fleet) -> None:
-        limit, queue = RateLimit(self._rate, self._rate * BURST_S), Queue()
-        with contextlib.suppress(WebSocketDisconnect, KeyError):  # a binary one has no text
+        limit, queue = RateLimit(self._rate, self._rate * BURST_S), CallQueue()
+        with contextlib.suppress(WebSocketDisconnect, KeyError):  # a binary message has no text
             while True:
                 text = await socket.receive_text()
                 verdict = limit.take(time.monotonic_ns())
                 if verdict is Verdict.ACCEPTED or ESTOP in text:
-                    word = self._read(text)
-                    if word is None:
-                        await socket.close(code=1003, reason="not one of the words")
+                    message = self._decode(text)
+                    if message is None:
+                        await socket.close(code=1003, reason="invalid message")
                         return
-                    self._take_in(viewer, word, queue, fleet)
+                    self._handle(viewer, message, queue, fleet)
                 else:
                     self._counters["messages_dropped"] += 1
                 if verdict is Verdict.ABUSIVE:
@@ -116,19 +159,20 @@ class Viewers:
                     await socket.close(code=1008, reason="too many messages")
                     return
 
-    def _take_in(self, viewer: str, word: AnyWord, queue: Queue, fleet: Fleet) -> None:
-        if isinstance(word, Estop) and word.robot and self.estop(word.robot, f"viewer {viewer}"):
-            return
-        if queue.is_full and not isinstance(word, Estop):
+    def _handle(self, viewer: str, message: AnyMessage, queue: CallQueue, fleet: Fleet) -> None:
+        if isinstance(message, Estop):
+            if message.robot and self.estop(message.robot, f"viewer {viewer}"):
+                return
+        elif queue.is_full:
             self._counters["messages_dropped"] += 1
             return
-        self._inbox.put(queue, partial(fleet.take_in, viewer, word))
+        self._inbox.put(queue, partial(fleet.handle, viewer, message))
 
-    def _read(self, text: str) -> AnyWord | None:
-        if len(text) > WORD_MAX:
+    def _decode(self, text: str) -> AnyMessage | None:
+        if len(text) > MESSAGE_MAX:
             return None
         try:
-            return self._words.decode(text)
+            return self._decoder.decode(text)
         except (msgspec.DecodeError, UnicodeEncodeError, RecursionError):
             return None
 
@@ -139,7 +183,7 @@ class Viewers:
                 await socket.send({"type": "websocket.send", "text": text})
             await socket.close(code=1013, reason="too slow")
 
-    def _put(self, viewers: Collection[str], text: bytes, newer_wins: bool) -> None:
+    def _put(self, viewers: Collection[str], text: bytes, replaces: bool) -> None:
         for viewer in viewers:
             if outbox := self._outboxes.get(viewer):
-                outbox.put(text, newer_wins)
+                outbox.put(text, replaces)

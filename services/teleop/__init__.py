@@ -1,1 +1,1 @@
-"""Teleop: an operator's keys and sticks to requests to move."""
+"""Teleop: drive requests from an operator's keys and gamepad."""

@@ -1,8 +1,171 @@
-"""``python -m services.teleop``: drive from this terminal."""
+"""Entry point of teleop: ``python -m services.teleop`` and ``t2 drive``.
 
+The node's loop runs in a thread of its own, the screen in the main thread. Every shutdown is the
+same: the controller sends its final zeros, its loop ends, then the screen exits. The screen's end,
+a signal or a lost terminal starts it. The loop polls the terminal, because a screen that writes to
+a dead terminal may hang; the process then ends without restoring the terminal.
+"""
+
+import argparse
+import contextlib
+import os
+import signal
 import sys
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
 
-from services.teleop.life import main
+from common import log
+from common.cli_args import EXIT_CONFIG, add_sources, sources
+from common.config import Loaded, load
+from common.errors import ConfigError, RobotError
+from common.service import STOP_TIMEOUT_S, Node
+from services.teleop.config import TeleopConfig
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
+from services.teleop.gamepad import find
+from services.teleop.round_trip import multiplexer
+
+if TYPE_CHECKING:
+    from services.teleop.app import TeleopApp
+
+EXIT_HANGUP = 128 + signal.SIGHUP
+TERMINAL_POLL_S = 0.2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command line options; each sets a setting."""
+    parser.add_argument("--source", help="name of the drive source, which has its own priority")
+    parser.add_argument("--robot", help="robot to drive, such as 001")
+    parser.add_argument("--no-gamepad", action="store_true", help="use keys only")
+    add_sources(parser)
+
+
+def drive(options: argparse.Namespace) -> int:
+    """Drive until the operator quits; raise ``RobotError`` if teleop cannot start."""
+    if options.source:
+        options.sets = [*options.sets, f"teleop.source={options.source}"]
+    if options.robot:
+        options.sets = [*options.sets, f"robot.id={options.robot}"]
+    if options.no_gamepad:
+        options.sets = [*options.sets, "teleop.gamepad=false"]
+    loaded = load(TeleopConfig, sources(options))
+    if not terminal_is_there():
+        raise RobotError("driving needs a terminal on standard input and output")
+    return TeleopProcess(loaded).run()
+
+
+class TeleopProcess:
+    """Teleop's process: the node's loop, the controller and the screen."""
+
+    def __init__(self, loaded: Loaded[TeleopConfig]) -> None:
+        self._screen = _screen_class()
+        event_log = EventLog()
+        event_log.capture_logs(loaded.config.log)
+        self._settings = loaded.config
+        self._node = node = Node("teleop", loaded)
+        self._controller = controller = Controller(
+            node, event_log, multiplexer(os.environ, ancestors())
+        )
+        node.announce()
+        node.loop.every(TERMINAL_POLL_S, self._check_terminal)
+        node.loop.post(lambda: controller.use_gamepad(find(self._settings.teleop)))
+        self._lost = False
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._serve, name="controller")
+
+    def run(self) -> int:
+        """Run the screen in the main thread and return the exit code."""
+        post = self._node.loop.post
+        _on_signal(self._leave, signal.SIGINT, signal.SIGTERM)
+        _on_signal(self._hang_up, signal.SIGHUP)
+        self._node.bus.open()
+        self._thread.start()
+        try:
+            self._screen(
+                self._controller, post, lambda: not self._thread.is_alive(), self._settings.teleop
+            ).run()
+        finally:
+            self._leave()
+            self._thread.join(STOP_TIMEOUT_S)
+            log.configure(self._settings.log, "teleop")
+        if self._error:
+            raise self._error
+        return 0
+
+    def _serve(self) -> None:
+        try:
+            self._node.loop.run()
+        except BaseException as error:  # raised again in the main thread, once the screen is down
+            self._error = error
+        self._node.bus.close()
+        self._node.loop.close()
+        if self._lost:
+            os._exit(EXIT_HANGUP)
+
+    def _leave(self) -> None:
+        self._node.loop.post(self._controller.leave)
+
+    def _hang_up(self) -> None:
+        self._lost = True
+        self._leave()
+
+    def _check_terminal(self, _: int) -> None:
+        if not terminal_is_there():
+            self._hang_up()
+
+
+def terminal_is_there() -> bool:
+    """Return whether standard input and output are still a terminal."""
+    return os.isatty(0) and os.isatty(1)
+
+
+def ancestors() -> list[str]:
+    """Return the names of the parent processes, the nearest first; empty without /proc."""
+    names, pid = [], os.getppid()
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        while pid:
+            status = Path(f"/proc/{pid}/stat").read_text(errors="replace")
+            name, _, rest = status.partition("(")[2].rpartition(")")
+            names.append(name)
+            pid = int(rest.split()[1])
+    return names
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Drive from this terminal; return the exit code, as for every service."""
+    parser = argparse.ArgumentParser(prog="teleop")
+    add_arguments(parser)
+    try:
+        return drive(parser.parse_args(argv))
+    except RobotError as error:
+        print(f"teleop: {error}", file=sys.stderr)  # noqa: T201 - there is no screen
+        return EXIT_CONFIG if isinstance(error, ConfigError) else 1
+
+
+def _screen_class() -> "type[TeleopApp]":
+    try:
+        from services.teleop.app import TeleopApp
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] in {"textual", "rich"}:
+            raise RobotError(
+                f"the screen needs {error.name}: install the extra `teleop` "
+                "(pip install -e '.[teleop]')"
+            ) from None
+        raise
+    return TeleopApp
+
+
+def _on_signal(call: Callable[[], None], *numbers: signal.Signals) -> None:
+    def handle(number: int, _: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)  # a second one ends the process at once
+        call()
+
+    for number in numbers:
+        signal.signal(number, handle)
+
 
 if __name__ == "__main__":
     sys.exit(main())

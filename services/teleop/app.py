@@ -1,6 +1,6 @@
-"""The screen: panels that are drawn anew five times a second, and keys that go to the desk.
+"""The screen: panels that are redrawn five times a second; keys go to the controller.
 
-Nothing is decided here. When the desk has sent its last zeros, the screen leaves.
+The screen decides nothing. It exits when the controller has sent its final zeros.
 """
 
 import time
@@ -16,32 +16,32 @@ from textual.widgets import Static
 
 from common.bus.bus import Post
 from common.freshness import NS_PER_S
-from services.teleop import panels, table
+from services.teleop import motion_panel, panels
 from services.teleop.config import Teleop
-from services.teleop.controller import Desk
+from services.teleop.controller import Controller
 from services.teleop.hold import Press
 from services.teleop.round_trip import NUMBERS, PROBE_S
 from services.teleop.sonar_view import around
 
-QUESTION = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, ask for it, move it back
-UNANSWERED = 10  # questions; after that many only every tenth is asked
-REFRESH_S = 0.2  # a picture costs Textual tens of milliseconds, and keys wait for it
+QUERY = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
+MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
+REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
 
 
 class Panel(Static):
-    """A box of text that is only drawn when it has changed."""
+    """A box of text that is redrawn only when it has changed."""
 
     shown: Text | None = None
 
     def show(self, text: Text) -> None:
-        """Draw the text, unless it is there already."""
+        """Draw the text, unless it is already shown."""
         if text != self.shown or text.spans != getattr(self.shown, "spans", None):
             self.shown = text
-            self.update(text, layout=False)  # its size is the layout's, never the text's
+            self.update(text, layout=False)  # the layout sets the size, not the text
 
 
 class TeleopApp(App[None]):
-    """What the operator sees; keys are posted to the desk, its view is drawn."""
+    """The operator's screen: posts keys to the controller and draws its view."""
 
     CSS = """
     Screen { layout: vertical; overflow: hidden; }
@@ -68,7 +68,7 @@ class TeleopApp(App[None]):
 
     def __init__(
         self,
-        desk: Desk,
+        controller: Controller,
         post: Post,
         ended: Callable[[], bool],
         hold: Teleop,
@@ -76,20 +76,20 @@ class TeleopApp(App[None]):
     ) -> None:
         super().__init__()
         self._clock = clock
-        self._desk = desk
+        self._controller = controller
         self._post = post
         self._ended = ended
         self._hold = hold
         self._leaving = False
-        self._view = desk.view  # as drawn last
-        self._asked = 0  # questions to the terminal
+        self._view = controller.view  # the last one drawn
+        self._queries = 0  # to the terminal
         self._unanswered = 0  # in a row
         self._header, self._hints = Panel(id="header"), Panel(id="hints")
         self._safety, self._around = titled("safety"), titled("around")
         self._motion, self._events = titled("motion"), titled("events")
 
     def compose(self) -> ComposeResult:
-        """Lay the panels out."""
+        """Lay out the panels."""
         yield self._header
         yield self._safety
         with Horizontal(id="middle"):
@@ -99,79 +99,79 @@ class TeleopApp(App[None]):
         yield self._hints
 
     def on_mount(self) -> None:
-        """Begin to draw."""
+        """Start the timers."""
         self.set_interval(REFRESH_S, self.draw)
         self.set_interval(PROBE_S, self.probe)
 
     def on_resize(self, event: events.Resize) -> None:
-        """Give a tall terminal more room around the vehicle."""
+        """Enlarge the sonar view in a tall terminal."""
         self.screen.set_class(event.size.height >= 30, "tall")
 
     def draw(self) -> None:
-        """Draw what is known now; leave once the desk has closed."""
+        """Redraw all panels; exit once the controller's loop has ended."""
         if self._ended():
             self.exit()
             return
         now_ns = self._clock()
-        self._post(lambda: self._desk.watch(now_ns))
-        self._view = view = self._desk.view
+        self._post(lambda: self._controller.screen_drawn(now_ns))
+        self._view = view = self._controller.view
         size = self._around.content_size
         self._header.show(panels.header(view))
         self.set_class(panels.release(view) is not None, "contact")
         self._safety.show(panels.safety(view, self._safety.content_size.height))
         self._around.show(around(view.ultrasonic, view.bumper, size.width, size.height))
-        self._motion.show(table.motion(view))
+        self._motion.show(motion_panel.motion(view))
         size = self._events.content_size
         self._events.show(panels.events(view, size.height, size.width))
         self._hints.show(panels.hints(view, self._hold.hold_first, self._hold.hold))
 
     def probe(self) -> None:
-        """Query the terminal's cursor, at a column that is this query's number."""
+        """Query the cursor position, at a column that equals the query's number."""
         if self._leaving:
             return  # the shell would read the answer as input
-        self._asked += 1
-        if self._unanswered >= UNANSWERED and self._asked % UNANSWERED:
-            return  # a terminal that does not read: its queue must not fill up
+        self._queries += 1
+        if self._unanswered >= MAX_UNANSWERED and self._queries % MAX_UNANSWERED:
+            return  # a terminal that does not read: its queue must not fill
         self._unanswered += 1
-        number, now_ns = self._asked % max(1, min(NUMBERS, self.size.width)), self._clock()
-        self._post(lambda: self._desk.terminal.sent(number, now_ns))
-        self.query_terminal(QUESTION.format(column=number + 1))
+        number, now_ns = self._queries % max(1, min(NUMBERS, self.size.width)), self._clock()
+        self._post(lambda: self._controller.terminal.sent(number, now_ns))
+        self.query_terminal(QUERY.format(column=number + 1))
 
-    def query_terminal(self, question: str) -> None:
-        """Write to the terminal after what was drawn so far."""
+    def query_terminal(self, query: str) -> None:
+        """Write a query to the terminal, after the pending output."""
         if self._driver is not None:
-            self._driver.write(question)
+            self._driver.write(query)
 
     def on_cursor_position(self, event: events.CursorPosition) -> None:
-        """Pass an answer on."""
+        """Post an answer of the terminal to the controller."""
         self._unanswered = 0
-        number, at_ns = event.x, self._came_ns(event)
-        self._post(lambda: self._desk.terminal.answered(number, at_ns))
+        number, at_ns = event.x, self._received_ns(event)
+        self._post(lambda: self._controller.terminal.answered(number, at_ns))
 
     def on_key(self, event: events.Key) -> None:
-        """Hand a key over; CapsLock and shift make no difference."""
+        """Post a key to the controller; CapsLock and shift make no difference."""
         key = event.key.removeprefix("shift+").lower()
-        press = Press(key, self._came_ns(event), self._view.safety)
-        self._post(lambda: self._desk.press(press, self._clock()))
+        press = Press(key, self._received_ns(event), self._view.safety)
+        self._post(lambda: self._controller.press(press, self._clock()))
 
-    def _came_ns(self, event: events.Event) -> int:
-        """Return when an event was read from the terminal."""
+    def _received_ns(self, event: events.Event) -> int:
+        """Return the time when an event was read from the terminal."""
         return self._clock() - round((time.monotonic() - event.time) * NS_PER_S)
 
     def on_app_blur(self) -> None:
-        """Let go when the terminal loses the focus: the repeats go elsewhere."""
-        self._post(self._desk.let_go)
+        """Release the controls when the terminal loses the focus, and with it the key repeats."""
+        self._post(self._controller.release_controls)
 
     def action_leave(self) -> None:
-        """Ask the desk for its last zeros; ``draw`` leaves after them, a second ask at once."""
+        """Request the final zeros; ``draw`` exits after them. A second call exits at once."""
         if self._leaving:
             self.exit()
         self._leaving = True
-        self._post(self._desk.leave)
+        self._post(self._controller.leave)
 
 
 def titled(name: str) -> Panel:
-    """Return a panel with a border that bears its name."""
+    """Return a panel with its name as the border title."""
     panel = Panel(id=name)
     panel.border_title = name
     return panel

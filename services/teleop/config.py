@@ -16,20 +16,20 @@ PROTECTIVE: settings.Limits = {"round_trip": (0.02, 0.3), "gamepad_silence": (0.
 
 
 class Teleop(settings.Section, frozen=True, kw_only=True):
-    """How an operator's keys and sticks become requests; slow by default."""
+    """Settings of keys, gears and gamepad; slow by default."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that take a protection away, on purpose
+    unsafe_overrides: tuple[str, ...] = ()  # protective settings outside of their limits, by intent
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "teleop"
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     turbo_linear: Speed = 1.0  # m/s
     turbo_angular: Speed = 1.0  # rad/s
-    hold_first: Hold = 0.6  # s that a tap drives: a terminal's first repeat comes after ~0.5 s
+    hold_first: Hold = 0.6  # s that a tap drives: most terminals send the first repeat after ~0.5 s
     hold: Hold = 0.3  # s that a repeat drives
-    round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; keys of slower ones do not drive
+    round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; slower: no driving keys
     gamepad: bool = True
-    gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s that it drives without event
-    deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's way
+    gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s without an event
+    deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's range
     expo: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5  # 0 is straight, 1 is cubic
     linear_axis: Index = 1  # left stick, up and down
     angular_axis: Index = 3  # right stick, left and right

@@ -1,6 +1,6 @@
-"""The last few things worth a line: the program's own log and the events of all services.
+"""The event log on the screen: teleop's own log lines and the events of all services.
 
-While the screen is up, standard error is the operator's picture, so the log must not go there.
+While the screen is up it owns the terminal, so no log line may go to standard error.
 """
 
 import threading
@@ -13,18 +13,18 @@ from common.messages import Level
 from common.settings import Log, LogLevel
 from services.teleop.view import Line
 
-KEPT = 100
+CAPACITY = 100
 
 
-class Logbook:
-    """Keeps the newest lines; may be written from any thread."""
+class EventLog:
+    """The newest lines; any thread may add one."""
 
     def __init__(self) -> None:
-        self._lines: deque[Line] = deque(maxlen=KEPT)
+        self._lines: deque[Line] = deque(maxlen=CAPACITY)
         self._lock = threading.Lock()
 
     def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
-        """Append a line, of now unless its wall clock time is given; a repeated one only moves."""
+        """Append a line with its wall clock time, by default now; a repeat replaces the last."""
         line = Line(time.time_ns() if t_ns is None else t_ns, service, level, text)
         with self._lock:
             if self._lines and replace(self._lines[-1], t_ns=line.t_ns) == line:
@@ -36,9 +36,9 @@ class Logbook:
         with self._lock:
             return tuple(self._lines)[-count:]
 
-    def take_log(self, settings: Log) -> None:
-        """Let every log line of this process end here and nowhere else."""
-        log.redirect(self._keep, settings.level)
+    def capture_logs(self, settings: Log) -> None:
+        """Redirect all log lines of this process to this log only."""
+        log.redirect(self._on_log, settings.level)
 
-    def _keep(self, level: LogLevel, event: str, _: log.Fields) -> None:
+    def _on_log(self, level: LogLevel, event: str, _: log.Fields) -> None:
         self.add("teleop", "info" if level == "debug" else level, event)

@@ -1,7 +1,7 @@
-"""A gamepad by SDL, where there is one; found and lost while running.
+"""Gamepad input through SDL, with hot-plugging.
 
-pygame is imported only when a gamepad is wanted: it is large, and it takes a second. SDL wants one
-thread for everything, so all calls come from the loop's.
+pygame is imported only if a gamepad is enabled, because the import takes a second. SDL requires
+that all calls come from one thread: the loop's.
 """
 
 import contextlib
@@ -13,44 +13,44 @@ from services.teleop.config import Teleop
 from services.teleop.mapping import Deflection, Stick
 
 ENVIRON = {
-    "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would be drawn over the screen
-    "SDL_VIDEODRIVER": "dummy",  # events want a display, and ssh has none
+    "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would overwrite the screen
+    "SDL_VIDEODRIVER": "dummy",  # events need a display, and ssh has none
     "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # without a window there is no foreground
-    "SDL_NO_SIGNAL_HANDLERS": "1",  # ctrl-c is ours
+    "SDL_NO_SIGNAL_HANDLERS": "1",  # teleop handles ctrl-c
 }
 
 
 class Gamepad(Protocol):
-    """What teleop needs of a gamepad."""
+    """The interface of a gamepad."""
 
     @property
-    def words(self) -> str:
-        """Say which one there is, or why there is none."""
+    def status(self) -> str:
+        """The gamepad's name, or why there is none."""
 
     def read(self) -> Stick | None:
-        """Return how it stands now, None while there is none."""
+        """Return the current state; None without a gamepad."""
 
 
 class NoGamepad:
-    """Stands in where none is wanted or none can be."""
+    """A gamepad that is disabled or unavailable."""
 
-    def __init__(self, words: str) -> None:
-        self.words = words
+    def __init__(self, status: str) -> None:
+        self.status = status
 
     def read(self) -> Stick | None:
-        """Return None: there is none."""
+        """Return None."""
         return None
 
 
 class SdlGamepad:
-    """The first gamepad that SDL sees; the next one that it sees after that is lost."""
+    """The first gamepad that SDL finds; after its loss, the next one."""
 
     def __init__(self, pygame: ModuleType, settings: Teleop) -> None:
         self._pygame: Any = pygame
         self._settings = settings
         self._joystick: Any = None
         self._events = 0  # axis and button events
-        self._by_hand = {
+        self._input_events = {
             pygame.JOYAXISMOTION, pygame.JOYBALLMOTION, pygame.JOYHATMOTION,
             pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP,
         }  # fmt: skip
@@ -58,27 +58,27 @@ class SdlGamepad:
         pygame.joystick.init()
 
     @property
-    def words(self) -> str:
-        """Say which one there is."""
+    def status(self) -> str:
+        """The gamepad's name, or "none"."""
         return str(self._joystick.get_name()) if self._joystick else "none"
 
     def read(self) -> Stick | None:
-        """Return how it stands now, None while there is none."""
+        """Return the current state; None without a gamepad."""
         for event in self._pygame.event.get():
-            self._take(event)
+            self._handle(event)
         if self._joystick is None and self._pygame.joystick.get_count():
-            with contextlib.suppress(self._pygame.error):  # gone again in the meantime
+            with contextlib.suppress(self._pygame.error):  # unplugged in the meantime
                 self._joystick = self._pygame.joystick.Joystick(0)
         return self._stick() if self._joystick else None
 
-    def _take(self, event: Any) -> None:
+    def _handle(self, event: Any) -> None:
         if not self._joystick:
             return
         if getattr(event, "instance_id", None) != self._joystick.get_instance_id():
             return
         if event.type == self._pygame.JOYDEVICEREMOVED:
             self._joystick = None
-        elif event.type in self._by_hand:
+        elif event.type in self._input_events:
             self._events += 1
 
     def _stick(self) -> Stick:
@@ -95,12 +95,12 @@ class SdlGamepad:
 
     @staticmethod
     def _part(read: Any, index: int, count: int) -> float:
-        """Read an axis or button; one that this gamepad lacks is at rest."""
+        """Read an axis or button; a missing one is at rest."""
         return float(read(index)) if index < count else 0.0
 
 
 def find(settings: Teleop) -> Gamepad:
-    """Return the gamepad that the settings want; never fails for want of one."""
+    """Return the gamepad of the settings, or a ``NoGamepad`` with the reason."""
     if not settings.gamepad:
         return NoGamepad("off")
     for name, value in ENVIRON.items():

@@ -1,7 +1,7 @@
-"""Keys and sticks to a twist, in ``base_link``: m/s and rad/s, x forward, counter-clockwise.
+"""Mapping of keys and sticks to a twist in ``base_link``: m/s and rad/s, counter-clockwise.
 
-A key gives a direction, a stick gives a deflection; both are -1..1 for each of the two axes, and
-the gear says how fast 1 is. Backward to the left means that the tail goes left, as in a car.
+A key gives a direction, a stick a deflection: -1..1 on each of the two axes. The gear sets the
+speed of full deflection. Backward left means that the rear goes left, as in a car.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from services.teleop.config import Teleop
 
 @dataclass(frozen=True, slots=True)
 class Deflection:
-    """How far the operator pushes, -1..1: forward and counter-clockwise positive."""
+    """Deflection of a control, -1..1: forward and counter-clockwise positive."""
 
     linear: float = 0.0
     angular: float = 0.0
@@ -22,16 +22,16 @@ class Deflection:
 
 @dataclass(frozen=True, slots=True)
 class Stick:
-    """What a gamepad shows at one moment."""
+    """State of a gamepad."""
 
     push: Deflection
-    deadman: bool  # held down; without it the sticks mean nothing
+    deadman: bool  # held down; without it the sticks are ignored
     turbo: bool
-    events: int = 0  # how many the gamepad has sent since it was found
+    events: int = 0  # received since the gamepad was found
 
 
 # The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal
-# repeats one key only, so an arc needs a key of its own.
+# repeats one key only, so each arc has its own key.
 DIRECTIONS = {
     "w": Deflection(1, 0), "up": Deflection(1, 0),
     "s": Deflection(-1, 0), "down": Deflection(-1, 0),
@@ -44,7 +44,7 @@ DIRECTIONS = {
 
 
 def deflection(held: Iterable[str]) -> Deflection:
-    """Return what the held keys ask together; opposite ones cancel out."""
+    """Return the deflection of all held keys; opposite keys cancel out."""
     pushes = [DIRECTIONS[key] for key in held]
     return Deflection(
         clamp(sum(push.linear for push in pushes), 1.0),
@@ -53,12 +53,12 @@ def deflection(held: Iterable[str]) -> Deflection:
 
 
 def shaped(raw: Deflection, deadzone: float, expo: float) -> Deflection:
-    """Return a stick's push without the play around its middle, fine there and full at the end."""
+    """Return a stick's deflection after deadzone and expo curve; full deflection stays 1."""
     return Deflection(_shape(raw.linear, deadzone, expo), _shape(raw.angular, deadzone, expo))
 
 
 def twist(push: Deflection, gear: int, turbo: bool, settings: Teleop) -> Twist:
-    """Return the motion that a push asks in a gear, 1 to 5; turbo takes the place of the gear."""
+    """Return the twist of a deflection in a gear, 1 to 5; turbo replaces the gear."""
     linear = settings.turbo_linear if turbo else settings.gears_linear[gear - 1]
     angular = settings.turbo_angular if turbo else settings.gears_angular[gear - 1]
     return Twist(push.linear * linear, push.angular * angular)
@@ -67,6 +67,6 @@ def twist(push: Deflection, gear: int, turbo: bool, settings: Teleop) -> Twist:
 def _shape(raw: float, deadzone: float, expo: float) -> float:
     if not codec.finite(raw) or abs(raw) <= deadzone:
         return 0.0
-    way = min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone))
-    bent = expo * way**3 + (1.0 - expo) * way
-    return bent if raw > 0 else -bent
+    linear = min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone))
+    curved = expo * linear**3 + (1.0 - expo) * linear
+    return curved if raw > 0 else -curved

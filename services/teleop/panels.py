@@ -1,6 +1,6 @@
-"""The view in words: pure functions from what is known to styled text, one for each panel.
+"""The panels of the screen: pure functions from the view to styled text.
 
-The table of the motion panel is in ``table.py``.
+The motion panel is in ``motion_panel.py``.
 """
 
 from datetime import datetime
@@ -9,13 +9,13 @@ from textwrap import wrap
 from rich.text import Text
 
 from common.messages import Cause, Direction, Release, SafetyState, Verdict
+from services.teleop.motion_panel import BAD, DIM, GOOD, WARN, Part
 from services.teleop.round_trip import ADVICE
-from services.teleop.table import BAD, DIM, GOOD, WARN, Part
 from services.teleop.view import Line, View
 
 KEY = "bold black on cyan"
 HELD = "bold black on yellow"
-DIRECTIONS: dict[Direction, tuple[str, Direction]] = {  # its key, and the opposite
+DIRECTIONS: dict[Direction, tuple[str, Direction]] = {  # key and opposite direction
     "forward": ("F", "backward"), "backward": ("B", "forward"),
 }  # fmt: skip
 BADGES: dict[Verdict, str] = {
@@ -25,17 +25,17 @@ BADGES: dict[Verdict, str] = {
     "brake": "bold white on red",
     "inhibited": "bold white on grey35",
 }
-PREFIX, MIN_WORDS = len("00:00:00 safety  "), 20  # columns of an event's line
+PREFIX, MIN_TEXT = len("00:00:00 safety  "), 20  # columns of an event line
 LEVELS = {"info": "", "warning": WARN, "error": BAD}
 KEYS = (
     ("WASD", "drive"), ("ZC", "arc"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"),
     ("E", "ESTOP"), ("R", "reset"), ("FB", "release"), ("Q", "quit"),
 )  # fmt: skip
-STILL = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # what counts on a slow terminal
+SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
 
 
 def header(view: View) -> Text:
-    """Which robot, the ways to it, the gear."""
+    """Return the header: robot, connections, gear."""
     bus = ("● bus", GOOD) if view.connected else ("○ no router yet", WARN)
     gear = ("TURBO", BAD) if view.turbo else (f"gear {view.gear}/5", "bold")
     top = (f"{view.top.linear:.2f} m/s {view.top.angular:.2f} rad/s", "")
@@ -44,7 +44,7 @@ def header(view: View) -> Text:
 
 
 def board(view: View) -> Part:
-    """The way from the bridge to the vehicle's board."""
+    """Return the state of the link between bridge and board."""
     if view.link is None:
         return ("○ no bridge", WARN)
     if view.link.state == "up":
@@ -53,30 +53,33 @@ def board(view: View) -> Part:
 
 
 def bumper(view: View) -> Part:
-    """The bumper strip."""
+    """Return the state of the bumper."""
     if view.bumper is None:
         return ("○ bumper", WARN)
     return ("● bumper PRESSED", BAD) if view.bumper.pressed else ("● bumper", GOOD)
 
 
 def safety(view: View, rows: int) -> Text:
-    """The verdict, its sentence, and the causes, the latched ones first; by name if cramped."""
+    """Return verdict, text and causes, latched ones first; causes by name if rows are short."""
     state = view.safety
     if state is None:
-        return Text.assemble((" NO SAFETY ", BADGES["inhibited"]), "  its service is not heard")
+        return Text.assemble(
+            (" NO SAFETY ", BADGES["inhibited"]),
+            "  no state of safety received; check it with `t2 doctor`",
+        )
     text = Text.assemble((f" {state.verdict.upper()} ", BADGES[state.verdict]), f"  {state.text}")
-    if (ways := release(view)) is not None:
-        return Text("\n").join([text, *ways, *_causes(state, rows - 1 - len(ways))])
+    if (lines := release(view)) is not None:
+        return Text("\n").join([text, *lines, *_causes(state, rows - 1 - len(lines))])
     return Text("\n").join([text, *_causes(state, rows - 1)])
 
 
 def release(view: View) -> tuple[Text, Text] | None:
-    """How to move off a pressed bumper, in two rows; None without a contact."""
+    """Return how to move off a pressed bumper, in two rows; None without a contact."""
     known = view.safety.release if view.safety else None
     if known is None:
         return None
-    ways = Text("   ").join(_way(known, direction, view.release) for direction in DIRECTIONS)
-    return _believed(known), ways.append(f"   {known.left:.2f} m left until reset", style="bold")
+    keys = Text("   ").join(_key(known, direction, view.release) for direction in DIRECTIONS)
+    return _believed(known), keys.append(f"   {known.left:.2f} m left until reset", style="bold")
 
 
 def _believed(known: Release) -> Text:
@@ -90,7 +93,7 @@ def _believed(known: Release) -> Text:
     )  # fmt: skip
 
 
-def _way(known: Release, direction: Direction, held: Direction | None) -> Text:
+def _key(known: Release, direction: Direction, held: Direction | None) -> Text:
     key = (f" {DIRECTIONS[direction][0]} ", HELD if held == direction else KEY)
     if direction in known.forbidden:
         return Text.assemble(key, f" {direction} ", ("FORBIDDEN", BAD))
@@ -98,7 +101,7 @@ def _way(known: Release, direction: Direction, held: Direction | None) -> Text:
 
 
 def _causes(state: SafetyState, rows: int) -> list[Text]:
-    """One row for each cause; by name in one row if there are more than rows."""
+    """Return one row per cause, or all names in one row if there are too few rows."""
     causes = [cause for cause in state.causes if cause.name != "no_request"]
     causes.sort(key=lambda cause: cause.name not in state.latched)
     if len(causes) <= rows:
@@ -106,20 +109,20 @@ def _causes(state: SafetyState, rows: int) -> list[Text]:
     return [Text("  ").join(_cause(cause, cause.name, state) for cause in causes)]
 
 
-def _cause(cause: Cause, words: str, state: SafetyState) -> Text:
+def _cause(cause: Cause, text: str, state: SafetyState) -> Text:
     latched = cause.name in state.latched
     tag = ("LATCHED ", BAD) if latched else (f"{cause.action} ", WARN)
-    return Text.assemble(tag, words, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
+    return Text.assemble(tag, text, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
 
 
 def events(view: View, rows: int, width: int = 200) -> Text:
-    """The newest lines, the newest last; a line that is too long goes on in the next row."""
+    """Return the newest event lines, the newest last, wrapped to the width."""
     shown: list[Text] = []
     for line in reversed(view.lines):
         room = rows - len(shown)
         if room <= 0:
             break
-        shown = [*_wrapped(line, max(MIN_WORDS, width - PREFIX))[:room], *shown]
+        shown = [*_wrapped(line, max(MIN_TEXT, width - PREFIX))[:room], *shown]
     return Text("\n", no_wrap=True).join(shown)
 
 
@@ -135,14 +138,14 @@ def _wrapped(line: Line, width: int) -> list[Text]:
 
 
 def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
-    """The keys, and what a terminal cannot report or why its keys do not count."""
-    keys = [hint for hint in KEYS if hint in STILL or not view.keys_refused]
+    """Return the keys, and the limit of key repeats or why keys are refused."""
+    keys = [hint for hint in KEYS if hint in SLOW_KEYS or not view.keys_refused]
     row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in keys)
     if view.keys_refused:
         return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
     limit = (
         f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
-        f"a hold {hold_s:g} s past the last repeat"
+        f"a hold {hold_s:g} s past its last repeat"
     )
     return row.append(limit, style=DIM)
 

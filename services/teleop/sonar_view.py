@@ -1,10 +1,10 @@
-"""The vehicle from above in characters, with what its eight sonars see around it.
+"""The vehicle from above in characters, with the readings of its eight sonars.
 
 ::
 
-              1.42 m            each sonar has arcs, one for each band of distance; the one that
-      -     ━━━━━━━━━    0.80 m the reading falls into is lit in the band's colour, "fault" and
-         ╱   ━━━━━━━   ╲        "near" light all of them
+              1.42 m            Each sonar has one arc per band of distance. The arc of its
+      -     ━━━━━━━━━    0.80 m reading is lit in the band's colour; "fault" and "near" light
+         ╱   ━━━━━━━   ╲        all of its arcs.
            █╭───────╮█
        ┃ ┃  │   ▲   │  ┃ ┃
     -  ┃ ┃  │       │  ┃ ┃  2.10 m
@@ -18,12 +18,12 @@ from rich.text import Text
 
 from common.messages import SONAR_NAMES, Bumper, RangeStatus, Ultrasonic
 
-# Where a band ends, in metres, and its colour. Safety's own distances depend on the speed; these
-# are only for the eye.
+# End of each band, in metres, and its colour. For display only: the distances at which safety acts
+# depend on the speed.
 BANDS = ((0.5, "bold red"), (1.0, "bold yellow"), (2.0, "green"))
 FAR = "green"
 DIM = "grey35"
-TROUBLE = "bold magenta"
+FAULT = "bold magenta"
 UNKNOWN = "-"
 
 HIT = "bold white on red"
@@ -43,45 +43,45 @@ BODY_WIDTH, BODY_HEIGHT = len(BODY[0]), len(BODY)
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One sonar's reading, ready to draw: its words, its colour, and the arcs that are lit."""
+    """A sonar's reading, ready to draw: label, colour and lit arcs."""
 
-    words: str
+    label: str
     style: str
     lit: frozenset[int]  # 0 is the nearest band
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Where things go; ``ahead`` is -1 for the front, ``side`` is -1 for the left."""
+    """Positions on the canvas; ``ahead`` is -1 for the front, ``side`` is -1 for the left."""
 
-    middle: int  # column of the vehicle's middle
+    middle: int  # column of the vehicle's centre
     top: int  # row of its front
-    bands: int  # how many arcs fit
+    bands: int  # arcs that fit
 
     def row(self, ahead: int, band: int) -> int:
-        """Return the row that is ``band`` rows away from the front or the rear."""
+        """Return the row at ``band`` rows from the front or the rear."""
         return self.top - 1 - band if ahead < 0 else self.top + BODY_HEIGHT + band
 
-    def outside(self, side: int, words: str) -> int:
-        """Return where words begin that stand outside of the outermost arc."""
+    def outside(self, side: int, label: str) -> int:
+        """Return the first column of a label beside the outermost arc."""
         gap = 7 + 2 * self.bands
-        return self.middle + gap if side > 0 else self.middle - gap - len(words) + 1
+        return self.middle + gap if side > 0 else self.middle - gap - len(label) + 1
 
 
 class Canvas:
-    """A grid of characters, each with a style; what falls outside is left out."""
+    """A grid of styled characters; text outside of it is clipped."""
 
     def __init__(self, width: int, height: int) -> None:
         self._cells = [[(" ", "")] * width for _ in range(height)]
 
     def put(self, row: int, column: int, text: str, style: str) -> None:
-        """Write from left to right."""
+        """Write a text from left to right."""
         for at, character in enumerate(text, column):
             if 0 <= row < len(self._cells) and 0 <= at < len(self._cells[0]):
                 self._cells[row][at] = (character, style)
 
     def text(self) -> Text:
-        """Return the whole as lines."""
+        """Return all lines."""
         return Text("\n", no_wrap=True).join(self._line(row) for row in self._cells)
 
     @staticmethod
@@ -91,12 +91,12 @@ class Canvas:
 
 
 def reading(distance: float | None, status: RangeStatus) -> Reading:
-    """Return how one sonar's reading (metres) is drawn."""
-    everything = frozenset(range(len(BANDS)))
+    """Return how a sonar's reading (metres) is drawn."""
+    all_arcs = frozenset(range(len(BANDS)))
     if status == "fault":
-        return Reading("fault", TROUBLE, everything)
+        return Reading("fault", FAULT, all_arcs)
     if status == "too_near":
-        return Reading("near", BANDS[0][1], everything)
+        return Reading("near", BANDS[0][1], all_arcs)
     if status == "no_echo" or distance is None:
         return Reading(UNKNOWN, DIM, frozenset())
     for band, (end, style) in enumerate(BANDS):
@@ -106,7 +106,7 @@ def reading(distance: float | None, status: RangeStatus) -> Reading:
 
 
 def readings(ultrasonic: Ultrasonic | None) -> dict[str, Reading]:
-    """Return all eight by name; without any news they are unknown."""
+    """Return all eight readings by name; unknown without a fresh message."""
     if ultrasonic is None:
         return {name: Reading("?", DIM, frozenset()) for name in SONAR_NAMES}
     seen = zip(SONAR_NAMES, ultrasonic.ranges, ultrasonic.status, strict=True)
@@ -116,9 +116,9 @@ def readings(ultrasonic: Ultrasonic | None) -> dict[str, Reading]:
 def around(
     ultrasonic: Ultrasonic | None, bumper: Bumper | None, width: int = 38, height: int = 11
 ) -> Text:
-    """Return the vehicle and its surroundings, ``width`` by ``height`` characters."""
+    """Return the sonar view, ``width`` by ``height`` characters."""
     top = (height - BODY_HEIGHT) // 2
-    room = min(top - 1, (width // 2 - 13) // 2)  # a row, or six columns, are for the words
+    room = min(top - 1, (width // 2 - 13) // 2)  # a row, or six columns, for the labels
     plan = Plan(width // 2, top, max(1, min(len(BANDS), room)))
     canvas = Canvas(width, height)
     seen = readings(ultrasonic)
@@ -138,8 +138,8 @@ def _body(canvas: Canvas, plan: Plan, bumper: Bumper | None) -> None:
     left = plan.middle - BODY_WIDTH // 2
     for row, line in enumerate(BODY):
         canvas.put(plan.top + row, left, line, style)
-    words = "BUMPER" if hit else "T2"
-    canvas.put(plan.top + 2, left + (BODY_WIDTH - len(words)) // 2, words, style)
+    label = "BUMPER" if hit else "T2"
+    canvas.put(plan.top + 2, left + (BODY_WIDTH - len(label)) // 2, label, style)
 
 
 def _end(canvas: Canvas, plan: Plan, ahead: int, sonar: Reading) -> None:
@@ -148,8 +148,8 @@ def _end(canvas: Canvas, plan: Plan, ahead: int, sonar: Reading) -> None:
         canvas.put(
             plan.row(ahead, band), plan.middle - half, "━" * (2 * half + 1), _arc(sonar, band)
         )
-    column = plan.middle - len(sonar.words) // 2
-    canvas.put(plan.row(ahead, plan.bands), column, sonar.words, sonar.style)
+    column = plan.middle - len(sonar.label) // 2
+    canvas.put(plan.row(ahead, plan.bands), column, sonar.label, sonar.style)
 
 
 def _side(canvas: Canvas, plan: Plan, side: int, sonar: Reading) -> None:
@@ -157,7 +157,7 @@ def _side(canvas: Canvas, plan: Plan, side: int, sonar: Reading) -> None:
         for row in range(1, BODY_HEIGHT - 1):
             column = plan.middle + side * (7 + 2 * band)
             canvas.put(plan.top + row, column, "┃", _arc(sonar, band))
-    canvas.put(plan.top + 2, plan.outside(side, sonar.words), sonar.words, sonar.style)
+    canvas.put(plan.top + 2, plan.outside(side, sonar.label), sonar.label, sonar.style)
 
 
 def _corner(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> None:
@@ -166,7 +166,7 @@ def _corner(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> 
         column = plan.middle + side * (7 + 2 * band)
         canvas.put(plan.row(ahead, band), column, "╱" if ahead == side else "╲", _arc(sonar, band))
     row = plan.row(ahead, plan.bands - 1)
-    canvas.put(row, plan.outside(side, sonar.words), sonar.words, sonar.style)
+    canvas.put(row, plan.outside(side, sonar.label), sonar.label, sonar.style)
 
 
 def _arc(sonar: Reading, band: int) -> str:

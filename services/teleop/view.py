@@ -1,4 +1,4 @@
-"""What the operator sees, as one frozen picture: made in the loop's thread, drawn in another."""
+"""The state on the screen as one frozen value: made in the loop's thread, drawn in another."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -23,20 +23,20 @@ from common.motion import Twist
 M = TypeVar("M", bound=Message)
 
 
-class Ear(Generic[M]):
-    """The newest message of a topic while it is worth showing."""
+class LatestTopic(Generic[M]):
+    """The newest message of a topic, until it is too old to show."""
 
-    def __init__(self, bus: Bus, topic: Topic[M], worth_s: float, side: str = "") -> None:
+    def __init__(self, bus: Bus, topic: Topic[M], max_age_s: float, side: str = "") -> None:
         self._latest: Latest[M] | None = None
-        self._worth_s = worth_s
-        bus.subscribe(topic, self._hear, side=side)
+        self._max_age_s = max_age_s
+        bus.subscribe(topic, self._on_message, side=side)
 
     def at(self, now_ns: int) -> M | None:
-        """Return the message, or None once it is older than it is worth."""
+        """Return the message, or None once it is too old."""
         latest = self._latest
-        return latest.value if latest and fresh(latest, now_ns, self._worth_s) else None
+        return latest.value if latest and fresh(latest, now_ns, self._max_age_s) else None
 
-    def _hear(self, arrival: Arrival[M]) -> None:
+    def _on_message(self, arrival: Arrival[M]) -> None:
         self._latest = Latest(arrival.message, arrival.received_ns)
 
 
@@ -52,19 +52,19 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """Everything on the screen at one moment; None where nothing (fresh) is known."""
+    """Everything on the screen; None for values without a fresh message."""
 
     robot: str
     source: str
     connected: bool  # to a router
     gear: int
     turbo: bool
-    top: Twist  # what full deflection asks in this gear
-    asked: Twist | None = None  # None: silent
+    top: Twist  # of full deflection in this gear
+    requested: Twist | None = None  # None: silent
     release: Direction | None = None  # direction of the release that the operator holds
-    keys_refused: str = ""  # why the keys do not count
-    gamepad: str = ""  # in words
-    move_stick: bool = False  # the gamepad drives and has sent nothing for a while
+    keys_refused: str = ""  # why keys are refused
+    gamepad: str = ""  # its status
+    move_stick: bool = False  # the gamepad drives and sent no event for a while
     safety: SafetyState | None = None
     velocity: Velocity | None = None
     odometry: Odometry | None = None

@@ -149,8 +149,8 @@ class Absent:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Absent())
 from cli.__main__ import COMMANDS, main
-from services.teleop import life
-life.terminal_is_there = lambda: True
+from services.teleop import __main__ as teleop
+teleop.terminal_is_there = lambda: True
 for name in COMMANDS:
     try:
         main([name, "--help"])

@@ -9,7 +9,7 @@ from common.bus.bus import Arrival
 from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.messages import Drive
-from common.source import BARRED_AFTER, DriveSource
+from common.source import DENIED_AFTER, DriveSource
 from tests.factories import safety_state
 from tests.teleop.support import FakeBus
 from verification.harness.bus import at, bus_on, running
@@ -21,7 +21,7 @@ def bus() -> FakeBus:
     return FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
 
 
-def test_before_safety_was_heard_the_echo_is_zero(bus: FakeBus) -> None:
+def test_the_echo_is_zero_before_the_first_state_of_safety(bus: FakeBus) -> None:
     sent = DriveSource(bus, "demo").ask(0.2, -0.1)
     assert (sent.linear, sent.angular, sent.echo, sent.seq) == (0.2, -0.1, 0, 1)
 
@@ -34,11 +34,11 @@ def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_no_motion_is_refused(bus: FakeBus, wrong: float) -> None:
+def test_a_non_finite_request_is_refused(bus: FakeBus, wrong: float) -> None:
     source = DriveSource(bus, "demo")
-    with pytest.raises(ValueError, match="is not a finite motion"):
+    with pytest.raises(ValueError, match="non-finite request"):
         source.ask(wrong, 0.0)
-    with pytest.raises(ValueError, match="is not a finite motion"):
+    with pytest.raises(ValueError, match="non-finite request"):
         source.ask(0.0, wrong)
 
 
@@ -66,22 +66,22 @@ def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("passed_on", "is_heard", "barred"),
+    ("passed_on", "is_heard", "denied"),
     [(False, True, True), (False, False, False), (True, True, False), (None, True, False)],
 )
 def test_who_may_only_watch_is_barred(
     bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
-    passed_on: bool | None, is_heard: bool, barred: bool,
+    passed_on: bool | None, is_heard: bool, denied: bool,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(Publisher, "passed_on", passed_on)
     source = DriveSource(bus, "demo")
     if is_heard:
         bus.tell(keys.SAFETY, safety_state(heartbeat=7))
-    for _ in range(BARRED_AFTER - 1):
+    for _ in range(DENIED_AFTER - 1):
         source.ask(0.1, 0.0)
-    assert not source.barred
+    assert not source.denied
     source.ask(0.1, 0.0)
-    assert source.barred is barred
+    assert source.denied is denied
     monkeypatch.setattr(Publisher, "passed_on", True)
     source.ask(0.1, 0.0)
-    assert not source.barred
+    assert not source.denied

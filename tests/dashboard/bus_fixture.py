@@ -1,4 +1,4 @@
-"""What else is on the bus of a dashboard under test."""
+"""The other programs on the bus of a dashboard under test."""
 
 import time
 
@@ -8,14 +8,14 @@ from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, Release
 from tests.factories import safety_state
-from verification.harness.dashboard import Viewer
+from verification.harness.dashboard import Client
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 HOLD = {"x": 1.0, "y": 0.0}
 
 
-class World:
-    """What else is on the bus: a safety that runs, and ears for what is asked."""
+class Peer:
+    """A simulated safety, and subscribers for requests and stops."""
 
     def __init__(self, loop: Loop) -> None:
         self.requests: list[Drive] = []
@@ -44,7 +44,7 @@ class World:
         bus.live(keys.live_key("002", "bridge", "x"))
         bus.live(keys.live_key("one-more", "bridge", "x"))
 
-        def tell(now_ns: int) -> None:
+        def publish(now_ns: int) -> None:
             if self.safe:
                 state.put(
                     safety_state(
@@ -55,10 +55,10 @@ class World:
                     )
                 )
 
-        self._loop.post(lambda: self._loop.every(0.05, tell))
+        self._loop.post(lambda: self._loop.every(0.05, publish))
 
-    def quiet(self) -> None:
-        """Wait until no stop has come for a second."""
+    def wait_for_silence(self) -> None:
+        """Wait until no stop was received for a second."""
         count, since_ns = len(self.estops), time.monotonic_ns()
 
         def over() -> bool:
@@ -73,20 +73,20 @@ class World:
         return bool(self.requests) and self.requests[-1].linear > 0
 
     def zeros(self) -> int:
-        """Return how many zeros came last."""
+        """Return the number of zeros at the end."""
         count = 0
         while count < len(self.requests) and not self.requests[-1 - count].linear:
             count += 1
         return count
 
 
-def drive(it: Viewer, world: World) -> None:
-    """Answer every picture with a push, until requests to move go out."""
+def drive(it: Client, peer: Peer) -> None:
+    """Answer every snapshot with a push until drive requests are sent."""
     deadline = time.monotonic() + PATIENCE_S
-    while not world.moving():
-        assert time.monotonic() < deadline, "nothing was ever asked"
-        picture = it.look()
-        if picture["hands"]["grip"] == "lapsed":
-            it.say("free")  # this machine held somebody up
+    while not peer.moving():
+        assert time.monotonic() < deadline, "no drive request was sent"
+        snapshot = it.next_snapshot()
+        if snapshot["driver"]["hold"] == "lapsed":
+            it.send("free")  # the host has stalled
         else:
-            it.say("hold", n=picture["n"], **HOLD)
+            it.send("hold", n=snapshot["n"], **HOLD)

@@ -1,13 +1,13 @@
-"""A router, a world on it and a dashboard that shows it, for the tests of one file."""
+"""A router, its simulated safety and a dashboard, for the tests of one module."""
 
 from collections.abc import Iterator
 
 import pytest
 
 from common.loop import Loop
-from tests.dashboard.bus_fixture import World
+from tests.dashboard.bus_fixture import Peer
 from verification.harness.bus import bus_on, router_process, running
-from verification.harness.dashboard import Site, dashboard
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.ports import free_port
 
 
@@ -19,14 +19,14 @@ def endpoint() -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def world(endpoint: str) -> Iterator[World]:
+def peer(endpoint: str) -> Iterator[Peer]:
     with running(Loop()) as loop:
-        world = World(loop)
-        with bus_on(endpoint, loop, world.declare):
-            yield world
+        peer = Peer(loop)
+        with bus_on(endpoint, loop, peer.declare):
+            yield peer
 
 
 @pytest.fixture(scope="module")
-def site(endpoint: str, world: World, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with dashboard(endpoint, tmp_path_factory.mktemp("site"), "dashboard.round_trip=0.5") as it:
+def server(endpoint: str, peer: Peer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with dashboard(endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=0.5") as it:
         yield it

@@ -1,7 +1,7 @@
-"""``python -m tests.dashboard.load PORT PID``: what viewers cost the dashboard's process.
+"""``python -m tests.dashboard.load PORT PID``: CPU load of the dashboard's process by viewers.
 
-Connects ten viewers, waits, and prints the pictures that each got and the process's share of a
-core, by the system's own account.
+Connects ten viewers, waits, and prints the rate of snapshots per viewer and the CPU time of the
+process as a share of a core.
 """
 
 import os
@@ -24,16 +24,16 @@ def cpu_s(pid: int) -> float:
 
 
 def watch(port: str, counts: list[int], index: int) -> None:
-    """Count the pictures that one viewer gets."""
+    """Count the snapshots of one viewer."""
     origin = Origin(f"http://127.0.0.1:{port}")
     with connect(f"ws://127.0.0.1:{port}/live", origin=origin) as socket:
         socket.send('{"k":"look","robot":"001"}')
         for text in socket:
-            counts[index] += '"now"' in str(text)[:12]
+            counts[index] += '"fast"' in str(text)[:12]
 
 
 def main() -> None:
-    """Measure for a while."""
+    """Run the measurement."""
     port, pid = sys.argv[1], int(sys.argv[2])
     counts = [0] * VIEWERS
     for index in range(VIEWERS):
@@ -44,7 +44,7 @@ def main() -> None:
     past_s = time.monotonic() - began_s
     rates = [(after - before) / past_s for after, before in zip(counts, counted, strict=True)]
     share = (cpu_s(pid) - used_s) / past_s
-    print(f"{VIEWERS} viewers, {min(rates):.1f} to {max(rates):.1f} pictures/s each: ", end="")  # noqa: T201
+    print(f"{VIEWERS} viewers, {min(rates):.1f} to {max(rates):.1f} snapshots/s each: ", end="")  # noqa: T201
     print(f"{100 * share:.1f} % of a core")  # noqa: T201
 
 

@@ -1,4 +1,4 @@
-"""Safety's and the bridge's servers, with configured answers."""
+"""Call servers of safety and bridge with configured answers."""
 
 import contextlib
 import time
@@ -19,7 +19,7 @@ from common.messages import (
     Switches,
     SwitchesRequest,
 )
-from tests.dashboard.bus_fixture import World
+from tests.dashboard.bus_fixture import Peer
 from verification.harness.bus import bus_on, running
 
 CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
@@ -28,10 +28,10 @@ FREE = Release(believed_free="backward", travelled=0.4, age=2.0, forbidden=(), l
 
 
 @dataclass
-class Servers:
-    """Safety's and the bridge's servers: what they were asked, and what they answer."""
+class CallServers:
+    """Call servers of safety and bridge: received requests and configured answers."""
 
-    world: World
+    peer: Peer
     resets: list[ResetRequest] = field(default_factory=list)
     releases: list[ReleaseRequest] = field(default_factory=list)
     switches: list[SwitchesRequest] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Servers:
     def reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         self.resets.append(request)
         if self.is_effective:
-            self.world.latched, self.world.causes = (), ()
+            self.peer.latched, self.peer.causes = (), ()
         done = ResetDone(
             text="Reset.", boot=self.boot, heartbeat=time.monotonic_ns(), cleared=request.causes
         )
@@ -62,11 +62,11 @@ class Servers:
 
 
 @contextlib.contextmanager
-def serving(endpoint: str, world: World) -> Iterator[Servers]:
+def serving(endpoint: str, peer: Peer) -> Iterator[CallServers]:
     """Answer while the context lasts, on the bus of a robot with a contact."""
-    it = Servers(world, boot=world.boot)
-    world.safe = True
-    world.latched, world.causes, world.release = ("contact",), (CONTACT,), FREE
+    it = CallServers(peer, boot=peer.boot)
+    peer.safe = True
+    peer.latched, peer.causes, peer.release = ("contact",), (CONTACT,), FREE
     with running(Loop()) as loop, bus_on(endpoint, loop, it.declare):
         yield it
-    world.latched, world.causes, world.release = (), (), None
+    peer.latched, peer.causes, peer.release = (), (), None

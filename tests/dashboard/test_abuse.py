@@ -22,8 +22,8 @@ from cryptography.x509.oid import NameOID
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from services.dashboard.listener import RESERVE
-from tests.dashboard.bus_fixture import World
-from verification.harness.dashboard import Site, Viewer, dashboard, viewer
+from tests.dashboard.bus_fixture import Peer
+from verification.harness.dashboard import Client, Server, connected, dashboard
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open, is_closed
 from verification.harness.waiting import wait_until
 
@@ -38,63 +38,63 @@ def report(text: str) -> None:
     sys.stdout.write(f"{text}\n")
 
 
-def posted(site: Site) -> None:
+def posted(server: Server) -> None:
     request = urllib.request.Request(
-        f"{site.url}estop/001", method="POST", headers={"Origin": site.url.rstrip("/")}
+        f"{server.url}estop/001", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
     with urllib.request.urlopen(request, timeout=10) as answer:
         assert answer.status == 200
 
 
-def worst_s(world: World, ask: Callable[[], None]) -> float:
+def worst_s(peer: Peer, ask: Callable[[], None]) -> float:
     """Return the longest time from asking for an emergency stop to its arrival on the bus."""
     worst = 0.0
     for _ in range(TRIES):
-        world.latched = ("estop",)
-        world.quiet()
-        world.estops.clear()
-        world.latched = ()
+        peer.latched = ("estop",)
+        peer.wait_for_silence()
+        peer.estops.clear()
+        peer.latched = ()
         began = time.monotonic()
         ask()
-        wait_until(lambda: world.estops, "the emergency stop on the bus", 10)
+        wait_until(lambda: peer.estops, "the emergency stop on the bus", 10)
         worst = max(worst, time.monotonic() - began)
-    world.latched = ("estop",)
+    peer.latched = ("estop",)
     return worst
 
 
-def said(site: Site) -> None:
-    with viewer(site) as it:
-        it.say("estop")
+def said(server: Server) -> None:
+    with connected(server) as it:
+        it.send("estop")
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("message", FLOODS.values(), ids=FLOODS)
 def test_a_flood_of_messages_does_not_delay_an_emergency_stop(
-    site: Site, world: World, message: bytes
+    server: Server, peer: Peer, message: bytes
 ) -> None:
-    with flooded(site, message):
+    with flooded(server, message):
         time.sleep(1.0)
-        by_request = worst_s(world, lambda: posted(site))
-        by_message = worst_s(world, lambda: said(site))
+        by_request = worst_s(peer, lambda: posted(server))
+        by_message = worst_s(peer, lambda: said(server))
     report(f"E-STOP at worst: {by_request:.3f} s by request, {by_message:.3f} s by message")
     assert by_request < ESTOP_S
     assert by_message < ESTOP_S
 
 
-def test_requests_that_never_end_are_ended(endpoint: str, world: World, tmp_path: Path) -> None:
-    with dashboard(endpoint, tmp_path) as site:
-        resource.prlimit(site.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
-        with half_open(site, HALF_OPEN) as opened:
+def test_requests_that_never_end_are_ended(endpoint: str, peer: Peer, tmp_path: Path) -> None:
+    with dashboard(endpoint, tmp_path) as server:
+        resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
+        with half_open(server, HALF_OPEN) as opened:
             began = time.monotonic()
-            by_request = worst_s(world, lambda: posted(site))
+            by_request = worst_s(peer, lambda: posted(server))
             wait_until(lambda: all(map(is_closed, opened)), "the end of all half-open requests")
             report(f"E-STOP {by_request:.3f} s; all ended after {time.monotonic() - began:.1f} s")
     assert by_request < ESTOP_S
 
 
-def status_of(site: Site) -> int:
+def status_of(server: Server) -> int:
     try:
-        with urllib.request.urlopen(site.url, timeout=10) as answer:
+        with urllib.request.urlopen(server.url, timeout=10) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         with error:
@@ -102,51 +102,51 @@ def status_of(site: Site) -> int:
 
 
 def test_beyond_the_limit_only_an_emergency_stop_is_served(
-    endpoint: str, world: World, tmp_path: Path
+    endpoint: str, peer: Peer, tmp_path: Path
 ) -> None:
     limit = 8
     with (
-        dashboard(endpoint, tmp_path, f"dashboard.connections_per_address={limit}") as site,
+        dashboard(endpoint, tmp_path, f"dashboard.connections_per_address={limit}") as server,
         contextlib.ExitStack() as viewers,
     ):
         for _ in range(limit):
-            viewers.enter_context(viewer(site))
-        assert status_of(site) == 503
+            viewers.enter_context(connected(server))
+        assert status_of(server) == 503
         with pytest.raises(InvalidStatus):
-            viewers.enter_context(viewer(site))
-        with half_open(site, 2 * RESERVE) as opened:
-            assert worst_s(world, lambda: posted(site)) < ESTOP_S
+            viewers.enter_context(connected(server))
+        with half_open(server, 2 * RESERVE) as opened:
+            assert worst_s(peer, lambda: posted(server)) < ESTOP_S
             assert sum(map(is_closed, opened)) >= RESERVE  # the oldest made room
         viewers.close()
-        wait_until(lambda: status_of(site) == 200, "the page, once there is room")
+        wait_until(lambda: status_of(server) == 200, "the page, once there is room")
 
 
-def test_an_emergency_stop_among_messages_that_are_dropped(site: Site, world: World) -> None:
-    world.latched = ("estop",)
-    world.quiet()
-    world.estops.clear()
-    with viewer(site) as it:
+def test_an_emergency_stop_among_messages_that_are_dropped(server: Server, peer: Peer) -> None:
+    peer.latched = ("estop",)
+    peer.wait_for_silence()
+    peer.estops.clear()
+    with connected(server) as it:
         for _ in range(300):  # more than a burst, less than abuse
-            it.say("free")
-        it.say("estop", robot="001")
-        wait_until(lambda: world.estops, "the emergency stop")
-        while (rest := it.waits("rest")) and not dropped(rest):
+            it.send("free")
+        it.send("estop", robot="001")
+        wait_until(lambda: peer.estops, "the emergency stop")
+        while (rest := it.wait_for("slow")) and not dropped(rest):
             pass
 
 
 def dropped(rest: dict[str, Any]) -> int:
     """Return the count of dropped messages in the dashboard's health; 0 until there is one."""
     own = [one for one in rest["services"] if one["name"] == "dashboard"]
-    return sum(int(one["troubles"].get("messages_dropped", 0)) for one in own)
+    return sum(int(one["counters"].get("messages_dropped", 0)) for one in own)
 
 
-def test_who_goes_on_sending_is_closed(site: Site) -> None:
-    def go_on(it: Viewer) -> None:
+def test_a_viewer_that_keeps_flooding_is_disconnected(server: Server) -> None:
+    def go_on(it: Client) -> None:
         for _ in range(600):
-            it.say("free")
-        it.waits("never")
+            it.send("free")
+        it.wait_for("never")
 
-    with viewer(site) as it, pytest.raises(ConnectionClosed):
+    with connected(server) as it, pytest.raises(ConnectionClosed):
         go_on(it)
 
 
@@ -155,15 +155,15 @@ def test_a_tls_handshake_that_never_ends_is_ended(endpoint: str, tmp_path: Path)
     sets = (f"dashboard.certificate={certificate}", f"dashboard.private_key={key}")
     context = ssl.create_default_context(cafile=certificate)
     with contextlib.ExitStack() as stack:
-        site = stack.enter_context(
+        server = stack.enter_context(
             dashboard(endpoint, tmp_path, "dashboard.request_timeout=1.0", *sets, tls=context)
         )
         opened = [
-            stack.enter_context(socket.create_connection(("127.0.0.1", site.port)))
+            stack.enter_context(socket.create_connection(("127.0.0.1", server.port)))
             for _ in range(4)
         ]
         wait_until(lambda: all(map(is_closed, opened)), "their end")
-        assert site.serves()
+        assert server.serves()
 
 
 def self_signed(folder: Path) -> tuple[Path, Path]:
@@ -184,7 +184,7 @@ def self_signed(folder: Path) -> tuple[Path, Path]:
         )
         .sign(key, hashes.SHA256())
     )
-    files = folder / "site.pem", folder / "site.key"
+    files = folder / "server.pem", folder / "server.key"
     files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM))
     files[1].write_bytes(
         key.private_bytes(

@@ -1,10 +1,11 @@
-"""Which connections are admitted: the limits, the reserve, and which one is closed."""
+"""Limits of connections and messages: admission, reserve, rate limit."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.dashboard.admission import Admission, Place, network_of
+from common.freshness import NS_PER_S
+from services.dashboard.admission import Admission, Place, RateLimit, Verdict, network_of
 
 ORDINARY, RESERVE = Place.ORDINARY, Place.RESERVE
 
@@ -14,27 +15,27 @@ def admission() -> Admission:
     return Admission(total=4, per_network=2, reserve=2)
 
 
-def test_one_network_fills_its_own_part(admission: Admission) -> None:
+def test_one_network_reaches_its_own_limit(admission: Admission) -> None:
     assert admission.admit(1, "a") == (ORDINARY, None)
     assert admission.admit(2, "a") == (ORDINARY, None)
     assert admission.admit(3, "a") == (RESERVE, None)
     assert admission.admit(4, "b") == (ORDINARY, None)
 
 
-def test_all_networks_fill_the_whole(admission: Admission) -> None:
+def test_all_networks_reach_the_total_limit(admission: Admission) -> None:
     for number, network in enumerate("aabb"):
         assert admission.admit(number, network) == (ORDINARY, None)
     assert admission.admit(9, "c") == (RESERVE, None)
 
 
-def test_the_oldest_in_a_full_reserve_ends(admission: Admission) -> None:
+def test_the_oldest_connection_of_a_full_reserve_is_closed(admission: Admission) -> None:
     for number in (1, 2, 3, 4):
         admission.admit(number, "a")
     assert admission.admit(5, "a") == (RESERVE, 3)
     assert admission.admit(6, "a") == (RESERVE, 4)
 
 
-def test_a_network_pushes_out_its_own(admission: Admission) -> None:
+def test_a_network_displaces_its_own_connections(admission: Admission) -> None:
     for number, network in enumerate("aabb"):
         admission.admit(number, network)
     admission.admit(10, "c")
@@ -43,7 +44,7 @@ def test_a_network_pushes_out_its_own(admission: Admission) -> None:
     assert admission.admit(13, "a") == (RESERVE, 12)
 
 
-def test_an_end_gives_the_place_back(admission: Admission) -> None:
+def test_a_closed_connection_frees_its_place(admission: Admission) -> None:
     admission.admit(1, "a")
     admission.admit(2, "a")
     admission.release(1)
@@ -52,7 +53,9 @@ def test_an_end_gives_the_place_back(admission: Admission) -> None:
 
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.booleans()), max_size=60))
-def test_the_limits_hold_and_a_newcomer_stays(steps: list[tuple[str, bool]]) -> None:
+def test_the_limits_hold_and_a_new_connection_is_never_closed(
+    steps: list[tuple[str, bool]],
+) -> None:
     admission = Admission(total=4, per_network=2, reserve=2)
     inside: dict[int, tuple[str, Place]] = {}
     for number, (network, is_end) in enumerate(steps):
@@ -85,3 +88,53 @@ def test_the_limits_hold_and_a_newcomer_stays(steps: list[tuple[str, bool]]) -> 
 )
 def test_the_network_of_an_address(one: str, other: str, same: bool) -> None:
     assert (network_of(one) == network_of(other)) is same
+
+
+ACCEPTED, DROPPED, ABUSIVE = Verdict.ACCEPTED, Verdict.DROPPED, Verdict.ABUSIVE
+
+
+def test_a_burst_is_accepted_then_dropped_then_abusive() -> None:
+    limit = RateLimit(rate=10, burst=3)
+    assert [limit.take(0) for _ in range(6)] == [
+        ACCEPTED, ACCEPTED, ACCEPTED, DROPPED, DROPPED, ABUSIVE,
+    ]  # fmt: skip
+
+
+def test_the_allowed_rate_is_always_accepted() -> None:
+    limit = RateLimit(rate=10, burst=3)
+    assert {limit.take(tick * NS_PER_S // 10) for tick in range(1000)} == {ACCEPTED}
+
+
+def test_a_pause_refills_one_burst_at_most() -> None:
+    limit = RateLimit(rate=10, burst=3)
+    limit.take(0)
+    assert [limit.take(3600 * NS_PER_S) for _ in range(4)] == [ACCEPTED] * 3 + [DROPPED]
+
+
+def test_a_client_that_returns_to_the_rate_is_accepted() -> None:
+    limit = RateLimit(rate=10, burst=3)
+    for _ in range(5):
+        limit.take(0)
+    assert limit.take(NS_PER_S // 2) is ACCEPTED
+
+
+def test_a_debt_is_bounded() -> None:
+    limit = RateLimit(rate=10, burst=3)
+    for _ in range(1000):
+        limit.take(0)
+    assert limit.take(NS_PER_S // 2) is ACCEPTED
+
+
+@pytest.mark.parametrize(("cost", "verdict"), [(3, ACCEPTED), (4, DROPPED), (6, ABUSIVE)])
+def test_a_cost_takes_more_than_one_token(cost: float, verdict: Verdict) -> None:
+    assert RateLimit(rate=10, burst=3).take(0, cost) is verdict
+
+
+@given(st.lists(st.integers(0, NS_PER_S), min_size=1, max_size=200))
+def test_accepted_messages_are_bounded_by_rate_and_burst(waits: list[int]) -> None:
+    limit, now_ns, accepted = RateLimit(rate=10, burst=3), 0, 0
+    for wait_ns in waits:
+        now_ns += wait_ns
+        accepted += limit.take(now_ns) is ACCEPTED
+    past_s = (now_ns - waits[0]) / NS_PER_S
+    assert accepted <= 3 + 10 * past_s + 1e-6

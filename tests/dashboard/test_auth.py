@@ -1,4 +1,4 @@
-"""Who may come in to the dashboard, and who may not."""
+"""Authentication of the dashboard's web server."""
 
 import json
 import re
@@ -14,34 +14,34 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from services.dashboard.server import reachable
-from tests.dashboard.bus_fixture import World
-from verification.harness.dashboard import Site, dashboard
+from tests.dashboard.bus_fixture import Peer
+from verification.harness.dashboard import Server, dashboard
 
 
-def test_another_page_of_the_same_browser_cannot_act(site: Site, world: World) -> None:
+def test_another_page_of_the_same_browser_cannot_act(server: Server, peer: Peer) -> None:
     for origin in (Origin("http://evil.example"), None):
         with pytest.raises(InvalidStatus):
-            connect(f"ws://127.0.0.1:{site.port}/live", origin=origin)
-    world.latched = ("estop",)  # so that earlier stops are repeated no more
-    world.quiet()
-    world.estops.clear()
-    request = urllib.request.Request(f"{site.url}estop/001", method="POST")
+            connect(f"ws://127.0.0.1:{server.port}/live", origin=origin)
+    peer.latched = ("estop",)  # so that earlier stops are repeated no more
+    peer.wait_for_silence()
+    peer.estops.clear()
+    request = urllib.request.Request(f"{server.url}estop/001", method="POST")
     with pytest.raises(urllib.error.HTTPError, match="403"):
         urllib.request.urlopen(request)
-    assert world.estops == []
-    world.latched = ()
+    assert peer.estops == []
+    peer.latched = ()
 
 
-def test_a_bent_name_is_shown_the_right_one(site: Site) -> None:
-    request = urllib.request.Request(site.url, headers={"Host": "evil.example"})
+def test_a_rebound_host_name_is_refused(server: Server) -> None:
+    request = urllib.request.Request(server.url, headers={"Host": "evil.example"})
     with pytest.raises(urllib.error.HTTPError, match="403") as refused:
         urllib.request.urlopen(request)
     assert b"localhost" in refused.value.read()
 
 
 @pytest.mark.parametrize("path", ["", "t2/dashboard.js", "t2/none.js", "nowhere", "estop/001"])
-def test_every_answer_keeps_other_pages_out(site: Site, path: str) -> None:
-    request = urllib.request.Request(site.url + path, headers={"Origin": "http://evil.example"})
+def test_every_response_has_the_security_headers(server: Server, path: str) -> None:
+    request = urllib.request.Request(server.url + path, headers={"Origin": "http://evil.example"})
     try:
         answer = urllib.request.urlopen(request)
     except urllib.error.HTTPError as error:
@@ -58,9 +58,9 @@ def test_every_answer_keeps_other_pages_out(site: Site, path: str) -> None:
         assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-def test_a_preflight_is_refused(site: Site) -> None:
+def test_a_preflight_is_refused(server: Server) -> None:
     request = urllib.request.Request(
-        f"{site.url}estop/001",
+        f"{server.url}estop/001",
         method="OPTIONS",
         headers={"Origin": "http://evil.example", "Access-Control-Request-Method": "POST"},
     )
@@ -70,51 +70,51 @@ def test_a_preflight_is_refused(site: Site) -> None:
         assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-def test_the_page_has_no_inline_code(site: Site) -> None:
-    with urllib.request.urlopen(site.url) as answer:
+def test_the_page_has_no_inline_code(server: Server) -> None:
+    with urllib.request.urlopen(server.url) as answer:
         page = answer.read().decode()
     assert re.findall(r"<script(?![^>]*(?:src=|application/json))", page) == []
     assert re.findall(r"\s(?:on\w+|style)=", page) == []
 
 
 def browser() -> urllib.request.OpenerDirector:
-    """Return something that keeps cookies."""
+    """Return a client that stores cookies."""
     return urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
 
 
-def test_on_the_network_a_token_is_asked_for(endpoint: str, tmp_path: Path) -> None:
+def test_from_the_network_a_token_is_required(endpoint: str, tmp_path: Path) -> None:
     secret = tmp_path / "token"
     secret.write_text("open sesame\n", encoding="utf-8")
     sets = ("dashboard.host=0.0.0.0", f"dashboard.token_file={secret}")
-    with dashboard(endpoint, tmp_path, *sets) as site:
+    with dashboard(endpoint, tmp_path, *sets) as server:
         for path in ("", "t2/dashboard.js", "?token=wrong"):
             with pytest.raises(urllib.error.HTTPError, match="401") as refused:
-                browser().open(site.url + path)
+                browser().open(server.url + path)
             assert b"<form" in refused.value.read()
         with pytest.raises(InvalidStatus):
-            connect(f"ws://127.0.0.1:{site.port}/live", origin=Origin(site.url.rstrip("/")))
+            connect(f"ws://127.0.0.1:{server.port}/live", origin=Origin(server.url.rstrip("/")))
         one = browser()
         form = urllib.parse.urlencode({"token": "open sesame"}).encode()
-        with one.open(site.url, form) as answer:
+        with one.open(server.url, form) as answer:
             assert b'id="texts"' in answer.read()
-        with one.open(f"{site.url}t2/dashboard.js") as answer:
+        with one.open(f"{server.url}t2/dashboard.js") as answer:
             assert answer.status == 200
-        with browser().open(f"{site.url}?token=open+sesame") as answer:
+        with browser().open(f"{server.url}?token=open+sesame") as answer:
             assert answer.status == 200
-        assert "open sesame" not in site.log.read_text()
+        assert "open sesame" not in server.log.read_text()
 
 
-def test_the_address_that_is_named() -> None:
+def test_the_logged_address() -> None:
     assert reachable("127.0.0.1") == "127.0.0.1"
     assert reachable("fe80::1") == "[fe80::1]"
     for everywhere in ("0.0.0.0", "::"):
         assert reachable(everywhere).strip("[]") not in ("", everywhere)
 
 
-def test_a_new_token_is_printed(endpoint: str, tmp_path: Path) -> None:
-    with dashboard(endpoint, tmp_path, "dashboard.host=0.0.0.0") as site:
-        lines = [json.loads(line) for line in site.log.read_text().splitlines()]
+def test_a_new_token_is_logged(endpoint: str, tmp_path: Path) -> None:
+    with dashboard(endpoint, tmp_path, "dashboard.host=0.0.0.0") as server:
+        lines = [json.loads(line) for line in server.log.read_text().splitlines()]
         where = next(line["open"] for line in lines if line["event"] == "started")
         assert "0.0.0.0" not in where
-        with browser().open(f"{site.url}?{urlsplit(where).query}") as answer:
+        with browser().open(f"{server.url}?{urlsplit(where).query}") as answer:
             assert b'id="texts"' in answer.read()

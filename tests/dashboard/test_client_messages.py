@@ -1,37 +1,37 @@
-"""What a browser may say."""
+"""Messages from the browser."""
 
 import msgspec
 import pytest
 
 from common.messages import LedRequest, SwitchesRequest
-from services.dashboard import client_messages as w
+from services.dashboard import client_messages as client
 
-READ = msgspec.json.Decoder(w.AnyWord)
+READ = msgspec.json.Decoder(client.AnyMessage)
 
 
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ('{"k":"look","robot":"001","name":"Ada"}', w.Look("001", "Ada")),
-        ('{"k":"take"}', w.Take()),
-        ('{"k":"take","force":true}', w.Take(force=True)),
-        ('{"k":"leave"}', w.Leave()),
-        ('{"k":"hold","n":3,"x":0.5,"y":-1}', w.Hold(3, 0.5, -1.0)),
-        ('{"k":"hold","n":3,"x":0,"y":0,"release":"backward"}', w.Hold(3, release="backward")),
-        ('{"k":"free"}', w.Free()),
-        ('{"k":"gear","gear":5}', w.Gear(5)),
-        ('{"k":"estop"}', w.Estop()),
-        ('{"k":"estop","robot":"002"}', w.Estop("002")),
-        ('{"k":"reset"}', w.Reset(0)),
-        ('{"k":"reset","n":9}', w.Reset(9)),
+        ('{"k":"look","robot":"001","name":"Ada"}', client.Look("001", "Ada")),
+        ('{"k":"take"}', client.Take()),
+        ('{"k":"take","force":true}', client.Take(force=True)),
+        ('{"k":"leave"}', client.Leave()),
+        ('{"k":"hold","n":3,"x":0.5,"y":-1}', client.Hold(3, 0.5, -1.0)),
+        ('{"k":"hold","n":3,"x":0,"y":0,"release":"backward"}', client.Hold(3, release="backward")),
+        ('{"k":"free"}', client.Free()),
+        ('{"k":"gear","gear":5}', client.Gear(5)),
+        ('{"k":"estop"}', client.Estop()),
+        ('{"k":"estop","robot":"002"}', client.Estop("002")),
+        ('{"k":"reset"}', client.Reset(0)),
+        ('{"k":"reset","n":9}', client.Reset(9)),
         (
             '{"k":"switch","n":9,"to":{"bumper_brake":false}}',
-            w.Switch(SwitchesRequest(bumper_brake=False), 9),
+            client.Switch(SwitchesRequest(bumper_brake=False), 9),
         ),
-        ('{"k":"lamp","to":{"channel":1,"mode":2}}', w.Lamp(LedRequest(channel=1, mode=2))),
+        ('{"k":"lamp","to":{"channel":1,"mode":2}}', client.Lamp(LedRequest(channel=1, mode=2))),
     ],
 )
-def test_the_words(text: str, word: w.Word) -> None:
+def test_valid_messages_are_decoded(text: str, word: client.ClientMessage) -> None:
     assert READ.decode(text) == word
 
 
@@ -55,6 +55,6 @@ def test_the_words(text: str, word: w.Word) -> None:
         '{"k":"lamp","to":{"channel":256,"mode":1}}',
     ],
 )
-def test_anything_else_is_refused(text: str) -> None:
+def test_invalid_messages_are_refused(text: str) -> None:
     with pytest.raises(msgspec.DecodeError):
         READ.decode(text)

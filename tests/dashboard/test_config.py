@@ -1,4 +1,4 @@
-"""The dashboard's settings, and what stands in the way of its start."""
+"""The dashboard's settings, and errors at its start."""
 
 import socket
 import sys
@@ -8,7 +8,8 @@ import pytest
 
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
-from services.dashboard import host, life
+from services.dashboard import __main__ as dashboard
+from services.dashboard import host
 from services.dashboard.config import Dashboard
 
 
@@ -25,7 +26,7 @@ from services.dashboard.config import Dashboard
         (["--set", "dashboard.connections=0"], "dashboard.connections"),
         (["--set", "dashboard.connections_per_address=1000"], "connections_per_address"),
         (["--set", "dashboard.request_timeout=0"], "dashboard.request_timeout"),
-        (["--set", "dashboard.certificate=a.pem"], "belong together"),
+        (["--set", "dashboard.certificate=a.pem"], "must be set together"),
         (["--set", "dashboard.source=No"], "dashboard.source"),
         (["--set", "dashboard.token_file=/no/such"], "/no/such"),
         (["--robot", "a/b"], "robot.id"),
@@ -35,35 +36,35 @@ from services.dashboard.config import Dashboard
         ),
     ],
 )
-def test_a_bad_setting_ends_it_before_anything_opens(
+def test_an_invalid_setting_ends_the_start(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert life.main(words) == EXIT_CONFIG
+    assert dashboard.main(words) == EXIT_CONFIG
     assert named in capsys.readouterr().err
 
 
-def test_a_taken_port_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_in_use_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        assert life.main(["--port", port]) == EXIT_LINK
+        assert dashboard.main(["--port", port]) == EXIT_LINK
     said = capsys.readouterr().err
     assert port in said
-    assert "name another port" in said
+    assert "set another one" in said
 
 
-def test_a_missing_extra_is_named(
+def test_a_missing_extra_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delitem(sys.modules, "services.dashboard.host", raising=False)
     monkeypatch.delitem(sys.modules, "services.dashboard.server", raising=False)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    assert life.main([]) == 1
+    assert dashboard.main([]) == 1
     assert "install the extra `dashboard`" in capsys.readouterr().err
 
 
-def test_this_machine_needs_no_token_and_others_get_a_new_one() -> None:
+def test_localhost_needs_no_token_and_other_hosts_get_a_new_one() -> None:
     assert host.token(Dashboard()) == ""
     assert host.token(Dashboard(host="::1")) == ""
     assert len(host.token(Dashboard(host="0.0.0.0"))) >= 16

@@ -1,65 +1,72 @@
-"""Who may come in, and who may act."""
+"""Credentials: which requests may view and which may act."""
 
 import pytest
 
-from services.dashboard.credentials import COOKIE, Gate, new_token
+from services.dashboard.credentials import COOKIE, Credentials, new_token
 
-OPEN, CLOSED = Gate(), Gate("a long token")
-BADGE = {"cookie": f"other=1; {COOKIE}={CLOSED.badge}"}
+LOCAL, WITH_TOKEN = Credentials(), Credentials("a long token")
+COOKIE_HEADER = {"cookie": f"other=1; {COOKIE}={WITH_TOKEN.cookie}"}
 
 
 @pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "localhost", "[::1]:8080"])
-def test_this_machine_may_come_in_without_a_token(host: str) -> None:
-    assert OPEN.lets_in({"host": host})
-    assert OPEN.lets_act({"host": host, "origin": f"http://{host}"})
+def test_localhost_may_view_and_act_without_a_token(host: str) -> None:
+    assert LOCAL.may_view({"host": host})
+    assert LOCAL.may_act({"host": host, "origin": f"http://{host}"})
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "", "[::1", "10.7.5.9:8080"])
-def test_a_name_that_somebody_else_has_bent_opens_nothing(host: str) -> None:
-    assert not OPEN.lets_in({"host": host})
-    assert not OPEN.lets_act({"host": host, "origin": f"http://{host}"})
+def test_another_host_name_is_refused_without_a_token(host: str) -> None:
+    assert not LOCAL.may_view({"host": host})
+    assert not LOCAL.may_act({"host": host, "origin": f"http://{host}"})
 
 
-def test_without_any_host_nothing_opens() -> None:
-    assert not OPEN.lets_in({})
+def test_a_request_without_a_host_is_refused() -> None:
+    assert not LOCAL.may_view({})
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://localhost:9999", "null", "", "localhost:8080"]
 )
-def test_another_page_may_look_and_not_act(origin: str) -> None:
+def test_another_origin_may_view_but_not_act(origin: str) -> None:
     headers = {"host": "localhost:8080", "origin": origin}
-    assert OPEN.lets_in(headers)
-    assert not OPEN.lets_act(headers)
-    assert not OPEN.lets_act({"host": "localhost:8080"})
+    assert LOCAL.may_view(headers)
+    assert not LOCAL.may_act(headers)
+    assert not LOCAL.may_act({"host": "localhost:8080"})
 
 
-def test_with_a_token_only_its_badge_opens() -> None:
+def test_with_a_token_only_its_cookie_is_accepted() -> None:
     robot = {"host": "10.7.5.220:8080"}
-    assert CLOSED.lets_in(robot | BADGE)
-    assert CLOSED.lets_act(robot | BADGE | {"origin": "https://10.7.5.220:8080"})
-    assert not CLOSED.lets_act(robot | BADGE | {"origin": "https://evil.example"})
-    assert not CLOSED.lets_act(robot | {"origin": "https://10.7.5.220:8080"})
+    assert WITH_TOKEN.may_view(robot | COOKIE_HEADER)
+    assert WITH_TOKEN.may_act(robot | COOKIE_HEADER | {"origin": "https://10.7.5.220:8080"})
+    assert not WITH_TOKEN.may_act(robot | COOKIE_HEADER | {"origin": "https://evil.example"})
+    assert not WITH_TOKEN.may_act(robot | {"origin": "https://10.7.5.220:8080"})
 
 
 @pytest.mark.parametrize(
-    "cookie", ["", f"{COOKIE}=", f"{COOKIE}=a long token", f"{COOKIE}={Gate('x').badge}", "ü=1;[]",
-               f"{COOKIE}=\xff"]
-)  # fmt: skip
-def test_any_other_cookie_opens_nothing(cookie: str) -> None:
-    assert not CLOSED.lets_in({"host": "localhost:8080", "cookie": cookie})
+    "cookie",
+    [
+        "",
+        f"{COOKIE}=",
+        f"{COOKIE}=a long token",
+        f"{COOKIE}={Credentials('x').cookie}",
+        "ü=1;[]",
+        f"{COOKIE}=\xff",
+    ],
+)
+def test_any_other_cookie_is_refused(cookie: str) -> None:
+    assert not WITH_TOKEN.may_view({"host": "localhost:8080", "cookie": cookie})
 
 
-def test_the_token_and_nothing_else_is_the_token() -> None:
-    assert CLOSED.knows("a long token")
-    assert not CLOSED.knows("a long toke")
-    assert not CLOSED.knows("")
-    assert not CLOSED.knows("ü")
+def test_only_the_token_is_the_token() -> None:
+    assert WITH_TOKEN.is_token("a long token")
+    assert not WITH_TOKEN.is_token("a long toke")
+    assert not WITH_TOKEN.is_token("")
+    assert not WITH_TOKEN.is_token("ü")
 
 
-def test_the_badge_does_not_show_the_token() -> None:
-    assert "a long token" not in CLOSED.badge
-    assert CLOSED.badge != Gate("another").badge
+def test_the_cookie_does_not_contain_the_token() -> None:
+    assert "a long token" not in WITH_TOKEN.cookie
+    assert WITH_TOKEN.cookie != Credentials("another").cookie
 
 
 def test_new_tokens_differ() -> None:

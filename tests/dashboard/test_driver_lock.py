@@ -1,4 +1,4 @@
-"""Who drives, and what holds count: the table, the round trip, hostile values."""
+"""The driver lock: its table, the round trip, hostile values."""
 
 import math
 
@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from services.dashboard.driver_lock import PICTURES, Grip, Push, Wheel
+from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState, Push
 
 AHEAD = Push(1.0, 0.0)
 LIMIT_S = 0.3
@@ -18,126 +18,126 @@ def at(seconds: float) -> int:
 
 
 @pytest.fixture
-def wheel() -> Wheel:
-    """The viewer "a" drives, and picture 1 went out at 10 s."""
-    wheel = Wheel(LIMIT_S)
-    assert wheel.take("a", force=False)
-    wheel.sent(1, at(10))
-    return wheel
+def lock() -> DriverLock:
+    """The viewer "a" drives, and snapshot 1 was sent at 10 s."""
+    lock = DriverLock(LIMIT_S)
+    assert lock.take("a", force=False)
+    lock.sent(1, at(10))
+    return lock
 
 
-def test_nobody_drives_at_first() -> None:
-    wheel = Wheel(LIMIT_S)
-    wheel.sent(1, at(10))
-    assert not wheel.hold("a", 1, AHEAD, at(10))
-    assert wheel.held(at(10)) is None
+def test_there_is_no_driver_at_first() -> None:
+    lock = DriverLock(LIMIT_S)
+    lock.sent(1, at(10))
+    assert not lock.hold("a", 1, AHEAD, at(10))
+    assert lock.held(at(10)) is None
 
 
-def test_the_wheel_is_one_viewers(wheel: Wheel) -> None:
-    assert not wheel.take("b", force=False)
-    assert wheel.driver == "a"
-    assert not wheel.hold("b", 1, AHEAD, at(10))
-    assert wheel.take("a", force=False)
+def test_one_viewer_has_the_lock(lock: DriverLock) -> None:
+    assert not lock.take("b", force=False)
+    assert lock.driver == "a"
+    assert not lock.hold("b", 1, AHEAD, at(10))
+    assert lock.take("a", force=False)
 
 
-def test_taking_over_lets_go_and_starts_in_the_first_gear(wheel: Wheel) -> None:
-    wheel.shift("a", 4)
-    wheel.hold("a", 1, AHEAD, at(10))
-    assert wheel.take("b", force=True)
-    assert (wheel.driver, wheel.gear, wheel.held(at(10))) == ("b", 1, None)
-    assert not wheel.hold("a", 1, AHEAD, at(10))
+def test_a_takeover_ends_the_hold_and_starts_in_gear_1(lock: DriverLock) -> None:
+    lock.shift("a", 4)
+    lock.hold("a", 1, AHEAD, at(10))
+    assert lock.take("b", force=True)
+    assert (lock.driver, lock.gear, lock.held(at(10))) == ("b", 1, None)
+    assert not lock.hold("a", 1, AHEAD, at(10))
 
 
-def test_taking_it_again_changes_nothing(wheel: Wheel) -> None:
-    wheel.shift("a", 4)
-    wheel.hold("a", 1, AHEAD, at(10))
-    assert wheel.take("a", force=True)
-    assert (wheel.gear, wheel.held(at(10))) == (4, AHEAD)
+def test_taking_the_lock_again_changes_nothing(lock: DriverLock) -> None:
+    lock.shift("a", 4)
+    lock.hold("a", 1, AHEAD, at(10))
+    assert lock.take("a", force=True)
+    assert (lock.gear, lock.held(at(10))) == (4, AHEAD)
 
 
-def test_who_leaves_lets_go(wheel: Wheel) -> None:
-    wheel.hold("a", 1, AHEAD, at(10))
-    wheel.leave("b")
-    assert wheel.held(at(10)) == AHEAD
-    wheel.leave("a")
-    assert (wheel.driver, wheel.held(at(10))) == (None, None)
-    assert wheel.take("b", force=False)
+def test_leaving_ends_the_hold(lock: DriverLock) -> None:
+    lock.hold("a", 1, AHEAD, at(10))
+    lock.leave("b")
+    assert lock.held(at(10)) == AHEAD
+    lock.leave("a")
+    assert (lock.driver, lock.held(at(10))) == (None, None)
+    assert lock.take("b", force=False)
 
 
-def test_only_the_driver_shifts(wheel: Wheel) -> None:
-    wheel.shift("b", 5)
-    assert wheel.gear == 1
+def test_only_the_driver_shifts(lock: DriverLock) -> None:
+    lock.shift("b", 5)
+    assert lock.gear == 1
 
 
-def test_only_the_driver_lets_go(wheel: Wheel) -> None:
-    wheel.hold("a", 1, AHEAD, at(10))
-    wheel.let_go("b")
-    assert wheel.grip is Grip.HELD
+def test_only_the_driver_ends_the_hold(lock: DriverLock) -> None:
+    lock.hold("a", 1, AHEAD, at(10))
+    lock.let_go("b")
+    assert lock.state is HoldState.HELD
 
 
-def test_a_hold_counts_for_the_round_trip_of_its_picture(wheel: Wheel) -> None:
-    assert wheel.hold("a", 1, AHEAD, at(10.3))
-    assert wheel.held(at(10.3)) == AHEAD
-    assert wheel.held(at(10.3) + 1) is None
-    assert wheel.grip is Grip.LAPSED
+def test_a_hold_is_valid_for_the_round_trip_of_its_snapshot(lock: DriverLock) -> None:
+    assert lock.hold("a", 1, AHEAD, at(10.3))
+    assert lock.held(at(10.3)) == AHEAD
+    assert lock.held(at(10.3) + 1) is None
+    assert lock.state is HoldState.LAPSED
 
 
-def test_an_answer_to_an_old_picture_is_refused(wheel: Wheel) -> None:
-    assert not wheel.hold("a", 1, AHEAD, at(10.3) + 1)
-    assert wheel.grip is Grip.FREE
+def test_an_answer_to_an_old_snapshot_is_refused(lock: DriverLock) -> None:
+    assert not lock.hold("a", 1, AHEAD, at(10.3) + 1)
+    assert lock.state is HoldState.FREE
 
 
-def test_an_answer_to_no_picture_is_refused(wheel: Wheel) -> None:
-    assert not wheel.hold("a", 2, AHEAD, at(10))
+def test_an_answer_to_an_unknown_snapshot_is_refused(lock: DriverLock) -> None:
+    assert not lock.hold("a", 2, AHEAD, at(10))
 
 
-def test_a_picture_of_long_ago_is_forgotten(wheel: Wheel) -> None:
-    for number in range(2, 2 + PICTURES):
-        wheel.sent(number, at(10))
-    assert not wheel.hold("a", 1, AHEAD, at(10))
-    assert wheel.hold("a", 2, AHEAD, at(10))
+def test_only_the_newest_snapshots_are_kept(lock: DriverLock) -> None:
+    for number in range(2, 2 + SNAPSHOTS_KEPT):
+        lock.sent(number, at(10))
+    assert not lock.hold("a", 1, AHEAD, at(10))
+    assert lock.hold("a", 2, AHEAD, at(10))
 
 
-def test_every_round_trip_renews(wheel: Wheel) -> None:
+def test_every_answer_renews_the_hold(lock: DriverLock) -> None:
     for number in range(2, 40):
         now_ns = at(10) + number * NS_PER_S // 20
-        wheel.sent(number, now_ns)
-        assert wheel.hold("a", number, AHEAD, now_ns)
-        assert wheel.held(now_ns + NS_PER_S // 4) == AHEAD
+        lock.sent(number, now_ns)
+        assert lock.hold("a", number, AHEAD, now_ns)
+        assert lock.held(now_ns + NS_PER_S // 4) == AHEAD
 
 
-def test_what_was_overtaken_changes_nothing(wheel: Wheel) -> None:
-    wheel.sent(2, at(10.05))
-    assert wheel.hold("a", 2, AHEAD, at(10.1))
-    assert not wheel.hold("a", 1, Push(-1.0), at(10.1))
-    assert wheel.held(at(10.1)) == AHEAD
-    assert wheel.answered == 2
+def test_a_reordered_hold_changes_nothing(lock: DriverLock) -> None:
+    lock.sent(2, at(10.05))
+    assert lock.hold("a", 2, AHEAD, at(10.1))
+    assert not lock.hold("a", 1, Push(-1.0), at(10.1))
+    assert lock.held(at(10.1)) == AHEAD
+    assert lock.answered == 2
 
 
-def test_after_a_lapse_the_hand_must_come_off(wheel: Wheel) -> None:
-    wheel.hold("a", 1, AHEAD, at(10))
-    assert wheel.held(at(11)) is None
-    wheel.sent(2, at(11))
-    assert not wheel.hold("a", 2, AHEAD, at(11))
-    wheel.let_go("a")
-    assert wheel.hold("a", 2, AHEAD, at(11))
+def test_after_a_lapse_a_release_is_required(lock: DriverLock) -> None:
+    lock.hold("a", 1, AHEAD, at(10))
+    assert lock.held(at(11)) is None
+    lock.sent(2, at(11))
+    assert not lock.hold("a", 2, AHEAD, at(11))
+    lock.let_go("a")
+    assert lock.hold("a", 2, AHEAD, at(11))
 
 
-def test_a_free_hand_does_not_lapse(wheel: Wheel) -> None:
-    wheel.lapse()
-    assert wheel.grip is Grip.FREE
+def test_a_free_lock_does_not_lapse(lock: DriverLock) -> None:
+    lock.lapse()
+    assert lock.state is HoldState.FREE
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-def test_no_number_is_refused(wheel: Wheel, wrong: float) -> None:
-    assert not wheel.hold("a", 1, Push(wrong, 0.0), at(10))
-    assert not wheel.hold("a", 1, Push(0.0, wrong), at(10))
-    assert wheel.held(at(10)) is None
+def test_a_non_finite_push_is_refused(lock: DriverLock, wrong: float) -> None:
+    assert not lock.hold("a", 1, Push(wrong, 0.0), at(10))
+    assert not lock.hold("a", 1, Push(0.0, wrong), at(10))
+    assert lock.held(at(10)) is None
 
 
-def test_more_than_full_is_full(wheel: Wheel) -> None:
-    wheel.hold("a", 1, Push(7.0, -7.0, release="backward"), at(10))
-    assert wheel.held(at(10)) == Push(1.0, -1.0, release="backward")
+def test_a_push_is_clamped(lock: DriverLock) -> None:
+    lock.hold("a", 1, Push(7.0, -7.0, release="backward"), at(10))
+    assert lock.held(at(10)) == Push(1.0, -1.0, release="backward")
 
 
 STEPS = st.lists(
@@ -152,36 +152,36 @@ STEPS = st.lists(
 
 
 class Play:
-    """A wheel, and when each viewer's hold last counted."""
+    """A lock, and the time of each viewer's last valid hold."""
 
     def __init__(self) -> None:
-        self.wheel = Wheel(LIMIT_S)
+        self.lock = DriverLock(LIMIT_S)
         self.now_ns = 0
         self.counted_ns: dict[str, int] = {}
 
     def step(self, what: str, who: str, number: int, seconds: float) -> None:
         match what:
             case "take" | "force":
-                self.wheel.take(who, force=what == "force")
+                self.lock.take(who, force=what == "force")
             case "leave":
-                self.wheel.leave(who)
+                self.lock.leave(who)
             case "free":
-                self.wheel.let_go(who)
+                self.lock.let_go(who)
             case "sent":
-                self.wheel.sent(number, self.now_ns)
-            case "hold" if self.wheel.hold(who, number, AHEAD, self.now_ns):
+                self.lock.sent(number, self.now_ns)
+            case "hold" if self.lock.hold(who, number, AHEAD, self.now_ns):
                 self.counted_ns[who] = self.now_ns
             case "wait":
                 self.now_ns += round(seconds * NS_PER_S)
 
 
 @given(STEPS)
-def test_what_is_held_was_held_by_the_driver_within_the_round_trip(
+def test_a_valid_hold_is_the_drivers_and_within_the_round_trip(
     steps: list[tuple[str, str, int, float]],
 ) -> None:
     play = Play()
     for step in steps:
         play.step(*step)
-        if play.wheel.held(play.now_ns) is not None:
-            assert play.wheel.driver is not None
-            assert play.now_ns - play.counted_ns[play.wheel.driver] <= LIMIT_S * NS_PER_S
+        if play.lock.held(play.now_ns) is not None:
+            assert play.lock.driver is not None
+            assert play.now_ns - play.counted_ns[play.lock.driver] <= LIMIT_S * NS_PER_S

@@ -1,4 +1,4 @@
-"""Which robots are looked at: with buses that carry nothing, as time here is not the clock's."""
+"""Robots and viewers, with fake buses and a time that the test sets."""
 
 import json
 import time
@@ -8,16 +8,16 @@ import pytest
 
 from common import keys
 from common.freshness import NS_PER_S
-from services.dashboard import client_messages as w
+from services.dashboard import client_messages as client
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
-from services.dashboard.fleet import REST_TICKS, ROBOTS_MAX, UNWANTED_S, Fleet
+from services.dashboard.fleet import IDLE_S, ROBOTS_MAX, SLOW_TICKS, Fleet
 from verification.harness.waiting import wait_until
 
 
 @pytest.fixture
 def buses(monkeypatch: pytest.MonkeyPatch) -> dict[str, Mock]:
-    """Return the buses that are opened, by robot."""
+    """Return the buses that are open_page, by robot."""
     opened: dict[str, Mock] = {}
 
     def bus(_endpoints: object, robot: str, *_: object) -> Mock:
@@ -33,18 +33,18 @@ def fleet() -> Fleet:
     return Fleet(Mock(config=DashboardConfig()), Mock())
 
 
-def test_a_robot_that_nobody_knows_is_not_stopped(fleet: Fleet, buses: dict[str, Mock]) -> None:
+def test_an_unknown_robot_is_not_stopped(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
     assert fleet.knows("001")  # by the settings, alive or not
     assert not fleet.knows("made-up")
-    fleet.take_in("1", w.Estop("made-up"))
+    fleet.handle("1", client.Estop("made-up"))
     assert buses == {}
-    fleet.take_in("1", w.Estop("001"))
+    fleet.handle("1", client.Estop("001"))
     assert buses["001"].estop.called
     assert fleet._node.bus.estop.called  # type: ignore[attr-defined]
 
 
-def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
+def test_a_robot_is_known_after_it_was_alive_or_while_it_has_viewers(
     fleet: Fleet, buses: dict[str, Mock]
 ) -> None:
     _, note_alive = fleet._node.bus.watch_live.call_args.args  # type: ignore[attr-defined]
@@ -53,34 +53,34 @@ def test_a_robot_is_known_once_it_was_alive_or_while_it_is_looked_at(
     note_alive(token, False)
     assert fleet.knows("002")
     fleet.join("1")
-    fleet.take_in("1", w.Look("003"))
+    fleet.handle("1", client.Look("003"))
     assert fleet.knows("003")
-    fleet.take_in("1", w.Look("002"))
-    fleet.tick(time.monotonic_ns() + round((UNWANTED_S + 1) * NS_PER_S))
+    fleet.handle("1", client.Look("002"))
+    fleet.tick(time.monotonic_ns() + round((IDLE_S + 1) * NS_PER_S))
     assert not fleet.knows("003")
     assert fleet.knows("002")
 
 
-def test_a_robot_that_nobody_looks_at_is_let_go(fleet: Fleet, buses: dict[str, Mock]) -> None:
+def test_a_robot_without_viewers_is_closed(fleet: Fleet, buses: dict[str, Mock]) -> None:
     fleet.join("1")
-    fleet.take_in("1", w.Look("002"))
+    fleet.handle("1", client.Look("002"))
     fleet.estop("003", "somebody")
     now_ns = time.monotonic_ns()
     fleet.tick(now_ns)
-    fleet.take_in("1", w.Look("001"))
-    late_ns = now_ns + round((UNWANTED_S + 1) * NS_PER_S)
+    fleet.handle("1", client.Look("001"))
+    late_ns = now_ns + round((IDLE_S + 1) * NS_PER_S)
     buses["003"].connected = False  # it is still being looked for
     fleet.tick(late_ns)
     wait_until(lambda: buses["002"].close.called, "the end of its session")
     assert not buses["001"].close.called
     assert not buses["003"].close.called
     first = buses["002"]
-    fleet.take_in("1", w.Look("002"))
+    fleet.handle("1", client.Look("002"))
     assert buses["002"] is not first
     assert not buses["002"].close.called
 
 
-def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock]) -> None:
+def test_fifty_robots_are_listed_some_open_and_any_stopped(buses: dict[str, Mock]) -> None:
     shown: list[bytes] = []
     node = Mock(config=DashboardConfig())
     fleet = Fleet(node, lambda _viewers, text, _newer_wins: shown.append(text))
@@ -91,19 +91,19 @@ def test_fifty_are_listed_some_looked_at_and_any_stopped(buses: dict[str, Mock])
     note_alive(keys.live_key(names[-1], "safety", "1"), False)
     fleet.join("1")
     for name in names[: ROBOTS_MAX + 1]:
-        fleet.take_in("1", w.Look(name))
+        fleet.handle("1", client.Look(name))
     assert set(buses) == {"001", *names[: ROBOTS_MAX - 1]}  # the settings' robot is one of them
     assert b"too_many_robots" in b"".join(shown)
     fleet.estop(names[-2], "somebody")
     assert buses[names[-2]].estop.called
     shown.clear()
-    for tick in range(REST_TICKS):
+    for tick in range(SLOW_TICKS):
         fleet.tick(time.monotonic_ns() + tick)
-    (rest,) = (json.loads(text) for text in shown if b'"k":"rest"' in text)
+    (rest,) = (json.loads(text) for text in shown if b'"k":"slow"' in text)
     assert rest["robots"] == {"001": False} | dict.fromkeys(names, True) | {names[-1]: False}
 
 
-def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:
+def test_a_new_name_does_not_restore_the_trail(buses: dict[str, Mock]) -> None:
     shown: list[bytes] = []
     fleet = Fleet(
         Mock(config=DashboardConfig()), lambda _viewers, text, _newer_wins: shown.append(text)
@@ -113,11 +113,11 @@ def test_a_new_name_brings_no_trail_back(buses: dict[str, Mock]) -> None:
         return sum(b'"path"' in text for text in shown)
 
     fleet.join("1")
-    fleet.take_in("1", w.Look("001"))
+    fleet.handle("1", client.Look("001"))
     assert paths() == 1
-    fleet.take_in("1", w.Look("001", "Ada"))
+    fleet.handle("1", client.Look("001", "Ada"))
     assert paths() == 1
     assert b'"Ada"' in shown[-1]
-    fleet.take_in("1", w.Look("002", "Ada"))
+    fleet.handle("1", client.Look("002", "Ada"))
     assert paths() == 2
     assert set(buses) == {"001", "002"}

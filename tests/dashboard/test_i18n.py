@@ -1,4 +1,4 @@
-"""Both languages are whole: every text that is asked for is there, in each of them."""
+"""The catalogue is complete: every text that the page uses, in both languages."""
 
 import re
 from pathlib import Path
@@ -8,17 +8,19 @@ import pytest
 
 from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
-from services.dashboard.auth import asking
-from services.dashboard.driver_lock import Grip
-from services.dashboard.i18n import LANGUAGES, TEXTS, table
+from services.dashboard.auth import token_page
+from services.dashboard.driver_lock import HoldState
+from services.dashboard.i18n import LANGUAGES, PAGE, TEXTS, table
+from services.dashboard.i18n_events import EVENTS
 from services.safety.causes import RULES
+from tools.docs import DOCS
 
 CODE = Path(server.__file__).parent
 HAN = re.compile("[\u4e00-\u9fff]")
 
 
-def asked_for() -> set[str]:
-    """Return every key that the page or a script names as it stands."""
+def used_keys() -> set[str]:
+    """Return every key that the page, a script or the server names literally."""
     page = (CODE / "static" / "index.html").read_text(encoding="utf-8")
     found = set(re.findall(r'data-t(?:-\w+)?="(\w+)"', page))
     for script in (CODE / "static").glob("*.js"):
@@ -27,12 +29,12 @@ def asked_for() -> set[str]:
         found |= set(re.findall(r'toast\("(\w+)"', text))
         found |= set(re.findall(r'"(release_\w+|moved_\w+|believed_\w+)"', text))
     fleet = (CODE / "fleet.py").read_text(encoding="utf-8")
-    found |= set(re.findall(r'_tell\([^)]*"(\w+)"\)', fleet))
+    found |= set(re.findall(r'_notify\([^)]*"(\w+)"\)', fleet))
     robot = (CODE / "robot.py").read_text(encoding="utf-8")
-    return found | set(re.findall(r'tell\("error", "(\w+)"\)', robot))
+    return found | set(re.findall(r'"(?:error|info|warning)", "(\w+)"', robot))
 
 
-def test_the_search_finds_some() -> None:
+def test_the_search_finds_known_keys() -> None:
     assert {
         "estop",
         "follow",
@@ -41,11 +43,11 @@ def test_the_search_finds_some() -> None:
         "theme",
         "too_late",
         "reset_unconfirmed",
-    } <= asked_for()
+    } <= used_keys()
 
 
-def test_every_text_that_is_asked_for_is_there() -> None:
-    assert asked_for() <= set(TEXTS)
+def test_every_used_key_has_a_text() -> None:
+    assert used_keys() <= set(TEXTS)
 
 
 @pytest.mark.parametrize(
@@ -55,12 +57,39 @@ def test_every_text_that_is_asked_for_is_there() -> None:
         ("verdict", [*get_args(Verdict), "none", "lost"]),
         ("link", [*get_args(LinkState), "none"]),
         ("fault", [*get_args(FaultName), "reserved"]),
-        ("hold", list(Grip)),
+        ("hold", list(HoldState)),
         ("bumper", ["true", "false", "none"]),
     ],
 )
-def test_every_name_of_the_contract_has_its_text(prefix: str, names: list[str]) -> None:
+def test_every_name_of_the_messages_has_its_text(prefix: str, names: list[str]) -> None:
     assert {f"{prefix}.{getattr(name, 'value', name)}" for name in names} <= set(TEXTS)
+
+
+def events_of_the_guide() -> list[tuple[str, str]]:
+    """Return service and name of every event in the guide to operations."""
+    page = (DOCS / "operations.md").read_text(encoding="utf-8")
+    part = page.partition("<!-- events -->")[2].partition("<!-- end -->")[0]
+    events = re.findall(r"^\| (\w+) \| `(\w+)` \|", part, re.MULTILINE)
+    assert len(events) > 40
+    return [*events, ("bridge", "drive_link_up"), ("safety", "drive_link_lost")]
+
+
+@pytest.mark.parametrize(("service", "name"), events_of_the_guide())
+def test_every_event_has_its_text(service: str, name: str) -> None:
+    assert {f"event.{service}.{name}", f"event.{name}"} & set(TEXTS)
+
+
+def test_every_result_of_a_call_has_its_text() -> None:
+    robot = (CODE / "robot.py").read_text(encoding="utf-8")
+    found = re.findall(r'(?:reason|text|done\.text), "(\w+)"\)', robot)
+    assert {"reset_refused", "reset_done", "release_held", "release_refused", "call_refused"} == {
+        name for name in found if name
+    }
+    assert {f"event.{name}" for name in found} <= set(TEXTS)
+
+
+def test_the_parts_of_the_catalogue_do_not_overlap() -> None:
+    assert not PAGE.keys() & EVENTS.keys()
 
 
 @pytest.mark.parametrize("direction", get_args(Direction))
@@ -69,14 +98,14 @@ def test_every_direction_has_its_texts(direction: str) -> None:
         assert f"{prefix}_{direction}" in TEXTS
 
 
-def test_english_causes_are_safetys_own() -> None:
+def test_the_english_causes_are_those_of_safety() -> None:
     assert {rule.name: rule.text for rule in RULES} == {
         rule.name: TEXTS[f"cause.{rule.name}"][0] for rule in RULES
     }
 
 
 @pytest.mark.parametrize("key", TEXTS)
-def test_both_languages_say_something(key: str) -> None:
+def test_both_languages_have_a_text(key: str) -> None:
     english, chinese = TEXTS[key]
     assert english.strip()
     assert chinese.strip()
@@ -85,14 +114,14 @@ def test_both_languages_say_something(key: str) -> None:
         assert HAN.search(chinese)
 
 
-def test_the_table_goes_to_the_page_by_language() -> None:
+def test_the_table_has_the_texts_by_language() -> None:
     both = table()
     assert tuple(both) == LANGUAGES
     assert (both["en"]["estop"], both["zh"]["estop"]) == TEXTS["estop"]
 
 
-def test_the_door_speaks_both() -> None:
+def test_the_token_page_has_both_languages() -> None:
     for text in TEXTS["token_ask"]:
-        assert text in asking(wrong=False)
+        assert text in token_page(wrong=False)
     for text in TEXTS["token_wrong"]:
-        assert text in asking(wrong=True)
+        assert text in token_page(wrong=True)

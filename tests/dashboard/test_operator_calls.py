@@ -1,4 +1,4 @@
-"""Reset, switches and release from the browser: what was seen, how old it is, what it changed."""
+"""Reset, switches and release from the browser: the answered snapshot, its age, the effect."""
 
 import time
 from collections.abc import Iterator
@@ -6,107 +6,107 @@ from collections.abc import Iterator
 import pytest
 
 from common.messages import Cause
-from tests.dashboard.bus_fixture import World
-from tests.dashboard.servers import CONTACT, NEWER, Servers, serving
-from verification.harness.dashboard import Site, Viewer, viewer
+from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.servers import CONTACT, NEWER, CallServers, serving
+from verification.harness.dashboard import Client, Server, connected
 from verification.harness.waiting import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
 
 
 @pytest.fixture
-def servers(endpoint: str, world: World) -> Iterator[Servers]:
-    with serving(endpoint, world) as it:
+def calls(endpoint: str, peer: Peer) -> Iterator[CallServers]:
+    with serving(endpoint, peer) as it:
         yield it
 
 
 @pytest.fixture
-def ada(site: Site, servers: Servers) -> Iterator[Viewer]:
+def ada(server: Server, calls: CallServers) -> Iterator[Client]:
     """The driver's connection, at a contact."""
-    with viewer(site) as it:
-        it.takes()
+    with connected(server) as it:
+        it.take_control()
         seen(it, CONTACT)
         yield it
 
 
-def seen(it: Viewer, cause: Cause) -> int:
-    """Wait for a picture with a cause, and return its number."""
+def seen(it: Client, cause: Cause) -> int:
+    """Wait for a snapshot with a cause and return its number."""
     while True:
-        picture = it.look()
-        if picture["safety"] and [one["id"] for one in picture["safety"]["causes"]] == [cause.id]:
-            return int(picture["n"])
+        snapshot = it.next_snapshot()
+        if snapshot["safety"] and [one["id"] for one in snapshot["safety"]["causes"]] == [cause.id]:
+            return int(snapshot["n"])
 
 
-def told(it: Viewer) -> tuple[str, str]:
-    word = it.waits("told")
-    return word["level"], word["text"]
+def notice(it: Client) -> tuple[str, str]:
+    message = it.wait_for("notice")
+    return message["level"], message["text"]
 
 
-def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Viewer, servers: Servers) -> None:
-    ada.say("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("info", "Reset.")
-    (request,) = servers.resets
+def test_a_reset_names_what_was_seen_and_is_confirmed(ada: Client, calls: CallServers) -> None:
+    ada.send("reset", n=seen(ada, CONTACT))
+    assert notice(ada) == ("info", "Reset.")
+    (request,) = calls.resets
     assert request.causes == (CONTACT.id,)
     assert request.echo is not None
-    assert 0 <= time.monotonic_ns() - request.echo < 20e9  # a heartbeat of this world
+    assert 0 <= time.monotonic_ns() - request.echo < 20e9  # a heartbeat of this peer
 
 
-def test_a_reset_does_not_name_a_newer_contact(ada: Viewer, servers: Servers) -> None:
-    servers.is_effective = False
+def test_a_reset_does_not_name_a_newer_contact(ada: Client, calls: CallServers) -> None:
+    calls.is_effective = False
     number = seen(ada, CONTACT)
-    servers.world.causes = (NEWER,)
+    calls.peer.causes = (NEWER,)
     seen(ada, NEWER)
-    ada.say("reset", n=number)
-    wait_until(lambda: servers.resets, "the reset")
-    assert servers.resets[0].causes == (CONTACT.id,)
+    ada.send("reset", n=number)
+    wait_until(lambda: calls.resets, "the reset")
+    assert calls.resets[0].causes == (CONTACT.id,)
 
 
-def test_a_reset_that_a_proxy_held_clears_nothing(ada: Viewer, servers: Servers) -> None:
+def test_a_reset_that_a_proxy_held_clears_nothing(ada: Client, calls: CallServers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
-    servers.world.causes = (NEWER,)
+    calls.peer.causes = (NEWER,)
     while time.monotonic() - began < PROXY_S:
-        ada.look()
-    ada.say("reset", n=number)
-    assert told(ada) == ("warning", "too_late")
-    ada.say("switch", n=number, to={"bumper_brake": False})
-    assert told(ada) == ("warning", "too_late")
-    ada.say("reset")
-    assert told(ada) == ("warning", "too_late")
-    assert servers.resets == []
-    assert servers.switches == []
-    assert servers.world.causes == (NEWER,)
+        ada.next_snapshot()
+    ada.send("reset", n=number)
+    assert notice(ada) == ("warning", "too_late")
+    ada.send("switch", n=number, to={"bumper_brake": False})
+    assert notice(ada) == ("warning", "too_late")
+    ada.send("reset")
+    assert notice(ada) == ("warning", "too_late")
+    assert calls.resets == []
+    assert calls.switches == []
+    assert calls.peer.causes == (NEWER,)
 
 
-def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Viewer, servers: Servers) -> None:
-    servers.boot += 1
-    servers.is_effective = False
-    ada.say("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("error", "reset_unconfirmed")
+def test_an_answer_that_is_not_safetys_is_not_confirmed(ada: Client, calls: CallServers) -> None:
+    calls.boot += 1
+    calls.is_effective = False
+    ada.send("reset", n=seen(ada, CONTACT))
+    assert notice(ada) == ("error", "reset_unconfirmed")
 
 
-def test_a_reset_without_effect_is_not_confirmed(ada: Viewer, servers: Servers) -> None:
-    servers.is_effective = False
+def test_a_reset_without_effect_is_not_confirmed(ada: Client, calls: CallServers) -> None:
+    calls.is_effective = False
     began = time.monotonic()
-    ada.say("reset", n=seen(ada, CONTACT))
-    assert told(ada) == ("error", "reset_unconfirmed")
+    ada.send("reset", n=seen(ada, CONTACT))
+    assert notice(ada) == ("error", "reset_unconfirmed")
     assert time.monotonic() - began > 0.9
 
 
-def test_a_switch_carries_the_echo_of_what_was_seen(ada: Viewer, servers: Servers) -> None:
-    ada.say("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
-    assert told(ada) == ("info", "done")
-    (request,) = servers.switches
+def test_a_switch_carries_the_echo_of_what_was_seen(ada: Client, calls: CallServers) -> None:
+    ada.send("switch", n=seen(ada, CONTACT), to={"bumper_brake": False, "echo": 1})
+    assert notice(ada) == ("info", "done")
+    (request,) = calls.switches
     assert request.bumper_brake is False
     assert (request.echo or 0) > 1
 
 
-def test_a_release_names_the_direction_and_what_was_seen(ada: Viewer, servers: Servers) -> None:
+def test_a_release_names_the_direction_and_what_was_seen(ada: Client, calls: CallServers) -> None:
     for _ in range(20):
-        ada.say("hold", n=ada.look()["n"], release="backward")
-    assert ada.seen["now"]["safety"]["release"]["believed_free"] == "backward"
-    ada.say("free")
-    wait_until(lambda: servers.releases and not servers.releases[-1].held, "the end of it")
-    held, end = servers.releases[:-1], servers.releases[-1]
+        ada.send("hold", n=ada.next_snapshot()["n"], release="backward")
+    assert ada.received["fast"]["safety"]["release"]["believed_free"] == "backward"
+    ada.send("free")
+    wait_until(lambda: calls.releases and not calls.releases[-1].held, "the end of it")
+    held, end = calls.releases[:-1], calls.releases[-1]
     assert {one.direction for one in held} == {"backward"}
     echoes = [one.echo or 0 for one in held]
     assert echoes == sorted(echoes)
@@ -114,11 +114,11 @@ def test_a_release_names_the_direction_and_what_was_seen(ada: Viewer, servers: S
     assert end.direction is None
 
 
-def test_a_release_that_comes_late_is_not_asked(ada: Viewer, servers: Servers) -> None:
+def test_a_late_release_is_not_called(ada: Client, calls: CallServers) -> None:
     number, began = seen(ada, CONTACT), time.monotonic()
     while time.monotonic() - began < 1.0:
-        ada.look()
+        ada.next_snapshot()
     for _ in range(20):
-        ada.say("hold", n=number, release="backward")
-        ada.look()
-    assert servers.releases == []
+        ada.send("hold", n=number, release="backward")
+        ada.next_snapshot()
+    assert calls.releases == []

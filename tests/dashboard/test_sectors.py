@@ -1,4 +1,4 @@
-"""What the sectors and the wheels look like."""
+"""Tones of the sonar sectors and wheel angles."""
 
 import math
 
@@ -6,7 +6,7 @@ import pytest
 
 from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
 from common.settings import Vehicle
-from services.dashboard.sectors import Protection, Tone, named, tones, wheel_angles
+from services.dashboard.sectors import Protection, Tone, sonars_named, tones, wheel_angles
 from services.safety.config import Safety
 from services.safety.zones import zones
 
@@ -47,7 +47,7 @@ def test_a_tone_for_each_reading(front: float | None, status: RangeStatus, tone:
     assert {it for i, it in enumerate(seen) if i != FRONT} == {"clear"}
 
 
-def test_nothing_heard_is_dark() -> None:
+def test_without_data_all_sectors_are_dark() -> None:
     assert tones(None, (), AS_SHIPPED) == ("dark",) * 8
 
 
@@ -60,22 +60,22 @@ def test_nothing_heard_is_dark() -> None:
         ("contact", "The front was hit.", "clear"),
     ],
 )
-def test_what_safety_names_wins(name: str, text: str, tone: Tone) -> None:
+def test_the_reason_that_safety_names_sets_the_tone(name: str, text: str, tone: Tone) -> None:
     assert tones(sonar(4.0), [cause(name, text)], AS_SHIPPED)[FRONT] == tone
 
 
-def test_what_is_worse_stays() -> None:
+def test_the_worse_tone_is_kept() -> None:
     assert tones(sonar(0.1), [cause("obstacle", "(front)")], AS_SHIPPED)[FRONT] == "stop"
 
 
-def test_the_names_in_a_sentence() -> None:
-    assert [SONAR_NAMES[i] for i in named("Sonar not trusted: front left, rear.")] == [
+def test_sonars_named_in_a_text() -> None:
+    assert [SONAR_NAMES[i] for i in sonars_named("Sonar not trusted: front left, rear.")] == [
         "front_left", "rear",
     ]  # fmt: skip
-    assert named("All is well.") == []
+    assert sonars_named("All is well.") == []
 
 
-def test_the_shipped_protection_is_safetys() -> None:
+def test_the_default_protection_equals_safetys_settings() -> None:
     safety = Safety()
     assert (
         Protection(
@@ -88,29 +88,29 @@ def test_the_shipped_protection_is_safetys() -> None:
     )
 
 
-def test_full_speed_needs_the_room_that_safety_says() -> None:
+def test_full_speed_needs_the_distance_of_safetys_zones() -> None:
     field = zones(Vehicle(), Safety())
     assert field.allowed(AS_SHIPPED.full_speed_room) == pytest.approx(AS_SHIPPED.max_linear)
 
 
-def test_wheels_straight_on() -> None:
+def test_wheel_angles_straight_ahead() -> None:
     assert wheel_angles(0.5, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
     assert wheel_angles(-0.5, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
     assert wheel_angles(0.0, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_wheels_on_the_spot_stand_across_the_middle() -> None:
+def test_wheel_angles_of_a_turn_on_the_spot() -> None:
     one = Vehicle(wheelbase=0.6, track=0.6)
     quarter = math.pi / 4
     across = (-quarter, quarter, quarter, -quarter)
     assert wheel_angles(0.0, 0.5, one) == pytest.approx(across)
 
 
-def test_wheels_in_a_left_turn() -> None:
+def test_wheel_angles_in_a_left_turn() -> None:
     front_left, front_right, rear_left, rear_right = wheel_angles(0.5, 0.3, Vehicle())
     assert front_left > front_right > 0 > rear_right > rear_left
     assert rear_left == pytest.approx(-front_left)
 
 
-def test_wheels_backward_point_forward() -> None:
+def test_wheel_angles_backward_point_forward() -> None:
     assert wheel_angles(-0.5, -0.3, Vehicle()) == pytest.approx(wheel_angles(0.5, 0.3, Vehicle()))

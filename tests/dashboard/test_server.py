@@ -1,4 +1,4 @@
-"""The whole program without a browser: a real bus, real sockets, real requests."""
+"""The whole program without a browser, on a real bus and real sockets."""
 
 import signal
 import time
@@ -13,193 +13,195 @@ from websockets.exceptions import ConnectionClosed
 
 from common.freshness import NS_PER_S
 from services.dashboard.fleet import ROBOTS_MAX
-from tests.dashboard.bus_fixture import HOLD, World, drive
-from verification.harness.dashboard import Site, Viewer, dashboard, viewer
+from tests.dashboard.bus_fixture import HOLD, Peer, drive
+from verification.harness.dashboard import Client, Server, connected, dashboard
 from verification.harness.waiting import wait_until
 
 
 @pytest.fixture
-def ada(site: Site, world: World) -> Iterator[Viewer]:
-    """A viewer who sees that safety runs."""
-    world.safe = True
-    with viewer(site) as it:
-        while not it.look()["safety"]:
+def ada(server: Server, peer: Peer) -> Iterator[Client]:
+    """A viewer with a state of safety."""
+    peer.safe = True
+    with connected(server) as it:
+        while not it.next_snapshot()["safety"]:
             pass
         yield it
 
 
-def test_a_hold_drives_and_letting_go_is_zeros_and_silence(ada: Viewer, world: World) -> None:
-    ada.takes()
-    world.requests.clear()
-    drive(ada, world)
-    assert world.requests[0].linear == 0.0  # neutral first
-    assert world.requests[-1].linear == 0.2  # the first gear
-    assert world.requests[-1].echo > 0
-    ada.say("free")
-    wait_until(lambda: world.zeros() >= 3, "zeros")
-    ada.look()
-    ada.look()
-    assert world.zeros() == 3
+def test_a_hold_drives_and_a_release_sends_three_zeros(ada: Client, peer: Peer) -> None:
+    ada.take_control()
+    peer.requests.clear()
+    drive(ada, peer)
+    assert peer.requests[0].linear == 0.0  # neutral first
+    assert peer.requests[-1].linear == 0.2  # the first gear
+    assert peer.requests[-1].echo > 0
+    ada.send("free")
+    wait_until(lambda: peer.zeros() >= 3, "zeros")
+    ada.next_snapshot()
+    ada.next_snapshot()
+    assert peer.zeros() == 3
 
 
-def test_a_missed_round_trip_lets_go_until_the_hand_was_off(ada: Viewer, world: World) -> None:
-    ada.takes()
-    world.requests.clear()
-    drive(ada, world)
+def test_a_missed_round_trip_ends_the_hold_until_a_release(ada: Client, peer: Peer) -> None:
+    ada.take_control()
+    peer.requests.clear()
+    drive(ada, peer)
     silent_ns = time.monotonic_ns()  # the socket stays open, and nothing is answered
-    wait_until(lambda: world.zeros() >= 3, "zeros")
+    wait_until(lambda: peer.zeros() >= 3, "zeros")
     assert time.monotonic_ns() - silent_ns > 0.1 * NS_PER_S
-    while ada.look()["hands"]["grip"] != "lapsed":
-        pass  # pictures from before, which nobody has read yet
-    count = len(world.requests)
+    while ada.next_snapshot()["driver"]["hold"] != "lapsed":
+        pass  # earlier snapshots that are not yet read
+    count = len(peer.requests)
     for _ in range(10):
-        picture = ada.look()
-        ada.say("hold", n=picture["n"], **HOLD)
-        assert picture["hands"]["grip"] == "lapsed"
-    assert len(world.requests) == count
-    ada.say("free")
-    drive(ada, world)
+        snapshot = ada.next_snapshot()
+        ada.send("hold", n=snapshot["n"], **HOLD)
+        assert snapshot["driver"]["hold"] == "lapsed"
+    assert len(peer.requests) == count
+    ada.send("free")
+    drive(ada, peer)
 
 
-def test_an_old_picture_is_no_reason_to_drive(ada: Viewer, world: World) -> None:
-    ada.takes()
-    ada.say("free")
-    first = ada.look()["n"]
+def test_an_answer_to_an_old_snapshot_does_not_drive(ada: Client, peer: Peer) -> None:
+    ada.take_control()
+    ada.send("free")
+    first = ada.next_snapshot()["n"]
     for _ in range(12):
-        ada.look()
-    world.requests.clear()
-    ada.say("hold", n=first, **HOLD)
+        ada.next_snapshot()
+    peer.requests.clear()
+    ada.send("hold", n=first, **HOLD)
     for _ in range(4):
-        assert ada.look()["hands"]["grip"] == "free"
-    assert world.requests == []
+        assert ada.next_snapshot()["driver"]["hold"] == "free"
+    assert peer.requests == []
 
 
-def test_a_viewer_who_is_gone_has_let_go(site: Site, world: World) -> None:
-    with viewer(site) as it:
-        it.takes()
-        world.requests.clear()
-        drive(it, world)
-    wait_until(lambda: world.zeros() >= 3, "zeros")
-    with viewer(site) as it:
-        assert it.look()["hands"]["id"] is None
+def test_a_disconnect_ends_the_hold(server: Server, peer: Peer) -> None:
+    with connected(server) as it:
+        it.take_control()
+        peer.requests.clear()
+        drive(it, peer)
+    wait_until(lambda: peer.zeros() >= 3, "zeros")
+    with connected(server) as it:
+        assert it.next_snapshot()["driver"]["id"] is None
 
 
-def test_a_silent_safety_lets_go(ada: Viewer, world: World) -> None:
-    ada.takes()
-    world.requests.clear()
-    drive(ada, world)
-    world.safe = False
-    while (picture := ada.look())["hands"]["grip"] != "lapsed":
-        ada.say("hold", n=picture["n"], **HOLD)
-    assert picture["safety"] is None
-    wait_until(lambda: world.zeros() >= 3, "zeros")
+def test_a_silent_safety_ends_the_hold(ada: Client, peer: Peer) -> None:
+    ada.take_control()
+    peer.requests.clear()
+    drive(ada, peer)
+    peer.safe = False
+    while (snapshot := ada.next_snapshot())["driver"]["hold"] != "lapsed":
+        ada.send("hold", n=snapshot["n"], **HOLD)
+    assert snapshot["safety"] is None
+    wait_until(lambda: peer.zeros() >= 3, "zeros")
 
 
-def test_one_drives_and_taking_over_asks(site: Site, ada: Viewer, world: World) -> None:
-    ada.takes()
-    ada.say("look", robot="001", name="Ada")
-    with viewer(site) as bob:
-        bob.say("take")
-        assert bob.waits("ask")["who"] == "Ada"
-        picture = bob.look()
-        assert picture["hands"]["name"] == "Ada"
-        world.requests.clear()
-        bob.say("hold", n=picture["n"], **HOLD)
-        bob.say("reset")
-        assert bob.waits("told")["text"] == "take_first"
-        assert world.requests == []
-        bob.takes(force=True)
-        assert ada.waits("told")["text"] == "taken_over"
+def test_one_viewer_drives_and_a_takeover_asks(server: Server, ada: Client, peer: Peer) -> None:
+    ada.take_control()
+    ada.send("look", robot="001", name="Ada")
+    with connected(server) as bob:
+        bob.send("take")
+        assert bob.wait_for("taken")["by"] == "Ada"
+        snapshot = bob.next_snapshot()
+        assert snapshot["driver"]["name"] == "Ada"
+        peer.requests.clear()
+        bob.send("hold", n=snapshot["n"], **HOLD)
+        bob.send("reset")
+        assert bob.wait_for("notice")["text"] == "take_first"
+        assert peer.requests == []
+        bob.take_control(force=True)
+        assert ada.wait_for("notice")["text"] == "taken_over"
 
 
-def test_anybody_may_stop_and_it_is_asked_until_it_is_confirmed(ada: Viewer, world: World) -> None:
-    world.estops.clear()
-    ada.say("estop")
-    wait_until(lambda: len(world.estops) > 5, "stops, again and again")
+def test_any_viewer_may_stop_and_the_stop_is_repeated(ada: Client, peer: Peer) -> None:
+    peer.estops.clear()
+    ada.send("estop")
+    wait_until(lambda: len(peer.estops) > 5, "stops, again and again")
 
 
-def test_one_tap_gets_through_without_a_socket(site: Site, world: World) -> None:
-    world.estops.clear()
-    taps(site, "001")
-    wait_until(lambda: world.estops, "a stop")
+def test_a_stop_by_post_needs_no_websocket(server: Server, peer: Peer) -> None:
+    peer.estops.clear()
+    post_stop(server, "001")
+    wait_until(lambda: peer.estops, "a stop")
 
 
-def taps(site: Site, robot: str) -> None:
-    """Stop a robot beside the socket."""
+def post_stop(server: Server, robot: str) -> None:
+    """Stop a robot by POST."""
     request = urllib.request.Request(
-        f"{site.url}estop/{robot}", method="POST", headers={"Origin": site.url.rstrip("/")}
+        f"{server.url}estop/{robot}", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
     with urllib.request.urlopen(request) as answer:
         assert answer.status == 200
 
 
-def test_a_refusal_is_told(ada: Viewer) -> None:
-    ada.takes()
-    ada.say("reset", n=ada.look()["n"])
-    assert "safety does not answer" in ada.waits("told")["text"]
+def test_a_refusal_is_reported(ada: Client) -> None:
+    ada.take_control()
+    ada.send("reset", n=ada.next_snapshot()["n"])
+    assert "safety does not answer" in ada.wait_for("notice")["text"]
 
 
-def test_several_robots(site: Site, ada: Viewer) -> None:
-    wait_until(lambda: "002" in ada.waits("rest")["robots"], "the other robot")
-    assert "two words" not in ada.seen["rest"]["robots"]
-    with viewer(site, "002") as it:
-        assert it.look()["safety"] is None
-        assert [one["name"] for one in it.waits("rest")["services"]] == ["bridge"]
-    ada.say("look", robot="003")
-    assert ada.waits("hello")["robot"] == "003"
+def test_several_robots(server: Server, ada: Client) -> None:
+    wait_until(lambda: "002" in ada.wait_for("slow")["robots"], "the other robot")
+    assert "two words" not in ada.received["slow"]["robots"]
+    with connected(server, "002") as it:
+        assert it.next_snapshot()["safety"] is None
+        assert [one["name"] for one in it.wait_for("slow")["services"]] == ["bridge"]
+    ada.send("look", robot="003")
+    assert ada.wait_for("hello")["robot"] == "003"
 
 
-def test_not_any_number_of_robots_but_for_a_stop(site: Site, world: World) -> None:
-    with viewer(site) as it:
+def test_the_number_of_robots_is_limited_except_for_a_stop(server: Server, peer: Peer) -> None:
+    with connected(server) as it:
         for number in range(ROBOTS_MAX + 1):
-            it.say("look", robot=f"many-{number}")
-        assert it.waits("told")["text"] == "too_many_robots"
-    world.stops_elsewhere.clear()
-    taps(site, "one-more")
-    wait_until(lambda: world.stops_elsewhere, "a stop of one more")
+            it.send("look", robot=f"many-{number}")
+        assert it.wait_for("notice")["text"] == "too_many_robots"
+    peer.stops_elsewhere.clear()
+    post_stop(server, "one-more")
+    wait_until(lambda: peer.stops_elsewhere, "a stop of one more")
 
 
-def test_no_robot_is_called_so(site: Site) -> None:
+def test_an_invalid_robot_name_is_refused(server: Server) -> None:
     request = urllib.request.Request(
-        f"{site.url}estop/*", method="POST", headers={"Origin": site.url.rstrip("/")}
+        f"{server.url}estop/*", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
     with pytest.raises(urllib.error.HTTPError, match="404"):
         urllib.request.urlopen(request)
 
 
-def test_a_stop_of_a_robot_that_is_not_known_is_refused(site: Site, ada: Viewer) -> None:
+def test_a_stop_of_an_unknown_robot_is_refused(server: Server, ada: Client) -> None:
     request = urllib.request.Request(
-        f"{site.url}estop/made-up", method="POST", headers={"Origin": site.url.rstrip("/")}
+        f"{server.url}estop/made-up", method="POST", headers={"Origin": server.url.rstrip("/")}
     )
     with pytest.raises(urllib.error.HTTPError, match="404") as refused:
         urllib.request.urlopen(request)
-    assert b"no robot 'made-up' is known here" in refused.value.read()
-    ada.say("estop", robot="made-up")
-    assert ada.waits("told")["text"] == "estop_unknown"
-    assert "made-up" not in ada.waits("rest")["robots"]
+    assert b"robot 'made-up' is unknown" in refused.value.read()
+    ada.send("estop", robot="made-up")
+    assert ada.wait_for("notice")["text"] == "estop_unknown"
+    assert "made-up" not in ada.wait_for("slow")["robots"]
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])
-def test_who_says_something_else_is_hung_up_on(site: Site, text: str) -> None:
-    with viewer(site) as it:
+def test_an_invalid_message_closes_the_connection(server: Server, text: str) -> None:
+    with connected(server) as it:
         it.socket.send(text)
         with pytest.raises(ConnectionClosed):
-            it.waits("never")
+            it.wait_for("never")
 
 
-def test_it_is_alive_on_the_bus(world: World) -> None:
-    wait_until(lambda: world.alive, "presence")
+def test_the_dashboard_is_alive_on_the_bus(peer: Peer) -> None:
+    wait_until(lambda: peer.alive, "presence")
 
 
-def test_a_signal_is_zeros_and_the_end(endpoint: str, world: World, tmp_path: Path) -> None:
-    world.safe = True
-    with dashboard(endpoint, tmp_path, "dashboard.round_trip=1.0") as site:
-        with viewer(site) as it:
-            it.takes()
-            world.requests.clear()
-            drive(it, world)
-            site.process.send_signal(signal.SIGTERM)
-            wait_until(lambda: world.zeros() >= 3, "zeros")
-        wait_until(lambda: site.process.poll() is not None, "its end")
-        assert site.process.returncode == 0
-        assert "Traceback" not in site.log.read_text()
+def test_a_signal_sends_zeros_and_ends_the_process(
+    endpoint: str, peer: Peer, tmp_path: Path
+) -> None:
+    peer.safe = True
+    with dashboard(endpoint, tmp_path, "dashboard.round_trip=1.0") as server:
+        with connected(server) as it:
+            it.take_control()
+            peer.requests.clear()
+            drive(it, peer)
+            server.process.send_signal(signal.SIGTERM)
+            wait_until(lambda: peer.zeros() >= 3, "zeros")
+        wait_until(lambda: server.process.poll() is not None, "its end")
+        assert server.process.returncode == 0
+        assert "Traceback" not in server.log.read_text()

@@ -1,4 +1,4 @@
-"""What is shown, from what was heard and when."""
+"""Snapshots from telemetry, and the log of sent snapshots."""
 
 import json
 import math
@@ -29,9 +29,11 @@ from common.messages import (
 from common.motion import Command
 from common.settings import Vehicle
 from services.dashboard import snapshot
-from services.dashboard.driver_lock import Grip, Wheel
+from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState
 from services.dashboard.sectors import Protection
-from services.dashboard.telemetry_cache import Heard
+from services.dashboard.snapshot import SentSnapshots
+from services.dashboard.telemetry_cache import TelemetryCache
+from tests.factories import safety_state
 
 AT = 100 * NS_PER_S
 RELEASE = Release(
@@ -39,9 +41,9 @@ RELEASE = Release(
 )
 
 
-def full() -> Heard:
-    """Return a robot of which everything was heard at ``AT``."""
-    heard = Heard()
+def full() -> TelemetryCache:
+    """Return the telemetry of a robot with all messages received at ``AT``."""
+    telemetry = TelemetryCache()
     causes = (Cause(name="contact", action="brake", age=2.0, text="The bumper was hit."),)
     for path, message in {
         "tel/bridge/velocity": Velocity(linear=0.5, angular=0.1),
@@ -70,15 +72,17 @@ def full() -> Heard:
             counters={"late": 2, "overrun": 0}, lateness=0.001, rss=1000,
         ),
     }.items():  # fmt: skip
-        heard.hear(path, message, AT)
-    heard.lives("t2/v1/001/live/odom/x", True)
-    return heard
+        telemetry.update(path, message, AT)
+    telemetry.update_liveliness("t2/v1/001/live/odom/x", True)
+    return telemetry
 
 
-def now(heard: Heard, wheel: Wheel | None = None, at: int = AT) -> snapshot.Now:
-    return snapshot.now(
-        heard,
-        wheel or Wheel(0.3),
+def fast(
+    telemetry: TelemetryCache, lock: DriverLock | None = None, at: int = AT
+) -> snapshot.FastSnapshot:
+    return snapshot.fast_snapshot(
+        telemetry,
+        lock or DriverLock(0.3),
         at,
         number=7,
         names={"1": "Ada"},
@@ -88,8 +92,8 @@ def now(heard: Heard, wheel: Wheel | None = None, at: int = AT) -> snapshot.Now:
     )
 
 
-def test_what_moves() -> None:
-    seen = now(full())
+def test_the_fast_snapshot() -> None:
+    seen = fast(full())
     assert (seen.n, seen.connected, seen.link, seen.bumper) == (7, True, "up", True)
     assert (seen.measured, seen.allowed) == ((0.5, 0.1), (0.0, 0.0))
     assert (seen.pose, seen.epoch) == ((1.0, 2.0, 0.3), 3)
@@ -98,24 +102,24 @@ def test_what_moves() -> None:
     assert seen.safety is not None
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
     assert seen.safety.release == RELEASE
-    assert seen.hands == snapshot.Hands(None, "", Grip.FREE, 1)
+    assert seen.driver == snapshot.DriverState(None, "", HoldState.FREE, 1)
 
 
-def test_what_is_asked_is_of_the_source_that_drives() -> None:
-    assert now(full()).asked == (0.7, 0.2)
+def test_the_request_is_that_of_the_driving_source() -> None:
+    assert fast(full()).requested == (0.7, 0.2)
 
 
 def test_who_drives() -> None:
-    wheel = Wheel(0.3)
-    wheel.take("1", force=False)
-    wheel.shift("1", 3)
-    assert now(full(), wheel).hands == snapshot.Hands("1", "Ada", Grip.FREE, 3)
+    lock = DriverLock(0.3)
+    lock.take("1", force=False)
+    lock.shift("1", 3)
+    assert fast(full(), lock).driver == snapshot.DriverState("1", "Ada", HoldState.FREE, 3)
 
 
-@pytest.mark.parametrize("heard", [Heard(), full()], ids=["never", "long ago"])
-def test_what_is_not_fresh_is_not_shown(heard: Heard) -> None:
-    seen = now(heard, at=AT + 10 * NS_PER_S)
-    known = (seen.measured, seen.asked, seen.allowed, seen.pose, seen.bumper, seen.link)
+@pytest.mark.parametrize("telemetry", [TelemetryCache(), full()], ids=["never", "long ago"])
+def test_old_values_are_not_shown(telemetry: TelemetryCache) -> None:
+    seen = fast(telemetry, at=AT + 10 * NS_PER_S)
+    known = (seen.measured, seen.requested, seen.allowed, seen.pose, seen.bumper, seen.link)
     assert known == (None,) * 6
     assert seen.safety is None
     assert seen.tones == ("dark",) * 8
@@ -123,31 +127,33 @@ def test_what_is_not_fresh_is_not_shown(heard: Heard) -> None:
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_what_is_no_number_is_not_shown(number: float) -> None:
-    heard = full()
-    heard.hear("tel/bridge/velocity", Velocity(linear=0.1, angular=number), AT)
-    heard.hear("tel/bridge/ultrasonic", Ultrasonic(ranges=(number,) * 8, status=("ok",) * 8), AT)
-    seen = now(heard)
+def test_non_finite_values_are_not_shown(number: float) -> None:
+    telemetry = full()
+    telemetry.update("tel/bridge/velocity", Velocity(linear=0.1, angular=number), AT)
+    telemetry.update(
+        "tel/bridge/ultrasonic", Ultrasonic(ranges=(number,) * 8, status=("ok",) * 8), AT
+    )
+    seen = fast(telemetry)
     assert (seen.measured, seen.ranges) == (None, (None,) * 8)
     assert seen.tones == ("dark",) * 8
     assert seen.wheels == (0.0,) * 4
 
 
-def test_nobody_drives_and_nothing_is_asked() -> None:
-    heard = full()
-    state = heard.newest(keys.SAFETY, AT)
+def test_without_a_driving_source_there_is_no_request() -> None:
+    telemetry = full()
+    state = telemetry.newest(keys.SAFETY, AT)
     assert state is not None
-    heard.hear("tel/safety/state", msgspec.structs.replace(state, source=None), AT)
-    assert now(heard).asked is None
+    telemetry.update("tel/safety/state", msgspec.structs.replace(state, source=None), AT)
+    assert fast(telemetry).requested is None
 
 
-def test_what_stands_still() -> None:
-    seen = snapshot.rest(full(), {"001": True}, {"1": "Ada"}, Protection(), AT)
+def test_the_slow_snapshot() -> None:
+    seen = snapshot.slow_snapshot(full(), {"001": True}, {"1": "Ada"}, Protection(), AT)
     assert [(it.name, it.instances, it.version) for it in seen.services] == [
         ("odom", 1, ""),
         ("safety", 0, "0.1"),
     ]
-    assert seen.services[1].troubles == {"late": 2}
+    assert seen.services[1].counters == {"late": 2}
     assert seen.left is not None
     assert (seen.left.bits, seen.right) == (4, None)
     assert seen.switches == Switches(ultrasonic_brake=True, bumper_brake=False)
@@ -155,14 +161,55 @@ def test_what_stands_still() -> None:
 
 
 def test_the_events() -> None:
-    heard = full()
-    heard.note("safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * NS_PER_S))
-    assert snapshot.told(heard) == [snapshot.Told(2.0, "safety", "stop", "warning", "Stopped.")]
+    telemetry = full()
+    telemetry.add_event(
+        "safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * NS_PER_S)
+    )
+    assert snapshot.event_lines(telemetry) == [
+        snapshot.EventLine(2.0, "safety", "stop", "warning", "Stopped.")
+    ]
 
 
-def test_it_is_small_json() -> None:
-    coded = msgspec.json.encode(now(full()))
+def test_the_fast_snapshot_is_small() -> None:
+    coded = msgspec.json.encode(fast(full()))
     read: dict[str, Any] = json.loads(coded)
-    assert read["k"] == "now"
+    assert read["k"] == "fast"
     assert read["safety"]["causes"][0]["name"] == "contact"
     assert len(coded) < 1500  # 20 of them a second to each viewer
+
+
+STATE = safety_state(heartbeat=5)
+LIMIT_S = 1.0
+
+
+@pytest.fixture
+def snapshots() -> SentSnapshots:
+    snapshots = SentSnapshots()
+    snapshots.sent(1, STATE, 10 * NS_PER_S)
+    snapshots.sent(2, None, 10 * NS_PER_S)
+    return snapshots
+
+
+@pytest.mark.parametrize(
+    ("number", "now_ns", "seen"),
+    [
+        (1, 10 * NS_PER_S, STATE),
+        (1, 11 * NS_PER_S, STATE),
+        (1, 11 * NS_PER_S + 1, None),
+        (1, 15 * NS_PER_S, None),
+        (2, 10 * NS_PER_S, None),  # no state of safety
+        (0, 10 * NS_PER_S, None),
+        (3, 10 * NS_PER_S, None),
+    ],
+)
+def test_the_state_in_a_sent_snapshot(
+    snapshots: SentSnapshots, number: int, now_ns: int, seen: object
+) -> None:
+    assert snapshots.seen(number, now_ns, LIMIT_S) == seen
+
+
+def test_only_the_newest_sent_snapshots_are_kept(snapshots: SentSnapshots) -> None:
+    for number in range(3, 3 + SNAPSHOTS_KEPT):
+        snapshots.sent(number, STATE, 10 * NS_PER_S)
+    assert snapshots.seen(1, 10 * NS_PER_S, LIMIT_S) is None
+    assert snapshots.seen(3, 10 * NS_PER_S, LIMIT_S) == STATE

@@ -1,4 +1,4 @@
-"""The dashboard under systemd: it is there when it serves, and both of its loops must work."""
+"""The dashboard under systemd: readiness and the watchdog of both loops."""
 
 import contextlib
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
         yield made
 
 
-def test_it_is_ready_when_it_serves(
+def test_the_service_is_ready_once_it_serves(
     manager: Manager, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC"):
@@ -32,7 +32,7 @@ def test_it_is_ready_when_it_serves(
     assert manager.hear()[-1] == "STOPPING=1"
 
 
-def test_a_word_of_the_servers_loop_waits_for_the_nodes(manager: Manager) -> None:
+def test_both_loops_must_run_for_a_notification(manager: Manager) -> None:
     host = Host.__new__(Host)
     with contextlib.closing(Loop()) as loop:
         host.__dict__.update(_node=SimpleNamespace(loop=loop), _systemd=Systemd(manager.environ))

@@ -14,7 +14,8 @@ from common import codec, keys
 from common import messages as m
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.members import Member, Members
-from services.metrics import exporter, life
+from services.metrics import __main__ as metrics
+from services.metrics import exporter
 from services.metrics.exporter import call_in_loop
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
@@ -158,7 +159,7 @@ def test_missing_library_names_the_extra(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "services.metrics.exporter", None)
-    assert life.main([]) == EXIT_CONFIG
+    assert metrics.main([]) == EXIT_CONFIG
     assert "install the extra `metrics`" in capsys.readouterr().err
 
 

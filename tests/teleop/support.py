@@ -1,4 +1,4 @@
-"""A node without a network: what it publishes and asks is recorded, what it hears is told."""
+"""A node without a network: records what it publishes and calls, and injects messages."""
 
 import time
 from collections.abc import Callable
@@ -15,8 +15,8 @@ from common.messages import Drive, Message
 from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.controller import Desk
-from services.teleop.event_log import Logbook
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.view import View
 from verification.harness.bus import at
 
@@ -32,7 +32,7 @@ class FakeBus(Bus):
         super().__init__(*args)
 
     def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
-        """Keep the handler for ``tell``; a depth makes no difference here."""
+        """Store the handler for ``tell``; the depth is ignored."""
         names.pop("depth", None)
         self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
 
@@ -40,12 +40,12 @@ class FakeBus(Bus):
         self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
         timeout_s: float = 2.0,
     ) -> None:  # fmt: skip
-        """Keep the request and where its answer goes."""
+        """Store the request and the handlers of its answer."""
         self.asked.append((call.path, request))
         self.answers.append((on_reply, on_refusal))
 
     def estop(self) -> None:
-        """Count it."""
+        """Count the stop."""
         self.estops += 1
 
     def tell(
@@ -56,7 +56,7 @@ class FakeBus(Bus):
         declared: str = "",
         **names: str,
     ) -> None:
-        """Let a message come in, by default now; ``declared`` where the handler's key has a *."""
+        """Inject a message, by default now; ``declared`` is the handler's key if it has a *."""
         key = topic.on(self.robot, **names)
         now_ns = time.monotonic_ns() if received_ns is None else received_ns
         for handler in self.handlers[declared or key]:
@@ -64,13 +64,13 @@ class FakeBus(Bus):
 
 
 class FakeNode(Node[TeleopConfig]):
-    """A node on a ``FakeBus``; its log goes to a logbook, its loop does not run."""
+    """A node on a ``FakeBus``; its logs go to an event log, its loop does not run."""
 
     def __init__(self, **settings: Any) -> None:
-        self.logbook = Logbook()
+        self.event_log = EventLog()
         config = TeleopConfig()
         super().__init__("teleop", Loaded(config, {}))
-        self.logbook.take_log(config.log)
+        self.event_log.capture_logs(config.log)
 
     def open_bus(self) -> FakeBus:
         """Return the fake."""
@@ -79,7 +79,7 @@ class FakeNode(Node[TeleopConfig]):
 
     @property
     def requests(self) -> tuple[int, Drive | None]:
-        """How many requests to move went out, and the last one."""
+        """The number of drive requests sent, and the last one."""
         publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
         return publisher.next_seq - 1, publisher.last
 
@@ -97,7 +97,7 @@ def view(**fields: Any) -> View:
     return View(**usual | fields)
 
 
-def answer(desk: Desk, now_ns: int) -> None:
-    """Let a desk know a terminal that answers at once."""
-    desk.terminal.sent(0, now_ns - NS_PER_S // 1000)
-    desk.terminal.answered(0, now_ns)
+def answer(controller: Controller, now_ns: int) -> None:
+    """Simulate a terminal that answers at once."""
+    controller.terminal.sent(0, now_ns - NS_PER_S // 1000)
+    controller.terminal.answered(0, now_ns)

@@ -1,4 +1,4 @@
-"""The screen, with a real desk on a bus that never opens; the test moves the desk's clock."""
+"""The screen with a real controller on a bus that never opens, and a clock of the test."""
 
 import asyncio
 import time
@@ -16,35 +16,35 @@ from common.freshness import NS_PER_S
 from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
-from services.teleop.controller import Desk
+from services.teleop.controller import Controller
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.support import FakeNode, answer
 from verification.harness.teleop_app import LocalTerminalApp
 from verification.harness.waiting import PATIENCE_S
 
 
-class Bench:
-    """A node, its desk and the screen in front of it."""
+class Screen:
+    """A node with its controller and screen."""
 
     def __init__(self) -> None:
         self.node = FakeNode()
-        self.desk = Desk(self.node, self.node.logbook)
+        self.controller = Controller(self.node, self.node.event_log)
         self.ended = False
         self.now_ns = 100 * NS_PER_S
-        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the desk's here
+        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the controller's here
         self.app = LocalTerminalApp(
-            self.desk, post, lambda: self.ended, Teleop(), lambda: self.now_ns
+            self.controller, post, lambda: self.ended, Teleop(), lambda: self.now_ns
         )
-        # However long this machine takes to hand a key over.
-        self.app._came_ns = lambda event: self.now_ns  # type: ignore[method-assign]
+        # Independent of the time that this host takes to deliver a key.
+        self.app._received_ns = lambda event: self.now_ns  # type: ignore[method-assign]
 
     def speeds(self, count: int) -> list[float]:
-        """Let the desk's clock tick, and return the speeds asked for, in order."""
+        """Run the controller's ticks and return the requested speeds in order."""
         sent = []
         for _ in range(count):
             before, _ = self.node.requests
             self.answer()
-            self.desk.tick(self.now_ns)
+            self.controller.tick(self.now_ns)
             self.now_ns += NS_PER_S // 20
             after, last = self.node.requests
             if after > before and last is not None:
@@ -52,12 +52,12 @@ class Bench:
         return sent
 
     def answer(self) -> None:
-        """Let the terminal have been near, so that a key counts that the machine held up."""
+        """Simulate a fast terminal, so that keys that the host delayed count."""
         for ago in range(10, 0, -1):
-            answer(self.desk, self.now_ns - ago * NS_PER_S // 20)
+            answer(self.controller, self.now_ns - ago * NS_PER_S // 20)
 
-    def words(self, name: str) -> str:
-        """Return what a panel shows; nothing before it is there."""
+    def text_of(self, name: str) -> str:
+        """Return the text of a panel; empty before it exists."""
         panels = self.app.query(Panel).filter(f"#{name}")
         return "".join(panel.shown.plain for panel in panels if panel.shown)
 
@@ -69,17 +69,17 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    bench = Bench()
-    yield bench
-    bench.node.loop.close()
+def screen() -> Iterator[Screen]:
+    screen = Screen()
+    yield screen
+    screen.node.loop.close()
 
 
-def play(bench: Bench, act: Callable[[Pilot[None]], Awaitable[None]], *size: int) -> None:
+def play(screen: Screen, act: Callable[[Pilot[None]], Awaitable[None]], *size: int) -> None:
     """Run the screen while ``act`` lasts."""
 
     async def main() -> None:
-        async with bench.shown((size[0], size[1]) if size else (80, 24)) as pilot:
+        async with screen.shown((size[0], size[1]) if size else (80, 24)) as pilot:
             await act(pilot)
 
     asyncio.run(main())
@@ -95,87 +95,87 @@ async def until(true: Callable[[], object], what: str) -> None:
 @pytest.mark.parametrize(
     ("key", "speed"), [("w", 0.2), ("W", 0.2), ("up", 0.2), ("shift+up", 0.2), ("s", -0.2)]
 )
-def test_a_key_drives_and_silence_follows(bench: Bench, key: str, speed: float) -> None:
+def test_a_key_drives_and_then_requests_end(screen: Screen, key: str, speed: float) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press(key)
-        sent = bench.speeds(30)
+        sent = screen.speeds(30)
         assert sent[:2] == [0.0, speed]
         assert sent[-4:] == [speed, 0.0, 0.0, 0.0]
         assert len(sent) < 20
-        assert bench.speeds(3) == []
+        assert screen.speeds(3) == []
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_calls_are_made_by_their_keys(bench: Bench) -> None:
+def test_keys_make_their_calls(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("e")
-        assert bench.node.fake.estops == 1
-        tell_contact(bench)
-        await until(lambda: "pressed" in bench.words("safety"), "the contact on the screen")
+        assert screen.node.fake.estops == 1
+        tell_contact(screen)
+        await until(lambda: "pressed" in screen.text_of("safety"), "the contact on the screen")
         await pilot.press("r")
-        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=7, causes=(42,)))]
+        assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=7, causes=(42,)))]
         await pilot.press("f")
-        bench.speeds(1)
+        screen.speeds(1)
         held = ReleaseRequest(direction="forward", echo=7)
-        assert bench.node.fake.asked[-1] == (keys.RELEASE.path, held)
+        assert screen.node.fake.asked[-1] == (keys.RELEASE.path, held)
 
-    play(bench, act)
-
-
-def tell_contact(bench: Bench) -> None:
-    """Let safety report a pressed bumper."""
-    bench.node.fake.tell(keys.SAFETY, contact_state(), bench.now_ns)
-    bench.desk.tick(bench.now_ns)
+    play(screen, act)
 
 
-def test_a_reset_clears_what_the_screen_showed(bench: Bench) -> None:
+def tell_contact(screen: Screen) -> None:
+    """Simulate a pressed bumper in safety's state."""
+    screen.node.fake.tell(keys.SAFETY, contact_state(), screen.now_ns)
+    screen.controller.tick(screen.now_ns)
+
+
+def test_a_reset_clears_what_the_screen_showed(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        tell_contact(bench)
-        await until(lambda: "pressed" in bench.words("safety"), "the contact on the screen")
+        tell_contact(screen)
+        await until(lambda: "pressed" in screen.text_of("safety"), "the contact on the screen")
         later = Cause(name="estop", action="brake", age=0.0, text="Stopped.", id=43)
         newest = contact_state(heartbeat=9)
         newest = contact_state(
             heartbeat=9, latched=("contact", "estop"), causes=(*newest.causes, later)
         )
-        bench.node.fake.tell(keys.SAFETY, newest, bench.now_ns)  # not drawn yet
+        screen.node.fake.tell(keys.SAFETY, newest, screen.now_ns)  # not drawn yet
         await pilot.press("r")
-        assert bench.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=9, causes=(42,)))]
+        assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=9, causes=(42,)))]
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_a_key_carries_the_time_when_it_came(bench: Bench) -> None:
+def test_a_key_carries_its_receive_time(screen: Screen) -> None:
     key = Key("w", "w")
     key.time = time.monotonic() - 3.0
-    came_ns = LocalTerminalApp._came_ns(bench.app, key)
-    assert (bench.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
+    came_ns = LocalTerminalApp._received_ns(screen.app, key)
+    assert (screen.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
 
 
-def test_a_screen_that_hung_was_not_watched_meanwhile(bench: Bench) -> None:
+def test_a_redraw_that_is_posted_late_keeps_its_time(screen: Screen) -> None:
     posted: list[Callable[[], object]] = []
 
     async def act(_: Pilot[None]) -> None:
-        bench.app._post = posted.append
-        bench.app.draw()
-        drawn_ns = bench.now_ns
-        bench.now_ns += 10 * NS_PER_S
+        screen.app._post = posted.append
+        screen.app.draw()
+        drawn_ns = screen.now_ns
+        screen.now_ns += 10 * NS_PER_S
         posted[0]()  # late
-        assert bench.desk._watched_ns == drawn_ns
+        assert screen.controller._drawn_ns == drawn_ns
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_the_terminal_is_asked_and_its_answer_counts(bench: Bench) -> None:
+def test_the_terminal_is_queried_and_its_answer_counts(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        bench.now_ns += 10 * NS_PER_S  # what was answered so far is old
-        await until(lambda: not bench.desk.terminal.refusal(bench.now_ns), "an answer")
+        screen.now_ns += 10 * NS_PER_S  # what was answered so far is old
+        await until(lambda: not screen.controller.terminal.refusal(screen.now_ns), "an answer")
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_a_terminal_that_does_not_answer_is_asked_less_often(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
+def test_a_terminal_that_does_not_answer_is_queried_less_often(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []
     monkeypatch.setattr(
@@ -185,113 +185,116 @@ def test_a_terminal_that_does_not_answer_is_asked_less_often(
     async def act(pilot: Pilot[None]) -> None:
         before = len(asked)
         for _ in range(60):
-            bench.app.probe()
+            screen.app.probe()
         assert len(asked) - before in (14, 15, 16)  # ten, then every tenth
         assert asked[-1].startswith("\x1b7\x1b[2;")
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_keys_that_do_not_count_are_said_to(bench: Bench) -> None:
+def test_refused_keys_are_shown(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        bench.now_ns += 10 * NS_PER_S
-        bench.desk.tick(bench.now_ns)
-        await until(lambda: "KEYS OFF" in bench.words("hints"), "the refusal")
+        screen.now_ns += 10 * NS_PER_S
+        screen.controller.tick(screen.now_ns)
+        await until(lambda: "KEYS OFF" in screen.text_of("hints"), "the refusal")
 
-    play(bench, act)
+    play(screen, act)
 
 
-def fits(bench: Bench, name: str) -> bool:
-    """Return whether nothing of a panel is cut off."""
-    panel, lines = bench.app.query_one(f"#{name}", Panel), bench.words(name).split("\n")
+def fits(screen: Screen, name: str) -> bool:
+    """Return whether a panel is shown without clipping."""
+    panel, lines = screen.app.query_one(f"#{name}", Panel), screen.text_of(name).split("\n")
     room = panel.content_size
     return (
-        bench.app.screen.region.contains_region(panel.region)
+        screen.app.screen.region.contains_region(panel.region)
         and len(lines) <= room.height
         and max(map(len, lines)) <= room.width
     )
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)])
-def test_a_contact_makes_room_for_its_release(bench: Bench, size: tuple[int, int]) -> None:
+def test_a_contact_shows_its_release_without_clipping(
+    screen: Screen, size: tuple[int, int]
+) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        tell_contact(bench)
-        await until(lambda: "LATCHED" in bench.words("safety"), "the cause")
+        tell_contact(screen)
+        await until(lambda: "LATCHED" in screen.text_of("safety"), "the cause")
         for name in ("safety", "motion", "around"):
-            await until(partial(fits, bench, name), f"{name} to fit")
-        assert "0.12 m left" in bench.words("safety")
+            await until(partial(fits, screen, name), f"{name} to fit")
+        assert "0.12 m left" in screen.text_of("safety")
         refusal = "release refused: " + "the vehicle needs two rows to say why it may not. " * 2
-        bench.node.logbook.add("safety", "warning", refusal.strip())
-        bench.desk.tick(bench.now_ns)
+        screen.node.event_log.add("safety", "warning", refusal.strip())
+        screen.controller.tick(screen.now_ns)
         await until(
-            lambda: " ".join(bench.words("events").split())[16:] == refusal.strip(), "all of it"
+            lambda: " ".join(screen.text_of("events").split())[16:] == refusal.strip(), "all of it"
         )
 
-    play(bench, act, *size)
+    play(screen, act, *size)
 
 
-def test_the_focus_is_the_hold(bench: Bench) -> None:
+def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("w")
-        bench.app.post_message(AppBlur())
+        screen.app.post_message(AppBlur())
         await pilot.pause()
-        assert bench.speeds(5) == []
+        assert screen.speeds(5) == []
 
-    play(bench, act)
+    play(screen, act)
 
 
 @pytest.mark.parametrize("key", ["q", "Q", "ctrl+c", "ctrl+q"])
-def test_leaving_waits_for_the_last_zeros(bench: Bench, key: str) -> None:
+def test_quitting_waits_for_the_final_zeros(screen: Screen, key: str) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press(key)
-        assert bench.app.is_running
-        assert bench.speeds(5) == [0.0] * 3
-        bench.ended = True
-        await until(lambda: not bench.app.is_running, "the screen to leave")
+        assert screen.app.is_running
+        assert screen.speeds(5) == [0.0] * 3
+        screen.ended = True
+        await until(lambda: not screen.app.is_running, "the screen to leave")
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_leaving_twice_does_not_wait_for_a_desk_that_hangs(bench: Bench) -> None:
+def test_quitting_twice_does_not_wait(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("q")
         await pilot.press("q")
-        await until(lambda: not bench.app.is_running, "the screen to leave")
+        await until(lambda: not screen.app.is_running, "the screen to leave")
 
-    play(bench, act)
+    play(screen, act)
 
 
-def test_what_is_known_is_shown(bench: Bench) -> None:
+def test_received_values_are_shown(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        fake = bench.node.fake
+        fake = screen.node.fake
         fake.tell(keys.SAFETY, safety_state(text="Driving, slowly."))
         fake.tell(keys.LINK, link())
         fake.tell(
             keys.ULTRASONIC, Ultrasonic(ranges=(1.5, *(None,) * 7), status=("ok", *("fault",) * 7))
         )
-        bench.desk.tick(0)
-        await until(lambda: "Driving, slowly." in bench.words("safety"), "safety's words")
-        assert "10.7.5.224:4002" in bench.words("motion")
-        assert "1.50 m" in bench.words("around")
-        assert bench.words("around").count("fault") == 7
-        assert "no router yet" in bench.words("header")
-        bench.node.logbook.add("safety", "error", "contact")
-        bench.desk.tick(0)
-        await until(lambda: "contact" in bench.words("events"), "the event")
+        screen.controller.tick(0)
+        await until(lambda: "Driving, slowly." in screen.text_of("safety"), "safety's words")
+        assert "10.7.5.224:4002" in screen.text_of("motion")
+        assert "1.50 m" in screen.text_of("around")
+        assert screen.text_of("around").count("fault") == 7
+        assert "no router yet" in screen.text_of("header")
+        screen.node.event_log.add("safety", "error", "contact")
+        screen.controller.tick(0)
+        await until(lambda: "contact" in screen.text_of("events"), "the event")
 
-    play(bench, act)
+    play(screen, act)
 
 
 @pytest.mark.parametrize(("size", "rows"), [((80, 24), 11), ((120, 40), 13)])
-def test_it_fits_and_grows(bench: Bench, size: tuple[int, int], rows: int) -> None:
+def test_the_screen_fits_and_grows(screen: Screen, size: tuple[int, int], rows: int) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await until(
-            lambda: len(bench.words("around").split("\n")) == rows, f"a drawing of {rows} rows"
+            lambda: len(screen.text_of("around").split("\n")) == rows, f"a drawing of {rows} rows"
         )
-        for panel in bench.app.query(Panel):
-            assert bench.app.screen.region.contains_region(panel.region), panel.id
+        for panel in screen.app.query(Panel):
+            assert screen.app.screen.region.contains_region(panel.region), panel.id
         assert (
-            bench.words("motion").count("\n") < bench.app.query_one("#motion").content_size.height
+            screen.text_of("motion").count("\n")
+            < screen.app.query_one("#motion").content_size.height
         )
 
-    play(bench, act, *size)
+    play(screen, act, *size)

@@ -10,7 +10,7 @@ from common.errors import ConfigError
 from services.teleop.config import Teleop, TeleopConfig
 
 
-def test_the_shipped_file_says_the_defaults() -> None:
+def test_the_shipped_file_has_the_defaults() -> None:
     assert load(TeleopConfig, Sources(environ={})).config.teleop == Teleop()
 
 
@@ -55,6 +55,6 @@ def test_a_refused_protection_says_what_is_allowed() -> None:
         load(TeleopConfig, Sources(environ={}, sets=["teleop.gamepad_silence=9.0"]))
 
 
-def test_a_protection_may_be_given_up_by_name() -> None:
+def test_a_protection_may_be_overridden_by_name() -> None:
     settings = {"round_trip": 2.0, "unsafe_overrides": ["round_trip"]}
     assert msgspec.convert(settings, Teleop).round_trip == 2.0

@@ -1,4 +1,4 @@
-"""The desk: presses in, requests and calls out, and the picture; on a bus that never opens."""
+"""The controller: key presses in, requests, calls and view out; on a bus that never opens."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -23,7 +23,8 @@ from common.messages import (
     Velocity,
 )
 from common.motion import Twist
-from services.teleop.controller import ESTOP_TICKS, Desk
+from common.operator import ESTOP_TICKS
+from services.teleop.controller import Controller
 from services.teleop.hold import Press
 from services.teleop.mapping import Deflection, Stick
 from tests.factories import contact_state, link, safety_state
@@ -33,9 +34,9 @@ PERIOD_NS = NS_PER_S // 20
 
 
 class FakeGamepad:
-    """Pushed forward, with its deadman as told."""
+    """A gamepad with a configured state."""
 
-    words = "Fake Pad"
+    status = "Fake Pad"
     stick: Stick | None = None
 
     def read(self) -> Stick | None:
@@ -43,30 +44,30 @@ class FakeGamepad:
 
 
 class Operator:
-    """A desk on a clock that only ticks move."""
+    """A controller with a simulated clock that advances by ticks."""
 
     def __init__(self) -> None:
         self.node = FakeNode()
-        self.desk = Desk(self.node, self.node.logbook)
+        self.controller = Controller(self.node, self.node.event_log)
         self.now_ns = 100 * NS_PER_S
         self.near = True  # the terminal answers at once
         self.shown: SafetyState | None = None
-        answer(self.desk, self.now_ns)
+        answer(self.controller, self.now_ns)
 
     def press(self, key: str, waited_s: float = 0.0) -> None:
         at_ns = self.now_ns - round(waited_s * NS_PER_S)
-        self.desk.press(Press(key, at_ns, self.shown), self.now_ns)
+        self.controller.press(Press(key, at_ns, self.shown), self.now_ns)
 
     def wait(self, seconds: float) -> None:
-        """Let time pass in which nothing at all happens; after that the terminal is near."""
+        """Advance the clock without ticks; then the terminal answers at once."""
         self.now_ns += round(seconds * NS_PER_S)
-        answer(self.desk, self.now_ns)
+        answer(self.controller, self.now_ns)
 
     def tell_safety(self, **fields: Any) -> None:
         self.node.fake.tell(keys.SAFETY, safety_state(**fields), self.now_ns)
 
     def tell_contact(self, **fields: Any) -> None:
-        """Let safety report a pressed bumper, and the screen show it."""
+        """Simulate a pressed bumper in safety's state and on the screen."""
         self.shown = contact_state(**{"boot": 5} | fields)
         self.node.fake.tell(keys.SAFETY, self.shown, self.now_ns)
 
@@ -74,13 +75,13 @@ class Operator:
         sent = []
         for _ in range(count):
             before, _ = self.node.requests
-            self.desk.tick(self.now_ns)
+            self.controller.tick(self.now_ns)
             after, last = self.node.requests
             assert after - before <= 1
             sent.append(last if after > before else None)
             self.now_ns += PERIOD_NS
             if self.near:
-                answer(self.desk, self.now_ns)
+                answer(self.controller, self.now_ns)
         return sent
 
     def speeds(self, count: int) -> list[float | None]:
@@ -88,7 +89,7 @@ class Operator:
 
     @property
     def lines(self) -> list[str]:
-        return [line.text for line in self.node.logbook.last(99)]
+        return [line.text for line in self.node.event_log.last(99)]
 
 
 @pytest.fixture
@@ -98,7 +99,7 @@ def operator() -> Iterator[Operator]:
     operator.node.loop.close()
 
 
-def test_a_tap_is_asked_for_and_then_there_is_silence(operator: Operator) -> None:
+def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
     assert operator.speeds(3) == [None] * 3
     operator.press("w")
     assert operator.speeds(17) == [0.0] + [0.2] * 11 + [0.0] * 3 + [None] * 2
@@ -112,13 +113,13 @@ def test_requests_carry_the_echo(operator: Operator) -> None:
     assert request.echo == 99
 
 
-def test_estop_lets_go_and_stops_the_robot(operator: Operator) -> None:
+def test_estop_releases_and_stops_the_robot(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(3)
     operator.press("e")
     assert operator.node.fake.estops == 1
     assert operator.speeds(5) == [0.0] * 3 + [None] * 2
-    assert operator.lines == ["emergency stop asked by the operator"]
+    assert operator.lines == ["emergency stop requested by the operator"]
 
 
 def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> None:
@@ -130,7 +131,7 @@ def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> No
     assert operator.node.fake.estops == 4
 
 
-def test_an_estop_that_nobody_confirms_is_said(operator: Operator) -> None:
+def test_an_unconfirmed_estop_is_reported(operator: Operator) -> None:
     operator.press("e")
     operator.ticks(ESTOP_TICKS - 1)
     assert len(operator.lines) == 1
@@ -139,23 +140,23 @@ def test_an_estop_that_nobody_confirms_is_said(operator: Operator) -> None:
     assert "NOT CONFIRMED" in operator.lines[-1]
 
 
-def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
+def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
     operator: Operator,
 ) -> None:
     operator.tell_safety()
     speeds = []
-    for _ in range(40):  # held all the time: two seconds, safety is heard no more
+    for _ in range(40):  # held for two seconds, without a state of safety
         operator.press("w")
         speeds += operator.speeds(1)
     assert speeds[1] == 0.2
     assert speeds[-5:] == [None] * 5
-    assert "safety is not heard" in operator.lines[0]
+    assert "no state of safety" in operator.lines[0]
     operator.tell_safety()
     for _ in range(20):
         operator.press("w")
         operator.tell_safety()
         assert operator.speeds(1) == [None]
-    for _ in range(13):  # let go
+    for _ in range(13):  # released
         operator.tell_safety()
         operator.ticks(1)
     operator.press("w")
@@ -166,7 +167,7 @@ def test_a_lost_bus_is_a_release_and_a_key_still_held_does_not_drive_on(
 DONE = ResetDone(text="cleared contact", boot=5, heartbeat=8, cleared=(42,))
 
 
-def test_a_reset_clears_what_the_screen_shows_and_is_confirmed(operator: Operator) -> None:
+def test_a_reset_clears_the_shown_causes_and_is_confirmed(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     request = ResetRequest(echo=7, causes=(42,))
@@ -179,7 +180,7 @@ def test_a_reset_clears_what_the_screen_shows_and_is_confirmed(operator: Operato
     assert operator.lines == ["reset: cleared contact"]
 
 
-def test_a_reset_that_safety_does_not_show_is_not_confirmed(operator: Operator) -> None:
+def test_a_reset_without_effect_is_not_confirmed(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.node.fake.answers[0][0](DONE)
@@ -202,11 +203,11 @@ def test_a_reset_that_another_program_answers_is_not_confirmed(operator: Operato
 
 def assert_unconfirmed(operator: Operator) -> None:
     operator.ticks(3)
-    (line,) = (line for line in operator.node.logbook.last(99) if "NOT CONFIRMED" in line.text)
+    (line,) = (line for line in operator.node.event_log.last(99) if "NOT CONFIRMED" in line.text)
     assert line.level == "error"
 
 
-def test_a_refused_reset_says_why_and_the_next_one_is_sent(operator: Operator) -> None:
+def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.press("r")  # the key repeats
@@ -219,7 +220,7 @@ def test_a_refused_reset_says_why_and_the_next_one_is_sent(operator: Operator) -
     assert len(operator.node.fake.asked) == 2
 
 
-def test_a_new_reset_takes_the_place_of_one_that_waits_for_its_state(operator: Operator) -> None:
+def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:
     operator.tell_contact()
     operator.press("r")
     operator.node.fake.answers[0][0](DONE)
@@ -243,7 +244,7 @@ def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bo
 
 
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
-def test_a_release_is_asked_again_while_held_one_at_a_time(
+def test_a_release_is_repeated_while_held_one_at_a_time(
     operator: Operator, key: str, direction: Direction
 ) -> None:
     fake = operator.node.fake
@@ -260,13 +261,13 @@ def test_a_release_is_asked_again_while_held_one_at_a_time(
     fake.answers[-1][1]("safety does not answer")
     operator.ticks(1)
     fake.answers[-1][1]("safety does not answer")
-    assert operator.desk.view.release == direction
+    assert operator.controller.view.release == direction
     assert [request.echo for _, request in fake.asked] == [7, 8, 8, 8]
     for _ in range(20):
         operator.tell_contact(heartbeat=9)
         operator.ticks(1)
     assert fake.asked[-1][1] == ReleaseRequest(held=False, echo=9)
-    released: Direction | None = operator.desk.view.release
+    released: Direction | None = operator.controller.view.release
     assert released is None
     fake.answers[-1][0](Done(text="released"))
     count = len(fake.asked)
@@ -302,7 +303,7 @@ def test_a_release_in_the_other_direction_ends_the_first_one(operator: Operator)
     ]
 
 
-def test_the_answer_to_an_end_does_not_hurry_a_hold(operator: Operator) -> None:
+def test_the_answer_to_an_end_does_not_complete_a_hold(operator: Operator) -> None:
     fake = operator.node.fake
     operator.tell_contact(heartbeat=7)
     operator.press("f")
@@ -332,14 +333,14 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
         operator.press(key, waited_s=0.51)
     assert operator.speeds(3) == [None] * 3
     assert operator.node.fake.asked == []
-    assert (operator.desk.view.gear, operator.desk.view.turbo) == (1, False)
-    assert operator.lines == [f"key {key.upper()} ignored: it waited 0.5 s"]
+    assert (operator.controller.view.gear, operator.controller.view.turbo) == (1, False)
+    assert operator.lines == [f"key {key.upper()} ignored: it is 0.5 s old"]
     operator.wait(1.5)
     operator.press(key, waited_s=3.0)
-    assert operator.lines[1:] == [f"key {key.upper()} ignored: it waited 3.0 s"]
+    assert operator.lines[1:] == [f"key {key.upper()} ignored: it is 3.0 s old"]
 
 
-def test_an_estop_and_a_stop_count_however_late(operator: Operator) -> None:
+def test_an_estop_and_a_stop_count_at_any_age(operator: Operator) -> None:
     operator.press("e", waited_s=60.0)
     assert operator.node.fake.estops == 1
     operator.ticks(5)
@@ -347,17 +348,17 @@ def test_an_estop_and_a_stop_count_however_late(operator: Operator) -> None:
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
-def test_a_press_that_waited_shortly_counts_from_when_it_came(operator: Operator) -> None:
+def test_a_recent_press_counts_from_its_receive_time(operator: Operator) -> None:
     operator.ticks(10)
     operator.press("w", waited_s=0.3)
     assert [speed for speed in operator.speeds(10) if speed] == [0.2] * 5
 
 
 def slow(operator: Operator, took_s: float = 0.42) -> None:
-    """Let the terminal answer late from now on."""
+    """Simulate a terminal that answers late from now on."""
     operator.near = False
-    operator.desk.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
-    operator.desk.terminal.answered(1, operator.now_ns)
+    operator.controller.terminal.sent(1, operator.now_ns - round(took_s * NS_PER_S))
+    operator.controller.terminal.answered(1, operator.now_ns)
 
 
 @pytest.mark.parametrize("key", ["w", "left", "f", "b", "r"])
@@ -372,7 +373,7 @@ def test_on_a_slow_terminal_keys_move_and_reset_nothing(operator: Operator, key:
         "keys ignored: terminal too slow: 0.42 s, allowed 0.15 s; "
         "use `t2 drive` on a machine near the robot, or the dashboard"
     ]
-    assert operator.desk.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
+    assert operator.controller.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
 
 
 def test_on_a_slow_terminal_a_stop_counts(operator: Operator) -> None:
@@ -384,7 +385,7 @@ def test_on_a_slow_terminal_a_stop_counts(operator: Operator) -> None:
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
-def test_a_terminal_that_becomes_slow_lets_go_of_its_keys(operator: Operator) -> None:
+def test_a_terminal_that_becomes_slow_releases_its_keys(operator: Operator) -> None:
     operator.press("w")
     assert operator.speeds(2) == [0.0, 0.2]
     slow(operator)
@@ -399,7 +400,7 @@ def test_a_terminal_that_becomes_slow_lets_go_of_its_keys(operator: Operator) ->
     assert len([line for line in operator.lines if "keys ignored" in line]) == 1
 
 
-def test_a_terminal_that_no_longer_answers_lets_go_of_its_keys(operator: Operator) -> None:
+def test_a_terminal_that_stops_answering_releases_its_keys(operator: Operator) -> None:
     operator.near = False
     speeds = []
     for _ in range(20):
@@ -411,36 +412,36 @@ def test_a_terminal_that_no_longer_answers_lets_go_of_its_keys(operator: Operato
 
 def test_a_multiplexer_over_ssh_does_not_drive() -> None:
     node = FakeNode()
-    desk = Desk(node, node.logbook, "tmux over ssh hides the terminal's delay")
-    answer(desk, NS_PER_S)
-    desk.press(Press("w", NS_PER_S), NS_PER_S)
-    desk.tick(NS_PER_S)
+    controller = Controller(node, node.event_log, "tmux over ssh hides the terminal's delay")
+    answer(controller, NS_PER_S)
+    controller.press(Press("w", NS_PER_S), NS_PER_S)
+    controller.tick(NS_PER_S)
     assert node.requests == (0, None)
     node.loop.close()
 
 
-def test_a_gamepad_drives_while_the_screen_is_watched(operator: Operator) -> None:
+def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
-    operator.desk.watch(operator.now_ns)
+    operator.controller.use_gamepad(pad)
+    operator.controller.screen_drawn(operator.now_ns)
     pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
     operator.ticks(1)
     pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False)
     sent = operator.speeds(24)
     assert sent[:19] == [0.0] + [0.2] * 18
-    assert sent[20:] == [0.0, 0.0, 0.0, None]  # nobody looks any more
+    assert sent[20:] == [0.0, 0.0, 0.0, None]  # the screen is not redrawn any more
 
 
-def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: Operator) -> None:
+def test_a_gamepad_that_freezes_is_released_and_reported(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
+    operator.controller.use_gamepad(pad)
     pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
     speeds: list[float | None] = []
     hinted = 0
     for tick in range(70):
-        operator.desk.watch(operator.now_ns)
+        operator.controller.screen_drawn(operator.now_ns)
         speeds += operator.speeds(1)
-        hinted += operator.desk.view.move_stick
+        hinted += operator.controller.view.move_stick
         pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False, events=min(tick, 10))
     assert speeds.count(0.2) == 10 + 40
     assert speeds[-10:] == [None] * 10
@@ -451,29 +452,29 @@ def test_a_gamepad_that_freezes_is_released_and_the_operator_is_told(operator: O
     ]
 
 
-def test_a_gamepad_that_comes_is_told(operator: Operator) -> None:
+def test_a_gamepad_change_is_reported(operator: Operator) -> None:
     pad = FakeGamepad()
-    operator.desk.plug(pad)
+    operator.controller.use_gamepad(pad)
     operator.ticks(1)
-    pad.read = lambda: setattr(pad, "words", "none")  # type: ignore[method-assign]
+    pad.read = lambda: setattr(pad, "status", "none")  # type: ignore[method-assign]
     operator.ticks(2)
     assert operator.lines == ["gamepad: none"]
 
 
-def test_losing_the_focus_lets_go(operator: Operator) -> None:
+def test_losing_the_focus_releases(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(2)
-    operator.desk.let_go()
+    operator.controller.release_controls()
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
 @pytest.mark.parametrize("driving", [True, False])
-def test_leaving_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
+def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
     if driving:
         operator.press("w")
         operator.ticks(3)
-    operator.desk.leave()
-    operator.desk.leave()  # once is enough
+    operator.controller.leave()
+    operator.controller.leave()  # once is enough
     operator.press("w")
     operator.press("e")
     assert operator.speeds(4) == [0.0] * 3 + [None]
@@ -481,15 +482,15 @@ def test_leaving_sends_three_zeros_then_stops_the_loop(operator: Operator, drivi
     operator.node.loop.run()  # returns, for it has been stopped
 
 
-def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
+def test_the_view_shows_fresh_values(operator: Operator) -> None:
     fake = operator.node.fake
     fake.tell(keys.SAFETY, safety_state(text="Driving."))
     fake.tell(keys.VELOCITY, Velocity(linear=0.2, angular=0.0))
     fake.tell(keys.BUMPER, Bumper(pressed=False))
     fake.tell(keys.LINK, link())
     fake.tell(keys.DRIVER, Driver(faults=("encoder",), bits=4), side="right")
-    operator.desk.tick(0)  # a clock behind the messages': nothing is old
-    view = operator.desk.view
+    operator.controller.tick(0)  # a clock behind the messages': nothing is old
+    view = operator.controller.view
     assert view.safety is not None
     assert view.safety.text == "Driving."
     assert view.velocity == Velocity(linear=0.2, angular=0.0)
@@ -497,22 +498,22 @@ def test_the_picture_shows_what_is_fresh(operator: Operator) -> None:
     assert view.link == link()
     assert (view.left, view.right) == (None, Driver(faults=("encoder",), bits=4))
     assert (view.connected, view.robot, view.top) == (False, "001", Twist(0.2, 0.3))
-    operator.desk.tick(1 << 62)
-    assert operator.desk.view.safety is None
+    operator.controller.tick(1 << 62)
+    assert operator.controller.view.safety is None
 
 
-def test_events_of_others_are_shown_and_our_own_not_twice(operator: Operator) -> None:
+def test_events_of_others_are_shown_and_own_ones_only_once(operator: Operator) -> None:
     fake = operator.node.fake
     everyone = keys.EVENTS.on("001", service="*")
     contact = Event(name="contact", level="error", text="the bumper was hit", boot=5, t_ns=7)
     mine = Event(name="estop", level="info", text="mine", boot=fake.boot)
     fake.tell(keys.EVENTS, contact, declared=everyone, service="safety")
     fake.tell(keys.EVENTS, mine, declared=everyone, service="teleop")
-    (line,) = operator.node.logbook.last(9)
+    (line,) = operator.node.event_log.last(9)
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
 
 
-def test_an_operator_who_may_not_drive_is_told_once(
+def test_a_denied_operator_is_notified_once(
     operator: Operator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Publisher, "passed_on", False)

@@ -1,4 +1,4 @@
-"""The gamepad, with a fake in SDL's place and, where pygame is installed, with SDL itself."""
+"""The gamepad, with a fake SDL and, if pygame is installed, with SDL."""
 
 import ctypes
 import sys
@@ -47,7 +47,7 @@ class FakeJoystick:
 
 
 class FakePygame:
-    """As much of pygame as is used."""
+    """The used part of pygame."""
 
     JOYDEVICEREMOVED = REMOVED
     JOYAXISMOTION, JOYBALLMOTION, JOYHATMOTION = AXIS, BALL, HAT
@@ -75,28 +75,28 @@ def gamepad(pygame: FakePygame, settings: Teleop | None = None) -> SdlGamepad:
 
 def test_sticks_and_buttons_are_read() -> None:
     pad = gamepad(FakePygame())
-    assert pad.words == "none"
+    assert pad.status == "none"
     assert pad.read() == Stick(Deflection(0.5, -0.25), deadman=True, turbo=False)
-    assert pad.words == "Fake Pad"
+    assert pad.status == "Fake Pad"
 
 
-def test_what_a_gamepad_lacks_is_at_rest() -> None:
+def test_missing_axes_and_buttons_are_at_rest() -> None:
     pad = gamepad(FakePygame(), Teleop(angular_axis=9, deadman_button=20))
     assert pad.read() == Stick(Deflection(0.5, 0.0), deadman=False, turbo=False)
 
 
-def test_a_lost_one_reads_as_none_and_may_come_back() -> None:
+def test_a_lost_gamepad_reads_as_none_and_may_return() -> None:
     pygame = FakePygame()
     pad = gamepad(pygame)
     pad.read()
     pygame.count, pygame.events = 0, [SimpleNamespace(type=REMOVED, instance_id=3)]
     assert pad.read() is None
-    assert pad.words == "none"
+    assert pad.status == "none"
     pygame.count = 1
     assert pad.read() is not None
 
 
-def test_another_ones_loss_is_nothing() -> None:
+def test_the_loss_of_another_gamepad_is_ignored() -> None:
     pygame = FakePygame()
     pad = gamepad(pygame)
     pad.read()
@@ -107,7 +107,7 @@ def test_another_ones_loss_is_nothing() -> None:
     assert pad.read() is not None
 
 
-def test_what_a_hand_does_is_counted() -> None:
+def test_input_events_are_counted() -> None:
     pygame = FakePygame()
     pad = gamepad(pygame)
     pygame.events = [SimpleNamespace(type=AXIS, instance_id=3)]  # of one that is not ours yet
@@ -128,7 +128,7 @@ def test_what_a_hand_does_is_counted() -> None:
     assert counts == [0, 0, 1, 5, 5, 5, 5]
 
 
-def test_one_that_is_gone_before_it_opens_is_none() -> None:
+def test_a_gamepad_that_is_gone_before_it_opens_is_none() -> None:
     def gone(index: int) -> FakeJoystick:
         raise RuntimeError("Invalid joystick device number")
 
@@ -137,29 +137,29 @@ def test_one_that_is_gone_before_it_opens_is_none() -> None:
     assert gamepad(pygame).read() is None
 
 
-def test_one_that_is_not_wanted_does_not_import_pygame(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disabled_gamepad_does_not_import_pygame(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)  # importing it would fail
     pad = find(Teleop(gamepad=False))
     assert isinstance(pad, NoGamepad)
-    assert (pad.words, pad.read()) == ("off", None)
+    assert (pad.status, pad.read()) == ("off", None)
 
 
-def test_without_pygame_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_pygame_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    assert find(Teleop()).words == "none: pygame-ce is not installed"
+    assert find(Teleop()).status == "none: pygame-ce is not installed"
 
 
-def test_without_sdl_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_sdl_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail() -> None:
         raise RuntimeError("no joystick subsystem")
 
     pygame = FakePygame()
     pygame.joystick.init = fail
     monkeypatch.setitem(sys.modules, "pygame", pygame)
-    assert find(Teleop()).words == "none: no joystick subsystem"
+    assert find(Teleop()).status == "none: no joystick subsystem"
 
 
-def test_sdl_itself_starts_without_display_and_in_silence(
+def test_sdl_starts_without_display_and_without_output(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     pytest.importorskip("pygame")
@@ -170,7 +170,7 @@ def test_sdl_itself_starts_without_display_and_in_silence(
 
 
 class VirtualGamepad:
-    """A gamepad that SDL makes up: six axes, eleven buttons."""
+    """A virtual gamepad of SDL: six axes, eleven buttons."""
 
     def __init__(self) -> None:
         library = next(
@@ -197,14 +197,14 @@ def virtual() -> Iterator[tuple[SdlGamepad, VirtualGamepad]]:
     pytest.importorskip("pygame")
     pad = find(Teleop())
     if not (isinstance(pad, SdlGamepad) and MAPS.exists() and "libSDL2-" in MAPS.read_text()):
-        pytest.skip("SDL 2 is not at hand")
+        pytest.skip("SDL 2 is not available")
     gamepad = VirtualGamepad()
     yield pad, gamepad
     gamepad.unplug()
     assert pad.read() is None
 
 
-def test_sdl_itself_reports_every_change_and_no_more(
+def test_sdl_reports_every_change_once(
     virtual: tuple[SdlGamepad, VirtualGamepad],
 ) -> None:
     pad, gamepad = virtual

@@ -37,7 +37,7 @@ def test_keys_give_a_direction(held: list[str], push: tuple[float, float]) -> No
 
 
 @given(st.lists(st.sampled_from(sorted(DIRECTIONS))))
-def test_keys_never_ask_for_more_than_all(held: list[str]) -> None:
+def test_keys_never_exceed_full_deflection(held: list[str]) -> None:
     push = deflection(held)
     assert abs(push.linear) <= 1
     assert abs(push.angular) <= 1
@@ -52,7 +52,7 @@ def test_keys_never_ask_for_more_than_all(held: list[str]) -> None:
         (5, True, Twist(1.0, 1.0)),
     ],
 )
-def test_the_gear_says_how_fast(gear: int, turbo: bool, expected: Twist) -> None:
+def test_the_gear_sets_the_speed(gear: int, turbo: bool, expected: Twist) -> None:
     assert twist(Deflection(1, 1), gear, turbo, SETTINGS) == expected
     assert twist(Deflection(), gear, turbo, SETTINGS) == Twist()
 
@@ -78,7 +78,7 @@ def test_each_gear_is_faster() -> None:
         (math.inf, 0.5, 0.0),
     ],
 )
-def test_a_stick_is_still_in_the_middle_and_full_at_the_end(
+def test_a_stick_has_a_deadzone_and_full_deflection(
     raw: float, expo: float, expected: float
 ) -> None:
     both = shaped(Deflection(raw, raw), 0.1, expo)
@@ -87,5 +87,5 @@ def test_a_stick_is_still_in_the_middle_and_full_at_the_end(
 
 
 @given(st.floats(), st.floats(0.02, 0.5), st.floats(0, 1))
-def test_a_stick_never_asks_for_more_than_all(raw: float, deadzone: float, expo: float) -> None:
+def test_a_stick_never_exceeds_full_deflection(raw: float, deadzone: float, expo: float) -> None:
     assert -1 <= shaped(Deflection(raw, 0), deadzone, expo).linear <= 1

@@ -1,4 +1,4 @@
-"""The panels' words."""
+"""Texts of the panels."""
 
 import pytest
 
@@ -15,12 +15,12 @@ SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too ol
 IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
 
 
-def test_the_header_tells_the_way_to_the_vehicle() -> None:
+def test_the_header_shows_the_connections() -> None:
     words = panels.header(view(link=link(), bumper=Bumper(pressed=False))).plain
     assert words == "T2 001  ● bus  ● board  ● bumper  gear 1/5  0.20 m/s 0.30 rad/s"
 
 
-def test_the_header_fits_when_nothing_is_there() -> None:
+def test_the_header_fits_without_data() -> None:
     words = panels.header(view(connected=False)).plain
     assert "no router yet" in words
     assert "no bridge" in words
@@ -28,26 +28,26 @@ def test_the_header_fits_when_nothing_is_there() -> None:
 
 
 @pytest.mark.parametrize(("state", "words"), [("lost", "board lost"), ("never", "never seen")])
-def test_the_header_tells_a_board_that_is_away(state: str, words: str) -> None:
+def test_the_header_shows_a_missing_board(state: str, words: str) -> None:
     assert words in panels.header(view(link=link(state=state))).plain
 
 
-def test_the_header_tells_turbo_and_a_pressed_bumper() -> None:
+def test_the_header_shows_turbo_and_a_pressed_bumper() -> None:
     words = panels.header(view(turbo=True, top=Twist(1, 1), bumper=Bumper(pressed=True))).plain
     assert "TURBO  1.00 m/s" in words
     assert "PRESSED" in words
 
 
-def test_without_safety_it_says_so() -> None:
+def test_a_missing_safety_is_shown() -> None:
     assert "NO SAFETY" in panels.safety(view(), 2).plain
 
 
-def test_safety_is_told_in_its_own_words() -> None:
+def test_the_text_of_safety_is_shown() -> None:
     words = panels.safety(view(safety=safety_state(verdict="slow", text="Slowed.")), 2).plain
     assert words == " SLOW   Slowed."
 
 
-def test_latched_causes_come_first_and_say_what_helps() -> None:
+def test_latched_causes_come_first_with_advice() -> None:
     state = safety_state(
         verdict="brake", latched=("contact",), causes=(SILENT, CONTACT, IDLE), text="No."
     )
@@ -57,7 +57,7 @@ def test_latched_causes_come_first_and_say_what_helps() -> None:
     ]
 
 
-def test_where_room_is_scarce_causes_are_named_in_one_line() -> None:
+def test_with_few_rows_causes_are_named_in_one_line() -> None:
     state = safety_state(latched=("contact",), causes=(SILENT, CONTACT))
     lines = panels.safety(view(safety=state), 2).plain.split("\n")
     assert lines[1:] == ["LATCHED contact 12 s, R resets  stop silent 5 min"]
@@ -71,7 +71,7 @@ def test_the_newest_events_are_shown() -> None:
     assert panels.events(view(lines=lines), 9).plain.count("event") == 5
 
 
-def test_a_long_line_goes_on_in_the_next_row() -> None:
+def test_a_long_line_is_wrapped() -> None:
     lines = (Line(0, "bridge", "info", "short"), Line(0, "safety", "error", "word " * 30))
     shown = panels.events(view(lines=lines), 5, 76).plain.split("\n")
     assert [len(row) for row in shown] == [22, 76, 76, 46]
@@ -81,11 +81,11 @@ def test_a_long_line_goes_on_in_the_next_row() -> None:
     assert panels.events(view(lines=(Line(0, "safety", "info", ""),)), 2, 10).plain.strip()
 
 
-def test_the_hints_say_what_the_key_repeat_means_and_fit() -> None:
+def test_the_hints_explain_key_repeats_and_fit() -> None:
     keys, limit = panels.hints(view(), 0.6, 0.3).plain.split("\n")
     assert "E ESTOP" in keys
     assert "FB release" in keys
-    assert "a tap drives 0.6 s, a hold 0.3 s past the last repeat" in limit
+    assert "a tap drives 0.6 s, a hold 0.3 s past its last repeat" in limit
     assert max(len(keys), len(limit)) <= 78
 
 
@@ -98,7 +98,7 @@ def test_the_hints_say_what_the_key_repeat_means_and_fit() -> None:
         multiplexer({}, ["mosh-server"]),
     ],
 )
-def test_on_a_slow_terminal_the_hints_say_why_and_what_counts(reason: str) -> None:
+def test_on_a_slow_terminal_the_hints_give_the_reason_and_the_accepted_keys(reason: str) -> None:
     keys, advice = panels.hints(view(keys_refused=reason), 0.6, 0.3).plain.split("\n")
     assert keys == f"␣ stop E ESTOP Q quit  KEYS OFF: {reason}"
     assert "dashboard" in advice
@@ -124,7 +124,7 @@ def test_the_other_way_and_an_unknown_age() -> None:
     assert row == "RELEASE  believed free: FORWARD (moved backward; net -0.20 m)"
 
 
-def test_without_a_belief_the_operator_looks() -> None:
+def test_an_unknown_free_direction_is_shown() -> None:
     row = contact_rows(believed_free=None, age=None)[1]
     assert row == "RELEASE  free direction unknown: look at the vehicle"
 

@@ -1,4 +1,4 @@
-"""How late a key can be, by the questions that the terminal answers."""
+"""The bound on the age of a key, from the queries that the terminal answers."""
 
 from itertools import pairwise
 
@@ -41,19 +41,17 @@ def test_before_the_first_answer_the_delay_is_unknown(trip: RoundTrip) -> None:
 
 
 @pytest.mark.parametrize(("took_s", "counts"), [(0.0, True), (0.15, True), (0.151, False)])
-def test_the_limit_is_on_the_way_there_and_back(
-    trip: RoundTrip, took_s: float, counts: bool
-) -> None:
+def test_the_limit_applies_to_the_round_trip(trip: RoundTrip, took_s: float, counts: bool) -> None:
     ask(trip, 1, 10, took_s)
     assert (trip.refusal(at(10 + took_s)) == "") is counts
 
 
-def test_a_refusal_says_how_slow_and_what_is_allowed(trip: RoundTrip) -> None:
+def test_a_refusal_names_the_round_trip_and_the_limit(trip: RoundTrip) -> None:
     ask(trip, 1, 10, 0.42)
     assert trip.refusal(at(10.42)) == "terminal too slow: 0.42 s, allowed 0.15 s"
 
 
-def test_a_key_before_the_answer_may_be_older_than_the_question(trip: RoundTrip) -> None:
+def test_a_key_before_the_answer_may_be_older_than_the_query(trip: RoundTrip) -> None:
     ask(trip, 1, 10, 0.1)
     assert trip.refusal(at(10.099)) == UNKNOWN
     assert trip.refusal(at(10.1)) == ""
@@ -88,7 +86,7 @@ def test_answers_out_of_order_and_unknown_ones_are_ignored(trip: RoundTrip) -> N
     assert "1.70 s" in trip.refusal(at(12))
 
 
-def test_a_number_that_comes_round_is_the_new_question(trip: RoundTrip) -> None:
+def test_a_reused_number_is_the_new_query(trip: RoundTrip) -> None:
     for question in range(2 * NUMBERS):
         trip.sent(question % NUMBERS, at(10 + question * PROBE_S))
     last_s = 10 + (2 * NUMBERS - 1) * PROBE_S
@@ -96,13 +94,13 @@ def test_a_number_that_comes_round_is_the_new_question(trip: RoundTrip) -> None:
     assert trip.refusal(at(last_s + 0.1)) == ""
 
 
-def test_its_memory_is_bounded(trip: RoundTrip) -> None:
+def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
     for number in range(3 * NUMBERS):
         ask(trip, number, 10 + number, 0.01)
     assert len(trip._answers) == NUMBERS
 
 
-def test_what_cannot_be_measured_is_refused_whatever_answers() -> None:
+def test_an_unmeasurable_terminal_is_always_refused() -> None:
     trip = RoundTrip(LIMIT_S, "tmux hides it")
     ask(trip, 1, 10, 0.0)
     assert trip.refusal(at(10)) == "tmux hides it"
@@ -143,7 +141,7 @@ def test_no_key_that_counts_is_older_than_the_limit_allows(
         ({}, ["bash", "mosh-server", "systemd"], "mosh"),
     ],
 )
-def test_a_multiplexer_hides_a_terminal_that_is_far_away(
+def test_a_multiplexer_hides_a_remote_terminal(
     environ: dict[str, str], ancestors: list[str], program: str
 ) -> None:
     reason = multiplexer(environ, ancestors)

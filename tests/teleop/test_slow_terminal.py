@@ -1,4 +1,4 @@
-"""What a held key moves when the terminal is far away: the real program, on a real bus."""
+"""Held keys on a slow terminal: the real program on a real bus."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ def loop() -> Iterator[Loop]:
 
 
 class Listener:
-    """Notes when which speed was asked for, and teleop's events."""
+    """Records the requested speeds with their times, and teleop's events."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[int, float]] = []
@@ -56,7 +56,7 @@ def listener(endpoint: str, loop: Loop) -> Iterator[Listener]:
 
 
 def hold(it: Terminal, seconds: float, done: Callable[[], bool] = lambda: False) -> int:
-    """Hold W, as a keyboard repeats it; return when it was let go."""
+    """Hold W with a keyboard's repeats; return the time of its release."""
     end = time.monotonic() + seconds
     while time.monotonic() < end and not done():
         it.type("w")
@@ -65,7 +65,7 @@ def hold(it: Terminal, seconds: float, done: Callable[[], bool] = lambda: False)
 
 
 def ready(it: Terminal, listener: Listener) -> None:
-    """Wait for the screen, and for the way through the bus."""
+    """Wait for the screen and for the connection through the bus."""
 
     def zero() -> bool:
         it.type(" ")
@@ -77,7 +77,7 @@ def ready(it: Terminal, listener: Listener) -> None:
 
 
 def drives(it: Terminal, listener: Listener) -> bool:
-    """Hold W for a while; let go if that moves nothing."""
+    """Hold W for a while; release it if no drive request is sent."""
 
     def moving() -> bool:
         return any(linear for _, linear in listener.asked)

@@ -1,10 +1,10 @@
-"""The vehicle from above."""
+"""The sonar view in characters."""
 
 import pytest
 from rich.text import Text
 
 from common.messages import Bumper, RangeStatus, Ultrasonic
-from services.teleop.sonar_view import BANDS, DIM, TROUBLE, around, reading
+from services.teleop.sonar_view import BANDS, DIM, FAULT, around, reading
 
 OK: tuple[RangeStatus, ...] = ("ok",) * 8
 
@@ -21,20 +21,20 @@ def style_at(text: Text, words: str) -> str:
         (0.5, "ok", "0.50 m", BANDS[1][1], {1}),
         (1.99, "ok", "1.99 m", BANDS[2][1], {2}),
         (2.0, "ok", "2.00 m", "green", set()),
-        (None, "fault", "fault", TROUBLE, {0, 1, 2}),
+        (None, "fault", "fault", FAULT, {0, 1, 2}),
         (None, "too_near", "near", BANDS[0][1], {0, 1, 2}),
         (None, "no_echo", "-", DIM, set()),
         (None, "ok", "-", DIM, set()),
     ],
 )
-def test_a_reading_has_words_a_colour_and_arcs(
+def test_a_reading_has_a_label_a_colour_and_arcs(
     distance: float | None, status: RangeStatus, words: str, style: str, lit: set[int]
 ) -> None:
     seen = reading(distance, status)
-    assert (seen.words, seen.style, set(seen.lit)) == (words, style, lit)
+    assert (seen.label, seen.style, set(seen.lit)) == (words, style, lit)
 
 
-def test_every_sonar_stands_where_it_looks() -> None:
+def test_every_sonar_is_drawn_at_its_place() -> None:
     ranges = tuple(1.0 + i / 10 for i in range(8))
     lines = around(Ultrasonic(ranges=ranges, status=OK), None, 34, 11).plain.split("\n")
     assert "1.20 m" in lines[0]  # front
@@ -45,7 +45,7 @@ def test_every_sonar_stands_where_it_looks() -> None:
 
 
 @pytest.mark.parametrize(("width", "height"), [(34, 11), (38, 11), (60, 13), (120, 40), (4, 1)])
-def test_it_is_as_large_as_told(width: int, height: int) -> None:
+def test_the_view_has_the_requested_size(width: int, height: int) -> None:
     lines = around(None, None, width, height).plain.split("\n")
     assert len(lines) == height
     assert {len(line) for line in lines} == {width}
@@ -69,7 +69,7 @@ def test_a_near_wall_lights_the_nearest_arc_only() -> None:
     assert [str(s.style) for s in text.spans if s.start <= inner < s.end] == [BANDS[0][1]]
 
 
-def test_without_news_every_range_is_a_question() -> None:
+def test_without_data_every_range_is_unknown() -> None:
     assert around(None, None).plain.count("?") == 8
 
 

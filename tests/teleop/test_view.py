@@ -1,26 +1,26 @@
-"""A stream's newest value, while it is worth showing."""
+"""A topic's newest value, until it is too old."""
 
 from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Bumper
-from services.teleop.view import Ear
+from services.teleop.view import LatestTopic
 from tests.teleop.support import FakeBus
 from verification.harness.bus import at
 
 
-def test_a_value_is_shown_while_it_is_worth_it() -> None:
+def test_a_value_is_shown_until_it_is_too_old() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    ear = Ear(bus, keys.BUMPER, 0.5)
+    ear = LatestTopic(bus, keys.BUMPER, 0.5)
     assert ear.at(0) is None
     bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
     assert ear.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
     assert ear.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
 
 
-def test_each_side_has_its_own_ear() -> None:
+def test_each_side_has_its_own_topic() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    Ear(bus, keys.DRIVER, 2.0, side="left")
-    Ear(bus, keys.DRIVER, 2.0, side="right")
+    LatestTopic(bus, keys.DRIVER, 2.0, side="left")
+    LatestTopic(bus, keys.DRIVER, 2.0, side="right")
     assert sorted(bus.handlers) == [
         "t2/v1/001/tel/bridge/driver/left",
         "t2/v1/001/tel/bridge/driver/right",

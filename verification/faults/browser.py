@@ -8,23 +8,23 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from verification.faults.stack_fixture import StackFixture
-from verification.harness.dashboard import Site, dashboard
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open
 
 HALF_OPEN = 500
 SETTLE_S = 1.0  # until the abuse takes effect
 
-Abuse = Callable[[Site], AbstractContextManager[Any]]
+Abuse = Callable[[Server], AbstractContextManager[Any]]
 
 
-def flood(site: Site) -> AbstractContextManager[None]:
-    """Send 50 000 messages a second as a viewer."""
-    return flooded(site, FLOODS["look"])
+def flood(server: Server) -> AbstractContextManager[None]:
+    """Send 50 000 messages a second, as a viewer."""
+    return flooded(server, FLOODS["look"])
 
 
-def unfinished(site: Site) -> AbstractContextManager[Any]:
-    """Open requests that never end."""
-    return half_open(site, HALF_OPEN)
+def unfinished(server: Server) -> AbstractContextManager[Any]:
+    """Begin requests and never end them."""
+    return half_open(server, HALF_OPEN)
 
 
 def estop_while(abuse: Abuse) -> Callable[[StackFixture], int]:
@@ -32,11 +32,11 @@ def estop_while(abuse: Abuse) -> Callable[[StackFixture], int]:
 
     def inject(fixture: StackFixture) -> int:
         with contextlib.ExitStack() as stack:
-            site = stack.enter_context(dashboard(fixture.running.endpoint, fixture.folder))
-            stack.enter_context(abuse(site))
+            server = stack.enter_context(dashboard(fixture.running.endpoint, fixture.folder))
+            stack.enter_context(abuse(server))
             time.sleep(SETTLE_S)
             request = urllib.request.Request(
-                f"{site.url}estop/001", method="POST", headers={"Origin": site.url.rstrip("/")}
+                f"{server.url}estop/001", method="POST", headers={"Origin": server.url.rstrip("/")}
             )
             at_ns = time.monotonic_ns()
             with urllib.request.urlopen(request, timeout=10):

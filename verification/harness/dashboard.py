@@ -1,4 +1,4 @@
-"""The dashboard as a process, and a viewer without a browser."""
+"""The dashboard as a separate process, and a WebSocket client in place of a browser."""
 
 import contextlib
 import json
@@ -15,14 +15,13 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from verification.harness.bus import set_options
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 @dataclass
-class Site:
-    """A running dashboard."""
+class Server:
+    """The process of a dashboard."""
 
     command: list[str]
     port: int
@@ -35,7 +34,7 @@ class Site:
         return f"{'https' if self.tls else 'http'}://127.0.0.1:{self.port}/"
 
     def start(self) -> None:
-        """Start the process, and wait until it serves."""
+        """Start the process and wait until it serves the page."""
         with self.log.open("ab") as output:
             self.process = subprocess.Popen(self.command, stdout=output, stderr=output)
         wait_until(self.serves, f"the page; {self.log}", 2 * PATIENCE_S)
@@ -46,12 +45,12 @@ class Site:
             with urllib.request.urlopen(self.url, timeout=5, context=self.tls) as answer:
                 return bool(answer.status == 200)
         except urllib.error.HTTPError as error:
-            return error.code == 401  # it requires a token
+            return error.code == 401  # the token page
         except OSError:
             return False
 
     def end(self) -> None:
-        """Terminate the process; kill it when it hangs."""
+        """Terminate the process; kill it if it hangs."""
         self.process.terminate()
         try:
             self.process.wait(PATIENCE_S)
@@ -66,57 +65,58 @@ class Site:
 @contextlib.contextmanager
 def dashboard(
     endpoint: str, folder: Path, *sets: str, tls: ssl.SSLContext | None = None
-) -> Iterator[Site]:
-    """Run a dashboard on a free port."""
+) -> Iterator[Server]:
+    """Run a dashboard on a free port while the context lasts."""
     port = free_port()
     given = [f"bus.connect={endpoint}", f"dashboard.port={port}", "log.format=json", *sets]
-    command = [sys.executable, "-m", "services.dashboard", *set_options(*given)]
-    site = Site(command, port, folder / "dashboard.log", None, tls)  # type: ignore[arg-type]
-    site.start()
+    options = [part for one in given for part in ("--set", one)]
+    command = [sys.executable, "-m", "services.dashboard", *options]
+    server = Server(command, port, folder / "dashboard.log", None, tls)  # type: ignore[arg-type]
+    server.start()
     try:
-        yield site
+        yield server
     finally:
-        site.end()
+        server.end()
 
 
-class Viewer:
+class Client:
     """A viewer: stores the newest message of each kind."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
-        self.seen: dict[str, Any] = {}
+        self.received: dict[str, Any] = {}
 
-    def say(self, k: str, **fields: object) -> None:
+    def send(self, k: str, **fields: object) -> None:
         self.socket.send(json.dumps({"k": k, **fields}))
 
-    def look(self) -> dict[str, Any]:
-        """Wait for the next snapshot."""
+    def next_snapshot(self) -> dict[str, Any]:
+        """Wait for the next fast snapshot."""
         while True:
             message = json.loads(self.socket.recv(timeout=PATIENCE_S))
-            self.seen[message["k"]] = message
-            if message["k"] == "now":
+            self.received[message["k"]] = message
+            if message["k"] == "fast":
                 return dict(message)
 
-    def waits(self, kind: str) -> Any:
+    def wait_for(self, kind: str) -> Any:
         """Wait for a new message of this kind."""
-        self.seen.pop(kind, None)
-        while kind not in self.seen:
-            self.look()
-        return self.seen[kind]
+        self.received.pop(kind, None)
+        while kind not in self.received:
+            self.next_snapshot()
+        return self.received[kind]
 
-    def takes(self, force: bool = False) -> None:
-        """Take control, and wait until this viewer has it."""
-        self.say("take", force=force)
-        while self.look()["hands"]["id"] != self.seen["hello"]["id"]:
+    def take_control(self, force: bool = False) -> None:
+        """Take the driver lock and wait until it is granted."""
+        self.send("take", force=force)
+        while self.next_snapshot()["driver"]["id"] != self.received["hello"]["id"]:
             pass
 
 
 @contextlib.contextmanager
-def viewer(site: Site, robot: str = "001") -> Iterator[Viewer]:
-    """View a robot."""
-    address = f"ws://127.0.0.1:{site.port}/live"
-    with connect(address, origin=Origin(site.url.rstrip("/"))) as socket:
-        it = Viewer(socket)
-        it.say("look", robot=robot)
-        it.waits("hello")
+def connected(server: Server, robot: str = "001") -> Iterator[Client]:
+    """Show a robot while the context lasts."""
+    address = f"ws://127.0.0.1:{server.port}/live"
+    with connect(address, origin=Origin(server.url.rstrip("/"))) as socket:
+        it = Client(socket)
+        it.send("look", robot=robot)
+        it.wait_for("hello")
         yield it

@@ -1,4 +1,4 @@
-"""Hostile clients of the web server: message floods and unfinished requests."""
+"""Abusive clients of the web server: message floods and endless requests."""
 
 import contextlib
 import socket
@@ -10,7 +10,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from verification.harness.dashboard import Site
+from verification.harness.dashboard import Server
 
 TEXT, PING = 0x81, 0x89  # first bytes of WebSocket frames
 BATCH = 500
@@ -30,14 +30,14 @@ FLOODS = {
 }
 
 
-def flood(site: Site, message: bytes, stop: threading.Event) -> None:
-    """Send a frame at ``PER_SECOND`` until stopped; reconnect when disconnected."""
+def flood(server: Server, message: bytes, stop: threading.Event) -> None:
+    """Send a frame at ``PER_SECOND``, reconnecting as needed, until stopped."""
     batch = message * BATCH
-    origin = Origin(site.url.rstrip("/"))
+    origin = Origin(server.url.rstrip("/"))
     while not stop.is_set():
         with (
             contextlib.suppress(OSError, WebSocketException, TimeoutError),
-            connect(f"ws://127.0.0.1:{site.port}/live", origin=origin, open_timeout=5) as viewer,
+            connect(f"ws://127.0.0.1:{server.port}/live", origin=origin, open_timeout=5) as viewer,
         ):
             began = time.monotonic()
             sent = 0
@@ -49,10 +49,10 @@ def flood(site: Site, message: bytes, stop: threading.Event) -> None:
 
 
 @contextlib.contextmanager
-def flooded(site: Site, message: bytes) -> Iterator[None]:
-    """Flood the server."""
+def flooded(server: Server, message: bytes) -> Iterator[None]:
+    """Flood the server while the context lasts."""
     stop = threading.Event()
-    thread = threading.Thread(target=flood, args=(site, message, stop), daemon=True)
+    thread = threading.Thread(target=flood, args=(server, message, stop), daemon=True)
     thread.start()
     try:
         yield
@@ -62,12 +62,14 @@ def flooded(site: Site, message: bytes) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def half_open(site: Site, count: int) -> Iterator[list[socket.socket]]:
-    """Open connections, each with a request whose header never ends."""
+def half_open(server: Server, count: int) -> Iterator[list[socket.socket]]:
+    """Open this many connections, each with a request whose header never ends."""
     with contextlib.ExitStack() as stack:
         opened = []
         for _ in range(count):
-            it = stack.enter_context(socket.create_connection(("127.0.0.1", site.port), timeout=5))
+            it = stack.enter_context(
+                socket.create_connection(("127.0.0.1", server.port), timeout=5)
+            )
             with contextlib.suppress(OSError):  # it may be closed at once
                 it.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
             opened.append(it)

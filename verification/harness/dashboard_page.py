@@ -1,11 +1,11 @@
-"""Actions on the dashboard's page in a browser."""
+"""Actions and checks on the page in a browser."""
 
 import shutil
 from collections.abc import Callable
 
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
 
-from verification.harness.dashboard import Site
+from verification.harness.dashboard import Server
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
@@ -14,37 +14,39 @@ PHONE: ViewportSize = {"width": 390, "height": 844}
 STILL_MPS = 0.005
 
 
-def opened(page: Page, site: Site) -> None:
-    page.goto(site.url)
-    shows(page, "#link", "Board: up")
+def open_page(page: Page, server: Server) -> None:
+    page.goto(server.url)
+    wait_for_text(page, "#link", "Board: up")
 
 
 def text(page: Page, where: str) -> str:
     return page.inner_text(where, timeout=20_000)
 
 
-def shows(page: Page, where: str, words: str) -> None:
-    """Wait until an element contains this text."""
+def wait_for_text(page: Page, where: str, expected: str) -> None:
+    """Wait until an element of the page contains this text."""
     page.wait_for_function(
-        "([where, words]) => document.querySelector(where)?.textContent.includes(words)",
-        arg=[where, words],
+        "([where, text]) => document.querySelector(where)?.textContent.includes(text)",
+        arg=[where, expected],
         timeout=20_000,
     )
 
 
-def takes(page: Page) -> None:
-    """Take control, also from another viewer."""
+def take_control(page: Page) -> None:
+    """Take the driver lock, also from another viewer."""
     page.click("#take")
     page.wait_for_function(
-        "() => document.querySelector('.driving.mine') || document.querySelector('#question').open"
+        "() => document.querySelector('.is-driver') || document.querySelector('#question').open"
     )
     if page.is_visible("#question-yes"):
         page.click("#question-yes")
-    page.wait_for_selector(".driving.mine")
+    page.wait_for_selector(".driving.is-driver")
 
 
-def drives(stack: RunningStack, press: Callable[[], None], release: Callable[[], None]) -> None:
-    """Press until the vehicle moves; release and press again after a stall of the host."""
+def drive_until_moving(
+    stack: RunningStack, press: Callable[[], None], release: Callable[[], None]
+) -> None:
+    """Hold until the vehicle moves; release and retry after a stall of the host."""
     for _ in range(10):
         press()
         try:
@@ -56,20 +58,20 @@ def drives(stack: RunningStack, press: Callable[[], None], release: Callable[[],
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-def stands(stack: RunningStack) -> None:
+def wait_for_standstill(stack: RunningStack) -> None:
     wait_until(lambda: abs(stack.speed()) < STILL_MPS, "the vehicle stands")
 
 
-def middle(page: Page, where: str) -> tuple[float, float, float]:
-    """Return the center of an element, and half its height."""
+def center_of(page: Page, where: str) -> tuple[float, float, float]:
+    """Return the centre of an element, and half its height."""
     page.locator(where).scroll_into_view_if_needed()
     box = page.locator(where).bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["height"] / 2
 
 
-def resets(page: Page) -> None:
-    """Reset until nothing is latched; safety requires each cause to be gone first."""
+def reset_all(page: Page) -> None:
+    """Reset until nothing is latched; safety requires that each cause is gone first."""
 
     def over() -> bool:
         page.wait_for_timeout(300)
@@ -82,12 +84,12 @@ def resets(page: Page) -> None:
 
 
 def phone_of(
-    browser: Browser, site: Site, locale: str
+    browser: Browser, server: Server, locale: str
 ) -> tuple[BrowserContext, Page, Callable[..., None]]:
-    """Open the page on a phone; return context, page and a function for touch events."""
+    """Return a phone with the page, and a function that sends touch events."""
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, locale=locale)
     phone = context.new_page()
-    phone.goto(site.url)
+    phone.goto(server.url)
     phone.wait_for_selector("#robots option", state="attached")
     touch = context.new_cdp_session(phone)
 

@@ -1,4 +1,4 @@
-"""The teleop screen without a terminal; cursor queries are answered at once."""
+"""Teleop's screen without a terminal: an emulator answers its queries at once."""
 
 import re
 
@@ -8,10 +8,10 @@ from services.teleop.app import TeleopApp
 
 
 class LocalTerminalApp(TeleopApp):
-    """Answers its own cursor queries, like a local terminal."""
+    """The screen of a local terminal, which answers each query at once."""
 
-    def query_terminal(self, question: str) -> None:
-        """Answer a cursor query."""
-        if place := re.search(r"\[(\d+);(\d+)H", question):
+    def query_terminal(self, query: str) -> None:
+        """Answer like a terminal."""
+        if place := re.search(r"\[(\d+);(\d+)H", query):
             row, column = map(int, place.groups())
             self.post_message(CursorPosition(column - 1, row - 1))

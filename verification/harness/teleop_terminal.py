@@ -1,4 +1,4 @@
-"""A program in a pseudo terminal, teleop by default."""
+"""A program in a pseudo terminal with a simulated delay; teleop by default."""
 
 import contextlib
 import fcntl
@@ -15,21 +15,25 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-# A loaded test host also stalls terminals, longer than the shipped limit.
+# A host that runs tests stalls terminals for longer than a vehicle may accept.
 PATIENT = (
     "--set", 'teleop.unsafe_overrides=["round_trip"]', "--set", "teleop.round_trip=2.0",
 )  # fmt: skip
 STRICT = ("services.teleop", "--no-gamepad")
 TELEOP = (*STRICT, *PATIENT)
 
-# Teleop's cursor query, after it has moved the cursor.
-CURSOR_QUERY = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
+# Teleop's query of the cursor position.
+QUERY = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
 POLL_S = 0.005
-MULTIPLEXERS = ("TMUX", "STY", "ZELLIJ")  # the multiplexer of the tests does not contain teleop
+MULTIPLEXERS = (
+    "TMUX",
+    "STY",
+    "ZELLIJ",
+)  # of the test's terminal, removed from teleop's environment
 
 
 class DelayLine:
-    """One direction between program and terminal: FIFO with a delay."""
+    """One direction of the connection to a terminal: first in, first out, after a delay."""
 
     def __init__(self, delay_s: float) -> None:
         self.delay_s = delay_s
@@ -40,7 +44,7 @@ class DelayLine:
         self._parts.append((time.monotonic() + self.delay_s, part))
 
     def take(self) -> bytes:
-        """Return all bytes that have arrived."""
+        """Return the bytes that have arrived."""
         now, arrived = time.monotonic(), b""
         while self._parts and max(self._parts[0][0], self.held_until) <= now:
             arrived += self._parts.popleft()[1]
@@ -48,7 +52,7 @@ class DelayLine:
 
 
 class Terminal:
-    """A pseudo terminal with a program, and an emulator that answers its queries after a delay."""
+    """A pseudo terminal with a program and an emulator that answers its queries after a delay."""
 
     def __init__(
         self,
@@ -86,20 +90,16 @@ class Terminal:
         self._keys.put(keys_.encode())
 
     def stall(self, seconds: float) -> None:
-        """Stall both directions; afterwards everything arrives at once."""
+        """Delay both directions; then deliver everything at once."""
         self._keys.held_until = self._output.held_until = time.monotonic() + seconds
 
     def read(self) -> None:
-        """Wait until all output and input so far has been passed on, without a delay."""
+        """Wait until all output and keys are delivered, if there is no delay."""
         time.sleep(2 * POLL_S)
 
-    def reading(self) -> bool:
-        """Return True, for use in a condition."""
-        return True
-
-    def shows(self, words: bytes) -> bool:
-        """Return whether the text has been drawn."""
-        return words in self.shown
+    def shows(self, text: bytes) -> bool:
+        """Return whether this text was drawn."""
+        return text in self.shown
 
     def hang_up(self) -> None:
         if self.fd >= 0:
@@ -113,7 +113,7 @@ class Terminal:
         return self.process.poll() is not None
 
     def _serve(self) -> None:
-        """Read continuously: otherwise the program blocks."""
+        """Read continuously: otherwise the program stalls."""
         while not self._closed.is_set():
             with contextlib.suppress(OSError):  # the program has ended
                 if select.select([self.fd], [], [], POLL_S)[0]:
@@ -127,7 +127,7 @@ class Terminal:
 
     def _draw(self, part: bytes) -> None:
         self.shown += part
-        for query in CURSOR_QUERY.finditer(self.shown, self._seen):
+        for query in QUERY.finditer(self.shown, self._seen):
             self._seen = query.end()
             if self._answers:
                 row, column = query.groups()
@@ -138,7 +138,7 @@ class Terminal:
 def terminal(
     endpoint: str, *program: str, delay_s: float = 0.0, answers: bool = True
 ) -> Iterator[Terminal]:
-    """Run a module with its arguments, connected to an endpoint."""
+    """Run a module with its arguments in a terminal while the context lasts."""
     module = [sys.executable, "-m", *(program or TELEOP), "--set", f"bus.connect={endpoint}"]
     with at_terminal(Terminal(module, delay_s=delay_s, answers=answers)) as it:
         yield it
@@ -146,7 +146,7 @@ def terminal(
 
 @contextlib.contextmanager
 def at_terminal(it: Terminal) -> Iterator[Terminal]:
-    """Kill the program of a terminal at the end."""
+    """Kill the program in a terminal at the end of the context."""
     try:
         yield it
     finally:

@@ -22,8 +22,8 @@ from common.freshness import NS_PER_S
 from common.messages import Drive
 from common.service import Node
 from services.teleop.config import TeleopConfig
-from services.teleop.controller import Desk
-from services.teleop.event_log import Logbook
+from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.hold import Press
 from verification.faults.remote_host import AHEAD_S, OFFSETS, die_with_parent
 from verification.roaming.message_log import MessageLog
@@ -39,9 +39,9 @@ class Operator:
 
     def __init__(self, node: Node[TeleopConfig], file: Path) -> None:
         self.held = False
-        logbook = Logbook()
-        logbook.take_log(node.config.log)
-        self._desk = Desk(node, logbook)
+        event_log = EventLog()
+        event_log.capture_logs(node.config.log)
+        self._controller = Controller(node, event_log)
         self._requests: Publisher[Drive] = next(
             one for one in node.bus.publishers if one.topic is keys.DRIVE
         )
@@ -64,13 +64,13 @@ class Operator:
             self.held = float(line) > 0
 
     def _hold(self, now_ns: int) -> None:
-        self._desk.terminal.sent(0, now_ns)  # a local terminal answers at once
-        self._desk.terminal.answered(0, now_ns)
+        self._controller.terminal.sent(0, now_ns)  # its terminal is near, and answers at once
+        self._controller.terminal.answered(0, now_ns)
         if self.held:
             self._press("w", now_ns)
 
     def _press(self, key: str, now_ns: int) -> None:
-        self._desk.press(Press(key, now_ns), now_ns)
+        self._controller.press(Press(key, now_ns), now_ns)
 
     def _log_request(self, _: int) -> None:
         request = self._requests.last

@@ -1,12 +1,13 @@
-// Asked, allowed and measured, over the last half minute.
+// Charts of requested, allowed and measured motion over the last 30 s.
 const SPAN_MS = 30000;
-const LINES = ["asked", "allowed", "measured"];
-const EVERY = 2; // pictures between two drawings
+const LINES = ["requested", "allowed", "measured"];
+const EVERY = 2; // snapshots per drawing
 const samples = [];
 let count = 0;
 
-export function add(now, at) {
-  samples.push({ at, asked: now.asked, allowed: now.allowed, measured: now.measured });
+export function add(snapshot, at) {
+  const { requested, allowed, measured } = snapshot;
+  samples.push({ at, requested, allowed, measured });
   while (samples.length && at - samples[0].at > SPAN_MS) samples.shift();
 }
 

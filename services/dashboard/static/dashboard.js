@@ -1,65 +1,66 @@
-// The page's life: the socket, what it brings, and the words around it.
-import * as around from "./around.js";
+// The page: WebSocket, messages from the server, state bar, language, notices and dialogs.
 import * as charts from "./charts.js";
-import * as hands from "./hands.js";
-import * as lists from "./lists.js";
-import * as stop from "./stop.js";
+import * as driving from "./driving.js";
+import * as estop from "./estop.js";
+import * as panels from "./panels.js";
+import * as sonarView from "./sonar_view.js";
 import * as trail from "./trail.js";
 
-const LOST_MS = 1000; // without a picture
+const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
-const NOT_A_WORD = 1003; // with which the server closes
+const INVALID_MESSAGE = 1003; // close code of the server
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
-const QUIET = ["no_request", "neutral"]; // causes of a vehicle that is merely parked
+const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
 
 let texts = {};
 let language = stored("language", navigator.language.startsWith("zh") ? "zh" : "en");
 let socket = null;
-let now = null;
-let nowAt = -Infinity;
-let rest = null;
+let fast = null; // the newest snapshots
+let fastAt = -Infinity;
+let slow = null;
 let events = [];
 let hello = null;
-let robot = null; // that was chosen; the remembered one only while it is alive
-let drawn = -1;
+let robot = null; // the selected one
+let drawn = -1; // number of the drawn snapshot
 
 const t = (key) => texts[language][key] ?? key;
-const lost = () => performance.now() - nowAt > LOST_MS;
-const mine = () => !!now && !!hello && now.hands.id === hello.id && !lost();
+const lost = () => performance.now() - fastAt > LOST_MS;
+const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && !lost();
 const shown = () => hello?.robot ?? robot ?? $("page").dataset.robot;
-// What is held is sent only while the socket takes it: a burst of old answers is useless.
-const send = (word) => {
-  const open = socket?.readyState === WebSocket.OPEN && (word.k !== "hold" || socket.bufferedAmount < CONGESTED);
-  if (open) socket.send(JSON.stringify(word));
+// A hold is sent only while the socket is not congested: a burst of old answers is useless.
+const send = (message) => {
+  const open = socket?.readyState === WebSocket.OPEN
+    && (message.k !== "hold" || socket.bufferedAmount < CONGESTED);
+  if (open) socket.send(JSON.stringify(message));
   return open;
 };
 
 function connect() {
   const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`;
-  const fresh = (socket = new WebSocket(address));
-  fresh.onopen = look;
-  fresh.onmessage = (event) => take(JSON.parse(event.data));
-  fresh.onclose = (event) => {
-    if (fresh !== socket) return;
-    hands.letGo();
-    nowAt = -Infinity;
-    if (event.code === NOT_A_WORD) forget();
-    setTimeout(again, RETRY_MS);
+  const opened = (socket = new WebSocket(address));
+  opened.onopen = look;
+  opened.onmessage = (event) => handle(JSON.parse(event.data));
+  opened.onclose = (event) => {
+    if (opened !== socket) return;
+    driving.letGo();
+    fastAt = -Infinity;
+    if (event.code === INVALID_MESSAGE) forget();
+    setTimeout(reconnect, RETRY_MS);
   };
 }
 
-// A dashboard that began anew may want a new token: only its door can ask for that.
-async function again() {
-  const door = await fetch("/t2/dashboard.css", { cache: "no-store", signal: AbortSignal.timeout(LOST_MS) })
+// A restarted dashboard may require a new token: a reload opens its token page.
+async function reconnect() {
+  const response = await fetch("/t2/dashboard.css", { cache: "no-store", signal: AbortSignal.timeout(LOST_MS) })
     .catch(() => null);
-  if (door?.status === 401) location.reload();
+  if (response?.status === 401) location.reload();
   else connect();
 }
 
-// What was remembered made no word: it would be refused again and again.
+// The stored robot or name made an invalid message: it would be refused again and again.
 function forget() {
   for (const name of ["robot", "name"]) localStorage.removeItem(`t2.${name}`);
   $("name").value = "";
@@ -77,65 +78,65 @@ function choose(name) {
   look();
 }
 
-// Once: later on, nobody but the viewer may change what is looked at.
-function recall() {
-  const remembered = stored("robot", null);
-  choose(rest.robots[remembered] && !mine() ? remembered : $("page").dataset.robot);
+// Once: later only the viewer changes the selected robot.
+function selectStored() {
+  const name = stored("robot", null);
+  choose(slow.robots[name] && !isDriver() ? name : $("page").dataset.robot);
 }
 
-const TAKERS = {
-  hello(word) {
-    hello = word;
-    around.build(word.vehicle);
-    trail.size(word.vehicle);
+const HANDLERS = {
+  hello(message) {
+    hello = message;
+    sonarView.build(message.vehicle);
+    trail.size(message.vehicle);
   },
-  now(word) {
+  fast(message) {
     if (!hello) return;
-    now = word;
-    nowAt = performance.now();
-    hands.answer(word.n, mine(), word.hands.grip, word.safety);
-    stop.saw(word.safety);
-    charts.add(word, nowAt);
-    trail.add(word);
+    fast = message;
+    fastAt = performance.now();
+    driving.answer(message.n, isDriver(), message.driver.hold, message.safety);
+    estop.update(message.safety);
+    charts.add(message, fastAt);
+    trail.add(message);
   },
-  rest(word) {
-    rest = word;
-    if (robot === null && hello) recall();
-    lists.showRest(word, t);
+  slow(message) {
+    slow = message;
+    if (robot === null && hello) selectStored();
+    panels.showSlow(message, t);
     showRobots();
   },
-  events(word) {
-    events = word.lines;
-    lists.showEvents(events, t);
+  events(message) {
+    events = message.lines;
+    panels.showEvents(events, t, language);
   },
-  path: (word) => trail.begin(word.points),
-  told: (word) => toast(word.text, word.level),
-  ask: (word) => confirm("take_over", `${called(word.who)} ${t("take_over_from")}`,
+  path: (message) => trail.begin(message.points),
+  notice: (message) => toast(message.text, message.level, message.about),
+  taken: (message) => confirm("take_over", `${viewerName(message.by)} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
 };
-const take = (word) => TAKERS[word.k]?.(word);
+const handle = (message) => HANDLERS[message.k]?.(message);
 
-// --- what is always on the screen ---------------------------------------------------------------
+// --- state bar --------------------------------------------------------------------------------
 
 function draw() {
   requestAnimationFrame(draw);
-  const stamp = lost() ? "lost" : now.n;
-  if (stamp === drawn) return;
-  drawn = stamp;
+  const number = lost() ? "lost" : fast.n;
+  if (number === drawn) return;
+  drawn = number;
   document.body.classList.toggle("stale", lost());
   showState();
   showHead();
-  hands.show(mine(), lost() ? "free" : now.hands.grip);
-  hands.showGear(lost() ? 1 : now.hands.gear, mine());
+  driving.show(isDriver(), lost() ? "free" : fast.driver.hold);
+  driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
-  around.draw(now, t);
-  lists.showWhy(now.safety, t);
-  trail.draw(now.pose);
+  sonarView.draw(fast, t);
+  panels.showCauses(fast.safety, t);
+  trail.draw(fast.pose);
   charts.draw(t);
 }
 
 function showState() {
-  const safety = lost() ? null : now.safety;
+  const safety = lost() ? null : fast.safety;
   const worst = safety?.causes[0];
   const verdict = lost() ? "lost" : safety?.verdict ?? "none";
   const quiet = verdict === "stop" && QUIET.includes(worst?.name);
@@ -143,12 +144,12 @@ function showState() {
   $("state").dataset.tone = quiet ? "idle" : TONES[verdict] ?? "stop";
   $("state").dataset.verdict = verdict;
   set("sentence", lost() ? t("text.lost") : safety ? sentence(safety, worst)
-    : t(now.connected ? "text.none" : "text.no_router"));
-  const own = safety && language !== "en" && worst ? worst.text : "";
-  const how = safety?.latched.length && !mine() ? t("take_to_reset") : "";
-  set("detail", `${own} ${how}`.trim());
-  set("speed", lost() || !now.measured ? "–" : now.measured[0].toFixed(2));
-  set("turn", lost() || !now.measured ? "–" : now.measured[1].toFixed(2));
+    : t(fast.connected ? "text.none" : "text.no_router"));
+  const details = safety && language !== "en" && worst ? worst.text : "";
+  const advice = safety?.latched.length && !isDriver() ? t("take_to_reset") : "";
+  set("detail", `${details} ${advice}`.trim());
+  set("speed", lost() || !fast.measured ? "–" : fast.measured[0].toFixed(2));
+  set("turn", lost() || !fast.measured ? "–" : fast.measured[1].toFixed(2));
   $("reset").classList.toggle("due", !!safety?.latched.length);
 }
 
@@ -161,21 +162,21 @@ function sentence(safety, worst) {
 
 function showHead() {
   const off = lost();
-  chip("link", off ? "" : t(`link.${now.link ?? "none"}`), now?.link === "up" ? "clear" : "stop");
-  chip("bumper", off ? "" : t(`bumper.${now.bumper ?? "none"}`), now?.bumper === false ? "clear" : "stop");
-  chip("driver", off ? "" : driver(), mine() ? "clear" : "slow");
-  const count = Object.keys(rest?.viewers ?? {}).length;
+  chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
+  chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
+  chip("driver", off ? "" : driver(), isDriver() ? "clear" : "slow");
+  const count = Object.keys(slow?.viewers ?? {}).length;
   chip("watching", off || !count ? "" : `${count} ${t("watching")}`);
 }
 
-// Who gave no name has a number.
-const called = (name) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
+// A viewer without a name has a number.
+const viewerName = (name) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
 
 function driver() {
-  if (mine()) return t("you_drive");
-  const { id, name } = now.hands;
-  if (id) return `${called(name)} ${t("drives")}`;
-  const source = now.safety?.source;
+  if (isDriver()) return t("you_drive");
+  const { id, name } = fast.driver;
+  if (id) return `${viewerName(name)} ${t("drives")}`;
+  const source = fast.safety?.source;
   return source ? `${source} ${t("drives")}` : t("nobody_drives");
 }
 
@@ -190,24 +191,24 @@ function set(id, text) {
 }
 
 function showRobots() {
-  const names = Object.keys(rest.robots);
+  const names = Object.keys(slow.robots);
   const list = $("robots");
-  const wanted = names.map((name) => `${rest.robots[name] ? "●" : "○"} ${name}`);
+  const wanted = names.map((name) => `${slow.robots[name] ? "●" : "○"} ${name}`);
   if ([...list.options].map((it) => it.text).join() !== wanted.join()) {
     list.replaceChildren(...names.map((name, i) => new Option(wanted[i], name)));
   }
   if (hello && document.activeElement !== list) list.value = hello.robot;
 }
 
-// --- words, looks, questions --------------------------------------------------------------------
+// --- language, theme, notices, dialogs ----------------------------------------------------------
 
-function speak() {
+function showTexts() {
   document.documentElement.lang = language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
   for (const it of document.querySelectorAll("[data-t-placeholder]")) it.placeholder = t(it.dataset.tPlaceholder);
   for (const it of document.querySelectorAll("[data-t-title]")) it.title = t(it.dataset.tTitle);
-  if (rest) lists.showRest(rest, t);
-  lists.showEvents(events, t);
+  if (slow) panels.showSlow(slow, t);
+  panels.showEvents(events, t, language);
   drawn = -1;
 }
 
@@ -217,16 +218,22 @@ function theme(name) {
   drawn = -1;
 }
 
-function toast(text, level = "info") {
+// A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
+function noticeText(text, about) {
+  if (t(text) !== text || language === "en" || !about) return t(text);
+  return `${t(`event.${about}`)} ${text}`;
+}
+
+function toast(text, level = "info", about = "") {
   const it = document.createElement("div");
   it.dataset.level = level;
-  it.textContent = t(text);
+  it.textContent = noticeText(text, about);
   for (const old of [...$("toasts").children]) if (old.textContent === it.textContent) old.remove();
   $("toasts").append(it);
   setTimeout(() => it.remove(), level === "error" ? 20000 : 5000);
 }
 
-// Never modal: the emergency stop stays one tap away.
+// Not modal: the emergency stop must remain one tap away.
 function confirm(title, text, yes) {
   set("question-title", t(title));
   set("question-text", text);
@@ -235,12 +242,12 @@ function confirm(title, text, yes) {
   $("question-no").onclick = () => $("question").close();
 }
 
-function estop() {
-  hands.letGo();
-  stop.ask();
+function stop() {
+  driving.letGo();
+  estop.request();
 }
 
-// The picture on the screen: each command names the picture that the operator saw.
+// The drawn snapshot: each command names the snapshot that the operator saw.
 const seen = () => (typeof drawn === "number" && drawn >= 0 ? drawn : 0);
 
 function lamp() {
@@ -252,19 +259,19 @@ function lamp() {
 }
 
 function toggle(name) {
-  const on = rest?.switches?.[name] === true;
-  const ask = () => send({ k: "switch", to: { [name]: !on }, n: seen() });
-  if (on) confirm(name, t("switch_off"), ask);
-  else ask();
+  const on = slow?.switches?.[name] === true;
+  const apply = () => send({ k: "switch", to: { [name]: !on }, n: seen() });
+  if (on) confirm(name, t("switch_off"), apply);
+  else apply();
 }
 
 function begin() {
   texts = JSON.parse($("texts").textContent);
   const on = (id, call) => { $(id).onclick = call; };
-  on("estop", estop);
+  on("estop", stop);
   on("lamp", lamp);
   on("take", () => send({ k: "take", force: false }));
-  on("leave", () => { hands.letGo(); send({ k: "leave" }); });
+  on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", () => send({ k: "reset", n: seen() }));
   const light = matchMedia("(prefers-color-scheme: light)").matches;
   theme(stored("theme", light ? "light" : "dark"));
@@ -272,17 +279,17 @@ function begin() {
   $("language").onclick = () => {
     language = language === "en" ? "zh" : "en";
     localStorage.setItem("t2.language", language);
-    speak();
+    showTexts();
   };
   $("name").value = stored("name", "");
   $("name").onchange = () => { localStorage.setItem("t2.name", $("name").value); look(); };
   $("robots").onchange = () => { localStorage.setItem("t2.robot", $("robots").value); $("robots").blur(); choose($("robots").value); };
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
-  hands.begin({ send, estop, toast, t, gears: () => hello?.gears ?? [] });
-  stop.begin({ send, lost, toast, robot: shown });
+  driving.begin({ send, estop: stop, toast, t, gears: () => hello?.gears ?? [] });
+  estop.begin({ send, lost, toast, robot: shown });
   trail.begin([]);
   trail.listen();
-  speak();
+  showTexts();
   connect();
   draw();
 }

@@ -1,9 +1,9 @@
-// The way on a grid, in odom: x to the right, y up, metres.
+// The trajectory on a grid, in odom: x to the right, y up, metres.
 import { fitted } from "./charts.js";
 
-const SPACING = 0.05; // m between two points that are kept
+const SPACING = 0.05; // m between two stored points
 const KEPT = 20000;
-const [NEAR, FAR] = [300, 4]; // pixels for a metre
+const [NEAR, FAR] = [300, 4]; // pixels per metre
 let points = [];
 let vehicle = { length: 1.1, width: 0.7 };
 let scale = 40;
@@ -16,16 +16,16 @@ const fingers = new Map();
 export const size = (given) => { vehicle = given; };
 export const begin = (given) => {
   points = given.slice();
-  epoch = null; // it may be another robot's
+  epoch = null; // the points may belong to another robot
 };
 
-export function add(now) {
-  if (!now.pose) return;
-  if (epoch !== null && now.epoch !== epoch) points = [];
-  epoch = now.epoch;
+export function add(snapshot) {
+  if (!snapshot.pose) return;
+  if (epoch !== null && snapshot.epoch !== epoch) points = [];
+  epoch = snapshot.epoch;
   const last = points.at(-1);
-  if (last && Math.hypot(now.pose[0] - last[0], now.pose[1] - last[1]) < SPACING) return;
-  points.push([now.pose[0], now.pose[1]]);
+  if (last && Math.hypot(snapshot.pose[0] - last[0], snapshot.pose[1] - last[1]) < SPACING) return;
+  points.push([snapshot.pose[0], snapshot.pose[1]]);
   if (points.length > KEPT) points.shift();
 }
 
@@ -49,7 +49,7 @@ export function draw(given) {
 }
 
 function step() {
-  const least = 50 / scale; // m that are 50 pixels at least
+  const least = 50 / scale; // m for at least 50 pixels
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((n) => n * power).find((it) => it >= least);
 }

@@ -103,7 +103,7 @@ def drives(it: Member, robot: OnBoard) -> bool:
     def settled() -> bool:
         robot.state.put(safety_state(heartbeat=1))
         it.source.ask(0.1, 0.0)
-        return came() or it.source.barred
+        return came() or it.source.denied
 
     wait_until(settled, "a request, or the refusal of one")
     return came()
@@ -116,7 +116,7 @@ def test_a_driver_drives_and_a_viewer_is_refused(site: Site, join: Callable[...,
         hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert drives(anna, robot)
         assert not drives(hall, robot)
-        assert not anna.source.barred
+        assert not anna.source.denied
         assert anna.reset() == "reset"
         assert hall.reset() == "safety does not answer; run `t2 doctor`"
         hall.bus.estop()
@@ -138,8 +138,8 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
         anna = member(join, connecting(site.settings("driver", "anna"), secured), source="nav")
         assert not drives(stolen, robot), "it took teleop's priority"
         assert not drives(anna, robot)
-        assert stolen.source.barred
-        assert anna.source.barred
+        assert stolen.source.denied
+        assert anna.source.denied
 
 
 def test_members_reach_their_own_robots_through_the_sites_router(

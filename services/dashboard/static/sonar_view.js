@@ -1,4 +1,4 @@
-// The vehicle from above: forward is up, metres, so that x is up and y is to the left.
+// The sonar view: the vehicle from above in metres, x up and y to the left.
 const NS = "http://www.w3.org/2000/svg";
 const REACH = 1.9; // m of a sector at most, so that all fit
 const HALF = 0.36; // rad, half of a sector as drawn
@@ -6,7 +6,7 @@ const parts = { sectors: [], labels: [], wheels: [], body: null, mounts: [] };
 
 const at = (x, y) => `${(-y).toFixed(3)} ${(-x).toFixed(3)}`;
 
-function made(parent, tag, attributes) {
+function create(parent, tag, attributes) {
   const it = document.createElementNS(NS, tag);
   for (const [name, value] of Object.entries(attributes)) it.setAttribute(name, value);
   parent.append(it);
@@ -23,21 +23,21 @@ function mounts({ length, width }) {
 }
 
 export function build(vehicle) {
-  const svg = document.getElementById("around");
+  const svg = document.getElementById("sonar-view");
   svg.replaceChildren();
   parts.mounts = mounts(vehicle);
-  parts.sectors = parts.mounts.map(() => made(svg, "path", { class: "sector" }));
+  parts.sectors = parts.mounts.map(() => create(svg, "path", { class: "sector" }));
   const { length, width, wheelbase, track } = vehicle;
   parts.wheels = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => {
-    const place = made(svg, "g", { transform: `translate(${at((x * wheelbase) / 2, (y * track) / 2)})` });
-    return made(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });
+    const place = create(svg, "g", { transform: `translate(${at((x * wheelbase) / 2, (y * track) / 2)})` });
+    return create(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });
   });
-  parts.body = made(svg, "rect", {
+  parts.body = create(svg, "rect", {
     class: "body", x: -width / 2, y: -length / 2, width, height: length, rx: 0.1, "fill-opacity": 0.55,
   });
   const tip = length / 2 - 0.08;
-  made(svg, "path", { class: "nose", d: `M${at(tip, 0)}L${at(tip - 0.2, 0.13)}L${at(tip - 0.2, -0.13)}Z` });
-  parts.labels = parts.mounts.map(() => made(svg, "text", {}));
+  create(svg, "path", { class: "nose", d: `M${at(tip, 0)}L${at(tip - 0.2, 0.13)}L${at(tip - 0.2, -0.13)}Z` });
+  parts.labels = parts.mounts.map(() => create(svg, "text", {}));
 }
 
 function sector({ x, y, yaw }, reach) {
@@ -51,9 +51,9 @@ function label(range, tone, t) {
   return { fault: t("fault"), stop: t("near"), clear: "" }[tone] ?? "?";
 }
 
-export function draw(now, t) {
-  now.tones.forEach((tone, i) => {
-    const range = now.ranges[i];
+export function draw(snapshot, t) {
+  snapshot.tones.forEach((tone, i) => {
+    const range = snapshot.ranges[i];
     const reach = Math.max(0.25, Math.min(range ?? (tone === "stop" ? 0.25 : REACH), REACH));
     const mount = parts.mounts[i];
     parts.sectors[i].setAttribute("d", sector(mount, reach));
@@ -63,8 +63,8 @@ export function draw(now, t) {
     parts.labels[i].setAttribute("y", (-mount.x - far * Math.cos(mount.yaw)).toFixed(3));
     parts.labels[i].textContent = label(range, tone, t);
   });
-  now.wheels.forEach((angle, i) => {
+  snapshot.wheels.forEach((angle, i) => {
     parts.wheels[i].setAttribute("transform", `rotate(${((-angle * 180) / Math.PI).toFixed(1)})`);
   });
-  parts.body.dataset.pressed = now.bumper === true;
+  parts.body.dataset.pressed = snapshot.bumper === true;
 }

@@ -1,4 +1,4 @@
-"""The whole program in a terminal of its own, on a real bus."""
+"""The whole program in a pseudo terminal, on a real bus."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Drive, Health
-from services.teleop import life
+from services.teleop import __main__ as teleop
 from verification.harness.bus import bus_on, running
 from verification.harness.ports import free_port
 from verification.harness.teleop_terminal import Terminal, terminal
@@ -42,7 +42,7 @@ def bus(endpoint: str, loop: Loop, requests: list[Drive]) -> Iterator[Bus]:
 
 
 def drive_off(it: Terminal, requests: list[Drive]) -> None:
-    """Hold W until the vehicle is asked to move."""
+    """Hold W until a drive request is sent."""
 
     def hold(key: str) -> bool:
         it.type(key)
@@ -56,7 +56,7 @@ def drive_off(it: Terminal, requests: list[Drive]) -> None:
 
 
 def zeros(requests: list[Drive]) -> int:
-    """Return how many zeros came last."""
+    """Return the number of zeros at the end."""
     moving = [i for i, request in enumerate(requests) if request.linear]
     return len(requests) - 1 - moving[-1]
 
@@ -74,8 +74,10 @@ def leave(it: Terminal) -> None:
 
 
 @pytest.mark.usefixtures("bus")
-@pytest.mark.parametrize(("end", "code"), [(hang_up, life.EXIT_HANGUP), (terminate, 0), (leave, 0)])
-def test_every_end_is_zeros_and_then_silence(
+@pytest.mark.parametrize(
+    ("end", "code"), [(hang_up, teleop.EXIT_HANGUP), (terminate, 0), (leave, 0)]
+)
+def test_every_end_sends_zeros_and_then_nothing(
     endpoint: str, requests: list[Drive], end: Callable[[Terminal], None], code: int
 ) -> None:
     with terminal(endpoint) as it:
@@ -88,17 +90,17 @@ def test_every_end_is_zeros_and_then_silence(
 
 
 @pytest.mark.usefixtures("bus")
-def test_letting_go_is_zeros_and_then_silence(endpoint: str, requests: list[Drive]) -> None:
+def test_a_release_sends_zeros_and_then_nothing(endpoint: str, requests: list[Drive]) -> None:
     with terminal(endpoint) as it:
         drive_off(it, requests)
-        wait_until(lambda: it.reading() and zeros(requests) >= 3, "zeros")
+        wait_until(lambda: zeros(requests) >= 3, "zeros")
         assert it.process.poll() is None
         it.type("q")
         wait_until(it.ends, "its end")
     assert zeros(requests) == 6  # three for the release, three for the end: silence in between
 
 
-def test_it_is_alive_and_well_on_the_bus(endpoint: str, loop: Loop) -> None:
+def test_presence_and_health_are_on_the_bus(endpoint: str, loop: Loop) -> None:
     alive: list[str] = []
     health: list[Health] = []
 
@@ -106,12 +108,12 @@ def test_it_is_alive_and_well_on_the_bus(endpoint: str, loop: Loop) -> None:
         bus.subscribe(keys.HEALTH, lambda it: health.append(it.message), service="teleop")
         bus.watch_live(keys.live_key("001", "teleop", "*"), lambda key, up: alive.append(key))
 
-    with bus_on(endpoint, loop, declare), terminal(endpoint) as it:
-        wait_until(lambda: it.reading() and alive and health, "presence and health")
+    with bus_on(endpoint, loop, declare), terminal(endpoint):
+        wait_until(lambda: alive and health, "presence and health")
     assert health[0].service == "teleop"
 
 
-def test_without_a_router_the_screen_says_so() -> None:
+def test_a_missing_router_is_shown() -> None:
     with terminal(f"tcp/127.0.0.1:{free_port()}") as it:
         wait_until(lambda: it.shows(b"no router yet"), "the words")
         it.type("q")
@@ -119,11 +121,11 @@ def test_without_a_router_the_screen_says_so() -> None:
         assert it.process.returncode == 0
 
 
-def test_without_a_terminal_there_is_nothing_to_drive_with(
+def test_a_missing_terminal_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(life, "terminal_is_there", lambda: False)
-    assert life.main([]) == 1
+    monkeypatch.setattr(teleop, "terminal_is_there", lambda: False)
+    assert teleop.main([]) == 1
     assert "needs a terminal" in capsys.readouterr().err
 
 
@@ -135,30 +137,30 @@ def test_without_a_terminal_there_is_nothing_to_drive_with(
         (["--robot", "a/b"], "robot.id"),
     ],
 )
-def test_a_bad_setting_ends_it_before_anything_opens(
+def test_an_invalid_setting_ends_the_start(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert life.main(words) == 78
+    assert teleop.main(words) == 78
     assert named in capsys.readouterr().err
 
 
-def test_a_missing_extra_is_named(
+def test_a_missing_extra_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(life, "terminal_is_there", lambda: True)
+    monkeypatch.setattr(teleop, "terminal_is_there", lambda: True)
     monkeypatch.delitem(sys.modules, "services.teleop.app", raising=False)
     monkeypatch.setitem(sys.modules, "textual", None)
-    assert life.main(["--no-gamepad"]) == 1
+    assert teleop.main(["--no-gamepad"]) == 1
     assert "install the extra `teleop`" in capsys.readouterr().err
 
 
-def test_the_ancestors_are_named() -> None:
+def test_the_names_of_the_parent_processes() -> None:
     parent = Path(f"/proc/{os.getppid()}/comm")
     if not parent.exists():
         pytest.skip("there is no /proc")
-    assert life.ancestors()[0] == parent.read_text().strip()
+    assert teleop.ancestors()[0] == parent.read_text().strip()
 
 
 def test_without_proc_there_are_no_ancestors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "getppid", lambda: -5)
-    assert life.ancestors() == []
+    assert teleop.ancestors() == []

@@ -1,4 +1,4 @@
-"""The motion panel: speeds, pose, board, motors, who drives, as a table."""
+"""The motion panel: a table of speeds, pose, board, motors and driver."""
 
 import math
 
@@ -10,18 +10,18 @@ from services.teleop.view import View
 GOOD, WARN, BAD, DIM = "green", "bold yellow", "bold red", "grey58"
 NO_DATA = ("no data", DIM)
 
-Part = tuple[str, str]  # words and their style
+Part = tuple[str, str]  # text and its style
 
 
 def motion(view: View) -> Text:
-    """Return the whole table, eleven rows; ten during a contact, which needs room elsewhere."""
+    """Return the table: eleven rows, or ten during a contact, whose panel needs the room."""
     rows = [*_speeds(view), ("pose", _pose(view)), ("odom", _odom(view)), ("board", _link(view))]
     if not (view.safety and view.safety.release):
         rows.append(("rates", _rates(view)))
     rows += [
         ("motor L", Text(*_faults(view.left))),
         ("motor R", Text(*_faults(view.right))),
-        ("driver", _who(view)),
+        ("driver", _driver(view)),
         ("gamepad", _gamepad(view)),
     ]
     return Text("\n", no_wrap=True).join(
@@ -30,27 +30,27 @@ def motion(view: View) -> Text:
 
 
 def _speeds(view: View) -> list[tuple[str, Text]]:
-    asked, limits = view.asked, view.safety.limits if view.safety else None
-    backward = asked is not None and asked.linear < 0
+    requested, limits = view.requested, view.safety.limits if view.safety else None
+    backward = requested is not None and requested.linear < 0
     allowed = (limits.backward if backward else limits.forward) if limits else None
     measured = view.velocity
     return [
-        ("", Text(f"{'asked':>8}{'allowed':>9}{'measured':>10}", style=DIM)),
+        ("", Text(f"{'request':>8}{'allowed':>9}{'measured':>10}", style=DIM)),
         ("m/s", _triple(
-            asked.linear if asked else None, allowed, measured.linear if measured else None
+            requested.linear if requested else None, allowed, measured.linear if measured else None
         )),
         ("rad/s", _triple(
-            asked.angular if asked else None,
+            requested.angular if requested else None,
             limits.angular if limits else None,
             measured.angular if measured else None,
         )),
     ]  # fmt: skip
 
 
-def _triple(asked: float | None, allowed: float | None, measured: float | None) -> Text:
-    short = asked is not None and allowed is not None and abs(asked) > allowed + 0.005
+def _triple(requested: float | None, allowed: float | None, measured: float | None) -> Text:
+    short = requested is not None and allowed is not None and abs(requested) > allowed + 0.005
     return Text.assemble(
-        (f"{_signed(asked):>8}", "bold" if asked else ""),
+        (f"{_signed(requested):>8}", "bold" if requested else ""),
         (f"{'-' if allowed is None else f'{allowed:.2f}':>9}", WARN if short else ""),
         (f"{_signed(measured):>10}", "bold cyan" if measured else ""),
     )
@@ -97,12 +97,12 @@ def _faults(driver: Driver | None) -> Part:
     return (" ".join(driver.faults), BAD) if driver.faults else ("ok", GOOD)
 
 
-def _who(view: View) -> Text:
+def _driver(view: View) -> Text:
     if view.release:
         return Text(f"you, release {view.release}", style=WARN)
     driving = view.safety.source if view.safety else None
     if driving is None:
-        return Text("nobody", style=DIM)
+        return Text("none", style=DIM)
     return Text(f"{driving} (you)" if driving == view.source else driving, style="bold")
 
 

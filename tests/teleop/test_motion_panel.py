@@ -4,7 +4,7 @@ import pytest
 
 from common.messages import Direction, Driver, Limits, Velocity
 from common.motion import Twist
-from services.teleop.table import motion
+from services.teleop.motion_panel import motion
 from services.teleop.view import View
 from tests.factories import contact_state, link, odometry, safety_state
 from tests.teleop.support import view
@@ -22,19 +22,19 @@ def test_it_fits_between_its_borders() -> None:
         assert max(len(line) for line in lines) <= 40
 
 
-def test_without_data_nothing_is_made_up() -> None:
+def test_without_data_no_values_are_shown() -> None:
     table = rows(view())
     assert table["m/s"].split() == ["-", "-", "-"]
     assert {table[name] for name in ("pose", "odom", "board", "rates", "motor L")} == {"no data"}
-    assert table["driver"] == "nobody"
+    assert table["driver"] == "none"
 
 
 @pytest.mark.parametrize(("linear", "allowed"), [(0.35, "0.22"), (0.0, "0.22"), (-0.35, "0.50")])
-def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
+def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> None:
     limits = Limits(forward=0.22, backward=0.5, angular=0.9)
     table = rows(
         view(
-            asked=Twist(linear, 0.1),
+            requested=Twist(linear, 0.1),
             safety=safety_state(limits=limits),
             velocity=Velocity(linear=0.21, angular=-0.02),
         )
@@ -44,10 +44,10 @@ def test_speeds_asked_allowed_and_measured(linear: float, allowed: str) -> None:
 
 
 def test_zero_has_no_minus() -> None:
-    assert rows(view(asked=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
+    assert rows(view(requested=Twist(-0.0, -0.0)))["m/s"].split()[0] == "+0.00"
 
 
-def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
+def test_the_pose_and_its_residual() -> None:
     table = rows(view(odometry=odometry()))
     assert table["pose"] == "x +1.23  y -0.40 m  +90°"
     assert table["odom"] == "residual +0.004 m  no slip"
@@ -64,7 +64,7 @@ def test_the_pose_and_how_far_it_is_to_be_trusted() -> None:
         ({"armed": False}, "not armed"),
     ],
 )
-def test_the_way_to_the_board(fields: dict[str, object], words: str) -> None:
+def test_the_link_to_the_board(fields: dict[str, object], words: str) -> None:
     assert rows(view(link=link(**fields)))["board"] == words
 
 
@@ -84,7 +84,7 @@ def test_driver_faults_are_named_by_side() -> None:
 @pytest.mark.parametrize(
     ("held", "source", "words"),
     [
-        (None, None, "nobody"),
+        (None, None, "none"),
         (None, "teleop", "teleop (you)"),
         (None, "nav", "nav"),
         ("forward", None, "you, release forward"),

@@ -1,7 +1,7 @@
-// What the driver's hands do. Nothing drives but what is held this moment, and every way of losing
-// sight of the hand lets go: blur, another tab, a lost socket, a lost finger, a lost gamepad.
-// A hold is sent only as the answer to a picture, so that the server can tell how old it is.
-const DEADZONE = 0.12; // of the stick's way
+// Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
+// releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
+// as the answer to a snapshot, so that the server can compute its age.
+const DEADZONE = 0.12; // of the stick's range
 const DEADMAN = 4; // left shoulder, in the browser's standard mapping
 const STICKS = { linear: 1, angular: 2 }; // left stick up and down, right stick left and right
 const KEYS = {
@@ -11,17 +11,17 @@ const KEYS = {
 const RELEASE_KEYS = { KeyF: "forward", KeyB: "backward" };
 const $ = (id) => document.getElementById(id);
 const down = new Set();
-const seenUp = new Set(); // pads whose shoulder was seen up
+const seenUp = new Set(); // gamepads whose deadman was seen up
 let page = null;
 let stick = null; // { pointer, push }
 let releasing = null; // "forward" or "backward": off a pressed bumper
-let release = null; // safety's report on it, while there is a contact
-let driving = false; // whether the wheel is ours
-let sent = false; // whether the server believes that something is held
+let release = null; // safety's report on it, during a contact
+let driving = false; // whether this viewer has the driver lock
+let sent = false; // whether the server has a hold from here
 
-const shaped = (way) => {
-  if (Math.abs(way) <= DEADZONE) return 0;
-  return Math.sign(way) * Math.min(1, (Math.abs(way) - DEADZONE) / (1 - DEADZONE));
+const shaped = (raw) => {
+  if (Math.abs(raw) <= DEADZONE) return 0;
+  return Math.sign(raw) * Math.min(1, (Math.abs(raw) - DEADZONE) / (1 - DEADZONE));
 };
 const clamped = (value) => Math.max(-1, Math.min(1, value));
 
@@ -35,33 +35,33 @@ function held() {
   return gamepad();
 }
 
-// Only the browser's standard mapping says which axis is which: on another pad a trigger at rest
-// may be a full turn. The pad whose shoulder is pressed counts, whatever else is plugged in.
+// Only the browser's standard mapping defines the axes: on another gamepad a trigger at rest may be
+// a full turn. The gamepad whose deadman is pressed counts, if several are connected.
 function gamepad() {
   const pads = [...(navigator.getGamepads?.() ?? [])].filter((it) => it?.connected);
   const usable = pads.filter((it) => it.mapping === "standard");
   const pressed = usable.filter((it) => it.buttons[DEADMAN]?.pressed);
-  // A shoulder that is down when it is found, or after a release, must be let go first.
+  // A deadman that is down when the gamepad is found, or after a release, must be released first.
   for (const it of usable) if (!pressed.includes(it)) seenUp.add(it.index);
   for (const index of seenUp) if (!usable.some((it) => it.index === index)) seenUp.delete(index);
   const pad = pressed.find((it) => seenUp.has(it.index));
   const named = pad ?? usable[0] ?? pads[0];
-  const what = usable.length ? "gamepad" : "gamepad_unusable";
-  $("gamepad").textContent = named ? `${page.t(what)}: ${named.id}` : "";
+  const key = usable.length ? "gamepad" : "gamepad_unusable";
+  $("gamepad").textContent = named ? `${page.t(key)}: ${named.id}` : "";
   if (!pad) return null;
   return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
 }
 
-export function answer(n, isMine, grip, safety) {
+export function answer(n, isDriver, hold, safety) {
   release = safety?.release ?? null;
   // The bumper was pressed during the release: this direction is forbidden.
-  if ((driving && !isMine) || (releasing && refusal(releasing))) letGo();
-  driving = isMine;
+  if ((driving && !isDriver) || (releasing && refusal(releasing))) letGo();
+  driving = isDriver;
   if (!driving) return;
-  const now = held();
-  if (now) sent = page.send({ k: "hold", n, ...now });
-  // After a lapse the server waits to hear that the hand was off.
-  else if (sent || grip !== "free") free();
+  const controls = held();
+  if (controls) sent = page.send({ k: "hold", n, ...controls });
+  // After a lapse the server requires a release before the next hold.
+  else if (sent || hold !== "free") free();
 }
 
 function free() {
@@ -83,42 +83,42 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
-export function show(isMine, grip) {
+export function show(isDriver, hold) {
   const panel = document.querySelector(".driving");
-  panel.classList.toggle("mine", isMine);
-  panel.dataset.grip = grip;
-  $("hold").textContent = isMine ? page.t(`hold.${grip}`) : "";
-  for (const name of ["leave", "reset", "lamp"]) off($(name), !isMine);
-  for (const name of ["ultrasonic_brake", "bumper_brake"]) off($(name), !isMine);
-  off($("take"), isMine);
-  showRelease(isMine);
+  panel.classList.toggle("is-driver", isDriver);
+  panel.dataset.hold = hold;
+  $("hold").textContent = isDriver ? page.t(`hold.${hold}`) : "";
+  for (const name of ["leave", "reset", "lamp"]) disable($(name), !isDriver);
+  for (const name of ["ultrasonic_brake", "bumper_brake"]) disable($(name), !isDriver);
+  disable($("take"), isDriver);
+  showRelease(isDriver);
 }
 
-// Why safety would not release in this direction now; empty if it would.
+// Why safety refuses a release in this direction now, as a key; empty if it does not.
 function refusal(direction) {
   if (!release) return "release_no_contact";
   if (release.forbidden.includes(direction)) return `release_forbidden_${direction}`;
   return release.left > 0 ? "" : "release_used_up";
 }
 
-function showRelease(isMine) {
+function showRelease(isDriver) {
   $("release").hidden = !release;
-  const why = new Set();
+  const reasons = new Set();
   for (const direction of ["forward", "backward"]) {
     const refused = refusal(direction);
-    if (refused) why.add(page.t(refused));
+    if (refused) reasons.add(page.t(refused));
     const it = $(`release-${direction}`);
-    off(it, !isMine || !!refused);
+    disable(it, !isDriver || !!refused);
     it.title = refused ? page.t(refused) : "";
     it.classList.toggle("free", release?.believed_free === direction);
   }
   if (!release) return;
   write("release-free", believed());
   write("release-left", `${page.t("release_left")}: ${metres(release.left)}`);
-  write("release-forbidden", [...why].join(" "));
+  write("release-forbidden", [...reasons].join(" "));
 }
 
-// What safety believes, and from what: the last motion, how far it went, how long ago.
+// The direction that safety believes free, with the last motion, its distance and its age.
 function believed() {
   const { believed_free: free, travelled, age } = release;
   if (!free) return page.t("release_unknown");
@@ -133,21 +133,21 @@ function write(id, text) {
   if ($(id).textContent !== text) $(id).textContent = text;
 }
 
-function off(button, disabled) {
+function disable(button, disabled) {
   if (button.disabled !== disabled) button.disabled = disabled;
   button.classList.toggle("disabled", disabled);
 }
 
-export function showGear(gear, isMine) {
+export function showGear(gear, isDriver) {
   for (const it of document.querySelectorAll("[data-gear]")) {
-    it.classList.toggle("lit", isMine && Number(it.dataset.gear) === gear);
-    it.disabled = !isMine;
+    it.classList.toggle("lit", isDriver && Number(it.dataset.gear) === gear);
+    it.disabled = !isDriver;
   }
   const top = page.gears()[gear - 1];
-  $("top").textContent = top && isMine ? `${top.toFixed(2)} m/s` : "";
+  $("top").textContent = top && isDriver ? `${top.toFixed(2)} m/s` : "";
 }
 
-// --- listening ------------------------------------------------------------------------------------
+// --- input events -----------------------------------------------------------------------------
 
 const ready = () => {
   if (!driving) page.toast("take_first");
@@ -158,9 +158,9 @@ function listenToStick() {
   const it = $("stick");
   const pushed = (event) => {
     const box = it.getBoundingClientRect();
-    const way = box.width / 2;
-    let x = (box.top + way - event.clientY) / way;
-    let y = (box.left + way - event.clientX) / way;
+    const radius = box.width / 2;
+    let x = (box.top + radius - event.clientY) / radius;
+    let y = (box.left + radius - event.clientX) / radius;
     const length = Math.hypot(x, y);
     if (length > 1) [x, y] = [x / length, y / length];
     knob(x, y);
@@ -181,8 +181,8 @@ function listenToStick() {
   it.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-// Two directions at once count as none.
-function hold(direction) {
+// Two directions at once release.
+function holdRelease(direction) {
   if (!ready()) return;
   const refused = refusal(direction);
   if (refused) page.toast(refused, "warning");
@@ -195,7 +195,7 @@ function listenToRelease(direction) {
   it.addEventListener("pointerdown", (event) => {
     if (event.button > 0) return;
     it.setPointerCapture(event.pointerId);
-    hold(direction);
+    holdRelease(direction);
   });
   for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
     it.addEventListener(end, () => { if (releasing === direction) letGo(); });
@@ -203,17 +203,17 @@ function listenToRelease(direction) {
   it.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-// With one of these held, systems and browsers keep the other keys' way up to themselves.
+// While one of these is held, systems and browsers swallow the key-up of other keys.
 const MODIFIERS = ["Meta", "Control", "Alt"];
 const modified = (event) =>
   event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
 const typing = (event) => event.target.matches?.("input, select");
-// In every field, too; but where Chinese is composed, the space bar takes a word.
+// In input fields, too; but in an input method the space bar selects a word.
 const spacing = (event) => event.code === "Space" && !event.isComposing;
 
 function keyDown(event) {
   if (spacing(event)) {
-    event.preventDefault(); // or it would press the button that has the focus as well
+    event.preventDefault(); // it would press the focused button, too
     event.stopPropagation();
     if (!event.repeat) page.estop();
   }
@@ -221,9 +221,9 @@ function keyDown(event) {
   if (typing(event) || modified(event)) return;
   if (KEYS[event.code]) {
     event.preventDefault();
-    // A repeat is no press: after a release the key has to come up first.
+    // A repeat is no press: after a release the key must come up first.
     if (!event.repeat && ready()) down.add(event.code);
-  } else if (RELEASE_KEYS[event.code] && !event.repeat) hold(RELEASE_KEYS[event.code]);
+  } else if (RELEASE_KEYS[event.code] && !event.repeat) holdRelease(RELEASE_KEYS[event.code]);
   else if (/^Digit[1-5]$/.test(event.code)) page.send({ k: "gear", gear: Number(event.code.at(-1)) });
 }
 
@@ -237,7 +237,7 @@ function keyUp(event) {
   if (down.delete(event.code) && !down.size) letGo();
 }
 
-// At the first touch: with a finger on the stick, the tap of another one makes no click.
+// On pointerdown: while a finger is on the stick, the tap of another finger makes no click.
 function listenToStop() {
   addEventListener("pointerdown", (event) => { if (event.target.closest?.("#estop")) page.estop(); }, true);
 }
@@ -250,7 +250,7 @@ export function begin(given) {
   addEventListener("keydown", keyDown, true);
   addEventListener("keyup", keyUp, true);
   for (const name of ["blur", "pagehide", "gamepaddisconnected", "dragstart"]) addEventListener(name, letGo);
-  // An open menu swallows the key's way up; the stick opens none.
+  // An open menu swallows the key-up; the stick opens none.
   addEventListener("contextmenu", (event) => { if (!event.defaultPrevented) letGo(); });
   document.addEventListener("visibilitychange", () => { if (document.hidden) letGo(); });
   for (const it of document.querySelectorAll("[data-gear]")) {

@@ -1,12 +1,12 @@
-"""Order of the calls that wait for the fleet, and a full queue."""
+"""Order of the calls that wait for the fleet's thread, and a full queue."""
 
-from services.dashboard.inbox import WAITING_MAX, Call, Inbox, Queue
+from services.dashboard.websocket_hub import CALLS_MAX, Call, CallQueue, Inbox
 
 
-def test_an_emergency_stop_is_made_before_what_waits() -> None:
+def test_an_emergency_stop_is_made_before_waiting_calls() -> None:
     posted: list[Call] = []
     made: list[str] = []
-    inbox, queue = Inbox(posted.append), Queue()
+    inbox, queue = Inbox(posted.append), CallQueue()
     for name in ("first", "second"):
         inbox.put(queue, lambda name=name: made.append(name))  # type: ignore[misc]
     inbox.stop("001", lambda: made.append("stop"))
@@ -15,7 +15,7 @@ def test_an_emergency_stop_is_made_before_what_waits() -> None:
     assert made == ["stop", "first", "second"]
 
 
-def test_stops_of_one_robot_that_wait_are_one() -> None:
+def test_waiting_stops_of_one_robot_are_merged() -> None:
     posted: list[Call] = []
     made: list[str] = []
     inbox = Inbox(posted.append)
@@ -29,9 +29,9 @@ def test_stops_of_one_robot_that_wait_are_one() -> None:
     assert made[-1] == "again"
 
 
-def test_a_queue_has_an_end() -> None:
-    inbox, queue = Inbox(lambda _: None), Queue()
-    for _ in range(WAITING_MAX):
+def test_a_queue_is_bounded() -> None:
+    inbox, queue = Inbox(lambda _: None), CallQueue()
+    for _ in range(CALLS_MAX):
         assert not queue.is_full
         inbox.put(queue, lambda: None)
     assert queue.is_full

@@ -1,0 +1,44 @@
+// The emergency stop: sent by WebSocket and by POST, and repeated until a snapshot shows it latched.
+// The WebSocket may be broken without an error, and a POST may hang.
+const REPEAT_MS = 400;
+const TIMEOUT_MS = 3000;
+const POST_MS = 1000;
+const MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
+let page = null;
+let pending = null; // { robot, since }
+
+export function begin(given) {
+  page = given;
+  setInterval(repeat, REPEAT_MS);
+}
+
+export function request() {
+  if (!pending) page.toast("estop_asked", "warning");
+  pending = { robot: page.robot(), since: performance.now() };
+  sendStop();
+}
+
+export function update(safety) {
+  const isEarly = !pending || performance.now() - pending.since < MIN_AGE_MS;
+  if (!isEarly && pending.robot === page.robot() && safety?.latched.includes("estop")) pending = null;
+}
+
+function repeat() {
+  if (!pending) return;
+  if (performance.now() - pending.since < TIMEOUT_MS) sendStop();
+  else {
+    pending = null;
+    page.toast("estop_unconfirmed", "error");
+  }
+}
+
+function sendStop() {
+  page.send({ k: "estop", robot: pending.robot });
+  const failed = () => { if (page.lost()) page.toast("estop_unconfirmed", "error"); };
+  // With keepalive it is sent even if the page is being closed.
+  fetch(`/estop/${encodeURIComponent(pending.robot)}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
+    .then((response) => {
+      if (response.status === 404) page.toast("estop_unknown", "error");
+      else if (!response.ok) failed();
+    }, failed);
+}

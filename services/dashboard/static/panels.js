@@ -1,0 +1,126 @@
+// The panels of text: causes, limits, drivers, switches, services, streams, events.
+const $ = (id) => document.getElementById(id);
+const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
+const SILENT_AGE = 3; // s
+
+function create(tag, text = "", attributes = {}) {
+  const it = document.createElement(tag);
+  it.textContent = text;
+  for (const [name, value] of Object.entries(attributes)) it.setAttribute(name, value);
+  return it;
+}
+
+// Redrawn only when the content changes, for text selections and screen readers.
+function fill(element, stamp, make) {
+  if (element.dataset.stamp === stamp) return;
+  element.dataset.stamp = stamp;
+  element.replaceChildren(...make());
+}
+
+export function duration(seconds) {
+  if (seconds == null) return "–";
+  if (seconds < 100) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
+  if (seconds < 6000) return `${Math.floor(seconds / 60)} min`;
+  return `${Math.floor(seconds / 3600)} h ${Math.floor((seconds % 3600) / 60)} min`;
+}
+
+export function showCauses(safety, t) {
+  const causes = safety?.causes ?? [];
+  const shown = causes.map((it) => [it, it.age < 10 ? it.age?.toFixed(1) : Math.floor(it.age)]);
+  const stamp = JSON.stringify([shown.map(([it, age]) => [it.name, it.text, age]), safety?.latched, t("why")]);
+  if (!causes.length) {
+    fill($("causes"), stamp, () => [create("li", t(safety ? "no_causes" : "unknown"))]);
+  } else fill($("causes"), stamp, () => shown.map(([it]) => {
+    const known = t(`cause.${it.name}`) !== `cause.${it.name}`; // a newer safety may have other causes
+    const line = create("li", known ? t(`cause.${it.name}`) : it.text, { "data-action": it.action, "data-cause": it.name });
+    const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
+    const more = !known || it.text === t(`cause.${it.name}`) ? "" : `${it.text} · `;
+    line.append(create("small", `${more}${t("since")} ${duration(it.age)}${latched}`));
+    return line;
+  }));
+  const limits = safety?.limits;
+  fill($("limits"), JSON.stringify([limits, t("why")]), () => [
+    ["forward", limits?.forward, "m/s"], ["backward", limits?.backward, "m/s"],
+    ["turning", limits?.angular, "rad/s"],
+  ].map(([name, value, unit]) => {
+    const cell = create("div");
+    cell.append(create("b", value == null ? "–" : value.toFixed(2)), create("small", `${t(name)} ${unit}`));
+    return cell;
+  }));
+}
+
+export function showSlow(slow, t) {
+  showDrivers(slow, t);
+  for (const name of ["ultrasonic_brake", "bumper_brake"]) {
+    const on = slow.switches?.[name];
+    $(name).textContent = `${t(name)}: ${on === true ? t("on") : on === false ? t("off") : t("unknown")}`;
+    $(name).dataset.on = String(on);
+  }
+  $("services").replaceChildren(
+    row("th", ["service", "alive", "version", "uptime", "lateness", "memory"].map((it) => [t(it)])),
+    ...slow.services.map((it) => service(it, t)),
+  );
+  $("streams").replaceChildren(
+    row("th", [[t("key")], [t("rate"), "number"], [t("age"), "number"]]),
+    ...slow.streams.map((it) => row("td", [
+      [it.key], [it.rate.toFixed(1), "number"],
+      [duration(it.age), it.age > SILENT_AGE ? "number bad" : "number"],
+    ])),
+  );
+}
+
+function row(tag, cells) {
+  const line = create("tr");
+  line.append(...cells.map(([text, kind]) => create(tag, text, kind ? { class: kind } : {})));
+  return line;
+}
+
+function service(it, t) {
+  const hasHealth = it.uptime != null;
+  const state = it.instances ? (hasHealth ? "alive" : "silent") : "gone";
+  const line = row("td", [
+    [it.name], [t(state) + (it.instances > 1 ? ` ×${it.instances}` : ""), state === "alive" ? "" : "bad"],
+    [it.version], [hasHealth ? duration(it.uptime) : ""],
+    [hasHealth ? `${(it.lateness * 1000).toFixed(0)} ms` : ""], [hasHealth ? `${(it.rss / 1e6).toFixed(0)} MB` : ""],
+  ]);
+  line.dataset.service = it.name;
+  line.dataset.state = state;
+  const counters = Object.entries(it.counters).map(([name, count]) => `${name} ${count}`);
+  if (counters.length) line.firstChild.append(create("small", counters.join(", ")));
+  return line;
+}
+
+function showDrivers(slow, t) {
+  const stamp = JSON.stringify([slow.left, slow.right, t("left")].map((it) => [it?.bits ?? it, it?.faults]));
+  fill($("drivers"), stamp, () => ["left", "right"].flatMap((side) => {
+    const driver = slow[side];
+    const cell = create("div");
+    cell.append(create("b", t(side)), driver ? (driver.bits ? "" : t("no_fault")) : t("unknown"));
+    const faults = driver ? bits(driver.bits) : [];
+    return [cell, ...faults.map((bit) => create("div",
+      `${t(side)}, ${t("bit")} ${bit}: ${t(`fault.${BITS[bit] ?? "reserved"}`)}`, { class: "bad", "data-bit": bit }))];
+  }));
+}
+
+const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 ** bit) % 2);
+
+// An event of the catalogue by its name; its own English text follows, as it has the figures.
+function eventTexts({ service, name, text }, t, language) {
+  if (language === "en") return [text];
+  const keys = [`event.${service}.${name}`, `event.${name}`];
+  const key = keys.find((it) => t(it) !== it); // a newer service may have other events
+  return key ? [t(key), text] : [text];
+}
+
+export function showEvents(events, t, language) {
+  const lines = [...events].reverse().map((it) => {
+    const line = create("li", "", { "data-level": it.level, "data-name": it.name });
+    const clock = new Date(it.t * 1000).toLocaleTimeString([], { hour12: false });
+    const [title, details] = eventTexts(it, t, language);
+    const body = create("b", title);
+    if (details) body.append(create("small", details));
+    line.append(create("time", clock), create("span", it.service), body);
+    return line;
+  });
+  $("events").replaceChildren(...(lines.length ? lines : [create("li", t("no_events"))]));
+}
