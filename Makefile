@@ -93,6 +93,8 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
+	$(BIN)/codespell
+	$(BIN)/python -m tools.prose
 
 search: $(STAMP) ## the search for holes in the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
