@@ -70,6 +70,9 @@ NAMES = (
     Rule(r"last_words", "on_exit"),
     Rule(r"holdup|hold_up", "host_stalls"),
     Rule(r"heir", "child"),
+    Rule(r"run_behind", "run_optional_service"),
+    Rule(r"[Rr]oster", "members"),
+    Rule(r"enclosure", "namespaces"),
 )
 
 # Enforced in Markdown, not yet enforced in code: move a rule up once `--later` reports no match.
@@ -111,6 +114,17 @@ LATER_NAMES = (
     Rule(r"desk|Desk", "controller"),
     Rule(r"life", "__main__"),
     Rule(r"deeds|breakages|troubles", "injectors, mutations, fault_rules"),
+    Rule(r"[Ll]ane|[Rr]ig|[Ss]cene|[Ss]tage", "stack_fixture, *_fixture"),
+    Rule(r"handover|guarded", "guard_ipc, child"),
+    Rule(r"[Ss]helf|[Tt]ape", "storage, rolling_writer"),
+    Rule(r"[Bb]eliefs?", "PoseEstimate, accepts"),
+    Rule(r"[Gg]rip|[Dd]oor", "driver_lock, auth"),
+    Rule(r"legs?", "arc_segments"),
+    Rule(r"meters", "stream_stats"),
+    Rule(r"quietly", "until_interrupt"),
+    Rule(r"thinning", "downsampling"),
+    Rule(r"[Aa]sk|[Ww]ish", "DriveRequest, requested twist"),
+    Rule(r"mend(?:ed)?|tells?|told|somebody|nobody|anybody|everybody", "fix, report, or the role"),
 )
 
 
