@@ -4,7 +4,7 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 DEMO := .venv/.demo
 # uv installs in seconds what takes pip most of a minute. It does not read pip's settings: where it
-# finds nothing, pip has the last word.
+# finds nothing, pip is used instead.
 UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --python $(BIN)/python
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
@@ -168,7 +168,7 @@ systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd
 audit: $(STAMP) ## known vulnerabilities of FILE=requirements.lock, from a public database
 	$(BIN)/python -m tools.audit $(FILE)
 
-# A tool in an environment of its own, in uv's cache: what it brings is not what T2 stands on.
+# A tool in an environment of its own, in uv's cache: it adds no dependencies to T2.
 SBOM = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python \
   --from cyclonedx-bom==7.0.0 cyclonedx-py
 SBOM_OPTIONS = --pyproject pyproject.toml --output-reproducible

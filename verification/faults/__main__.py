@@ -139,17 +139,19 @@ TEXT = """# Faults
 
 Made by `make faults` on {date}: {machine}, Python {python}, {minutes} minutes.
 
-Real processes, real UDP, the simulated board, 0.8 m/s on an empty plain with the stick held on.
+After this page you know how fast the vehicle stops after each fault. `make faults` repeats the campaign.
 
-- *p50, p99, worst*: from the fault to the last command to move that the board received, or to the
-  first STOP or BREAK if that came later.
-- *held up*: how long the machine kept a process that only sleeps from running, at worst, while a
-  sample lasted, and with SIGKILL how long the kernel took to end the process: others notice its
-  end by its pipes, which are closed last. A sample may take so much longer than its budget.
-- Network, disk and mounts are the campaign's own. It wants root for that; what it cannot have here
-  is said below the table.
-- *then*: what it took to drive again once the fault was gone. Faults that come again and again trip
-  safety's `flapping`, which wants a reset; those resets are the campaign's own and do not count.
+The campaign uses real processes, real UDP and the simulated board, at 0.8 m/s on an empty plain with the stick held.
+
+- *p50, p99, worst*: from the fault to the last motion command that the board received, or to the
+  first STOP or BRAKE (BREAK in the manual) if that came later.
+- *held up*: the longest scheduling stall of the host during a sample, measured by a process that
+  only sleeps. With SIGKILL it includes the time that the kernel took to end the process: others
+  detect the end by its pipes, which are closed last. A sample may exceed its budget by this time.
+- Network, disk and mounts belong to the campaign and need root. Faults that cannot be injected
+  here are listed below the table.
+- *then*: what was needed to drive again after the fault. Repeated faults trip safety's
+  `flapping`, which needs a reset; the campaign makes these resets itself and does not count them.
 
 {table}{left_out}
 {verdict}
