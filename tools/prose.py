@@ -114,7 +114,7 @@ LATER_NAMES = (
     Rule(r"desk|Desk", "controller"),
     Rule(r"life", "__main__"),
     Rule(r"deeds|breakages|troubles", "injectors, mutations, fault_rules"),
-    Rule(r"[Ll]ane|[Rr]ig|[Ss]cene|[Ss]tage", "stack_fixture, *_fixture"),
+    Rule(r"Lane|lane|[Rr]ig|[Ss]cene|Stage|stage", "stack_fixture, *_fixture"),
     Rule(r"handover|guarded", "guard_ipc, child"),
     Rule(r"[Ss]helf|[Tt]ape", "storage, rolling_writer"),
     Rule(r"[Bb]eliefs?", "PoseEstimate, accepts"),

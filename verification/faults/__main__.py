@@ -139,9 +139,11 @@ TEXT = """# Faults
 
 Made by `make faults` on {date}: {machine}, Python {python}, {minutes} minutes.
 
-After this page you know how fast the vehicle stops after each fault. `make faults` repeats the campaign.
+After this page you know how fast the vehicle stops after each fault. `make faults` repeats
+the campaign.
 
-The campaign uses real processes, real UDP and the simulated board, at 0.8 m/s on an empty plain with the stick held.
+The campaign uses real processes, real UDP and the simulated board, at 0.8 m/s on an empty
+plain with the stick held.
 
 - *p50, p99, worst*: from the fault to the last motion command that the board received, or to the
   first STOP or BRAKE (BREAK in the manual) if that came later.
