@@ -4,7 +4,7 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 DEMO := .venv/.demo
 # uv installs in seconds what takes pip most of a minute. It does not read pip's settings: where it
-# finds nothing, pip has the last word.
+# finds nothing, pip is used instead.
 UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --python $(BIN)/python
 PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
@@ -13,10 +13,10 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 .DEFAULT_GOAL := help
 .PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
-docs: $(STAMP) ## renew what docs/bus.md and docs/safety.md take from the code, and the JSON schemas
+docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
 
-help: ## what can be made
+help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 $(STAMP): requirements.lock pyproject.toml
@@ -39,39 +39,39 @@ $(DEMO): requirements-demo.lock
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap through the real services
 	$(BIN)/python -m cli demo
 
-up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until ctrl-c
+up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C
 	$(BIN)/t2 up
 
-# Most tests wait for other processes most of the time; some measure, and no other may run then.
+# Most tests wait for other processes most of the time. Tests that measure run alone.
 TOGETHER = -n 4 --dist worksteal -m "not alone and not campaign"
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
 WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
-# What fails runs a second time, alone: docs/adr/0026-second-run.md.
+# Failed tests run a second time, alone: docs/adr/0026-second-run.md.
 TESTS = $(BIN)/python -m tools.run_tests
 
-test: $(STAMP) ## all tests but the campaigns and the search, which `make check` adds
+test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
 	$(TESTS) $(WITHOUT_SEARCH) $(TOGETHER)
 	$(TESTS) $(WITHOUT_SEARCH) -m alone
 
-fuzz: $(STAMP) ## hostile bytes for all that reads bytes, SECONDS=60 for each target
+fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
 
-soak: $(STAMP) ## laps with random faults and kill -9 for MINUTES=30, watching memory and more
+soak: $(STAMP) ## drive laps with random faults and kill -9 for MINUTES=30, checking memory and more
 	$(BIN)/python -m verification.soak --minutes $(or $(MINUTES),30)
 
-faults: $(STAMP) ## the fault campaign: kill, stop, cut, spoil; renews docs/faults.md
+faults: $(STAMP) ## run the fault campaign; renews docs/faults.md
 	$(BIN)/python -m verification.faults --out docs/faults.md
 
-fleet: $(STAMP) ## N=50 robots behind one site's router, measured; renews docs/fleet.md
+fleet: $(STAMP) ## measure N=50 robots behind one site's router; renews docs/fleet.md
 	$(BIN)/python -m verification.fleet --robots $(or $(N),50) --out docs/fleet.md
 
 # What costs on board is measured with what a robot installs.
 ROBOT = out/robot
 
-bench: $(STAMP) ## T2 beside what a user would pick instead, measured; renews docs/performance.md
+bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/performance.md
 	$(UV_INSTALL) --require-hashes -r requirements-bench.lock || \
 	  $(PIP_INSTALL) --require-hashes -r requirements-bench.lock
 	$(BIN)/python -m venv --clear $(ROBOT)
@@ -79,35 +79,37 @@ bench: $(STAMP) ## T2 beside what a user would pick instead, measured; renews do
 	  $(ROBOT)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-robot.lock
 	$(BIN)/python -m bench --out docs/performance.md
 
-compose-test: $(STAMP) ## the containers on a Docker engine: build, drive, kill, cut, upgrade; or why it did not run
+compose-test: $(STAMP) ## test the containers on a Docker engine: build, drive, kill, disconnect, upgrade
 	$(BIN)/python -m verification.containers
 
-roaming: $(STAMP) ## drive over a bad link between two hosts, and lose it; renews docs/roaming.md
+roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roaming.md
 	$(BIN)/python -m verification.roaming --out docs/roaming.md
 
 
-check: lint types cover search ## what CI runs: format, lint, types, import rules, tests, coverage, mutants
+check: lint types cover search ## what CI runs: format, lint, spelling, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
+	$(BIN)/codespell
+	$(BIN)/python -m tools.prose
 
-search: $(STAMP) ## the search for holes in the invariants
+search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
-cover: $(STAMP) ## all tests but the search, with what those cover that do not measure
+cover: $(STAMP) ## all tests except the search, with coverage
 	$(BIN)/coverage erase
 	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(TOGETHER)
 	$(TESTS) $(WITHOUT_SEARCH) -m "alone or campaign"
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 
-pictures: $(STAMP) ## renew the README's pictures of both operator's screens; wants chromium
+pictures: $(STAMP) ## renew the README's screenshots; needs chromium
 	$(BIN)/python -m tools.pictures
 
-mutants: $(STAMP) ## break each line of the cores and see a test fail; CHANGED=1: of changed files
+mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
 	$(BIN)/python -m verification.mutation $(if $(CHANGED),--changed)
 
 # The cores that decide, as the import rules name them: not a branch of theirs is untested.
@@ -119,7 +121,7 @@ PURE = $(BIN)/python -c 'import tomllib; \
 types: $(STAMP)
 	$(BIN)/mypy
 
-format: $(STAMP) ## let ruff write the format
+format: $(STAMP) ## format the code with ruff
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -146,7 +148,7 @@ DOWNLOAD = $(BIN)/pip download --quiet --disable-pip-version-check --no-deps --r
   $(foreach glibc,2_28 2_17,--platform manylinux_$(glibc)_$(WHEEL_ARCH)) --platform manylinux2014_$(WHEEL_ARCH) \
   --dest $(HOUSE)
 
-wheelhouse: $(STAMP) ## all for a robot without internet; SET=laptop WHEEL_PYTHON=3.13 WHEEL_ARCH=aarch64
+wheelhouse: $(STAMP) ## package set for a robot without internet; SET=laptop WHEEL_PYTHON=3.13 WHEEL_ARCH=aarch64
 	rm -rf $(HOUSE)
 	mkdir -p $(HOUSE)
 	$(DOWNLOAD) -r deploy/pip.lock
@@ -160,21 +162,21 @@ wheelhouse: $(STAMP) ## all for a robot without internet; SET=laptop WHEEL_PYTHO
 	  sha256sum -- * > SHA256SUMS
 	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
 
-systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; wants root, Docker and debootstrap
+systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; needs root, Docker and debootstrap
 	$(BIN)/python -m verification.systemd
 
-audit: $(STAMP) ## known flaws of what FILE=requirements.lock names, from a public database
+audit: $(STAMP) ## known vulnerabilities of FILE=requirements.lock, from a public database
 	$(BIN)/python -m tools.audit $(FILE)
 
-# A tool in an environment of its own, in uv's cache: what it brings is not what T2 stands on.
+# A tool in an environment of its own, in uv's cache: it adds no dependencies to T2.
 SBOM = $(BIN)/uv tool run --quiet --system-certs --python $(BIN)/python \
   --from cyclonedx-bom==7.0.0 cyclonedx-py
 SBOM_OPTIONS = --pyproject pyproject.toml --output-reproducible
 
-sbom: $(STAMP) ## what is installed, and what a robot gets, as CycloneDX: out/sbom.json, out/sbom-robot.json
+sbom: $(STAMP) ## bill of materials, installed and robot, as CycloneDX: out/sbom.json, out/sbom-robot.json
 	mkdir -p out
 	$(SBOM) environment $(SBOM_OPTIONS) --output-file out/sbom.json $(BIN)/python
 	$(SBOM) requirements $(SBOM_OPTIONS) --output-file out/sbom-robot.json requirements-robot.lock
 
-clean: ## remove what was made
+clean: ## remove all generated files
 	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist

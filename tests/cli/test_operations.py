@@ -25,11 +25,11 @@ def words(node: ast.expr) -> list[str]:
 
 
 def calls(path: Path) -> Iterator[ast.Call]:
-    """Yield the calls that publish an event: ``node.event(...)`` and safety's ``Note(...)``."""
+    """Yield the calls that publish an event: ``.event(...)`` and ``Transition(...)``."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call):
             name = getattr(node.func, "attr", "") or getattr(node.func, "id", "")
-            if name in ("event", "Note"):
+            if name in ("event", "Transition"):
                 yield node
 
 

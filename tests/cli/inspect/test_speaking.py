@@ -108,7 +108,7 @@ def test_a_short_name_of_two_calls_is_ambiguous(tool: Tool) -> None:
 
 def test_list_of_calls(tool: Tool) -> None:
     assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
-    assert "clear the causes that are named" in tool("call", "--text").out
+    assert "clear the named causes" in tool("call", "--text").out
 
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
