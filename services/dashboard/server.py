@@ -58,7 +58,8 @@ def serving(
             lifespan="off",
             proxy_headers=False,  # limits use the peer's address, which cannot be forged
             server_header=False,
-            log_level="error",
+            log_config=None,  # its lines go through common/log.py
+            log_level="error",  # any client can cause warnings
             access_log=False,
             # Many small frames: compression costs more than it saves.
             ws_per_message_deflate=False,
