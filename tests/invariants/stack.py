@@ -44,7 +44,7 @@ class Sockets:
     """The bridge's end of the cable; one port is enough here."""
 
     refused = send_errors = 0
-    last_stranger = None
+    last_foreign_source = None
 
     def __init__(self, stack: "Stack", process: Process) -> None:
         self.sockets = [object()]

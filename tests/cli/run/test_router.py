@@ -55,7 +55,7 @@ def test_an_open_network_endpoint_needs_insecure(
     assert main(["router", *sets("bus.listen=tcp/0.0.0.0:7447")]) == EXIT_CONFIG
     message = capsys.readouterr().err
     assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in message
-    assert "--insecure lets in all" in message
+    assert "--insecure to accept all" in message
 
 
 def test_print_the_configuration_for_zenohd(capsys: pytest.CaptureFixture[str]) -> None:
