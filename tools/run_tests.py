@@ -20,6 +20,7 @@ CACHE = Path(".pytest_cache/v/cache/lastfailed")
 
 def main(arguments: Sequence[str]) -> int:
     """Run the tests; return pytest's exit code."""
+    CACHE.unlink(missing_ok=True)  # the failures of other runs
     code = pytest(arguments)
     if code != FAILED:
         return code

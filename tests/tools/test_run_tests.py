@@ -1,5 +1,6 @@
 """The second run of failed tests, with a small suite."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -37,6 +38,14 @@ def test_a_test_that_fails_once_is_named(tmp_path: Path, words: tuple[str, ...])
     assert done.returncode == 0, done.stdout
     assert "1 failed, 1 passed" in done.stdout
     assert done.stdout.endswith("passed the second time only:\n  test_it.py::test_fails_once\n")
+
+
+def test_the_failures_of_other_runs_do_not_count(tmp_path: Path) -> None:
+    cache = tmp_path / ".pytest_cache/v/cache"
+    cache.mkdir(parents=True)
+    others = {f"test_other.py::test_{number}": True for number in range(RETRIED_MAX + 1)}
+    (cache / "lastfailed").write_text(json.dumps(others), encoding="utf-8")
+    assert run(tmp_path, FIRST_TIME_ONLY).returncode == 0
 
 
 def test_a_test_that_fails_twice_fails_the_run(tmp_path: Path) -> None:
