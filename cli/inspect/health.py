@@ -75,7 +75,7 @@ def query(session: BusSession, name: str) -> list[Row]:
     """Query one service for its last health message."""
     if name == ROUTER:
         return [Row(session.robot, name, "ok", None)]
-    answers = session.probe.ask(keys.info_key(session.robot, name, "last"), timeout_s=ANSWER_S)
+    answers = session.probe.query(keys.info_key(session.robot, name, "last"), timeout_s=ANSWER_S)
     rows = [parse_answer(each, name) for each in answers if not each.refusal]
     return rows or [Row(session.robot, name, "silent", None)]
 

@@ -61,11 +61,11 @@ class TwoHosts:
 
     def press_again(self, speed: float) -> None:
         """Release the key, reset if due, and press the key again."""
-        self.fixture.ask(0.0)
+        self.fixture.request(0.0)
         time.sleep(RELEASE_S)
         if self.fixture.latched():
             self.fixture.reset()
-        self.fixture.ask(speed)
+        self.fixture.request(speed)
 
 
 @contextlib.contextmanager
