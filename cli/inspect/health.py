@@ -128,8 +128,8 @@ def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.structs.asdict(row.health) if row.health else {}
     fields.pop("timing", None)  # `t2 latency` shows it
-    alive, told = row.state in ("ok", "hangs"), row.health is not None
-    return {"robot": row.robot, "service": row.name, "alive": alive, "told": told} | fields
+    alive, has_health = row.state in ("ok", "hangs"), row.health is not None
+    return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
 
 def as_cells(row: Row) -> list[str]:

@@ -209,7 +209,7 @@ def flood(fixture: StackFixture) -> int:
 
 def spoil_config(fixture: StackFixture) -> int:
     """Write an invalid settings file, and kill the bridge."""
-    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'for ever'\n")
+    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'endless'\n")
     return kill("bridge", signal.SIGKILL)(fixture)
 
 

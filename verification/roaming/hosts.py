@@ -70,7 +70,7 @@ class TwoHosts:
 
 @contextlib.contextmanager
 def two_hosts(
-    folder: Path, *, shipped: bool = True, thinned: bool = True, dashboard: bool = True
+    folder: Path, *, shipped: bool = True, downsampled: bool = True, dashboard: bool = True
 ) -> Iterator[TwoHosts]:
     """Run both hosts; the laptop's clocks differ from the robot's."""
     folder.mkdir(exist_ok=True)
@@ -84,7 +84,7 @@ def two_hosts(
     env = clock(folder / "laptop")
     step_clock(folder / "laptop", AHEAD_S)
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
-    sets = [*QUICK, *certificate_sets(robots), *([] if thinned else [EVERYTHING])]
+    sets = [*QUICK, *certificate_sets(robots), *([] if downsampled else [EVERYTHING])]
     with running_stack(folder, sets=sets, shipped=shipped, listen=listen) as stack:
         command = [
             sys.executable,
