@@ -121,8 +121,8 @@ class Output(logging.Handler):
             self._file.write(line)
             self._file.flush()
         except BrokenPipeError:
-            # The reader is gone. Python would write the rest once more on its way out, and make
-            # its failure the exit code.
+            # The reader is gone. On exit, Python would write the rest again and fail; that failure
+            # would be the exit code.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self._file.fileno())
 
 

@@ -33,7 +33,7 @@ SUPERVISOR = 51
 CPU_LIMIT_US = 1_000_000
 
 
-def ask(priority: int, *, alone: bool = False) -> None:
+def request(priority: int, *, alone: bool = False) -> None:
     """Request SCHED_FIFO for this thread and the threads it starts; ignored without permission.
 
     ``alone``: threads and processes that it starts have normal priority.

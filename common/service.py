@@ -131,7 +131,7 @@ def run(
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
         if priority and loaded.config.robot.realtime:
-            realtime.ask(priority)  # before threads start: they inherit it
+            realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
         log.configure(loaded.config.log, name)
         node = Node(name, loaded)

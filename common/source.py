@@ -25,7 +25,7 @@ class DriveSource:
         self._on_denied = on_denied
         bus.subscribe(keys.SAFETY, self._on_safety)
 
-    def ask(self, linear: float, angular: float) -> Drive:
+    def request(self, linear: float, angular: float) -> Drive:
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
         if not codec.finite(linear, angular):
             raise ValueError(f"non-finite request: {linear} m/s, {angular} rad/s")

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     plan = load_plan(config.sim.world, config.vehicle)
     script = load_script(options.faults) if options.faults else Script()
     if config.robot.realtime:
-        realtime.ask(realtime.BOARD)
+        realtime.request(realtime.BOARD)
     log.configure(config.log, "sim")
     with closing(Trace(options.trace)) as trace:
         try:

@@ -1,7 +1,7 @@
 """The simulated main board: state, answers, and the effect of the current command.
 
-It holds the last motion command for ever: no watchdog is documented. It has two emergency brakes,
-off at power-on, which override that command. The real behaviour is unknown; here it is:
+It holds the last motion command indefinitely: no watchdog is documented. It has two emergency
+brakes, off at power-on, which override that command. The real behaviour is unknown; here it is:
 
 =================== ===============================================================================
 brake               while active, the board does BREAK instead of the command

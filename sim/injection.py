@@ -23,7 +23,7 @@ REPORTS: dict[q.ReportName, type[Frame]] = {
 
 
 class Reply(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The answer to a request; ``error`` says why it was refused."""
+    """The answer to a request; ``error`` is the reason of a refusal."""
 
     ok: bool
     error: str = ""
@@ -111,7 +111,7 @@ class Injection:
     def _place(self, pose: Pose) -> str:
         simulation = self._simulation
         if simulation.world.blocks(simulation.body, pose):
-            return f"something is in the way at x {pose.x:g}, y {pose.y:g}"
+            return f"an obstacle is at x {pose.x:g}, y {pose.y:g}"
         simulation.pose, simulation.twist = pose, STILL
         simulation.update_bumper()
         return ""
@@ -119,7 +119,7 @@ class Injection:
     def _rebuild(self, world: World) -> str:
         simulation = self._simulation
         if world.blocks(simulation.body, simulation.pose):
-            return "the vehicle is in the way"
+            return "an obstacle would overlap the vehicle"
         simulation.world = world
         simulation.update_bumper()
         return ""

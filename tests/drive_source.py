@@ -31,7 +31,7 @@ class ConstantSource:
         source = DriveSource(bus, "teleop")
 
         def ask(_: int) -> None:
-            source.ask(self.linear, 0.0)
+            source.request(self.linear, 0.0)
 
         self._loop.post(lambda: self._loop.every(0.05, ask))
 

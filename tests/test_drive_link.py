@@ -52,7 +52,7 @@ class Observer:
         bus.subscribe(keys.MOTION, lambda arrival: self.motions.append(arrival.message), depth=64)
         for topic in (keys.SAFETY, keys.BUMPER, keys.VELOCITY):
             bus.subscribe(topic, self._take)
-        self._loop.post(lambda: self._loop.every(0.05, lambda _: source.ask(self.linear, 0.0)))
+        self._loop.post(lambda: self._loop.every(0.05, lambda _: source.request(self.linear, 0.0)))
 
     def _take(self, arrival: Arrival[Any]) -> None:
         self.newest[arrival.key.removeprefix("t2/v1/001/")] = arrival.message
@@ -70,7 +70,7 @@ class Observer:
         """Ask for a reset, and return its answer."""
         count = len(self.answers)
         asked = m.ResetRequest(**_seen(self.state))
-        self.bus.ask(keys.RESET, asked, lambda _: self.answers.append(""), self.answers.append)
+        self.bus.call(keys.RESET, asked, lambda _: self.answers.append(""), self.answers.append)
         wait_until(lambda: len(self.answers) > count, "an answer to the reset")
         return self.answers[-1]
 

@@ -33,7 +33,7 @@ CLASSES: Mapping[str, str] = {
     "emergency stop of all": keys.estop_key("*"),
     "calls": keys.RESET.on(MINE),
     "calls of another robot": keys.RESET.on(OTHER),
-    "what a service tells who asks": keys.info_key(MINE, "safety", "config"),
+    "state and settings that a service returns to a query": keys.info_key(MINE, "safety", "config"),
     "presence of the services on board": keys.live_key(MINE, "safety", "1"),
     "health of an operator's dashboard": keys.HEALTH.on(MINE, service="dashboard"),
     "presence of an operator's dashboard": keys.live_key(MINE, "dashboard", "1"),

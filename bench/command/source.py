@@ -38,10 +38,10 @@ def by_t2(sock: socket.socket, sets: Sequence[str]) -> None:
 
     def reset(arrival: Arrival[SafetyState]) -> None:
         if arrival.message.latched:
-            bus.ask(keys.RESET, reset_request(arrival.message), lambda _: None, lambda _: None)
+            bus.call(keys.RESET, reset_request(arrival.message), lambda _: None, lambda _: None)
 
     bus.subscribe(keys.SAFETY, reset)
-    loop.watch(sock, lambda _: serve(sock, source.ask))
+    loop.watch(sock, lambda _: serve(sock, source.request))
     bus.open()
     loop.run()
 

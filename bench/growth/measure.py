@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bench.growth.page import CONSUMERS, KEYS, ROBOTS, SIZES
 from bench.load.board import SHIPPED, board, compiled
-from bench.load.stack import Pids, Ports, guarded, stack
+from bench.load.stack import Pids, Ports, bridge_pid, stack
 from bench.load.throughput import consuming
 from bench.series import Series
 from common import keys
@@ -52,7 +52,7 @@ class Robot:
     @property
     def pids(self) -> Pids:
         """Current pids; on a busy host the guard may have restarted the bridge."""
-        return {"router": self.router, "bridge": guarded(self.guard)}
+        return {"router": self.router, "bridge": bridge_pid(self.guard)}
 
 
 @contextlib.contextmanager

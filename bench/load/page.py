@@ -71,7 +71,7 @@ def tried(by_name: ByName, count: str) -> dict[int, Series]:
 
 
 def highest(by_name: ByName, count: str) -> int:
-    """Return the highest rate below all rates with a loss; 0 when there is none."""
+    """Return the highest rate below all rates with a loss; 0 without one."""
     found = tried(by_name, count)
     lossy = min((hz for hz, one in found.items() if one.note), default=max(found) + 1)
     return max((hz for hz in found if hz < lossy), default=0)

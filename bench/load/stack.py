@@ -53,9 +53,9 @@ def stack(ports: Ports, services: Sequence[str] = CHAIN) -> Iterator[Pids]:
             held.callback(process.kill)
             pids[name] = process.pid
         guard = pids["bridge"]
-        yield pids | {"guard": guard, "bridge": guarded(guard)}
+        yield pids | {"guard": guard, "bridge": bridge_pid(guard)}
 
 
-def guarded(guard: int) -> int:
+def bridge_pid(guard: int) -> int:
     """Wait for the bridge under a guard; return its pid."""
     return wait_until(lambda: children(guard), "a bridge under its guard")[0]

@@ -16,7 +16,7 @@ import zenoh
 from bench.load.board import STANDS, Board, board
 from bench.load.consumer import plain
 from bench.load.loss import Passage, highest
-from bench.load.stack import Pids, Ports, guarded, stack
+from bench.load.stack import Pids, Ports, bridge_pid, stack
 from bench.series import Series
 from common import keys
 from common.wire.frame import Frame
@@ -85,14 +85,14 @@ def trial(testbed: Testbed, hz: int, seconds: float) -> list[Series]:
     """Send at a rate; return the delay, with the losses as its note, and the CPU."""
     name = "frames", str(len(testbed.consumers)), str(hz)
     published, dropped = testbed.published(), udp_drops(testbed.ports.bridge)
-    pids = {"router": testbed.pids["router"], "bridge": guarded(testbed.pids["guard"])}
+    pids = {"router": testbed.pids["router"], "bridge": bridge_pid(testbed.pids["guard"])}
     for each in testbed.consumers:
         each.begin()
     with CpuShares(pids) as shares:
         sent = round(hz * seconds)
         pace = testbed.board.send(hz, sent) / hz
     counts = settled(testbed.consumers)
-    if guarded(testbed.pids["guard"]) != pids["bridge"]:
+    if bridge_pid(testbed.pids["guard"]) != pids["bridge"]:
         return [Series(name=(*name, "delay"), samples_ns=[], note=RESTARTED)]
     passage = Passage(
         sent=sent,

@@ -6,6 +6,6 @@ import sys
 from common import realtime
 
 if __name__ == "__main__":
-    realtime.ask(realtime.BRIDGE)
+    realtime.request(realtime.BRIDGE)
     _, *sys.argv = sys.argv
     runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

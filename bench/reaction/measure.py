@@ -47,7 +47,7 @@ def block(programs: Programs, responder: Responder, hits: int) -> list[int]:
 
 def is_granted() -> bool:
     """Return whether this host grants SCHED_FIFO."""
-    script = "from common import realtime as r; r.ask(r.GUARD); print(r.priority())"
+    script = "from common import realtime as r; r.request(r.GUARD); print(r.priority())"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
     return done.stdout.strip() == str(realtime.GUARD).encode()
 

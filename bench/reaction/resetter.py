@@ -27,7 +27,7 @@ class Resetter:
         state = self._state
         if arrival.message.latched and state is not None and state.latched and not self._pending:
             self._pending = True
-            self._bus.ask(keys.RESET, reset_request(state), self._answered, self._answered, 1.0)
+            self._bus.call(keys.RESET, reset_request(state), self._answered, self._answered, 1.0)
 
     def _answered(self, _: object) -> None:
         self._pending = False

@@ -42,8 +42,8 @@ def start_table(starts: Sequence[Series]) -> str:
 def memory_table(sizes: dict[str, tuple[int, int]]) -> str:
     """Return a row for each process and one for all, in MB."""
     lines = []
-    everybody = (sum(rss for rss, _ in sizes.values()), sum(pss for _, pss in sizes.values()))
-    for name, (rss, pss) in (sizes | {"all": everybody}).items():
+    total = (sum(rss for rss, _ in sizes.values()), sum(pss for _, pss in sizes.values()))
+    for name, (rss, pss) in (sizes | {"all": total}).items():
         lines.append([name, f"{rss / MB:.1f}", f"{pss / MB:.1f}"])
     return table(["process", "RSS", "PSS"], lines)
 

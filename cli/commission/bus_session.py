@@ -82,7 +82,7 @@ class CheckoutSession:
     def call(self, call: Call[Any, Any], request: Struct) -> tuple[bool, str]:
         """Make a call; return whether it succeeded, and the text of the answer."""
         answers: list[tuple[bool, str]] = []
-        self.bus.ask(
+        self.bus.call(
             call,
             request,
             lambda done: answers.append((True, done.text)),
@@ -151,7 +151,7 @@ class CheckoutSession:
         finally:
             # On every way out: a last zero at once. The silence after it is a release.
             self._requested = None
-            self._source.ask(0.0, 0.0)
+            self._source.request(0.0, 0.0)
 
     def _is_granted(self) -> bool:
         if not self.log.safety or not self.log.links:
@@ -173,7 +173,7 @@ class CheckoutSession:
 
     def _request(self, _: int) -> None:
         if self._requested is not None:
-            self._source.ask(self._requested.linear, self._requested.angular)
+            self._source.request(self._requested.linear, self._requested.angular)
 
     def _poll(self, _: int) -> None:
         if self._done():

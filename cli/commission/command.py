@@ -105,8 +105,8 @@ def guided(draft: Report, checks: Sequence[Check], operator: Operator) -> Report
     name = firmware = signed = aborted = ""
     checked: list[Checked] = []
     try:
-        name = operator.ask("Your name:")
-        firmware = operator.ask("The firmware version, from the board's label:")
+        name = operator.prompt("Your name:")
+        firmware = operator.prompt("The firmware version, from the board's label:")
         walk(checks, operator, checked)
         signed = sign(operator, name, checked)
     except KeyboardInterrupt:

@@ -10,10 +10,10 @@ from cli.commission.sonar import (
     Finding,
     HandDetector,
     Rest,
-    at_rest,
     judge_sonars,
     nearest,
     obstructions,
+    resting_ranges,
 )
 from common.messages import SONAR_NAMES
 
@@ -32,7 +32,7 @@ def sonars(session: CheckoutSession, operator: Operator) -> Verdict:
     session.listen(REST_S)
     if not log.ultrasonics:
         return judged(["No ranges are received: see the link."], "")
-    rest = at_rest([one.value for one in log.ultrasonics])
+    rest = resting_ranges([one.value for one in log.ultrasonics])
     if problem := obstructions(rest):
         return judged([problem], "")
     return judge_sonars(rest, [_one(session, operator, rest, name) for name in SONAR_NAMES])

@@ -22,7 +22,7 @@ class Operator:
         """Print a line without buffering."""
         print(text, flush=True)
 
-    def ask(self, question: str) -> str:
+    def prompt(self, question: str) -> str:
         """Return one stripped line; raise ``InputEndedError`` at the end of input."""
         if sys.stdin.isatty():
             with suppress(termios.error):
@@ -35,7 +35,7 @@ class Operator:
 
     def confirm(self, fact: str, phrase: str) -> bool:
         """Return whether the operator types the phrase."""
-        return self.ask(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
+        return self.prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
 
     def now(self) -> str:
         """Return the local date and time."""
@@ -64,18 +64,18 @@ def sign(operator: Operator, name: str, checked: Sequence[Checked]) -> str:
     operator.show("")
     for each in checked:
         operator.show(f"{each.verdict.outcome:8} {each.title}: {each.verdict.text}")
-    typed = operator.ask(f"To sign this off, type your name ({name}):")
+    typed = operator.prompt(f"To sign this off, type your name ({name}):")
     return name if name and typed.casefold() == name.casefold() else ""
 
 
 def _run(check: Check, operator: Operator) -> Verdict:
-    reason = operator.ask("Press Enter to begin, or type a reason to skip:")
+    reason = operator.prompt("Press Enter to begin, or type a reason to skip:")
     if reason:
         return Verdict("skipped", reason)
     while True:
         verdict = check.run()
         operator.show(f"{verdict.outcome}: {verdict.text}")
-        if verdict.outcome == "passed" or operator.ask(
+        if verdict.outcome == "passed" or operator.prompt(
             "Press Enter to try again, or type any word to continue:"
         ):
             return verdict

@@ -48,7 +48,7 @@ class Finding:
     nearest: float | None = None
 
 
-def at_rest(samples: Sequence[Ultrasonic]) -> Rest:
+def resting_ranges(samples: Sequence[Ultrasonic]) -> Rest:
     """Return each sonar's range at rest; None if it is faulty in half of the samples."""
     columns = zip(*([_distance(one, i) for i in range(8)] for one in samples), strict=True)
     return tuple(_middle(column) for column in columns)

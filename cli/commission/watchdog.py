@@ -116,7 +116,7 @@ def watchdog(master: BoardMaster, operator: Operator) -> Verdict:
     if problem := master.wait_for_standstill() or master.switch_brakes_on():
         return judged([problem], "")
     operator.show("The wheels turn. Ctrl-C stops them.")
-    with guarded(lambda: master.send(BRAKE)), signalled() as signals:
+    with braking_guard(lambda: master.send(BRAKE)), signalled() as signals:
         plan = _execute(master, operator, signals)
     verdict = judge_watchdog(plan)
     if plan.phase != "over":
@@ -160,7 +160,7 @@ def signalled() -> Iterator[list[int]]:
 
 
 @contextmanager
-def guarded(brake: Callable[[], None]) -> Iterator[None]:
+def braking_guard(brake: Callable[[], None]) -> Iterator[None]:
     """Fork a process that brakes when this one ends in any way, or takes too long.
 
     It also brakes after a regular end: one more BRAKE does no harm, and the rule stays simple.

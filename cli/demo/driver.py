@@ -45,7 +45,7 @@ class Driver:
         view = View(self.odometry[-1], self.safety, self._pressed, self._refusal, self._granted)
         action = self.lap.advance(view, now_ns)
         self._announce()
-        self._source.ask(action.twist.linear, action.twist.angular)
+        self._source.request(action.twist.linear, action.twist.angular)
         self.requested = action.twist
         self._press(action, self.safety, now_ns)
 
@@ -88,7 +88,7 @@ class Driver:
             answer(False, reason)
 
         if press == "reset":
-            self._bus.ask(keys.RESET, reset_request(seen), done, refused)
+            self._bus.call(keys.RESET, reset_request(seen), done, refused)
         else:  # the lap hits its box while driving forward
             request = release_request(seen, "backward", held=True)
-            self._bus.ask(keys.RELEASE, request, done, refused)
+            self._bus.call(keys.RELEASE, request, done, refused)

@@ -91,7 +91,7 @@ def make(
             return NO_STATE
         request = filled(call, request, seen)
     key = call.on(session.robot) if call else expression(path, session.robot)
-    answers = session.probe.ask(key, packed(call, request), options.timeout)
+    answers = session.probe.query(key, packed(call, request), options.timeout)
     if not answers:
         return no_answer(key, call)
     if refusals := show(answers, as_json=wants_json(options)):

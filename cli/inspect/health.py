@@ -75,7 +75,7 @@ def query(session: BusSession, name: str) -> list[Row]:
     """Query one service for its last health message."""
     if name == ROUTER:
         return [Row(session.robot, name, "ok", None)]
-    answers = session.probe.ask(keys.info_key(session.robot, name, "last"), timeout_s=ANSWER_S)
+    answers = session.probe.query(keys.info_key(session.robot, name, "last"), timeout_s=ANSWER_S)
     rows = [parse_answer(each, name) for each in answers if not each.refusal]
     return rows or [Row(session.robot, name, "silent", None)]
 
@@ -128,8 +128,8 @@ def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.structs.asdict(row.health) if row.health else {}
     fields.pop("timing", None)  # `t2 latency` shows it
-    alive, told = row.state in ("ok", "hangs"), row.health is not None
-    return {"robot": row.robot, "service": row.name, "alive": alive, "told": told} | fields
+    alive, has_health = row.state in ("ok", "hangs"), row.health is not None
+    return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
 
 def as_cells(row: Row) -> list[str]:

@@ -35,7 +35,7 @@ class Robot:
 
     @property
     def verdict(self) -> str:
-        """Safety's verdict, or the reason why there is none."""
+        """Safety's verdict, or why it is missing."""
         if self.state:
             return self.state.verdict
         if "safety" in self.services:

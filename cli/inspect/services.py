@@ -66,7 +66,7 @@ def discover(probe: Probe, robot: str) -> list[Member]:
     tokens = probe.alive(keys.live_key(robot, "*", "*"))
     declared = {
         each.key: read(each.payload, each.encoding).value
-        for each in probe.ask(ADMIN.format(robot=robot))
+        for each in probe.query(ADMIN.format(robot=robot))
         if not each.refusal
     }
     return members(tokens, declared, without=(probe.zid,))
@@ -74,7 +74,7 @@ def discover(probe: Probe, robot: str) -> list[Member]:
 
 def routers(probe: Probe) -> list[dict[str, Any]]:
     """Return the admin record of each router; empty where the admin space is closed."""
-    records = (read(each.payload, each.encoding).value for each in probe.ask(ROUTER))
+    records = (read(each.payload, each.encoding).value for each in probe.query(ROUTER))
     return [each for each in records if isinstance(each, dict)]
 
 

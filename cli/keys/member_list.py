@@ -15,7 +15,7 @@ def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:
 
 
 def newest(members: Members, role: Role, name: str) -> Member:
-    """Return the latest certificate of a member; raise ``RobotError`` if there is none."""
+    """Return the latest certificate of a member; raise ``RobotError`` without one."""
     found = of(members, role, name)
     if not found:
         raise RobotError(

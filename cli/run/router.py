@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, on first use
     if config.robot.realtime:
-        realtime.ask(realtime.ROUTER)
+        realtime.request(realtime.ROUTER)
     log.configure(config.log, "router")
     if config.robot.realtime and not realtime.priority():
         log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")

@@ -93,7 +93,7 @@ def main(text: str) -> int:
     for number in ENDS:
         signal.signal(number, signal.SIG_IGN)
     if realtime.priority():  # only if the parent has one; the router must not delay it
-        realtime.ask(realtime.PROBE)
+        realtime.request(realtime.PROBE)
         realtime.limit()
     setup = msgspec.json.decode(text, type=Setup)
     written = logs.configure(setup.log, "router")

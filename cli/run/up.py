@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
     config = load(Everything, sources(options)).config
     if config.robot.realtime:
-        realtime.ask(realtime.SUPERVISOR, alone=True)
+        realtime.request(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
     started = selected([*commands(options), *recorder(options)], options.only)
     with claimed(wanted(config, [name for name, _ in started])):

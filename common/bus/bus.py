@@ -171,7 +171,7 @@ class Bus:
             lambda session: session.liveliness().declare_subscriber(expression, queue, history=True)
         )
 
-    def ask(
+    def call(
         self,
         call: Call[Q, R],
         request: Q,

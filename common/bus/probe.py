@@ -84,7 +84,7 @@ class Probe:
         """Publish once, with ``raw`` as attachment."""
         self._session.put(key, payload, encoding=encoding, attachment=raw, **qos(service))
 
-    def ask(
+    def query(
         self, selector: str, payload: bytes | None = None, timeout_s: float = 2.0
     ) -> list[Answer]:
         """Return all answers to a query within the timeout."""

@@ -234,7 +234,7 @@ def answers(where: BusSettings) -> bool:
     A hanging router may block the caller for long: use a separate thread.
     """
     with contextlib.suppress(zenoh.ZError), zenoh.open(client_config(where)) as session:
-        # A robot's router that dials a site's is a peer.
+        # A robot's router with a connection to a site's router is a peer.
         routers = (*session.info.routers_zid(), *session.info.peers_zid())
         return any(
             reply.ok

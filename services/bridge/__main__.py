@@ -28,11 +28,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
     if config.robot.realtime:
-        realtime.ask(realtime.GUARD)
+        realtime.request(realtime.GUARD)
     # After the priority: the log's thread inherits it, and holds Python's lock at times.
     log.configure(config.log, "guard")
     if config.robot.realtime:
-        realtime.ask(realtime.GUARD, alone=True)
+        realtime.request(realtime.GUARD, alone=True)
         realtime.limit()
         if not realtime.priority():
             log.Logger().info("SCHED_FIFO is not granted: the bridge runs with normal priority")

@@ -13,8 +13,8 @@ neutral      start, not ready, lease over,   a STOP or a RUN of zero from the au
              a new authority                 ready: no motion on reconnect alone
 acked        a bumper hit (the reflex: BREAK a motion message whose ``judged`` covers that hit:
              at once)                        a RUN that was already sent must not undo the BREAK
-standstill   0.05 m or 0.05 rad away from a  a motion message which says that safety has latched
-             standstill while the lease was  this: its ``predecessor`` is the bridge itself
+standstill   0.05 m or 0.05 rad away from a  a motion message with safety's latch for this:
+             standstill while the lease was  its ``predecessor`` is the bridge itself
              over: BREAK at once
 latch owner  an authority that ended with a  its successor has latched in its place, and names
              latch that was not reset        the owner of that latch in ``predecessor``

@@ -96,7 +96,7 @@ class Robot:
         push = self.driver_lock.held(now_ns)
         request = self._requests.tick(None if push is None or push.release else self._twist())
         if request is not None:
-            self._source.ask(request.linear, request.angular)
+            self._source.request(request.linear, request.angular)
         self._call_release(push.release if push else None, safety, now_ns)
         self._check_resets(safety, now_ns)
         self._update_trail(now_ns)
@@ -128,7 +128,7 @@ class Robot:
             check.answer(done)
             self._resets.append((check, done.text, notify))
 
-        self.bus.ask(
+        self.bus.call(
             keys.RESET,
             reset_request(seen),
             answered,
@@ -141,7 +141,7 @@ class Robot:
 
     def call(self, call: Call[Any, R], request: msgspec.Struct, notify: Notify) -> None:
         """Call a service of the robot and report its answer."""
-        self.bus.ask(
+        self.bus.call(
             call,
             request,
             lambda reply: notify("info", reply.text if isinstance(reply, m.Done) else "done", ""),
@@ -181,7 +181,7 @@ class Robot:
         limit_s = self._settings.round_trip
         seen = self.snapshots.seen(self.driver_lock.answered, now_ns, limit_s)
         for request in self._release.tick(direction, seen, newest):
-            self.bus.ask(
+            self.bus.call(
                 keys.RELEASE,
                 request,
                 self._release_held if request.held else lambda _: None,

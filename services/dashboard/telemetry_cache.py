@@ -104,7 +104,7 @@ class TelemetryCache:
 
 @dataclass
 class Trail:
-    """The trajectory in ``odom``, metres: thinned by distance, bounded, one odometry epoch."""
+    """The trajectory in ``odom``, metres: downsampled by distance, bounded, one odometry epoch."""
 
     points: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=POINTS))
     epoch: int | None = None

@@ -1,1 +1,1 @@
-"""Safety: decides what may move the vehicle, and says why not."""
+"""Safety: decides what may move the vehicle, and reports the reason of a stop."""

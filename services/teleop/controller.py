@@ -134,7 +134,7 @@ class Controller:
         had_expired = self._controls.gamepad_expired
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
         if self._requested is not None:
-            self._source.ask(self._requested.linear, self._requested.angular)
+            self._source.request(self._requested.linear, self._requested.angular)
         if self._controls.gamepad_expired and not had_expired:
             text = (
                 f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "

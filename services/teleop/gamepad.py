@@ -25,7 +25,7 @@ class Gamepad(Protocol):
 
     @property
     def status(self) -> str:
-        """The gamepad's name, or why there is none."""
+        """The gamepad's name, or why it is missing."""
 
     def read(self) -> Stick | None:
         """Return the current state; None without a gamepad."""

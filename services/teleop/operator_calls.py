@@ -39,7 +39,7 @@ class OperatorCalls:
         if self._reset is not None and not self._reset.is_answered:
             return  # a held key repeats
         self._reset = check = ResetCheck(shown)
-        self._bus.ask(
+        self._bus.call(
             keys.RESET,
             replace(reset_request(shown), echo=newest.heartbeat),
             lambda done: self._reset_answered(check, done),
@@ -72,7 +72,7 @@ class OperatorCalls:
     def release(self, direction: Direction | None, newest: SafetyState | None) -> None:
         """Make the calls of a release that is held in a direction, or has ended."""
         for request in self._release.tick(direction, newest, newest):
-            self._bus.ask(
+            self._bus.call(
                 keys.RELEASE,
                 request,
                 self._release_held if request.held else lambda _: None,

@@ -25,7 +25,7 @@ def ask(bridge: BridgeFixture, call: Any, request: Any) -> Any:
         answers.append(answer)
         done.set()
 
-    bridge.bus.ask(call, request, take, take)
+    bridge.bus.call(call, request, take, take)
     assert done.wait(10)
     return answers[0]
 

@@ -14,7 +14,7 @@ SPIN = """
 import os
 from common import realtime
 from services.bridge.guard_ipc import received
-realtime.ask(realtime.BRIDGE)
+realtime.request(realtime.BRIDGE)
 realtime.limit()
 os.write(received(os.environ).heartbeat, b"\\0")
 while True:
@@ -30,7 +30,7 @@ from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
 config = load(BridgeConfig, Sources(environ={{}}, sets=sys.argv[1:])).config
 log.configure(config.log, "guard")
-realtime.ask(realtime.GUARD, alone=True)
+realtime.request(realtime.GUARD, alone=True)
 sys.exit(Guard(config, Sockets(config.board), [sys.executable, "-c", {SPIN!r}]).run())
 """
 

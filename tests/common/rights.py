@@ -24,7 +24,7 @@ def output_of(script: str) -> list[str]:
 
 @cache
 def granted() -> bool:
-    return output_of("r.ask(r.BOARD); print(r.priority())") == [str(BOARD)]
+    return output_of("r.request(r.BOARD); print(r.priority())") == [str(BOARD)]
 
 
 needs_right = pytest.mark.skipif(

@@ -23,14 +23,14 @@ def test_this_process_is_ordinary() -> None:
 @needs_right
 def test_threads_follow() -> None:
     thread = "t = threading.Thread(target=lambda: print(r.priority())); t.start(); t.join()"
-    assert output_of(f"r.ask(51); print(r.priority()); {thread}") == ["51", "51"]
+    assert output_of(f"r.request(51); print(r.priority()); {thread}") == ["51", "51"]
 
 
 @needs_right
 def test_what_is_started_alone_begins_as_ordinary() -> None:
     child = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
     look = "from common import realtime as r; print(r.priority())"
-    script = f"r.ask(54, alone=True); print(r.priority(), flush=True); {child}"
+    script = f"r.request(54, alone=True); print(r.priority(), flush=True); {child}"
     command = [sys.executable, "-c", PRELUDE + script, look]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     assert done.stdout.split() == ["54", "0"]
@@ -38,7 +38,7 @@ def test_what_is_started_alone_begins_as_ordinary() -> None:
 
 @needs_right
 def test_one_that_runs_away_is_ended() -> None:
-    script = f"{PRELUDE}r.CPU_LIMIT_US = 200_000; r.ask(1); r.limit()\nwhile True: pass"
+    script = f"{PRELUDE}r.CPU_LIMIT_US = 200_000; r.request(1); r.limit()\nwhile True: pass"
     ran = subprocess.run([sys.executable, "-c", script], timeout=PATIENCE_S, check=False)
     assert ran.returncode == -signal.SIGXCPU
 
@@ -52,9 +52,9 @@ def test_a_limit_that_is_narrower_is_kept() -> None:
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to become somebody without rights")
 def test_without_the_right_all_stays_as_it_was() -> None:
     drop = "resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0)); os.setuid(65534); "
-    assert output_of(f"{drop}r.ask(1); r.limit(); print(r.priority())") == ["0"]
+    assert output_of(f"{drop}r.request(1); r.limit(); print(r.priority())") == ["0"]
 
 
 def test_other_systems_go_on_as_ordinary() -> None:
     other = "import sys; sys.platform = 'darwin'; "
-    assert output_of(f"{other}r.ask(1); r.limit(); print(r.priority())") == ["0"]
+    assert output_of(f"{other}r.request(1); r.limit(); print(r.priority())") == ["0"]

@@ -22,7 +22,7 @@ def bus() -> FakeBus:
 
 
 def test_the_echo_is_zero_before_the_first_state_of_safety(bus: FakeBus) -> None:
-    sent = DriveSource(bus, "demo").ask(0.2, -0.1)
+    sent = DriveSource(bus, "demo").request(0.2, -0.1)
     assert (sent.linear, sent.angular, sent.echo, sent.seq) == (0.2, -0.1, 0, 1)
 
 
@@ -30,16 +30,16 @@ def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
     source = DriveSource(bus, "demo")
     for heartbeat in (7, 8):
         bus.tell(keys.SAFETY, safety_state(heartbeat=heartbeat))
-    assert source.ask(0.0, 0.0).echo == 8
+    assert source.request(0.0, 0.0).echo == 8
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_a_non_finite_request_is_refused(bus: FakeBus, wrong: float) -> None:
     source = DriveSource(bus, "demo")
     with pytest.raises(ValueError, match="non-finite request"):
-        source.ask(wrong, 0.0)
+        source.request(wrong, 0.0)
     with pytest.raises(ValueError, match="non-finite request"):
-        source.ask(0.0, wrong)
+        source.request(0.0, wrong)
 
 
 def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
@@ -57,7 +57,7 @@ def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
 
         def echoed() -> bool:
             state.put(safety_state(heartbeat=41))
-            sources[0].ask(0.3, 0.0)
+            sources[0].request(0.3, 0.0)
             return bool(heard) and heard[-1].message.echo == 41
 
         wait_until(echoed, "an echo of the heartbeat")
@@ -78,10 +78,10 @@ def test_who_may_only_watch_is_barred(
     if is_heard:
         bus.tell(keys.SAFETY, safety_state(heartbeat=7))
     for _ in range(DENIED_AFTER - 1):
-        source.ask(0.1, 0.0)
+        source.request(0.1, 0.0)
     assert not source.denied
-    source.ask(0.1, 0.0)
+    source.request(0.1, 0.0)
     assert source.denied is denied
     monkeypatch.setattr(Publisher, "passed_on", True)
-    source.ask(0.1, 0.0)
+    source.request(0.1, 0.0)
     assert not source.denied

@@ -76,7 +76,7 @@ class World:
             answers.append(text)
             done.set()
 
-        self.bus.ask(keys.SET_POSE, request, lambda done: take(done.text), take, PATIENCE_S)
+        self.bus.call(keys.SET_POSE, request, lambda done: take(done.text), take, PATIENCE_S)
         assert done.wait(PATIENCE_S)
         return answers[0]
 

@@ -65,7 +65,7 @@ def drive(stack: RunningStack) -> None:
         source = DriveSource(bus, "demo")
 
         def ask() -> None:
-            source.ask(*twist)
+            source.request(*twist)
 
         states: list[SafetyState] = []
         bus.subscribe(keys.SAFETY, lambda arrival: states.append(arrival.message))

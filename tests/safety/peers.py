@@ -103,7 +103,7 @@ class Peers:
     def call(self, call: Call[Q, R], request: Q) -> str:
         """Make a call and wait for its answer."""
         seen = len(self.answers)
-        self.bus.ask(
+        self.bus.call(
             call,
             request,
             lambda _: self.answers.append("done"),

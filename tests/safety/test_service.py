@@ -115,13 +115,13 @@ def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> Non
         assert seen.motions[-1].judged_boot == bus.boot
         wait_until(lambda: seen.states and seen.states[-1].release, "a latched contact")
         for held in (True, False):
-            bus.ask(
+            bus.call(
                 keys.RELEASE,
                 ReleaseRequest(held=held, direction="backward", echo=seen.states[-1].heartbeat),
                 lambda done: seen.answers.append(done.text),
                 seen.answers.append,
             )
-        bus.ask(
+        bus.call(
             keys.RESET,
             reset_request(seen.states[-1]),
             lambda done: seen.answers.append(done.text),

@@ -66,7 +66,7 @@ def test_it_is_placed_and_stands_there() -> None:
 def test_it_is_not_placed_into_something() -> None:
     sim = SimFixture(room(BOX))
     reply = sim.do(q.Place(x=3.0, y=0.0))
-    assert (reply.ok, reply.error) == (False, "something is in the way at x 3, y 0")
+    assert (reply.ok, reply.error) == (False, "an obstacle is at x 3, y 0")
     assert sim.truth.x == 0.0
 
 
@@ -87,7 +87,7 @@ def test_a_box_put_beside_the_vehicle_presses_the_bumper_at_once() -> None:
 def test_a_box_is_not_put_onto_the_vehicle() -> None:
     sim = SimFixture()
     reply = sim.do(q.AddBox(box=msgspec.structs.replace(CRATE, x=0.5)))
-    assert (reply.ok, reply.error) == (False, "the vehicle is in the way")
+    assert (reply.ok, reply.error) == (False, "an obstacle would overlap the vehicle")
     assert sim.simulation.world.boxes == ()
 
 
@@ -113,7 +113,7 @@ def test_what_is_asked_for_is_traced_with_its_error() -> None:
         "event": "fault",
         "mono_ns": START_NS,
         "request": {"do": "place", "x": 3.0, "y": 0.0, "heading": 0.0},
-        "error": "something is in the way at x 3, y 0",
+        "error": "an obstacle is at x 3, y 0",
     }
 
 

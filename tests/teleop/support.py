@@ -36,7 +36,7 @@ class FakeBus(Bus):
         names.pop("depth", None)
         self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
 
-    def ask(
+    def call(
         self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
         timeout_s: float = 2.0,
     ) -> None:  # fmt: skip

@@ -108,6 +108,13 @@ def test_no_false_alarm(root: Path, phrase: str) -> None:
     assert found(root, "a.md", phrase, *RULES, *LATER) == []
 
 
+def test_a_phrase_of_an_interface_is_allowed_in_its_files(root: Path) -> None:
+    names = (Rule("tell", "report"),)
+    (root / "services" / "recorder").mkdir(parents=True)
+    assert found(root, "services/recorder/a.py", "f.tell()\n", names=names) == []
+    assert found(root, "a.py", "f.tell()\n", names=names) == ["a.py:1: tell -> report"]
+
+
 def test_every_rule_suggests_something_else() -> None:
     for rule in (*RULES, *LATER, *NAMES):
         assert rule.suggestion

@@ -103,6 +103,6 @@ def test_a_late_subscriber_receives_earlier_events(stack: RunningStack) -> None:
         wait_until(
             lambda: "link_up" in [each.name for each in received], "the bridge's first event"
         )
-        bus.ask(keys.RESET, ResetRequest(), print, refusals.append)  # names no latch
+        bus.call(keys.RESET, ResetRequest(), print, refusals.append)  # names no latch
         wait_until(lambda: refusals, "a reply")
         wait_until(lambda: "reset_refused" in [each.name for each in received], "a new event")

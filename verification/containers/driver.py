@@ -42,7 +42,7 @@ class LaptopDriver:
             self.lap_driver.on_beat(now_ns)
         else:
             del self.lap_driver.odometry[:-1]
-            self._source.ask(self.linear, 0.0)
+            self._source.request(self.linear, 0.0)
 
     def drive_lap(self, pace: Pace) -> Sequence[m.Odometry]:
         """Drive a lap to its end; return its odometry."""
@@ -83,7 +83,7 @@ class LaptopDriver:
         # The safety state shows the result.
         if self.safety is not None:
             request = reset_request(self.safety)
-            self.bus.ask(keys.RESET, request, lambda _: None, lambda _: None)
+            self.bus.call(keys.RESET, request, lambda _: None, lambda _: None)
 
 
 @contextmanager

@@ -95,14 +95,14 @@ def traced(made: tuple[str, int], ours: int, endpoint: str, log: Path) -> Iterat
     """Run the bridge as its guard starts it, with its own thread under strace."""
     sockets = Sockets(Board(port=made[1], listen_ports=(ours,)))
     guard, heartbeat = os.pipe()
-    handover = Inherited(tuple(s.fileno() for s in sockets.sockets), heartbeat)
+    inherited = Inherited(tuple(s.fileno() for s in sockets.sockets), heartbeat)
     sets = (f"board.port={made[1]}", f"board.listen_ports={ours}", f"bus.connect={endpoint}")
     command = ["strace", "-o", str(log), sys.executable, "-m", "services.bridge.child",
                *(word for one in sets for word in ("--set", one))]  # fmt: skip
     process = subprocess.Popen(
         command,
-        env=os.environ | handover.environ(),
-        pass_fds=handover.descriptors,
+        env=os.environ | inherited.environ(),
+        pass_fds=inherited.descriptors,
         stderr=subprocess.DEVNULL,
     )
     os.close(heartbeat)

@@ -1,1 +1,1 @@
-"""The fault campaign: what the board was told, and when, after each fault of a catalogue."""
+"""The fault campaign: the commands that the board receives, and when, after each fault."""

@@ -26,10 +26,10 @@ def main() -> None:
     threading.Thread(target=read_speeds, daemon=True).start()
     bus.open()
 
-    def ask(_: int) -> None:
-        source.ask(requested[0], 0.0)
+    def send_request(_: int) -> None:
+        source.request(requested[0], 0.0)
 
-    loop.every(0.05, ask)
+    loop.every(0.05, send_request)
     loop.run()
     bus.close()
 

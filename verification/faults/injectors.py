@@ -119,10 +119,10 @@ def late_resets(fixture: StackFixture) -> int:
     becomes_true(fixture.latched, 2.0)
     assert fixture.state is not None
     late = reset_request(fixture.state)
-    fixture.ask(0.0)  # safety refuses a reset while motion is requested
+    fixture.request(0.0)  # safety refuses a reset while motion is requested
     time.sleep(LATE_S)
     for _ in range(20):
-        fixture.bus.ask(keys.RESET, late, ignored, ignored, 1.0)
+        fixture.bus.call(keys.RESET, late, ignored, ignored, 1.0)
     time.sleep(0.3)
     return at_ns
 
@@ -135,7 +135,7 @@ def late_releases(fixture: StackFixture) -> int:
     late = release_request(fixture.state, "backward", held=True)
     time.sleep(LATE_S)
     for _ in range(20):
-        fixture.bus.ask(keys.RELEASE, late, ignored, ignored, 1.0)
+        fixture.bus.call(keys.RELEASE, late, ignored, ignored, 1.0)
         time.sleep(0.02)
     fixture.running.control.do(Bumper(pressed=False))
     return fixture.frames.hits[0].mono_ns
@@ -209,7 +209,7 @@ def flood(fixture: StackFixture) -> int:
 
 def spoil_config(fixture: StackFixture) -> int:
     """Write an invalid settings file, and kill the bridge."""
-    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'for ever'\n")
+    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'endless'\n")
     return kill("bridge", signal.SIGKILL)(fixture)
 
 
@@ -276,7 +276,7 @@ def stall_terminal(seconds: float, held_s: float = 0.3) -> Callable[[StackFixtur
         at_ns = time.monotonic_ns()
         fixture.send_line(b"stall %f" % seconds)
         time.sleep(held_s)
-        fixture.ask(0.0)
+        fixture.request(0.0)
         return at_ns
 
     return inject

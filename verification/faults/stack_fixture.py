@@ -64,9 +64,9 @@ class StackFixture:
         self.running.processes["driver"] = subprocess.Popen(
             self._driver, stdin=subprocess.PIPE, env=self._env
         )
-        self.ask(self.asked)
+        self.request(self.asked)
 
-    def ask(self, speed: float) -> None:
+    def request(self, speed: float) -> None:
         """Request a speed, m/s."""
         self.asked = speed
         self.send_line(b"%f" % speed)
@@ -127,14 +127,14 @@ class StackFixture:
         done: list[Done | str] = []
         if self.state is None:
             return
-        self.bus.ask(keys.RESET, reset_request(self.state), done.append, done.append, 1.0)
+        self.bus.call(keys.RESET, reset_request(self.state), done.append, done.append, 1.0)
         becomes_true(lambda: done, 1.5)
 
     def rearm(self, patience_s: float) -> bool:
         """Request zero, then the speed again; return whether the vehicle drives."""
-        self.ask(0.0)
+        self.request(0.0)
         becomes_true(self.neutral, patience_s)
-        self.ask(SPEED_MPS)
+        self.request(SPEED_MPS)
         return becomes_true(self.at_speed, patience_s)
 
     def ready(self) -> None:
@@ -147,7 +147,7 @@ class StackFixture:
         while time.monotonic() < end_s:
             self.restart_ended()
             if self.latched():
-                self.ask(0.0)
+                self.request(0.0)
                 time.sleep(0.1)
                 self.reset()
             if self.rearm(2.0):

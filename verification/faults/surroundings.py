@@ -37,7 +37,7 @@ def cut_and_let_go(seconds: float) -> Callable[[StackFixture], int]:
         at_ns = time.monotonic_ns()
         fixture.disturb_network(Wire(drop=1.0))
         time.sleep(LET_GO_S)  # the driver still requests motion
-        fixture.ask(0.0)
+        fixture.request(0.0)
         time.sleep(seconds - LET_GO_S)
         fixture.disturb_network(Wire())
         return at_ns

@@ -73,7 +73,7 @@ def _outcome(fixture: StackFixture) -> Outcome | None:
         return "after a neutral"
     latched = False
     for _ in range(10):
-        fixture.restart_ended().ask(0.0)
+        fixture.restart_ended().request(0.0)
         time.sleep(0.1)
         latched = latched or (fixture.latched() and not fixture.flapping())
         fixture.reset()

@@ -48,12 +48,12 @@ class RequestSource:
             self._refused += 1
             if self._state is not None and self._state.latched and self._refused % 10 == 0:
                 request = reset_request(self._state)
-                self._bus.ask(keys.RESET, request, lambda _: None, lambda _: None)
-            self._source.ask(0.0, 0.0)
+                self._bus.call(keys.RESET, request, lambda _: None, lambda _: None)
+            self._source.request(0.0, 0.0)
             return
         self._number += 1
         linear = round(SLOW_MPS + STEP_MPS * (self._number % STEPS), 3)
-        drive = self._source.ask(linear, 0.0)
+        drive = self._source.request(linear, 0.0)
         if self._number % STEPS:  # the large step down is ramped
             self.requests.append(Request(drive.mono_ns, linear))
 

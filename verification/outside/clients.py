@@ -23,7 +23,7 @@ Map = dict[str, Any]
 
 
 def session(endpoint: str, mode: str = "client") -> "zenoh.Session":
-    """Open a session with the router; raises when there is none."""
+    """Open a session with the router; raises without one."""
     config = {
         "mode": mode,
         "connect": {"endpoints": [endpoint], "timeout_ms": 1500},
@@ -57,7 +57,7 @@ class Observer:
         self.messages[key].append((time.monotonic(), message, len(payload)))
 
     def last(self, key: str) -> Map:
-        """Return the newest message of a key; empty when there is none."""
+        """Return the newest message of a key; empty before the first one."""
         found = self.messages[key]
         return dict(found[-1][1]) if found else {}
 

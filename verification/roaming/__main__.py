@@ -73,13 +73,13 @@ def campaign(
     """Run all; downsampling and dashboard need separate stacks."""
     drives: dict[str, tuple[Condition, DriveResult, float]] = {}
     outages: list[tuple[Outage, Sequence[OutageResult], float]] = []
-    for thinned, dashboard in ((True, True), (True, False), (False, True), (False, False)):
-        mine = [w for w in conditions if (w.thinned, w.dashboard) == (thinned, dashboard)]
-        lost = outage_list if thinned and dashboard else ()
+    for downsampled, dashboard in ((True, True), (True, False), (False, True), (False, False)):
+        mine = [w for w in conditions if (w.downsampled, w.dashboard) == (downsampled, dashboard)]
+        lost = outage_list if downsampled and dashboard else ()
         if not (mine or lost):
             continue
-        stack_folder = folder / f"{thinned}-{dashboard}"
-        with two_hosts(stack_folder, thinned=thinned, dashboard=dashboard) as it:
+        stack_folder = folder / f"{downsampled}-{dashboard}"
+        with two_hosts(stack_folder, downsampled=downsampled, dashboard=dashboard) as it:
             for condition in mine:
                 result = steady(it, condition, seconds)
                 drives[condition.name] = condition, result, _held(stalls, result)

@@ -12,7 +12,7 @@ class Condition:
 
     name: str
     faults: Sequence[Wire] = ()
-    thinned: bool = True  # as shipped; False: no downsampling to laptops
+    downsampled: bool = True  # as shipped; False: no downsampling to laptops
     dashboard: bool = True  # beside teleop
 
 
@@ -26,26 +26,26 @@ class Outage:
     moves: bool = False  # to another address
 
 
-def narrow(bits: float, *, thinned: bool, dashboard: bool) -> Condition:
+def narrow(bits: float, *, downsampled: bool, dashboard: bool) -> Condition:
     """Return a link with limited bandwidth in both directions."""
     size = f"{bits / 1e6:g} Mbit/s" if bits >= 1e6 else f"{bits / 1e3:g} kbit/s"
     clients = "" if dashboard else ", teleop alone"
-    name = f"{size}{clients}{'' if thinned else ', not thinned'}"
-    return Condition(name, [Wire(rate=bits, delay=0.01)], thinned, dashboard)
+    name = f"{size}{clients}{'' if downsampled else ', not thinned'}"
+    return Condition(name, [Wire(rate=bits, delay=0.01)], downsampled, dashboard)
 
 
 CONDITIONS = [
     Condition("good"),
-    Condition("good, not thinned", thinned=False),
+    Condition("good, not thinned", downsampled=False),
     *(Condition(f"{round(100 * p)} % lost", [Wire(drop=p)]) for p in (0.01, 0.1, 0.3)),
     Condition("30 % lost on the way to the robot", [Wire(direction="to_pc", drop=0.3)]),
     Condition("30 % lost on the way to the laptop", [Wire(direction="to_board", drop=0.3)]),
     Condition("100 to 120 ms each way", [Wire(delay=0.1, jitter=0.02)]),
     Condition("200 to 250 ms each way", [Wire(delay=0.2, jitter=0.05)]),
-    *(narrow(1e6, thinned=thinned, dashboard=True) for thinned in (True, False)),
-    *(narrow(256e3, thinned=thinned, dashboard=False) for thinned in (True, False)),
-    narrow(256e3, thinned=True, dashboard=True),
-    narrow(256e3, thinned=False, dashboard=True),
+    *(narrow(1e6, downsampled=downsampled, dashboard=True) for downsampled in (True, False)),
+    *(narrow(256e3, downsampled=downsampled, dashboard=False) for downsampled in (True, False)),
+    narrow(256e3, downsampled=True, dashboard=True),
+    narrow(256e3, downsampled=False, dashboard=True),
 ]
 
 OUTAGES = [

@@ -61,16 +61,16 @@ class TwoHosts:
 
     def press_again(self, speed: float) -> None:
         """Release the key, reset if due, and press the key again."""
-        self.fixture.ask(0.0)
+        self.fixture.request(0.0)
         time.sleep(RELEASE_S)
         if self.fixture.latched():
             self.fixture.reset()
-        self.fixture.ask(speed)
+        self.fixture.request(speed)
 
 
 @contextlib.contextmanager
 def two_hosts(
-    folder: Path, *, shipped: bool = True, thinned: bool = True, dashboard: bool = True
+    folder: Path, *, shipped: bool = True, downsampled: bool = True, dashboard: bool = True
 ) -> Iterator[TwoHosts]:
     """Run both hosts; the laptop's clocks differ from the robot's."""
     folder.mkdir(exist_ok=True)
@@ -84,7 +84,7 @@ def two_hosts(
     env = clock(folder / "laptop")
     step_clock(folder / "laptop", AHEAD_S)
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
-    sets = [*QUICK, *certificate_sets(robots), *([] if thinned else [EVERYTHING])]
+    sets = [*QUICK, *certificate_sets(robots), *([] if downsampled else [EVERYTHING])]
     with running_stack(folder, sets=sets, shipped=shipped, listen=listen) as stack:
         command = [
             sys.executable,

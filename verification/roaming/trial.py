@@ -114,14 +114,14 @@ def estop(it: TwoHosts) -> tuple[float | None, float | None]:
         return [entry.at_ns for entry in it.received(STATE, pressed_ns) if entry.latched]
 
     becomes_true(lambda: braked() and confirmed(), ESTOP_S)
-    it.fixture.ask(0.0)
+    it.fixture.request(0.0)
     return _after_s(braked(), pressed_ns), _after_s(confirmed(), pressed_ns)
 
 
 def settle(it: TwoHosts) -> None:
     """Remove link faults, and reset until no latch is left."""
     it.disturb()
-    it.fixture.ask(0.0)
+    it.fixture.request(0.0)
     quiet_s = time.monotonic()
     while time.monotonic() - quiet_s < QUIET_S:
         if it.fixture.latched():

@@ -95,7 +95,7 @@ class Operator:
         safety = self._driver.safety
         if pose is not None and safety is not None:
             pose = replace(pose, echo=safety.heartbeat)
-            self._bus.ask(keys.SET_POSE, pose, self._done, self._refused)
+            self._bus.call(keys.SET_POSE, pose, self._done, self._refused)
 
     def _put_back(self) -> PoseRequest | None:
         self._control.do(Place(x=0.0, y=0.0))

@@ -29,13 +29,13 @@ def save(files: Sequence[Path], record: Record) -> None:
 
 def _draw_lives(memory: Axes, held: Axes, record: Record) -> None:
     """Draw each process in its own colour, with gaps while it did not run."""
-    names = list(dict.fromkeys(life.name for life in record.lives))
+    names = list(dict.fromkeys(run.name for run in record.lives))
     drawn = set()
-    for life, samples in record.lives.items():
-        color = f"C{names.index(life.name) % 10}"
+    for run, samples in record.lives.items():
+        color = f"C{names.index(run.name) % 10}"
         times = [sample.at_s for sample in samples]
-        label = None if life.name in drawn else life.name
-        drawn.add(life.name)
+        label = None if run.name in drawn else run.name
+        drawn.add(run.name)
         memory.plot(times, [sample.rss / MB for sample in samples], label=label, color=color)
         held.plot(times, [sample.threads for sample in samples], color=color)
         held.plot(times, [sample.descriptors for sample in samples], linestyle=":", color=color)

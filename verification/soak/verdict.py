@@ -82,8 +82,8 @@ def _median(samples: Sequence[Sample]) -> Sample:
 
 def _processes(lives: Mapping[Life, Sequence[Sample]], warm_up_s: float) -> list[Result]:
     rows: list[Result] = []
-    for name in dict.fromkeys(life.name for life in lives):
-        longest = max((lives[life] for life in lives if life.name == name), key=len)
+    for name in dict.fromkeys(run.name for run in lives):
+        longest = max((lives[run] for run in lives if run.name == name), key=len)
         span = growth(longest, warm_up_s)
         if span is None:
             rows.append((f"{name}: memory", "no run was long enough", False))

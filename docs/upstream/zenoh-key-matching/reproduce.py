@@ -47,7 +47,7 @@ def hung_s(expression: str, key: str) -> float:
             writer.put(key, b"")
             time.sleep(0.1)
             began_s = time.monotonic()
-            asking = threading.Thread(target=ask, daemon=True)
+            asking = threading.Thread(target=query_router, daemon=True)
             asking.start()
             asking.join(LIMIT_S)
             del kept
@@ -56,14 +56,14 @@ def hung_s(expression: str, key: str) -> float:
             router.kill()
 
 
-def ask() -> None:
-    """Ask, unless the router is killed meanwhile."""
+def query_router() -> None:
+    """Query the router, unless the router is killed meanwhile."""
     with contextlib.suppress(zenoh.ZError):
-        ask_anew()
+        query_anew()
 
 
-def ask_anew() -> None:
-    """Ask the router one question in a new session, after another one has come and gone."""
+def query_anew() -> None:
+    """Send one query to the router in a new session, after another one has come and gone."""
     with client() as newcomer:  # the router wants its tables for itself, and waits for the matching
         newcomer.declare_subscriber("y", lambda _: None)
         time.sleep(0.1)

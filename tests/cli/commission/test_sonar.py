@@ -10,12 +10,12 @@ from cli.commission.sonar import (
     Finding,
     HandDetector,
     Rest,
-    at_rest,
     judge_sonars,
     mixup,
     near,
     nearest,
     obstructions,
+    resting_ranges,
 )
 from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 
@@ -79,13 +79,13 @@ def test_range_at_rest_is_the_median() -> None:
         sample(front=2.2, rear="fault", left=1.5),
         sample(front="no_echo", rear=1.0, left=1.5),
     ]
-    rest = dict(zip(SONAR_NAMES, at_rest(samples), strict=True))
+    rest = dict(zip(SONAR_NAMES, resting_ranges(samples), strict=True))
     assert (rest["front"], rest["rear"], rest["left"]) == (2.2, None, 1.5)
     assert rest["right"] == math.inf
 
 
 def test_a_sonar_that_is_faulty_half_the_time_is_faulty() -> None:
-    assert at_rest([sample(front="fault"), sample(front=1.0)])[2] is None
+    assert resting_ranges([sample(front="fault"), sample(front=1.0)])[2] is None
 
 
 def test_obstructions() -> None:

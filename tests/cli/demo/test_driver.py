@@ -23,7 +23,7 @@ class FakeBus(Bus):
         super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
         self.calls: list[tuple[str, Callable[[Any], None], Callable[[str], None]]] = []
 
-    def ask(
+    def call(
         self,
         call: keys.Call[Any, Any],
         request: Any,

@@ -45,7 +45,7 @@ class Member:
     def reset(self) -> str:
         """Request a reset, and return the answer."""
         self.answers.clear()
-        self.bus.ask(
+        self.bus.call(
             keys.RESET, ResetRequest(), lambda done: self.answers.append(done.text),
             self.answers.append, timeout_s=1.0,
         )  # fmt: skip
@@ -102,7 +102,7 @@ def drives(it: Member, robot: OnBoard) -> bool:
 
     def settled() -> bool:
         robot.state.put(safety_state(heartbeat=1))
-        it.source.ask(0.1, 0.0)
+        it.source.request(0.1, 0.0)
         return came() or it.source.denied
 
     wait_until(settled, "a request, or the refusal of one")
@@ -210,6 +210,6 @@ def test_a_revoked_certificate_has_no_rights(
         hall = member(join, connecting(site.settings("viewer", "hall"), secured))
         assert not drives(hall, robot)  # by then it has received safety's state
         for _ in range(20):
-            anna.source.ask(0.1, 0.0)
-        assert anna.source.ask(0.1, 0.0).echo == 0  # it receives no heartbeat
+            anna.source.request(0.1, 0.0)
+        assert anna.source.request(0.1, 0.0).echo == 0  # it receives no heartbeat
         assert not robot.received

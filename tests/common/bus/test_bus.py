@@ -289,7 +289,7 @@ def test_a_closed_bus_calls_nobody_and_hurts_nobody(buses: BusFixture) -> None:
     assert hearer.counts[bumper(buses)] == count
     assert not hearer.connected
     hearer.estop()
-    hearer.ask(keys.RESET, ResetRequest(), print, print)
+    hearer.call(keys.RESET, ResetRequest(), print, print)
     hearer.close()
     assert hearer.publisher(keys.BUMPER).put(Bumper(pressed=False)).seq == 1
 

@@ -48,7 +48,7 @@ class Asker:
         return len(self.replies) + len(self.refusals)
 
     def ask(self, *, held: bool = True, timeout_s: float = 20.0) -> None:
-        self.bus.ask(
+        self.bus.call(
             keys.RELEASE,
             ReleaseRequest(held=held),
             self.replies.append,

@@ -131,7 +131,7 @@ def test_after_a_routers_restart_all_is_as_it_was(buses: BusFixture) -> None:
             lambda: events.put(Event(name="back", level="info", text="")), lambda: late, "an event"
         )
         until_heard(
-            lambda: sender.ask(keys.RESET, ResetRequest(), replies.append, print),
+            lambda: sender.call(keys.RESET, ResetRequest(), replies.append, print),
             lambda: replies,
             "a reply",
         )

@@ -56,7 +56,7 @@ class Room:
         bus.watch_live(keys.live_key("berlin-$*", "*", "*"), lambda key, _: self.tokens.append(key))
 
     def ask(self) -> None:
-        self.bus.ask(keys.RESET, ResetRequest(), self.replies.append, print)
+        self.bus.call(keys.RESET, ResetRequest(), self.replies.append, print)
 
 
 def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixture) -> None:

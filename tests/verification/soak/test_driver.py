@@ -31,7 +31,7 @@ class Desk(Bus):
         self.reply: Callable[[Any], None] = lambda _: None
         self.refuse: Callable[[str], None] = lambda _: None
 
-    def ask(
+    def call(
         self,
         call: keys.Call[Any, Any],
         request: Any,

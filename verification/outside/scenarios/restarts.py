@@ -51,13 +51,13 @@ def restarted(bed: Testbed, name: str) -> str:
     "no RUN from the request that goes on; after a neutral one the vehicle drives",
 )
 def restarts(bed: Testbed) -> Result:
-    troubles = []
+    failures = []
     for name in ("safety", "bridge", "router"):
-        trouble = restarted(bed, name)
-        if trouble:
-            troubles.append(trouble)
+        failure = restarted(bed, name)
+        if failure:
+            failures.append(failure)
             break
-    return Result("; ".join(troubles) or "drives again each time", not troubles)
+    return Result("; ".join(failures) or "drives again each time", not failures)
 
 
 @scenario(

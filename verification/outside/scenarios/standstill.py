@@ -47,7 +47,7 @@ def ignores_stop_turning(bed: Testbed) -> Result:
 
 
 def drifts(bed: Testbed, linear: float, angular: float) -> Result:
-    """Let the standing vehicle drift, and wait for BRAKE."""
+    """Make the standing vehicle drift, and wait for BRAKE."""
     vehicle = bed.board.vehicle
     time.sleep(1.0)
     distance, heading, at = vehicle.distance, vehicle.heading, time.monotonic()
