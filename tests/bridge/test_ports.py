@@ -131,13 +131,13 @@ def test_what_was_never_answered_is_asked_for_from_the_main_port_first() -> None
 
 
 @pytest.mark.parametrize(
-    ("age", "heard"), [(0, True), (NS_PER_S // 2, True), (NS_PER_S // 2 + 1, False)]
+    ("age", "received"), [(0, True), (NS_PER_S // 2, True), (NS_PER_S // 2 + 1, False)]
 )
-def test_what_was_heard_lately(age: int, heard: bool) -> None:
+def test_a_frame_counts_as_received_for_half_a_second(age: int, received: bool) -> None:
     made = ports()
     assert not made.is_received(BumperReport, NS_PER_S)
     come(made, BumperReport, 0, NS_PER_S)
-    assert made.is_received(BumperReport, NS_PER_S + age) is heard
+    assert made.is_received(BumperReport, NS_PER_S + age) is received
 
 
 @given(st.lists(st.tuples(st.integers(1, 400), st.integers(-20, 20), st.booleans(), st.booleans())))

@@ -39,30 +39,30 @@ def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched
 
 def test_the_guard_is_ready_once_the_bridge_lives(watched: Watched) -> None:
     _, process, manager = watched
-    wait_until(lambda: "READY=1" in manager.hear(), "that it is ready")
-    assert manager.told.count("READY=1") == 1
+    wait_until(lambda: "READY=1" in manager.read(), "that it is ready")
+    assert manager.messages.count("READY=1") == 1
     environ = Path(f"/proc/{bridge_pid(process)}/environ").read_bytes()
     assert b"NOTIFY_SOCKET" not in environ, "the bridge does not speak for its guard"
     process.send_signal(signal.SIGTERM)
     assert process.wait(20) == 0
-    assert "STOPPING=1" in manager.hear()
+    assert "STOPPING=1" in manager.read()
 
 
 def test_the_guard_beats_though_the_bridge_hangs_and_not_when_it_hangs(watched: Watched) -> None:
     made, process, manager = watched
-    wait_until(lambda: "READY=1" in manager.hear(), "that it is ready")
+    wait_until(lambda: "READY=1" in manager.read(), "that it is ready")
     first, count = bridge_pid(process), len(made.motions)
     os.kill(first, signal.SIGSTOP)
     wait_until(lambda: breaks_since(made, count), "BREAK")
-    heard = manager.beats()
-    wait_until(lambda: manager.beats() > heard, "a beat while it brakes")
+    beats = manager.beats()
+    wait_until(lambda: manager.beats() > beats, "a beat while it brakes")
     wait_until(lambda: bridge_pid(process) != first, "the next bridge")
     process.send_signal(signal.SIGSTOP)
-    heard = manager.beats()
+    beats = manager.beats()
     with pytest.raises(AssertionError):
-        wait_until(lambda: manager.beats() > heard + 1, "a beat of nobody's", patience_s=0.6)
+        wait_until(lambda: manager.beats() > beats + 1, "a beat of a stopped guard", patience_s=0.6)
     process.send_signal(signal.SIGCONT)
-    wait_until(lambda: manager.beats() > heard + 1, "beats again")
+    wait_until(lambda: manager.beats() > beats + 1, "beats again")
 
 
 SUPERVISOR = """

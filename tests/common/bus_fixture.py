@@ -61,17 +61,17 @@ class BusFixture:
         return session
 
 
-def until_heard(put: Callable[[], object], heard: Callable[[], object], what: str) -> None:
-    """Put again and again until it is heard: what is put before all is declared is lost."""
+def until_received(put: Callable[[], object], received: Callable[[], object], what: str) -> None:
+    """Publish repeatedly until received: samples sent before all declarations are lost."""
 
     def once() -> object:
         put()
-        return heard()
+        return received()
 
     wait_until(once, what)
 
 
 def rising(numbers: Iterable[int]) -> bool:
-    """Tell whether each is greater than the one before."""
+    """Return whether each number is greater than the one before."""
     found = list(numbers)
     return found == sorted(set(found))

@@ -1,4 +1,4 @@
-"""systemd's end of the socket that a service reports to."""
+"""The notification socket of systemd."""
 
 import contextlib
 import os
@@ -8,10 +8,10 @@ PATIENCE_US = 200_000
 
 
 class Manager:
-    """Keeps what it was told."""
+    """Stores the notifications that it receives."""
 
     def __init__(self, name: str) -> None:
-        self.told: list[str] = []
+        self.messages: list[str] = []
         self._sock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._sock.bind(name.replace("@", "\0"))
         self._sock.setblocking(False)
@@ -21,16 +21,16 @@ class Manager:
             "WATCHDOG_PID": str(os.getpid()),
         }
 
-    def hear(self) -> list[str]:
-        """Return all that it was told up to now."""
+    def read(self) -> list[str]:
+        """Return all notifications received so far."""
         with contextlib.suppress(BlockingIOError):
             while True:
-                self.told.append(self._sock.recv(4096).decode())
-        return self.told
+                self.messages.append(self._sock.recv(4096).decode())
+        return self.messages
 
     def beats(self) -> int:
-        """Return how many beats it has heard."""
-        return self.hear().count("WATCHDOG=1")
+        """Return the number of watchdog notifications."""
+        return self.read().count("WATCHDOG=1")
 
     def close(self) -> None:
         self._sock.close()

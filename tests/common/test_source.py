@@ -44,12 +44,12 @@ def test_a_non_finite_request_is_refused(bus: FakeBus, wrong: float) -> None:
 
 def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
     loop = Loop()
-    heard: list[Arrival[Drive]] = []
+    received: list[Arrival[Drive]] = []
     sources: list[DriveSource] = []
     with (
         running(loop),
         bus_on(
-            endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*")
+            endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, received.append, source="*")
         ) as safety,
         bus_on(endpoint, loop, lambda bus: sources.append(DriveSource(bus, "demo"))),
     ):
@@ -58,24 +58,24 @@ def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
         def echoed() -> bool:
             state.put(safety_state(heartbeat=41))
             sources[0].request(0.3, 0.0)
-            return bool(heard) and heard[-1].message.echo == 41
+            return bool(received) and received[-1].message.echo == 41
 
         wait_until(echoed, "an echo of the heartbeat")
-    assert heard[-1].key.endswith("@cmd/drive/demo")
-    assert heard[-1].message.linear == 0.3
+    assert received[-1].key.endswith("@cmd/drive/demo")
+    assert received[-1].message.linear == 0.3
 
 
 @pytest.mark.parametrize(
-    ("passed_on", "is_heard", "denied"),
+    ("passed_on", "has_heartbeat", "denied"),
     [(False, True, True), (False, False, False), (True, True, False), (None, True, False)],
 )
 def test_who_may_only_watch_is_barred(
     bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
-    passed_on: bool | None, is_heard: bool, denied: bool,
+    passed_on: bool | None, has_heartbeat: bool, denied: bool,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(Publisher, "passed_on", passed_on)
     source = DriveSource(bus, "demo")
-    if is_heard:
+    if has_heartbeat:
         bus.tell(keys.SAFETY, safety_state(heartbeat=7))
     for _ in range(DENIED_AFTER - 1):
         source.request(0.1, 0.0)

@@ -1,4 +1,4 @@
-"""What systemd is told, on a real socket of the kind that it enabled on."""
+"""Notifications to systemd, on a real notification socket."""
 
 import contextlib
 import os
@@ -31,12 +31,12 @@ def test_ready_is_said_once_and_beats_when_they_are_due(manager: Manager) -> Non
         systemd.ready(now_ns)
     systemd.stopping()
     beat = "WATCHDOG=1"
-    assert manager.hear() == ["READY=1", beat, beat, beat, "STOPPING=1"]
+    assert manager.read() == ["READY=1", beat, beat, beat, "STOPPING=1"]
 
 
 def test_a_beat_alone_does_not_say_that_it_is_ready(manager: Manager) -> None:
     Systemd(manager.environ).beat(NS_PER_S)
-    assert manager.hear() == ["WATCHDOG=1"]
+    assert manager.read() == ["WATCHDOG=1"]
 
 
 def test_its_children_do_not_find_it(manager: Manager) -> None:
@@ -49,7 +49,7 @@ def test_an_abstract_socket_is_found_by_its_name() -> None:
     name = f"@t2-test-{os.getpid()}"
     with contextlib.closing(Manager(name)) as manager:
         Systemd(manager.environ).ready(0)
-        assert manager.hear()[0] == "READY=1"
+        assert manager.read()[0] == "READY=1"
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_no_beat_where_nobody_waits_for_ours(manager: Manager, watchdog: dict[st
     systemd = Systemd({"NOTIFY_SOCKET": manager.environ["NOTIFY_SOCKET"]} | watchdog)
     systemd.ready(0)
     systemd.ready(100 * NS_PER_S)
-    assert manager.hear() == ["READY=1"]
+    assert manager.read() == ["READY=1"]
 
 
 def test_without_systemd_nothing_is_said() -> None:
@@ -70,16 +70,16 @@ def test_without_systemd_nothing_is_said() -> None:
     systemd.stopping()
 
 
-@pytest.mark.timeout(20)  # whoever waits for room waits for ever
+@pytest.mark.timeout(20)  # a send that waits for space would block indefinitely
 def test_a_socket_that_is_full_holds_nobody_up(manager: Manager) -> None:
     systemd = Systemd(manager.environ)
     for n in range(2000):  # more than a queue takes
         systemd.ready(n * NS_PER_S)
     systemd.stopping()
-    heard = manager.hear()
-    assert heard[:2] == ["READY=1", "WATCHDOG=1"]
-    assert len(heard) < 2000
-    assert "STOPPING=1" not in heard
+    messages = manager.read()
+    assert messages[:2] == ["READY=1", "WATCHDOG=1"]
+    assert len(messages) < 2000
+    assert "STOPPING=1" not in messages
 
 
 @pytest.mark.timeout(20)
@@ -93,7 +93,7 @@ def test_a_socket_that_is_gone_holds_nobody_up(manager: Manager) -> None:
     with contextlib.closing(Manager(str(place))) as successor:
         systemd.ready(2 * NS_PER_S)
         systemd.stopping()
-        assert successor.hear() == ["READY=1", "WATCHDOG=1", "STOPPING=1"]
+        assert successor.read() == ["READY=1", "WATCHDOG=1", "STOPPING=1"]
 
 
 def test_ready_is_said_again_until_a_full_queue_takes_it(manager: Manager) -> None:
@@ -101,10 +101,10 @@ def test_ready_is_said_again_until_a_full_queue_takes_it(manager: Manager) -> No
     for n in range(2000):
         systemd.beat(n * NS_PER_S)
     systemd.ready(3000 * NS_PER_S)
-    assert "READY=1" not in manager.hear()
+    assert "READY=1" not in manager.read()
     systemd.ready(3001 * NS_PER_S)
     systemd.ready(3002 * NS_PER_S)
-    assert manager.hear().count("READY=1") == 1
+    assert manager.read().count("READY=1") == 1
 
 
 # --- a service ----------------------------------------------------------------------------------
@@ -118,14 +118,16 @@ def test_a_service_is_ready_when_its_loop_runs_and_beats_until_it_hangs(
     where = f"tcp/127.0.0.1:{free_port()}"  # there is no router, and it is there all the same
     with program(SPECIMEN, "hanging", *on(where, "001")) as it:
         wait_until(lambda: manager.beats() > 3, "beats")
-        assert manager.told[0] == "READY=1"
+        assert manager.messages[0] == "READY=1"
         it.process.send_signal(signal.SIGUSR1)  # its loop hangs from here on
         it.wait_for("hangs")
-        heard = manager.beats()
+        beats = manager.beats()
         with pytest.raises(AssertionError):
-            wait_until(lambda: manager.beats() > heard, "a beat of nobody's", patience_s=0.6)
+            wait_until(
+                lambda: manager.beats() > beats, "a beat of a service that hangs", patience_s=0.6
+            )
         it.process.send_signal(signal.SIGUSR1)
-        wait_until(lambda: manager.beats() > heard, "beats again")
+        wait_until(lambda: manager.beats() > beats, "beats again")
         it.process.send_signal(signal.SIGTERM)
         assert it.code() == 0
-    assert "STOPPING=1" in manager.hear()
+    assert "STOPPING=1" in manager.read()

@@ -14,7 +14,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
 from common.messages import Bumper, Done, Drive, ReleaseRequest
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 ZENOH = Path(sys.executable).parent / "zenoh"
@@ -50,7 +50,7 @@ def test_it_shows_our_messages(buses: BusFixture, watching: "subprocess.Popen[st
     bus = buses.bus()
     publisher = bus.publisher(keys.BUMPER)
     # What is put before it has subscribed is lost; a match tells that it has.
-    until_heard(
+    until_received(
         lambda: publisher.put(Bumper(pressed=True)),
         lambda: publisher.passed_on,
         "the subscription",
@@ -81,14 +81,14 @@ def test_it_shows_what_is_no_message_and_lives_on(
 
 
 def test_it_puts_a_message_that_we_understand(buses: BusFixture) -> None:
-    heard: list[Arrival[Drive]] = []
-    buses.bus(lambda bus: bus.subscribe(keys.DRIVE, heard.append, source="*"))
+    received: list[Arrival[Drive]] = []
+    buses.bus(lambda bus: bus.subscribe(keys.DRIVE, received.append, source="*"))
     key = keys.DRIVE.on(buses.robot, source="web")
     text = '{"linear": 0.25, "angular": 0, "echo": 1}'
     done = zenoh(buses, "put", "-k", key, "--encoder", "t2", "-v", text)
     assert done.returncode == 0, done.stderr
-    wait_until(lambda: heard, "the message")
-    message = heard[0].message
+    wait_until(lambda: received, "the message")
+    message = received[0].message
     assert (message.linear, message.echo, message.seq) == (0.25, 1, 1)
     assert message.boot != 0
 

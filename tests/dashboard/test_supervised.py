@@ -28,8 +28,8 @@ def test_the_service_is_ready_once_it_serves(
         monkeypatch.setenv(name, manager.environ[name])
     with dashboard("tcp/127.0.0.1:1", tmp_path):
         wait_until(lambda: manager.beats() > 1, "beats", 2 * PATIENCE_S)
-        assert manager.told[0] == "READY=1"
-    assert manager.hear()[-1] == "STOPPING=1"
+        assert manager.messages[0] == "READY=1"
+    assert manager.read()[-1] == "STOPPING=1"
 
 
 def test_both_loops_must_run_for_a_notification(manager: Manager) -> None:
@@ -37,7 +37,7 @@ def test_both_loops_must_run_for_a_notification(manager: Manager) -> None:
     with contextlib.closing(Loop()) as loop:
         host.__dict__.update(_node=SimpleNamespace(loop=loop), _systemd=Systemd(manager.environ))
         host._alive()
-        assert manager.hear() == []
+        assert manager.read() == []
         loop.post(loop.stop)
         loop.run()
-        assert manager.hear() == ["READY=1", "WATCHDOG=1"]
+        assert manager.read() == ["READY=1", "WATCHDOG=1"]

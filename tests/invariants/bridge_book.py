@@ -69,8 +69,8 @@ class BridgeBook:
 
     def ready(self, now_ns: int) -> bool:
         """Return whether the board is connected, with both brakes on."""
-        heard = self.heard_ns is not None and now_ns - self.heard_ns <= SILENCE_NS + SLACK_NS
-        return heard and self.ultrasonic is True and self.bumper is True
+        connected = self.heard_ns is not None and now_ns - self.heard_ns <= SILENCE_NS + SLACK_NS
+        return connected and self.ultrasonic is True and self.bumper is True
 
     def complaints(self, now_ns: int) -> Iterator[str]:
         """Yield the reasons why no RUN may be sent now."""

@@ -201,8 +201,8 @@ class SafetyBook:
     def may_reset(self, now_ns: int) -> bool:
         """Tell whether a reset may be granted at all: standing, nobody asking."""
         at_ns, velocity = self.samples.get("velocity", (0, None))
-        heard = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
-        stands = heard and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
+        fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
+        stands = fresh and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
         asked = any(
             self.is_fresh(source, now_ns) and not wish.still for source, wish in self.wishes.items()
         )

@@ -19,7 +19,7 @@ from services.metrics import exporter
 from services.metrics.exporter import call_in_loop
 from services.metrics.samples import FAMILIES
 from tests.cli.inspect.tool import pretend
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from tests.metrics.robots import event, health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
@@ -28,13 +28,13 @@ from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 
-def test_scrape_of_a_running_robot(rig: BusFixture, tmp_path: Path) -> None:
-    robot = {"robot": rig.robot}
-    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
+def test_scrape_of_a_running_robot(buses: BusFixture, tmp_path: Path) -> None:
+    robot = {"robot": buses.robot}
+    with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
-        pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
-        pretend(rig, "safety", {keys.SAFETY: lambda: safety("estop")})
-        pretend(rig, "odom", {keys.ODOMETRY: odometry})
+        pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
+        pretend(buses, "safety", {keys.SAFETY: lambda: safety("estop")})
+        pretend(buses, "odom", {keys.ODOMETRY: odometry})
         wanted = {"t2_link_up", "t2_safety_latched", "t2_odometry_slip", "t2_service_info"}
         wait_until(lambda: wanted <= names(scraped(port)), "every stream")
         assert value(port, "t2_robot_up", **robot) == 1
@@ -47,10 +47,10 @@ def test_scrape_of_a_running_robot(rig: BusFixture, tmp_path: Path) -> None:
     assert names(found) <= known
 
 
-def test_a_dead_robot_has_no_values(rig: BusFixture, tmp_path: Path) -> None:
-    robot = {"robot": rig.robot}
-    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
-        bus = pretend(rig, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
+def test_a_dead_robot_has_no_values(buses: BusFixture, tmp_path: Path) -> None:
+    robot = {"robot": buses.robot}
+    with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
+        bus = pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
         wait_until(
             lambda: value(port, "t2_service_up", service="bridge", **robot) == 1, "the robot"
         )
@@ -71,18 +71,18 @@ def test_a_dead_robot_has_no_values(rig: BusFixture, tmp_path: Path) -> None:
         )
 
 
-def test_all_robots_of_a_site_are_exported(rig: BusFixture, tmp_path: Path) -> None:
+def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) -> None:
     root = "t2/v1"
-    site, stranger = f"{rig.robot}s", rig.session()
+    site, stranger = f"{buses.robot}s", buses.session()
 
     def put() -> None:
-        for robot in (f"{site}-1", f"{site}-2", f"other-{rig.robot}"):
+        for robot in (f"{site}-1", f"{site}-2", f"other-{buses.robot}"):
             stranger.put(f"{root}/{robot}/tel/bridge/link", codec.encode(link()))
         only_named = f"{root}/{site}-3/tel/dashboard/health"
         stranger.put(only_named, codec.encode(health("dashboard")))
 
-    with running(rig.endpoint, tmp_path, f"metrics.robots={site}-$*") as port:
-        until_heard(
+    with running(buses.endpoint, tmp_path, f"metrics.robots={site}-$*") as port:
+        until_received(
             put,
             lambda: {
                 dict(labels).get("robot")
@@ -95,19 +95,19 @@ def test_all_robots_of_a_site_are_exported(rig: BusFixture, tmp_path: Path) -> N
         assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # only a laptop has its id
 
 
-def test_events_are_counted_and_set_disk_full(rig: BusFixture, tmp_path: Path) -> None:
-    robot = {"robot": rig.robot}
+def test_events_are_counted_and_set_disk_full(buses: BusFixture, tmp_path: Path) -> None:
+    robot = {"robot": buses.robot}
     labels = {"event": "disk_full", "level": "error", "service": "recorder"}
-    with running(rig.endpoint, tmp_path, f"robot.id={rig.robot}") as port:
+    with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
         made: list[m.Health] = []
 
         def healthy() -> m.Health:
             made.append(health("recorder"))
             return made[-1]
 
-        bus = pretend(rig, "recorder", {keys.HEALTH: healthy}, service="recorder")
+        bus = pretend(buses, "recorder", {keys.HEALTH: healthy}, service="recorder")
         events = bus.publisher(keys.EVENTS, service="recorder")
-        until_heard(
+        until_received(
             lambda: events.put(event("disk_full")),
             lambda: value(port, "t2_events_total", **labels, **robot),
             "the event",
@@ -128,25 +128,25 @@ def test_router_loss_is_exported(tmp_path: Path) -> None:
             stack.close()
 
 
-def test_certificates_are_read_from_the_member_list(rig: BusFixture, tmp_path: Path) -> None:
+def test_certificates_are_read_from_the_member_list(buses: BusFixture, tmp_path: Path) -> None:
     members = tmp_path / "members.json"
     end = datetime(2030, 1, 1, tzinfo=UTC)
     one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
     members.write_bytes(msgspec.json.encode(Members(site="berlin", members=(one,))))
     labels = {"role": "driver", "name": "anna"}
     name = "t2_certificate_expiry_timestamp_seconds"
-    with running(rig.endpoint, tmp_path, f"bus.members={members}") as port:
+    with running(buses.endpoint, tmp_path, f"bus.members={members}") as port:
         assert value(port, name, **labels) == end.timestamp()
-    with running(rig.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
+    with running(buses.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
         assert value(port, name, **labels) is None
     assert "cannot read the member list" in (tmp_path / "metrics.log").read_text()
 
 
 def test_a_taken_port_is_an_error(
-    rig: BusFixture, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    buses: BusFixture, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with running(rig.endpoint, tmp_path) as port:
-        words = [f"bus.connect={rig.endpoint}", f"metrics.port={port}"]
+    with running(buses.endpoint, tmp_path) as port:
+        words = [f"bus.connect={buses.endpoint}", f"metrics.port={port}"]
         done = subprocess.run(
             [sys.executable, "-m", "services.metrics", *(w for t in words for w in ("--set", t))],
             capture_output=True, text=True, timeout=60, check=False,

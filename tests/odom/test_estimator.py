@@ -58,16 +58,16 @@ def test_after_lost_frames_distance_and_heading_are_those_of_the_counters(
     """Whatever is lost: the heading is the counters', and the way is no longer than they say."""
     odom = started()
     odom.board.coarse = coarse
-    for linear, angular, heard in way:
+    for linear, angular, received in way:
         odom.board.linear, odom.board.angular = linear, angular
-        for counters, velocity in heard:
+        for counters, velocity in received:
             odom.board.tick()
             odom.update(counters=counters, velocity=velocity)
     odom.board.tick()
     odom.update()
     pose, board = odom.pose(), odom.board
     assert apart(pose, board.truth)[1] <= math.radians(0.05) + 1e-9
-    fastest = sum(abs(linear) * len(heard) for linear, _, heard in way) + 1.5
+    fastest = sum(abs(linear) * len(received) for linear, _, received in way) + 1.5
     assert math.hypot(pose.x, pose.y) <= fastest * TICK_NS / NS_PER_S + 0.001 * (len(way) + 1)
 
 
@@ -77,12 +77,12 @@ def test_counters_alone_make_arcs_of_what_was_not_lost(
 ) -> None:
     odom = started()
     expected, distance, turn = Pose(0.0, 0.0, 0.0), 0.0, 0.0
-    for linear, angular, heard in way:
+    for linear, angular, received in way:
         odom.board.linear, odom.board.angular = linear, angular
         odom.board.tick()
         distance += linear * TICK_NS / NS_PER_S
         turn += angular * TICK_NS / NS_PER_S
-        if heard:
+        if received:
             odom.update(velocity=False)
             expected, distance, turn = expected.moved(distance, turn), 0.0, 0.0
     assert apart(odom.estimator._predicted.pose, expected) == EXACT
@@ -94,10 +94,10 @@ def test_lost_counters_leave_no_error_while_velocities_come(
 ) -> None:
     """A gap in the counters costs nothing: the velocities know the shape of the way."""
     odom = started()
-    for linear, angular, heard in way:
+    for linear, angular, received in way:
         odom.board.linear, odom.board.angular = linear, angular
         odom.update(counters=False)
-        for counters, _ in heard:
+        for counters, _ in received:
             odom.board.tick()
             odom.update(counters=counters)
     assert odom.off() == EXACT
@@ -105,12 +105,12 @@ def test_lost_counters_leave_no_error_while_velocities_come(
 
 @given(speeds, turnings, st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60))
 def test_any_loss_on_a_constant_arc_leaves_no_error(
-    linear: float, angular: float, heard: list[tuple[bool, bool]]
+    linear: float, angular: float, received: list[tuple[bool, bool]]
 ) -> None:
     odom = started()
     odom.board.linear, odom.board.angular = linear, angular
     odom.update(counters=False)
-    for counters, velocity in heard:
+    for counters, velocity in received:
         odom.board.tick()
         odom.update(counters=counters, velocity=velocity)
     odom.board.tick()

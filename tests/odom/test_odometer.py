@@ -29,7 +29,7 @@ class World:
     """A bridge that drives an arc, a reader of what odometry makes of it, and a caller."""
 
     def __init__(self) -> None:
-        self.heard: list[m.Odometry] = []
+        self.received: list[m.Odometry] = []
         self.events: list[str] = []
         self.speaking = True
         self.velocity: m.Velocity = m.Velocity(linear=SPEED, angular=TURNING)
@@ -47,7 +47,7 @@ class World:
         bus.subscribe(keys.EVENTS, self._on_event, depth=100, service="odom")
 
     def _on_odometry(self, arrival: Arrival[m.Odometry]) -> None:
-        self.heard.append(arrival.message)
+        self.received.append(arrival.message)
 
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
         self.events.append(arrival.message.name)
@@ -100,7 +100,7 @@ def world(endpoint: str, service: subprocess.Popen[bytes]) -> Iterator[World]:
     world, loop = World(), Loop()
     with running(loop), bus_on(endpoint, loop, world.declare):
         loop.post(lambda: loop.every(PERIOD_S, world.tick))
-        wait_until(lambda: world.heard, "odometry")
+        wait_until(lambda: world.received, "odometry")
         yield world
 
 
@@ -114,12 +114,12 @@ def trajectory(endpoint: str) -> Any:
 
 
 def test_the_drive_is_followed(endpoint: str, world: World) -> None:
-    wait_until(lambda: len(world.heard) > 50 and world.heard[-1].x > 0.5, "half a metre")
-    last = world.heard[-1]
+    wait_until(lambda: len(world.received) > 50 and world.received[-1].x > 0.5, "half a metre")
+    last = world.received[-1]
     assert last.y > 0  # it turns to the left
     assert (last.linear, last.angular) == (SPEED, TURNING)
     assert (last.frame_id, last.child_frame_id, last.epoch) == ("odom", "base_link", 0)
-    assert world.heard[0].x < 0.5  # the counters stand at 100 m
+    assert world.received[0].x < 0.5  # the counters stand at 100 m
     path = trajectory(endpoint)
     assert path["frame_id"] == "odom"
     assert len(path["points"]) >= 3
@@ -129,12 +129,13 @@ def test_the_drive_is_followed(endpoint: str, world: World) -> None:
 def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: World) -> None:
     bad = float("nan")
     wait_until(
-        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)), "heard safety"
+        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)),
+        "a received heartbeat",
     )
     pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.heartbeat)
     assert "x 10.000 m" in world.ask(pose)
-    wait_until(lambda: world.heard[-1].epoch == 1, "the new pose")
-    first = next(odometry for odometry in world.heard if odometry.epoch == 1)
+    wait_until(lambda: world.received[-1].epoch == 1, "the new pose")
+    first = next(odometry for odometry in world.received if odometry.epoch == 1)
     assert first.x == pytest.approx(10.0, abs=2.0)
     assert first.y == pytest.approx(-5.0, abs=2.0)
     assert all(point[0] > 5 for point in trajectory(endpoint)["points"])
@@ -143,7 +144,8 @@ def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: Wo
 def test_a_pose_that_was_asked_late_is_refused(world: World) -> None:
     bad = float("nan")
     wait_until(
-        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)), "heard safety"
+        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)),
+        "a received heartbeat",
     )
     late = m.PoseRequest(x=10.0, echo=world.heartbeat)
     due_s = time.monotonic() + 1.1
@@ -151,29 +153,29 @@ def test_a_pose_that_was_asked_late_is_refused(world: World) -> None:
     assert "allowed is 1 s" in world.ask(late)
     assert "no echo" in world.ask(m.PoseRequest(x=10.0))
     assert "unknown heartbeat" in world.ask(m.PoseRequest(x=10.0, echo=1))
-    assert world.heard[-1].epoch == 0
+    assert world.received[-1].epoch == 0
 
 
 def test_silence_is_told_and_nothing_old_is_published_again(world: World) -> None:
     world.speaking = False
     wait_until(lambda: "silent" in world.events, "word of the silence")
-    count = len(world.heard)
+    count = len(world.received)
     quiet_until = time.monotonic() + 0.3
     wait_until(lambda: time.monotonic() > quiet_until, "a while")
-    assert len(world.heard) == count
+    assert len(world.received) == count
     world.speaking = True
     wait_until(lambda: world.events.count("heard") >= 2, "word of the return")
-    wait_until(lambda: len(world.heard) > count, "odometry again")
+    wait_until(lambda: len(world.received) > count, "odometry again")
 
 
 def test_restart_slip_and_refusal_are_told(world: World) -> None:
-    wait_until(lambda: len(world.heard) > 25, "odometry that has heard the counters, too")
+    wait_until(lambda: len(world.received) > 25, "odometry that has received the counters, too")
     world.epoch, world.origin = 1, -50.0
     wait_until(lambda: "reanchored" in world.events, "word of the restart")
-    assert abs(world.heard[-1].x) < 30
+    assert abs(world.received[-1].x) < 30
     world.velocity = m.Velocity(linear=-SPEED, angular=TURNING)
     wait_until(lambda: "slip" in world.events, "word of the slip")
-    wait_until(lambda: any(odometry.slip for odometry in world.heard), "odometry that slips")
+    wait_until(lambda: any(odometry.slip for odometry in world.received), "odometry that slips")
     world.velocity = m.Velocity(linear=float("nan"), angular=0.0)
     wait_until(lambda: "slip_over" in world.events, "the counters alone")
 

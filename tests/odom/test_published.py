@@ -102,9 +102,9 @@ def test_covariance_is_symmetric_and_semidefinite(
     way: list[tuple[float, float, list[tuple[bool, bool]]]],
 ) -> None:
     odom = started()
-    for linear, angular, heard in way:
+    for linear, angular, received in way:
         odom.board.linear, odom.board.angular = linear, angular
-        for counters, velocity in heard:
+        for counters, velocity in received:
             odom.board.tick(2)
             odom.update(counters=counters, velocity=velocity)
     odom.update()

@@ -25,17 +25,17 @@ from services.recorder.reader import Reader, RecordedMessage
 from services.recorder.recorder import Recorder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from tests.recorder import samples
 from verification.harness.bus import running
 from verification.harness.host import StallRecorder
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 
-def sets(rig: BusFixture, folder: Path, *more: str) -> list[str]:
+def sets(buses: BusFixture, folder: Path, *more: str) -> list[str]:
     return [
-        f"bus.connect={rig.endpoint}",
-        f"robot.id={rig.robot}",
+        f"bus.connect={buses.endpoint}",
+        f"robot.id={buses.robot}",
         f"recorder.folder={folder}",
         "recorder.free=1",
         *more,
@@ -43,9 +43,9 @@ def sets(rig: BusFixture, folder: Path, *more: str) -> list[str]:
 
 
 @contextmanager
-def recorder(rig: BusFixture, folder: Path, *more: str) -> Iterator[None]:
+def recorder(buses: BusFixture, folder: Path, *more: str) -> Iterator[None]:
     """Record in this process while the context lasts."""
-    node = Node("recorder", load(RecorderConfig, Sources(sets=sets(rig, folder, *more))))
+    node = Node("recorder", load(RecorderConfig, Sources(sets=sets(buses, folder, *more))))
     Recorder(node)
     node.bus.open()
     with running(node.loop):
@@ -55,10 +55,10 @@ def recorder(rig: BusFixture, folder: Path, *more: str) -> Iterator[None]:
     node.bus.close()
 
 
-def recorder_events(rig: BusFixture) -> list[Event]:
+def recorder_events(buses: BusFixture) -> list[Event]:
     """Return the recorder's events, also earlier ones."""
     found: list[Event] = []
-    rig.bus(
+    buses.bus(
         lambda bus: bus.subscribe(
             keys.EVENTS, lambda a: found.append(a.message), depth=64, service="recorder"
         )
@@ -87,16 +87,16 @@ def paths(found: list[RecordedMessage]) -> set[str]:
     return {each.key.split("/", 3)[3] for each in found}
 
 
-def test_every_key_is_recorded_with_raw_frames(rig: BusFixture, tmp_path: Path) -> None:
-    stranger = rig.session()
-    root = f"t2/v1/{rig.robot}"
-    with recorder(rig, tmp_path, "recorder.everything=true"):
+def test_every_key_is_recorded_with_raw_frames(buses: BusFixture, tmp_path: Path) -> None:
+    stranger = buses.session()
+    root = f"t2/v1/{buses.robot}"
+    with recorder(buses, tmp_path, "recorder.everything=true"):
         stranger.put(f"{root}/estop", b"")
         stranger.put(f"{root}/@cmd/motion", b"\x80", encoding="x/y")
         stranger.put(f"{root}/tel/bridge/velocity", b"\x80", attachment=b"frame")
         stranger.delete(f"{root}/tel/mine/gone")
         stranger.put("t2/v1/another/tel/x", b"")
-        until_heard(
+        until_received(
             lambda: stranger.put(f"{root}/tel/mine/last", b""),
             lambda: "tel/mine/last" in paths(read(tmp_path)),
             "all of it in a file that is still being written",
@@ -109,15 +109,15 @@ def test_every_key_is_recorded_with_raw_frames(rig: BusFixture, tmp_path: Path) 
     assert "t2/v1/another/tel/x" not in found
 
 
-def test_a_latch_writes_the_black_box(rig: BusFixture, tmp_path: Path) -> None:
-    events, numbers = recorder_events(rig), count()
+def test_a_latch_writes_the_black_box(buses: BusFixture, tmp_path: Path) -> None:
+    events, numbers = recorder_events(buses), count()
     latched: list[str] = []
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
-    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(rig, tmp_path, "recorder.tail=1"):
-        heard: list[m.Velocity] = []
-        rig.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: heard.append(a.message)))
-        wait_until(lambda: len(heard) > 50, "some history")
+    pretend(buses, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
+    pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
+    with recorder(buses, tmp_path, "recorder.tail=1"):
+        received: list[m.Velocity] = []
+        buses.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: received.append(a.message)))
+        wait_until(lambda: len(received) > 50, "some history")
         assert read(tmp_path) == []
         latched.append("contact")
         wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
@@ -132,20 +132,20 @@ def test_a_latch_writes_the_black_box(rig: BusFixture, tmp_path: Path) -> None:
     assert velocities == sorted(velocities)
     with Reader(path) as reader:
         list(reader)
-    assert reader.about["robot"] == rig.robot
+    assert reader.about["robot"] == buses.robot
     assert reader.about["why"] == "latch-contact"
 
 
-def test_without_room_nothing_is_written(rig: BusFixture, tmp_path: Path) -> None:
-    events = recorder_events(rig)
+def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> None:
+    events = recorder_events(buses)
     latched: list[str] = []
-    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
+    pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
     all_of_it = "recorder.free=1000000"  # a terabyte
-    with recorder(rig, tmp_path, all_of_it, "recorder.everything=true"):
+    with recorder(buses, tmp_path, all_of_it, "recorder.everything=true"):
         wait_until(lambda: "disk_full" in [each.name for each in events], "the first event")
-        heard: list[m.SafetyState] = []
-        rig.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: heard.append(a.message)))
-        wait_until(lambda: len(heard) > 10, "safety's word")
+        received: list[m.SafetyState] = []
+        buses.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: received.append(a.message)))
+        wait_until(lambda: len(received) > 10, "safety's word")
         latched.append("estop")
         wait_until(lambda: "black_box_lost" in [each.name for each in events], "the second event")
     assert list(tmp_path.iterdir()) == []
@@ -155,9 +155,9 @@ def test_without_room_nothing_is_written(rig: BusFixture, tmp_path: Path) -> Non
 
 
 def test_an_incident_replaces_old_recordings_on_a_full_disk(
-    rig: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    buses: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stem = f"{rig.robot}-2026"
+    stem = f"{buses.robot}-2026"
     old = [f"{stem}0101-00000{n}{why}.mcap" for why in ("", "-latch-contact") for n in range(3)]
     for name in old:
         (tmp_path / name).write_bytes(bytes(MB))
@@ -168,13 +168,13 @@ def test_an_incident_replaces_old_recordings_on_a_full_disk(
         return SimpleNamespace(free=15.5 * MB - used)
 
     monkeypatch.setattr(shutil, "disk_usage", usage)
-    events = recorder_events(rig)
+    events = recorder_events(buses)
     latched: list[str] = []
-    pretend(rig, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(rig, tmp_path, "recorder.free=12", "recorder.tail=1"):
-        heard: list[m.SafetyState] = []
-        rig.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: heard.append(a.message)))
-        wait_until(lambda: len(heard) > 10, "safety's state")
+    pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
+    with recorder(buses, tmp_path, "recorder.free=12", "recorder.tail=1"):
+        received: list[m.SafetyState] = []
+        buses.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: received.append(a.message)))
+        wait_until(lambda: len(received) > 10, "safety's state")
         latched.append("estop")
         wait_until(lambda: "black_box" in [each.name for each in events], "the incident")
     (path,) = tmp_path.glob("*-latch-estop.mcap")
@@ -187,7 +187,7 @@ def test_an_incident_replaces_old_recordings_on_a_full_disk(
     assert not {"disk_full", "black_box_lost"} & {each.name for each in events}
 
 
-def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None:
+def test_sigkill_loses_at_most_a_second(buses: BusFixture, tmp_path: Path) -> None:
     numbers = count(1)
     put: list[m.Velocity] = []
 
@@ -195,8 +195,10 @@ def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None
         put.append(samples.velocity(next(numbers)))
         return put[-1]
 
-    pretend(rig, "bridge", {keys.VELOCITY: velocity})
-    words = [w for each in sets(rig, tmp_path, "recorder.everything=true") for w in ("--set", each)]
+    pretend(buses, "bridge", {keys.VELOCITY: velocity})
+    words = [
+        w for each in sets(buses, tmp_path, "recorder.everything=true") for w in ("--set", each)
+    ]
     with subprocess.Popen(
         [sys.executable, "-m", "services.recorder", *words], stderr=subprocess.DEVNULL
     ) as process:
@@ -217,10 +219,10 @@ def test_sigkill_loses_at_most_a_second(rig: BusFixture, tmp_path: Path) -> None
     assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * stall_s
 
 
-def test_an_invalid_safety_state_is_recorded_and_ignored(rig: BusFixture, tmp_path: Path) -> None:
-    stranger, key = rig.session(), keys.SAFETY.on(rig.robot)
-    with recorder(rig, tmp_path, "recorder.everything=true"):
-        until_heard(
+def test_an_invalid_safety_state_is_recorded_and_ignored(buses: BusFixture, tmp_path: Path) -> None:
+    stranger, key = buses.session(), keys.SAFETY.on(buses.robot)
+    with recorder(buses, tmp_path, "recorder.everything=true"):
+        until_received(
             lambda: stranger.put(key, b"\x80", encoding=codec.encoding(m.SafetyState)),
             lambda: [each for each in read(tmp_path) if each.key == key],
             "it in the file",
@@ -229,15 +231,15 @@ def test_an_invalid_safety_state_is_recorded_and_ignored(rig: BusFixture, tmp_pa
 
 
 def test_a_disk_error_ends_the_file_and_nothing_else(
-    rig: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    buses: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    events, numbers = recorder_events(rig), count()
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
+    events, numbers = recorder_events(buses), count()
+    pretend(buses, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
 
     def refuse(_: RecordingWriter) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with recorder(rig, tmp_path, "recorder.everything=true"):
+    with recorder(buses, tmp_path, "recorder.everything=true"):
         wait_until(lambda: read(tmp_path), "a recording")
         monkeypatch.setattr(RecordingWriter, "flush", refuse)
         wait_until(lambda: "disk_full" in [each.name for each in events], "the event")
@@ -249,11 +251,11 @@ def test_a_disk_error_ends_the_file_and_nothing_else(
     assert "No space left on device" in full.text
 
 
-def test_t2_record_completes_its_files_on_ctrl_c(rig: BusFixture, tmp_path: Path) -> None:
+def test_t2_record_completes_its_files_on_ctrl_c(buses: BusFixture, tmp_path: Path) -> None:
     numbers = count()
-    pretend(rig, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
-    where = ["--set", f"bus.connect={rig.endpoint}", "--set", "recorder.free=1"]
-    words = ["record", "--folder", str(tmp_path), "--robot", rig.robot, *where]
+    pretend(buses, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
+    where = ["--set", f"bus.connect={buses.endpoint}", "--set", "recorder.free=1"]
+    words = ["record", "--folder", str(tmp_path), "--robot", buses.robot, *where]
     with subprocess.Popen(
         [sys.executable, "-m", "cli", *words], stderr=subprocess.DEVNULL
     ) as process:

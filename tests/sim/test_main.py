@@ -56,7 +56,7 @@ class Bench:
         """Send a frame to the board from the PC's first port."""
         self.pc[0].sendto(FRAMING.pack(frame), ("127.0.0.1", self.port))
 
-    def heard(self, index: int = 0) -> list[Any]:
+    def received(self, index: int = 0) -> list[Any]:
         """Return the frames that wait at one of the PC's ports."""
         frames: list[Any] = []
         with suppress(BlockingIOError):
@@ -90,7 +90,7 @@ def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
     command = [sys.executable, "-m", "sim", *bench.arguments, *words]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
         try:
-            wait_until(lambda: bench.heard(), "the board's first frame")
+            wait_until(lambda: bench.received(), "the board's first frame")
             yield running
         finally:
             running.kill()
@@ -98,11 +98,11 @@ def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
 
 def test_a_process_streams_drives_and_ends_on_sigterm(bench: Bench) -> None:
     with process(bench, "--world", "empty") as running:
-        wait_until(lambda: VelocityReport(0, 0) in bench.heard(1), "the second port's stream")
+        wait_until(lambda: VelocityReport(0, 0) in bench.received(1), "the second port's stream")
         bench.send(MotionCommand(MotionKind.RUN, 500))
-        wait_until(lambda: VelocityReport(500, 0) in bench.heard(), "500 mm/s")
+        wait_until(lambda: VelocityReport(500, 0) in bench.received(), "500 mm/s")
         bench.send(BumperQuery())
-        wait_until(lambda: BumperReport(False) in bench.heard(), "the bumper's answer")
+        wait_until(lambda: BumperReport(False) in bench.received(), "the bumper's answer")
         running.send_signal(signal.SIGTERM)
         assert running.wait(PATIENCE_S) == 0
     (command,) = bench.lines("command")
@@ -161,10 +161,10 @@ def disturb(bench: Bench, control: Control) -> None:
     """Do a little of everything, and see it on the wire."""
     control.do(Bumper(pressed=True))
     bench.send(BumperQuery())
-    wait_until(lambda: BumperReport(True) in bench.heard(), "a pressed bumper")
+    wait_until(lambda: BumperReport(True) in bench.received(), "a pressed bumper")
     control.do(Wire(direction="to_pc", foreign=1.0))
     bench.send(BumperQuery())
-    wait_until(lambda: BumperReport(True) in bench.heard(), "the same from elsewhere")
+    wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
     control.do(Wire())
     control.do(AddBox(box=Box(name="crate", x=0.0, y=-1.0, length=0.4, width=0.4)))
     control.do(Place(x=0.0, y=0.2))
@@ -226,7 +226,7 @@ def test_without_control_port_and_trace_there_is_neither(bench: Bench) -> None:
     words = bench.arguments[2:-2]  # without --trace and sim.control_port
     command = [sys.executable, "-m", "sim", *words]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
-        wait_until(lambda: bench.heard(), "the board's first frame")
+        wait_until(lambda: bench.received(), "the board's first frame")
         assert not answers(bench.control_port)
         running.terminate()
         assert running.wait(PATIENCE_S) == 0

@@ -26,12 +26,12 @@ NOT_CONFIRMED = "not confirmed: safety's state does not show this reset"
 class Safety:
     """Publishes a state whose heartbeat rises, and serves calls as configured."""
 
-    def __init__(self, rig: BusFixture, *serves: Serve) -> None:
+    def __init__(self, buses: BusFixture, *serves: Serve) -> None:
         self.heartbeat = 100
         self.latched = True
         self.asked: list[Any] = []
         self._serves = serves
-        self.bus = pretend(rig, "safety", {keys.SAFETY: self.state}, self.declare)
+        self.bus = pretend(buses, "safety", {keys.SAFETY: self.state}, self.declare)
 
     def declare(self, bus: Bus) -> None:
         for call, answer in self._serves:
@@ -69,9 +69,9 @@ def done(_: Safety, caller: Caller[m.Done]) -> None:
 
 
 def test_a_reset_names_the_latched_causes_and_is_confirmed_by_the_state(
-    rig: BusFixture, tool: Tool
+    buses: BusFixture, tool: Tool
 ) -> None:
-    safety = Safety(rig, (keys.RESET, obey))
+    safety = Safety(buses, (keys.RESET, obey))
     result = tool("call", "safety/reset", "--text")
     assert (result.code, result.err) == (0, CLEARS)
     assert "text: Reset." in result.out
@@ -82,8 +82,8 @@ def test_a_reset_names_the_latched_causes_and_is_confirmed_by_the_state(
     assert 100 < request.echo <= safety.heartbeat
 
 
-def test_a_reset_without_effect_is_not_confirmed(rig: BusFixture, tool: Tool) -> None:
-    Safety(rig, (keys.RESET, lie))
+def test_a_reset_without_effect_is_not_confirmed(buses: BusFixture, tool: Tool) -> None:
+    Safety(buses, (keys.RESET, lie))
     result = tool("call", "safety/reset")
     assert result.code == 1
     assert NOT_CONFIRMED in result.err
@@ -92,15 +92,15 @@ def test_a_reset_without_effect_is_not_confirmed(rig: BusFixture, tool: Tool) ->
 @pytest.mark.parametrize(
     "payload", [b"ok", codec.encode(m.Done(text="ok")), codec.encode(m.ResetDone(text="ok"))]
 )
-def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: BusFixture, tool: Tool) -> None:
-    Safety(rig)
-    key = keys.RESET.on(rig.robot)
+def test_a_rogue_answer_is_not_confirmed(payload: bytes, buses: BusFixture, tool: Tool) -> None:
+    Safety(buses)
+    key = keys.RESET.on(buses.robot)
 
     def answer(query: zenoh.Query) -> None:
         query.reply(key, payload)
         query.drop()
 
-    queryable = rig.session().declare_queryable(key, answer)
+    queryable = buses.session().declare_queryable(key, answer)
     result = tool("call", "safety/reset")
     assert result.code == 1
     assert NOT_CONFIRMED in result.err
@@ -120,10 +120,10 @@ def test_a_rogue_answer_is_not_confirmed(payload: bytes, rig: BusFixture, tool: 
     ],
 )
 def test_every_operator_call_echoes_the_newest_state(
-    words: tuple[str, ...], call: keys.Call[Any, Any], meant: Any, rig: BusFixture, tool: Tool
+    words: tuple[str, ...], call: keys.Call[Any, Any], meant: Any, buses: BusFixture, tool: Tool
 ) -> None:
     reply = m.Switches() if call is keys.SET_SWITCHES else m.Done(text="done")
-    safety = Safety(rig, (call, lambda _, caller: caller.reply(reply)))
+    safety = Safety(buses, (call, lambda _, caller: caller.reply(reply)))
     result = tool("call", *words)
     assert (result.code, result.err) == (0, "")
     (asked,) = safety.asked
@@ -131,15 +131,15 @@ def test_every_operator_call_echoes_the_newest_state(
     assert asked == msgspec.structs.replace(meant, echo=asked.echo)
 
 
-def test_given_values_are_kept(rig: BusFixture, tool: Tool) -> None:
-    safety = Safety(rig, (keys.RESET, obey), (keys.SET_POSE, done))
+def test_given_values_are_kept(buses: BusFixture, tool: Tool) -> None:
+    safety = Safety(buses, (keys.RESET, obey), (keys.SET_POSE, done))
     assert tool("call", "odom/reset", '{"echo": 7}').code == 0
     assert tool("call", "safety/reset", '{"echo": 7, "causes": [8]}').err == ""
     assert safety.asked == [m.PoseRequest(echo=7), m.ResetRequest(echo=7, causes=(8,))]
 
 
 def test_no_operators_call_without_a_state(
-    rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "STATE_S", 0.3)
     for key in ("safety/reset", "safety/release", "odom/reset", "bridge/switches"):
@@ -148,23 +148,23 @@ def test_no_operators_call_without_a_state(
         assert "no state of safety within 1 s" in result.err
 
 
-def test_the_end_of_a_release_needs_no_state(rig: BusFixture, tool: Tool) -> None:
+def test_the_end_of_a_release_needs_no_state(buses: BusFixture, tool: Tool) -> None:
     asked: list[m.ReleaseRequest] = []
 
     def take(request: m.ReleaseRequest, caller: Caller[m.Done]) -> None:
         asked.append(request)
         caller.reply(m.Done(text="Let go."))
 
-    rig.bus(lambda bus: bus.serve(keys.RELEASE, take))
+    buses.bus(lambda bus: bus.serve(keys.RELEASE, take))
     assert tool("call", "safety/release", '{"held": false}').code == 0
     assert asked == [m.ReleaseRequest(held=False)]
 
 
-def test_invalid_states_are_ignored(rig: BusFixture, tool: Tool) -> None:
-    safety = Safety(rig, (keys.RESET, obey))
-    session = rig.session()
-    rig.loop.post(
-        lambda: rig.loop.every(0.01, lambda _: session.put(keys.SAFETY.on(rig.robot), b"\xc1"))
+def test_invalid_states_are_ignored(buses: BusFixture, tool: Tool) -> None:
+    safety = Safety(buses, (keys.RESET, obey))
+    session = buses.session()
+    buses.loop.post(
+        lambda: buses.loop.every(0.01, lambda _: session.put(keys.SAFETY.on(buses.robot), b"\xc1"))
     )
     assert tool("call", "safety/reset").code == 0
     assert not safety.latched

@@ -24,10 +24,10 @@ LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
 class Robot:
     """Safety of one robot; it latches on an emergency stop if ``obeys``."""
 
-    def __init__(self, rig: BusFixture, obeys: bool = True) -> None:
+    def __init__(self, buses: BusFixture, obeys: bool = True) -> None:
         self.stops: list[int] = []
         self._obeys = obeys
-        pretend(rig, "safety", {keys.SAFETY: self.state}, self.declare)
+        pretend(buses, "safety", {keys.SAFETY: self.state}, self.declare)
 
     def declare(self, bus: Bus) -> None:
         bus.on_any(keys.estop_key(bus.robot), self.stops.append)
@@ -47,9 +47,9 @@ def join(shared_router: str) -> Iterator[Join]:
     with contextlib.ExitStack() as stack:
 
         def made(name: str) -> BusFixture:
-            rig = BusFixture(shared_router)
-            rig.robot = name
-            return stack.enter_context(rig)
+            buses = BusFixture(shared_router)
+            buses.robot = name
+            return stack.enter_context(buses)
 
         yield made
 
@@ -172,10 +172,10 @@ def test_an_invalid_state_is_reported(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robots, "LISTEN_S", 0.3)
-    rig = join("a")
-    pretend(rig, "bridge", {})
-    session, key = rig.session(), keys.SAFETY.on("a")
-    rig.loop.post(lambda: rig.loop.every(0.02, lambda _: session.put(key, b"\xc1")))
+    buses = join("a")
+    pretend(buses, "bridge", {})
+    session, key = buses.session(), keys.SAFETY.on("a")
+    buses.loop.post(lambda: buses.loop.every(0.02, lambda _: session.put(key, b"\xc1")))
     result = t2("robots")
     assert (result.code, result.lines[0]["verdict"]) == (1, "no safety")
     assert "t2 robots: t2/v1/a/tel/safety/state: not a SafetyState" in result.err
@@ -198,7 +198,7 @@ def test_services_of_a_robot_that_dials_a_site(
     def found() -> dict[str, Any]:
         return {line["name"]: line["publishes"] for line in tool("services").lines}
 
-    with router(listening(site)), router(listening(own, site)), BusFixture(own) as rig:
-        rig.robot = "berlin-001"
-        pretend(rig, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
+    with router(listening(site)), router(listening(own, site)), BusFixture(own) as buses:
+        buses.robot = "berlin-001"
+        pretend(buses, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
         wait_until(lambda: found() == {"bridge": {"tel/bridge/velocity": []}}, "the bridge alone")

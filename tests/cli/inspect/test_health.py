@@ -14,10 +14,10 @@ from tests.cli.inspect.tool import Tool, health, pretend
 from tests.common.bus_fixture import BusFixture
 
 
-def test_health(rig: BusFixture, tool: Tool) -> None:
+def test_health(buses: BusFixture, tool: Tool) -> None:
     for name in ("bridge", "safety"):
-        pretend(rig, name, {keys.HEALTH: partial(health, name)}, service=name)
-    pretend(rig, "odom", {})
+        pretend(buses, name, {keys.HEALTH: partial(health, name)}, service=name)
+    pretend(buses, "odom", {})
     result = tool("health", "--text")
     assert result.code == 1
     rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
@@ -27,8 +27,8 @@ def test_health(rig: BusFixture, tool: Tool) -> None:
     assert "it hangs" in result.err
 
 
-def test_health_of_another_service_is_refused(rig: BusFixture, tool: Tool) -> None:
-    pretend(rig, "dashboard", {keys.HEALTH: partial(health, "safety")}, service="dashboard")
+def test_health_of_another_service_is_refused(buses: BusFixture, tool: Tool) -> None:
+    pretend(buses, "dashboard", {keys.HEALTH: partial(health, "safety")}, service="dashboard")
     result = tool("health")
     assert {line["service"]: line["alive"] for line in result.lines} == {
         "bridge": False, "safety": False, "odom": False, "dashboard": True,
@@ -43,15 +43,15 @@ def answers() -> dict[str, bytes]:
 
 
 @pytest.fixture
-def safety(rig: BusFixture, answers: dict[str, bytes]) -> Bus:
-    last = {keys.HEALTH.on(rig.robot, service="safety"): health("safety"), "another": None}
-    answers[rig.robot] = msgspec.json.encode(last)
+def safety(buses: BusFixture, answers: dict[str, bytes]) -> Bus:
+    last = {keys.HEALTH.on(buses.robot, service="safety"): health("safety"), "another": None}
+    answers[buses.robot] = msgspec.json.encode(last)
 
     def answer(bus: Bus) -> None:
-        key = keys.info_key(rig.robot, "safety", "last")
-        bus.answer(key, lambda: answers[rig.robot], "application/json")
+        key = keys.info_key(buses.robot, "safety", "last")
+        bus.answer(key, lambda: answers[buses.robot], "application/json")
 
-    return pretend(rig, "safety", {}, answer)
+    return pretend(buses, "safety", {}, answer)
 
 
 def test_query_of_one_service(safety: Bus, tool: Tool) -> None:
@@ -65,27 +65,27 @@ def test_query_of_one_service(safety: Bus, tool: Tool) -> None:
     assert shown.split()[1:4] == ["safety", "ok", "1"]
 
 
-def test_query_of_every_robot(rig: BusFixture, safety: Bus, tool: Tool) -> None:
-    assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [rig.robot]
+def test_query_of_every_robot(buses: BusFixture, safety: Bus, tool: Tool) -> None:
+    assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [buses.robot]
 
 
 def test_a_service_without_health_yet(
-    rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes]
+    buses: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes]
 ) -> None:
-    answers[rig.robot] = b"{}"
+    answers[buses.robot] = b"{}"
     result = tool("health", "safety")
     assert (result.code, result.lines[0]["alive"], result.lines[0]["told"]) == (0, True, False)
 
 
 @pytest.mark.parametrize("nonsense", [b"\xff", b"[]", b'{"KEY": {"service": 1}}'])
 def test_an_invalid_answer(
-    rig: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
+    buses: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
 ) -> None:
-    key = keys.HEALTH.on(rig.robot, service="safety")
-    answers[rig.robot] = nonsense.replace(b"KEY", key.encode())
+    key = keys.HEALTH.on(buses.robot, service="safety")
+    answers[buses.robot] = nonsense.replace(b"KEY", key.encode())
     result = tool("health", "safety")
     assert (result.code, result.lines[0]["alive"]) == (1, False)
-    assert f"safety of robot {rig.robot} answers with an invalid health message" in result.err
+    assert f"safety of robot {buses.robot} answers with an invalid health message" in result.err
 
 
 @pytest.fixture
@@ -100,14 +100,14 @@ def test_an_absent_service(tool: Tool, impatient: None) -> None:
 
 
 @pytest.fixture
-def stalled(rig: BusFixture, safety: Bus) -> Iterator[None]:
+def stalled(buses: BusFixture, safety: Bus) -> Iterator[None]:
     """Block the loop of all services while the test runs."""
     end = threading.Event()
 
     def hang() -> None:
         end.wait(20.0)
 
-    rig.loop.post(hang)
+    buses.loop.post(hang)
     yield
     end.set()
 

@@ -43,10 +43,12 @@ def test_simulated_boards(board: str, simulated: bool) -> None:
     assert is_loopback(board) is simulated
 
 
-def commands(rig: BusFixture) -> list[Drive]:
+def commands(buses: BusFixture) -> list[Drive]:
     """Collect the requests of any source."""
     received: list[Drive] = []
-    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: received.append(a.message), source="*"))
+    buses.bus(
+        lambda bus: bus.subscribe(keys.DRIVE, lambda a: received.append(a.message), source="*")
+    )
     return received
 
 
@@ -58,9 +60,9 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 ASKED = ("pub", "@cmd/drive/web", '{"linear": 0.1, "angular": 0, "echo": 3}', "--once")
 
 
-def test_a_command_is_refused(rig: BusFixture, tool: Tool) -> None:
-    received = commands(rig)
-    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
+def test_a_command_is_refused(buses: BusFixture, tool: Tool) -> None:
+    received = commands(buses)
+    pretend(buses, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     result = tool(*ASKED)
     assert (result.code, result.out, received) == (1, "", [])
     assert "@cmd/drive/web moves the wheels" in result.err
@@ -69,19 +71,19 @@ def test_a_command_is_refused(rig: BusFixture, tool: Tool) -> None:
 
 @pytest.mark.parametrize("boards", [["10.7.5.224:4002"], ["127.0.0.1:4003", "10.7.5.224:4002"], []])
 def test_a_command_for_a_simulator_never_reaches_a_real_board(
-    rig: BusFixture, tool: Tool, boards: list[str]
+    buses: BusFixture, tool: Tool, boards: list[str]
 ) -> None:
-    received = commands(rig)
+    received = commands(buses)
     for board in boards:
-        pretend(rig, "bridge", {keys.LINK: partial(link, board=board)})
+        pretend(buses, "bridge", {keys.LINK: partial(link, board=board)})
     result = tool(*ASKED, "--simulator")
     assert (result.code, result.out, received) == (1, "", [])
     assert ("a real one" if boards else "no bridge") in result.err
 
 
-def test_a_command_for_a_simulator(rig: BusFixture, tool: Tool) -> None:
-    received = commands(rig)
-    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
+def test_a_command_for_a_simulator(buses: BusFixture, tool: Tool) -> None:
+    received = commands(buses)
+    pretend(buses, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
     assert tool(*ASKED, "--simulator").code == 0
     wait_until(lambda: received, "the command")
     assert [(each.linear, each.echo) for each in received] == [(0.1, 3)]

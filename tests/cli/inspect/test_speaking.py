@@ -20,11 +20,11 @@ def state(*latched: str) -> SafetyState:
     )  # fmt: skip
 
 
-def test_pub_fills_in_the_header(rig: BusFixture, tool: Tool) -> None:
+def test_pub_fills_in_the_header(buses: BusFixture, tool: Tool) -> None:
     watched: list[tuple[bytes, str]] = []
-    session = rig.session()
+    session = buses.session()
     subscriber = session.declare_subscriber(
-        f"t2/v1/{rig.robot}/tel/mine/t",
+        f"t2/v1/{buses.robot}/tel/mine/t",
         lambda sample: watched.append((sample.payload.to_bytes(), str(sample.encoding))),
     )
     result = tool("pub", "tel/mine/t", '{"celsius": 21.5}', "--rate", "50", "--times", "2")
@@ -72,15 +72,15 @@ def test_commands_for_one_robot(words: tuple[str, ...], tool: Tool) -> None:
     assert "one robot at a time" in result.err
 
 
-def test_call(rig: BusFixture, tool: Tool) -> None:
+def test_call(buses: BusFixture, tool: Tool) -> None:
     def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
         if request.held:
             caller.refuse("the bumper is free")
         else:
             caller.reply(Done(text="ended"))
 
-    pretend(rig, "safety", {keys.SAFETY: state}, lambda bus: bus.serve(keys.RELEASE, release))
-    whole = f"t2/v1/{rig.robot}/srv/safety/release"
+    pretend(buses, "safety", {keys.SAFETY: state}, lambda bus: bus.serve(keys.RELEASE, release))
+    whole = f"t2/v1/{buses.robot}/srv/safety/release"
     for key in ("release", "safety/release", "/srv/safety/release", whole):
         result = tool("call", key, '{"held": false}')
         assert (result.code, result.lines) == (0, [{"text": "ended", "boot": 0}])
@@ -113,23 +113,25 @@ def test_list_of_calls(tool: Tool) -> None:
 
 @pytest.mark.parametrize("words", [("estop",), ("pub", "estop")])
 def test_estop_repeats_until_safety_confirms(
-    words: tuple[str, ...], rig: BusFixture, tool: Tool
+    words: tuple[str, ...], buses: BusFixture, tool: Tool
 ) -> None:
     stopped: list[int] = []
 
     def latch(bus: Bus) -> None:
-        bus.on_any(keys.estop_key(rig.robot), stopped.append)
+        bus.on_any(keys.estop_key(buses.robot), stopped.append)
 
-    pretend(rig, "safety", {keys.SAFETY: lambda: state(*["estop"] * bool(stopped))}, latch)
+    pretend(buses, "safety", {keys.SAFETY: lambda: state(*["estop"] * bool(stopped))}, latch)
     result = tool(*words)
     assert (result.code, result.err) == (0, "")
-    assert f"Robot {rig.robot} is stopped." in result.out
+    assert f"Robot {buses.robot} is stopped." in result.out
     assert stopped
 
 
-def test_an_unconfirmed_estop(rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unconfirmed_estop(
+    buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(estop, "TIMEOUT_S", 0.3)
-    pretend(rig, "safety", {keys.SAFETY: state})
+    pretend(buses, "safety", {keys.SAFETY: state})
     result = tool("estop")
     assert (result.code, result.out) == (1, "")
     assert "USE THE VEHICLE'S OWN SWITCH" in result.err

@@ -23,8 +23,8 @@ def bumper() -> Bumper:
 
 
 @pytest.fixture
-def bridge(rig: BusFixture) -> Bus:
-    return pretend(rig, "bridge", {keys.BUMPER: bumper})
+def bridge(buses: BusFixture) -> Bus:
+    return pretend(buses, "bridge", {keys.BUMPER: bumper})
 
 
 # --- echo -------------------------------------------------------------------------------------
@@ -71,16 +71,16 @@ def test_echo_shows_one_field(bridge: Bus, tool: Tool) -> None:
     assert "pressed" in result.err
 
 
-def test_echo_shows_invalid_messages(rig: BusFixture, tool: Tool) -> None:
-    session = rig.session()
+def test_echo_shows_invalid_messages(buses: BusFixture, tool: Tool) -> None:
+    session = buses.session()
     payloads = [(b"\xc1", "zenoh/bytes"), (b"\x81\xa1a\x01", codec.encoding(Bumper))]
 
     def put(_: int) -> None:
         for payload, encoding in payloads:
-            session.put(f"t2/v1/{rig.robot}/tel/x", payload, encoding=encoding)
-        session.delete(f"t2/v1/{rig.robot}/tel/x")
+            session.put(f"t2/v1/{buses.robot}/tel/x", payload, encoding=encoding)
+        session.delete(f"t2/v1/{buses.robot}/tel/x")
 
-    rig.loop.post(lambda: rig.loop.every(0.1, put))
+    buses.loop.post(lambda: buses.loop.every(0.1, put))
     lines = tool("echo", "tel/x", "--count", "6").lines
     assert {(line["type"], json.dumps(line["message"])) for line in lines} == {
         ("bytes", '"c1"'), ("Bumper", '{"a": 1}'), ("empty", "null"),
@@ -94,13 +94,13 @@ def test_echo_shows_invalid_messages(rig: BusFixture, tool: Tool) -> None:
     assert "DELETE" in shown
 
 
-def test_echo_shows_earlier_events(rig: BusFixture, tool: Tool) -> None:
+def test_echo_shows_earlier_events(buses: BusFixture, tool: Tool) -> None:
     def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
             Event(name="x", level="info", text="long ago")
         )
 
-    rig.bus(publish)
+    buses.bus(publish)
     assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
 
 
@@ -145,11 +145,11 @@ def test_silence_is_reported_once_a_second(tool: Tool, monkeypatch: pytest.Monke
     assert "no message on" in result.err
 
 
-def test_ls_names_type_rate_and_publisher(rig: BusFixture, bridge: Bus, tool: Tool) -> None:
-    rig.bus(lambda bus: bus.publisher(keys.VELOCITY))  # declared, silent, by a stranger
-    stranger = rig.session()
-    rig.loop.post(
-        lambda: rig.loop.every(0.1, lambda _: stranger.put(f"t2/v1/{rig.robot}/tel/x", b"\x01"))
+def test_ls_names_type_rate_and_publisher(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
+    buses.bus(lambda bus: bus.publisher(keys.VELOCITY))  # declared, silent, by a stranger
+    stranger = buses.session()
+    buses.loop.post(
+        lambda: buses.loop.every(0.1, lambda _: stranger.put(f"t2/v1/{buses.robot}/tel/x", b"\x01"))
     )
     found = {line["key"]: line for line in tool("ls", "--duration", "1").lines}
     assert found.keys() == {"tel/bridge/bumper", "tel/bridge/velocity", "tel/x"}
@@ -162,7 +162,7 @@ def test_ls_names_type_rate_and_publisher(rig: BusFixture, bridge: Bus, tool: To
     assert shown[0].split() == ["key", "type", "Hz", "of", "publisher"]
     assert shown[1].split()[::4] == ["tel/bridge/bumper", "bridge"]
     every = tool("ls", "bumper", "--duration", "0.5", robot="*").lines
-    assert keys.BUMPER.on(rig.robot) in {line["key"] for line in every}
+    assert keys.BUMPER.on(buses.robot) in {line["key"] for line in every}
 
 
 def test_ls_without_keys(tool: Tool) -> None:
@@ -171,8 +171,8 @@ def test_ls_without_keys(tool: Tool) -> None:
     assert "t2 doctor" in result.err
 
 
-def test_topic_info(bridge: Bus, rig: BusFixture, tool: Tool) -> None:
-    rig.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
+def test_topic_info(bridge: Bus, buses: BusFixture, tool: Tool) -> None:
+    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
     (row,) = tool("topic", "info", "/tel/bridge/bumper").lines
     assert (row["type"], row["hz"], row["class"]) == ("Bumper", 50, "fast")
     assert row["publishers"] == ["bridge"]
@@ -188,9 +188,9 @@ def test_topic_info_of_an_unknown_key(tool: Tool, monkeypatch: pytest.MonkeyPatc
 # --- services, schema -------------------------------------------------------------------------
 
 
-def test_services(rig: BusFixture, bridge: Bus, tool: Tool) -> None:
-    pretend(rig, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
-    pretend(rig, "nav", {keys.MOTION: lambda: keys.MOTION.message(command=Command.STOP)})
+def test_services(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
+    pretend(buses, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
+    pretend(buses, "nav", {keys.MOTION: lambda: keys.MOTION.message(command=Command.STOP)})
     found = {line["name"]: line for line in tool("services").lines}
     assert found.keys() >= {"bridge", "safety", "nav"}
     assert found["bridge"]["publishes"]["tel/bridge/bumper"] == ["safety"]
@@ -229,8 +229,8 @@ def test_an_unknown_type(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_silently(number: signal.Signals, bridge: Bus, rig: BusFixture) -> None:
-    where = ("--set", f"bus.connect={rig.endpoint}", "--robot", rig.robot)
+def test_ctrl_c_ends_it_silently(number: signal.Signals, bridge: Bus, buses: BusFixture) -> None:
+    where = ("--set", f"bus.connect={buses.endpoint}", "--robot", buses.robot)
     with subprocess.Popen(
         t2("echo", "bumper", *where), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -241,8 +241,8 @@ def test_ctrl_c_ends_it_silently(number: signal.Signals, bridge: Bus, rig: BusFi
     assert (process.returncode, err) == (0, "")
 
 
-def test_a_closed_pipe_ends_it_silently(bridge: Bus, rig: BusFixture) -> None:
-    words = f"echo bumper -o json --set bus.connect={rig.endpoint} --robot {rig.robot}"
+def test_a_closed_pipe_ends_it_silently(bridge: Bus, buses: BusFixture) -> None:
+    words = f"echo bumper -o json --set bus.connect={buses.endpoint} --robot {buses.robot}"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,

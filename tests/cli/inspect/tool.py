@@ -60,7 +60,7 @@ def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
 
 
 def pretend(
-    rig: BusFixture,
+    buses: BusFixture,
     name: str,
     streams: dict[Topic[Any], Callable[[], Message]],
     declare: Callable[[Bus], object] = lambda _: None,
@@ -71,7 +71,7 @@ def pretend(
     publishers: list[tuple[Any, Callable[[], Message]]] = []
 
     def everything(bus: Bus) -> None:
-        bus.live(keys.live_key(rig.robot, name, f"{bus.boot:x}"))
+        bus.live(keys.live_key(buses.robot, name, f"{bus.boot:x}"))
         for topic, make in streams.items():
             publishers.append((bus.publisher(topic, **names), make))
         declare(bus)
@@ -80,6 +80,6 @@ def pretend(
         for publisher, make in publishers:
             publisher.put(make())
 
-    bus = rig.bus(everything)
-    rig.loop.post(lambda: rig.loop.every(1 / hz, put))
+    bus = buses.bus(everything)
+    buses.loop.post(lambda: buses.loop.every(1 / hz, put))
     return bus

@@ -184,7 +184,7 @@ def test_late_subscribers_get_cached_events(
     came: list[str] = []
     history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
     for _ in range(5):  # a query may arrive before the declarations
-        heard = zenoh.ext.declare_advanced_subscriber(
+        subscribed = zenoh.ext.declare_advanced_subscriber(
             sessions[subscriber],
             key,
             lambda s: came.append(s.payload.to_string()),
@@ -196,7 +196,7 @@ def test_late_subscribers_get_cached_events(
         except AssertionError:
             continue
         finally:
-            heard.undeclare()
+            subscribed.undeclare()
         break
     assert came[0] == "kept"
     published.undeclare()

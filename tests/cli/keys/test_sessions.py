@@ -86,11 +86,11 @@ def connect(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
 
 def test_a_member_can_connect_and_publish(site: Site, endpoint: str) -> None:
     with connect(site.bus(DRIVER), endpoint) as one, connect(site.bus(ROBOT), endpoint) as other:
-        heard = other.declare_subscriber(KEY, zenoh.handlers.RingChannel(1))
+        subscriber = other.declare_subscriber(KEY, zenoh.handlers.RingChannel(1))
 
         def received() -> zenoh.Sample | None:
             one.put(KEY, b"hello")
-            return heard.try_recv()
+            return subscriber.try_recv()
 
         sample = wait_until(received, "a sample through the router")
         assert sample is not None

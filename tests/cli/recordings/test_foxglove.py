@@ -10,14 +10,14 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from common import keys
-from tests.cli.inspect.conftest import rig, shared_router, tool
+from tests.cli.inspect.conftest import buses, shared_router, tool
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-__all__ = ["rig", "shared_router", "tool"]
+__all__ = ["buses", "shared_router", "tool"]
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 MESSAGE_DATA = 1
@@ -74,11 +74,11 @@ class Viewer(threading.Thread):
     ],
 )
 def test_a_viewer_receives_live_messages(
-    rig: BusFixture, tool: Tool, topic: str, schema: str, field: str
+    buses: BusFixture, tool: Tool, topic: str, schema: str, field: str
 ) -> None:
     port = free_port()
-    pretend(rig, "odom", {keys.ODOMETRY: samples.odometry})
-    viewer = Viewer(port, topic.format(robot=rig.robot))
+    pretend(buses, "odom", {keys.ODOMETRY: samples.odometry})
+    viewer = Viewer(port, topic.format(robot=buses.robot))
     result = tool("foxglove", "--port", str(port), "--duration", "6")
     viewer.join(PATIENCE_S)
     assert (result.code, result.err) == (0, "")

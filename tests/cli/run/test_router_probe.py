@@ -73,10 +73,10 @@ def explode(endpoint: str) -> None:
 def test_ready_and_watchdog_beats_follow_answers(manager: Manager, endpoint: str) -> None:
     with router_process(endpoint, probe_deadline=DEADLINE_S) as process:
         wait_until(lambda: manager.beats() > 2, "beats")
-        assert manager.told[0] == "READY=1"
+        assert manager.messages[0] == "READY=1"
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == 0
-    assert manager.hear()[-1] == "STOPPING=1"
+    assert manager.read()[-1] == "STOPPING=1"
 
 
 def test_the_probe_is_restarted_and_ends_with_its_router(endpoint: str) -> None:

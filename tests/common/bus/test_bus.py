@@ -12,7 +12,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
-from tests.common.bus_fixture import BusFixture, rising, until_heard
+from tests.common.bus_fixture import BusFixture, rising, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
@@ -29,13 +29,15 @@ def events(bus: Bus) -> Callable[[str], object]:
 
 
 def test_a_message_arrives_with_header_key_time_and_raw_frame(buses: BusFixture) -> None:
-    heard: list[Arrival[Bumper]] = []
-    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=9))
+    received: list[Arrival[Bumper]] = []
+    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append, depth=9))
     sender = buses.bus()
     publisher = sender.publisher(keys.BUMPER)
     before_ns = time.monotonic_ns()
-    until_heard(lambda: publisher.put(Bumper(pressed=True), b"GS\t\0"), lambda: heard, "a bumper")
-    arrival = heard[0]
+    until_received(
+        lambda: publisher.put(Bumper(pressed=True), b"GS\t\0"), lambda: received, "a bumper"
+    )
+    arrival = received[0]
     assert arrival.message.pressed
     assert arrival.message.boot == sender.boot
     assert arrival.key == bumper(buses)
@@ -44,40 +46,40 @@ def test_a_message_arrives_with_header_key_time_and_raw_frame(buses: BusFixture)
 
 
 def test_messages_keep_their_order_and_are_counted_at_both_ends(buses: BusFixture) -> None:
-    heard: list[Arrival[Bumper]] = []
-    hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=100))
+    received: list[Arrival[Bumper]] = []
+    receiver = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append, depth=100))
     sender = buses.bus()
     publisher = sender.publisher(keys.BUMPER)
-    until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
+    until_received(lambda: publisher.put(Bumper(pressed=False)), lambda: received, "the first")
     for _ in range(50):
         publisher.put(Bumper(pressed=False))
-    wait_until(lambda: heard[-1].message.seq == publisher.next_seq - 1, "the last")
-    assert rising(arrival.message.seq for arrival in heard)
-    assert hearer.counts[bumper(buses)] == len(heard)
+    wait_until(lambda: received[-1].message.seq == publisher.next_seq - 1, "the last")
+    assert rising(arrival.message.seq for arrival in received)
+    assert receiver.counts[bumper(buses)] == len(received)
     assert sender.counts[bumper(buses)] == publisher.next_seq - 1
-    assert heard[0].raw is None
+    assert received[0].raw is None
 
 
 def test_sources_that_nobody_knows_are_counted_together(buses: BusFixture) -> None:
-    heard: set[str] = set()
+    received: set[str] = set()
 
     def take(arrival: Arrival[Drive]) -> None:
-        heard.add(arrival.key)
+        received.add(arrival.key)
 
-    hearer = buses.bus(
+    receiver = buses.bus(
         lambda bus: bus.subscribe(keys.DRIVE, take, depth=100, known=["nav", "web"], source="*")
     )
     sender = buses.bus()
     names = ["nav", *(f"made up {number}" for number in range(50))]
     publishers = [sender.publisher(keys.DRIVE, source=name) for name in names]
-    until_heard(
+    until_received(
         lambda: [each.put(Drive(linear=0.0, angular=0.0, echo=0)) for each in publishers],
-        lambda: len(heard) == len(names),
+        lambda: len(received) == len(names),
         "all sources",
     )
     everyone = keys.DRIVE.on(buses.robot, source="*")
-    assert set(hearer.counts) == {keys.DRIVE.on(buses.robot, source="nav"), everyone}
-    assert hearer.counts[everyone] >= 50
+    assert set(receiver.counts) == {keys.DRIVE.on(buses.robot, source="nav"), everyone}
+    assert receiver.counts[everyone] >= 50
 
 
 def test_it_travels_as_plain_messagepack_with_its_encoding(buses: BusFixture) -> None:
@@ -85,7 +87,7 @@ def test_it_travels_as_plain_messagepack_with_its_encoding(buses: BusFixture) ->
     stranger = buses.session()
     subscriber = stranger.declare_subscriber(bumper(buses), samples.append)
     publisher = buses.bus().publisher(keys.BUMPER)
-    until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: samples, "a sample")
+    until_received(lambda: publisher.put(Bumper(pressed=True)), lambda: samples, "a sample")
     subscriber.undeclare()
     assert msgpack.unpackb(samples[0].payload.to_bytes())["pressed"] is True
     assert str(samples[0].encoding) == "application/msgpack;t2.v1.Bumper"
@@ -94,10 +96,10 @@ def test_it_travels_as_plain_messagepack_with_its_encoding(buses: BusFixture) ->
 
 
 def test_every_source_is_heard_and_only_of_this_robot(buses: BusFixture) -> None:
-    heard: set[str] = set()
+    received: set[str] = set()
 
     def hear(arrival: Arrival[Drive]) -> None:
-        heard.add(arrival.key)
+        received.add(arrival.key)
 
     buses.bus(lambda bus: bus.subscribe(keys.DRIVE, hear, depth=50, source="*"))
     stranger = buses.session()
@@ -108,8 +110,8 @@ def test_every_source_is_heard_and_only_of_this_robot(buses: BusFixture) -> None
         for key in (keys.DRIVE.on(f"{buses.robot}x", source="web"), *ours, "t2/**"):
             stranger.put(key, payload)
 
-    until_heard(put, lambda: len(heard) == 2, "both sources")
-    assert heard == set(ours)
+    until_received(put, lambda: len(received) == 2, "both sources")
+    assert received == set(ours)
 
 
 HOSTILE = {
@@ -124,16 +126,18 @@ HOSTILE = {
 
 
 def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -> None:
-    heard: list[Arrival[Bumper]] = []
+    received: list[Arrival[Bumper]] = []
     refused: list[tuple[str, MessageError]] = []
 
     def declare(bus: Bus) -> None:
-        bus.subscribe(keys.BUMPER, heard.append, depth=64, refused=lambda *why: refused.append(why))
+        bus.subscribe(
+            keys.BUMPER, received.append, depth=64, refused=lambda *why: refused.append(why)
+        )
         bus.subscribe(keys.EVENTS, lambda _: None, service="*")  # nobody asks what was refused
 
-    hearer = buses.bus(declare)
+    receiver = buses.bus(declare)
     stranger = buses.session()
-    until_heard(lambda: stranger.put(bumper(buses), b""), lambda: refused, "the first")
+    until_received(lambda: stranger.put(bumper(buses), b""), lambda: refused, "the first")
     count = len(refused)
     wait = zenoh.CongestionControl.BLOCK  # what is dropped on the way is not refused
     for payload in HOSTILE.values():
@@ -141,25 +145,27 @@ def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -
     stranger.delete(bumper(buses), congestion_control=wait)
     wait_until(lambda: len(refused) >= count + len(HOSTILE) + 1, "all of them")
     stranger.put(bumper(buses), msgpack.packb({"pressed": True, "later": {"a": [1]}}))
-    wait_until(lambda: heard, "a good one after them")
-    assert [arrival.message.pressed for arrival in heard] == [True]
+    wait_until(lambda: received, "a good one after them")
+    assert [arrival.message.pressed for arrival in received] == [True]
     assert {key for key, _ in refused} == {bumper(buses)}
-    assert hearer.counters["undecodable"] == len(refused)
-    until_heard(
+    assert receiver.counters["undecodable"] == len(refused)
+    until_received(
         lambda: stranger.put(keys.EVENTS.on(buses.robot, service="x"), b"\xc1"),
-        lambda: hearer.counters["undecodable"] > len(refused),
+        lambda: receiver.counters["undecodable"] > len(refused),
         "a refusal that nobody asked for",
     )
 
 
 @pytest.mark.parametrize("depth", [1, 4])
 def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int) -> None:
-    heard: list[int] = []
-    hearer = buses.bus(
-        lambda bus: bus.subscribe(keys.BUMPER, lambda a: heard.append(a.message.seq), depth=depth)
+    received: list[int] = []
+    receiver = buses.bus(
+        lambda bus: bus.subscribe(
+            keys.BUMPER, lambda a: received.append(a.message.seq), depth=depth
+        )
     )
     publisher = buses.bus().publisher(keys.BUMPER)
-    until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
+    until_received(lambda: publisher.put(Bumper(pressed=False)), lambda: received, "the first")
     held, go_on = threading.Event(), threading.Event()
 
     def hold() -> None:
@@ -170,13 +176,13 @@ def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int)
     assert held.wait(20)
     for _ in range(30):
         publisher.put(Bumper(pressed=False))
-    wait_until(lambda: hearer.counters["overrun"] >= 30 - depth, "what had to go")
+    wait_until(lambda: receiver.counters["overrun"] >= 30 - depth, "what had to go")
     go_on.set()
     last = publisher.next_seq - 1
-    wait_until(lambda: heard[-1] == last, "the newest")
-    assert heard[-depth:] == list(range(last - depth + 1, last + 1))
+    wait_until(lambda: received[-1] == last, "the newest")
+    assert received[-depth:] == list(range(last - depth + 1, last + 1))
     publisher.put(Bumper(pressed=False))
-    wait_until(lambda: heard[-1] == last + 1, "the one after")
+    wait_until(lambda: received[-1] == last + 1, "the one after")
 
 
 def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
@@ -188,16 +194,16 @@ def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
     buses.opened(bus)
     for name in names[10:]:
         tell(name)
-    heard: list[str] = []
+    received: list[str] = []
 
     def hear(arrival: Arrival[Event]) -> None:
-        heard.append(arrival.message.name)
+        received.append(arrival.message.name)
 
     buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
-    wait_until(lambda: len(heard) >= 20, "the events that were")
+    wait_until(lambda: len(received) >= 20, "the events that were")
     tell("one more")
-    wait_until(lambda: "one more" in heard, "the next one")
-    assert heard == [*names, "one more"]
+    wait_until(lambda: "one more" in received, "the next one")
+    assert received == [*names, "one more"]
 
 
 def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
@@ -214,7 +220,7 @@ def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
         bus.subscribe(keys.BUMPER, bumped.append)
 
     buses.bus(declare)
-    until_heard(lambda: bump.put(Bumper(pressed=False)), lambda: bumped, "something live")
+    until_received(lambda: bump.put(Bumper(pressed=False)), lambda: bumped, "something live")
     assert driven == []
 
 
@@ -235,7 +241,7 @@ def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:
     ]
     for way in ways:
         count = len(stops)
-        until_heard(way, lambda count=count: len(stops) > count, "a stop")  # type: ignore[misc]
+        until_received(way, lambda count=count: len(stops) > count, "a stop")  # type: ignore[misc]
     assert all(isinstance(received_ns, int) for received_ns in stops)
 
 
@@ -266,10 +272,10 @@ def test_who_watches_late_sees_who_is_there(buses: BusFixture) -> None:
 
 
 def test_a_closed_bus_calls_nobody_and_hurts_nobody(buses: BusFixture) -> None:
-    heard: list[Arrival[Bumper]] = []
-    hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append, depth=8))
+    received: list[Arrival[Bumper]] = []
+    receiver = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append, depth=8))
     publisher = buses.bus().publisher(keys.BUMPER)
-    until_heard(lambda: publisher.put(Bumper(pressed=False)), lambda: heard, "the first")
+    until_received(lambda: publisher.put(Bumper(pressed=False)), lambda: received, "the first")
     held, go_on = threading.Event(), threading.Event()
 
     def hold() -> None:
@@ -278,20 +284,20 @@ def test_a_closed_bus_calls_nobody_and_hurts_nobody(buses: BusFixture) -> None:
 
     buses.loop.post(hold)
     assert held.wait(20)
-    count = hearer.counts[bumper(buses)]
+    count = receiver.counts[bumper(buses)]
     publisher.put(Bumper(pressed=True))
     wait_until(lambda: len(buses.loop._posted) > 0, "a sample that waits")
-    hearer.close()
+    receiver.close()
     go_on.set()
     done = threading.Event()
     buses.loop.post(done.set)
     assert done.wait(20)
-    assert hearer.counts[bumper(buses)] == count
-    assert not hearer.connected
-    hearer.estop()
-    hearer.call(keys.RESET, ResetRequest(), print, print)
-    hearer.close()
-    assert hearer.publisher(keys.BUMPER).put(Bumper(pressed=False)).seq == 1
+    assert receiver.counts[bumper(buses)] == count
+    assert not receiver.connected
+    receiver.estop()
+    receiver.call(keys.RESET, ResetRequest(), print, print)
+    receiver.close()
+    assert receiver.publisher(keys.BUMPER).put(Bumper(pressed=False)).seq == 1
 
 
 def test_a_session_that_is_found_but_not_taken_over_is_closed(buses: BusFixture) -> None:

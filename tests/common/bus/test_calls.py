@@ -9,7 +9,7 @@ from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.keys import info_key
 from common.messages import Done, LedRequest, ReleaseRequest
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
@@ -229,7 +229,7 @@ def test_any_query_on_an_answer_is_answered(buses: BusFixture) -> None:
         return [reply.ok for reply in replies if reply.ok]
 
     found: list[zenoh.Sample] = []
-    until_heard(lambda: found.extend(answers()), lambda: found, "an answer")
+    until_received(lambda: found.extend(answers()), lambda: found, "an answer")
     assert found[0].payload.to_bytes() == b'{"a": 1}'
     assert str(found[0].key_expr) == key
     assert str(found[0].encoding) == "application/json"

@@ -14,7 +14,7 @@ from common.freshness import NS_PER_S
 from common.messages import Bumper, Motion
 from common.motion import Command
 from common.settings import BusSettings as Settings
-from tests.common.bus_fixture import BusFixture, rising, until_heard
+from tests.common.bus_fixture import BusFixture, rising, until_received
 from verification.harness.bus import Lines, at
 from verification.harness.waiting import wait_until
 
@@ -48,7 +48,7 @@ class Ends:
 
     def linked(self) -> None:
         wait_until(lambda: self.bridge.connected and self.safety.connected, "the link")
-        until_heard(
+        until_received(
             lambda: (self.motion.put(Motion(command=Command.STOP)), self.bumper.put(CLEAR)),
             lambda: self.motions and self.bumpers,
             "both ways",
@@ -81,7 +81,7 @@ def test_each_message_arrives_once_with_its_frame_and_is_counted_once(ends: Ends
 def test_who_looks_on_the_bus_sees_each_message_once(ends: Ends) -> None:
     seen: list[Arrival[Motion]] = []
     ends.buses.bus(lambda bus: bus.subscribe(keys.MOTION, seen.append, depth=100))
-    until_heard(lambda: ends.motion.put(Motion(command=Command.STOP)), lambda: seen, "a motion")
+    until_received(lambda: ends.motion.put(Motion(command=Command.STOP)), lambda: seen, "a motion")
     for _ in range(50):
         ends.motion.put(Motion(command=Command.STOP))
         time.sleep(0.002)
@@ -106,7 +106,7 @@ def test_nothing_that_comes_by_the_router_arrives(ends: Ends) -> None:
     pressed = Bumper(pressed=True, seq=10**6, boot=ends.bridges_bus.boot)
     witnessed: list[Arrival[Motion]] = []
     ends.buses.bus(lambda bus: bus.subscribe(keys.MOTION, witnessed.append, depth=100))
-    until_heard(
+    until_received(
         lambda: (
             stranger.put(keys.MOTION.on(ends.buses.robot), codec.encode(copied)),
             stranger.put(keys.BUMPER.on(ends.buses.robot), codec.encode(pressed)),

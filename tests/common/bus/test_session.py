@@ -15,7 +15,7 @@ from common.bus.probe import probe
 from common.bus.session import client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import Lines, at, listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
@@ -76,15 +76,15 @@ def test_it_says_so_once_in_five_seconds(lines: Lines, tries: list[float]) -> No
 def test_a_router_that_comes_later_is_found(buses: BusFixture, lines: Lines) -> None:
     where = nowhere()
     buses.endpoint = where
-    heard: list[Arrival[Bumper]] = []
-    hearer = Bus(at(where), buses.robot, buses.loop.post)
-    hearer.subscribe(keys.BUMPER, heard.append)
-    hearer.open()
+    received: list[Arrival[Bumper]] = []
+    receiver = Bus(at(where), buses.robot, buses.loop.post)
+    receiver.subscribe(keys.BUMPER, received.append)
+    receiver.open()
     wait_until(lambda: lines, "the line that says so")
     with router(listening(where)):
         publisher = buses.bus().publisher(keys.BUMPER)
-        until_heard(lambda: publisher.put(Bumper(pressed=True)), lambda: heard, "a bumper")
-        hearer.close()
+        until_received(lambda: publisher.put(Bumper(pressed=True)), lambda: received, "a bumper")
+        receiver.close()
 
 
 def test_a_router_behind_one_that_is_silent_is_found(buses: BusFixture) -> None:
@@ -101,36 +101,36 @@ def test_a_router_behind_one_that_is_silent_is_found(buses: BusFixture) -> None:
 
 def test_after_a_routers_restart_all_is_as_it_was(buses: BusFixture) -> None:
     buses.endpoint = nowhere()
-    heard: list[Arrival[Bumper]] = []
+    received: list[Arrival[Bumper]] = []
     seen: list[str] = []
     replies: list[ResetDone] = []
     late: list[str] = []
     token = keys.live_key(buses.robot, "bridge", "1")
 
     def declare(bus: Bus) -> None:
-        bus.subscribe(keys.BUMPER, heard.append)
+        bus.subscribe(keys.BUMPER, received.append)
         bus.subscribe(keys.EVENTS, lambda a: late.append(a.message.name), depth=99, service="*")
         bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="done")))
         bus.watch_live(keys.live_key(buses.robot, "*", "*"), lambda key, _: seen.append(key))
 
     with router(listening(buses.endpoint)):
-        hearer, sender = buses.bus(declare), buses.bus(lambda bus: bus.live(token))
+        receiver, sender = buses.bus(declare), buses.bus(lambda bus: bus.live(token))
         bumper = sender.publisher(keys.BUMPER)
         events = sender.publisher(keys.EVENTS, service="bridge")
-        until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        until_received(lambda: bumper.put(Bumper(pressed=True)), lambda: received, "a bumper")
         wait_until(lambda: seen, "the token")
-    wait_until(lambda: not (hearer.connected or sender.connected), "the router's end")
+    wait_until(lambda: not (receiver.connected or sender.connected), "the router's end")
     bumper.put(Bumper(pressed=True))  # harmless
-    heard.clear()
+    received.clear()
     seen.clear()
     with router(listening(buses.endpoint)):
-        wait_until(lambda: hearer.connected and sender.connected, "both back")
-        until_heard(lambda: bumper.put(Bumper(pressed=True)), lambda: heard, "a bumper")
+        wait_until(lambda: receiver.connected and sender.connected, "both back")
+        until_received(lambda: bumper.put(Bumper(pressed=True)), lambda: received, "a bumper")
         wait_until(lambda: seen, "the token")
-        until_heard(
+        until_received(
             lambda: events.put(Event(name="back", level="info", text="")), lambda: late, "an event"
         )
-        until_heard(
+        until_received(
             lambda: sender.call(keys.RESET, ResetRequest(), replies.append, print),
             lambda: replies,
             "a reply",
@@ -161,9 +161,9 @@ def test_a_taken_port_is_a_link_error() -> None:
 
 def test_a_router_on_a_unix_socket(buses: BusFixture, tmp_path: Path) -> None:
     buses.endpoint = f"unixsock-stream/{tmp_path}/made/bus.sock"
-    heard: list[Arrival[Bumper]] = []
+    received: list[Arrival[Bumper]] = []
     with router(listening(buses.endpoint)):
-        hearer = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, heard.append))
+        receiver = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append))
         sender = buses.bus().publisher(keys.BUMPER)
-        until_heard(lambda: sender.put(Bumper(pressed=True)), lambda: heard, "a bumper")
-        hearer.close()
+        until_received(lambda: sender.put(Bumper(pressed=True)), lambda: received, "a bumper")
+        receiver.close()

@@ -8,7 +8,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
 from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.bus_fixture import BusFixture, until_heard
+from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at, listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
@@ -42,14 +42,14 @@ class Room:
     """Somebody at the site."""
 
     def __init__(self, buses: BusFixture) -> None:
-        self.heard: list[Arrival[Bumper]] = []
+        self.received: list[Arrival[Bumper]] = []
         self.late: list[str] = []
         self.tokens: list[str] = []
         self.replies: list[ResetDone] = []
         self.bus = buses.bus(self.declare)
 
     def declare(self, bus: Bus) -> None:
-        bus.subscribe(keys.BUMPER, self.heard.append)
+        bus.subscribe(keys.BUMPER, self.received.append)
         bus.subscribe(
             keys.EVENTS, lambda a: self.late.append(a.message.name), depth=99, service="*"
         )
@@ -69,11 +69,11 @@ def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixtur
             with router(listening(site)), zenoh.open(client_config(at(site))) as session:
                 buses.endpoint = site
                 room = Room(buses)
-                until_heard(onboard.put, lambda r=room: r.heard, "a bumper")  # type: ignore[misc]
+                until_received(onboard.put, lambda r=room: r.received, "a bumper")  # type: ignore[misc]
                 wait_until(lambda r=room: r.tokens, "the token")  # type: ignore[misc]
                 wait_until(lambda r=room: r.late, "the event")  # type: ignore[misc]
-                until_heard(room.ask, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
-                until_heard(
+                until_received(room.ask, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
+                until_received(
                     lambda s=session: s.put(keys.estop_key("berlin-$*"), b""),  # type: ignore[misc]
                     lambda: onboard.stops,
                     "a stop",
@@ -85,9 +85,9 @@ def test_without_its_site_a_robot_is_whole(buses: BusFixture) -> None:
     buses.endpoint = somewhere()
     with router(listening(buses.endpoint, somewhere())):
         room, onboard = Room(buses), Onboard(buses)
-        until_heard(onboard.put, lambda: room.heard, "a bumper")
-        until_heard(onboard.bus.estop, lambda: onboard.stops, "a stop")
-        until_heard(room.ask, lambda: room.replies, "a reply")
+        until_received(onboard.put, lambda: room.received, "a bumper")
+        until_received(onboard.bus.estop, lambda: onboard.stops, "a stop")
+        until_received(room.ask, lambda: room.replies, "a reply")
         for bus in (room.bus, onboard.bus):
             bus.close()
 
@@ -101,16 +101,18 @@ def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
         one, other, room = (
             stack.enter_context(zenoh.open(client_config(at(e)))) for e in (first, second, site)
         )
-        heard: list[str] = []
+        received: list[str] = []
         seen: list[str] = []
         ears = [
-            other.declare_subscriber("t2/**", lambda sample: heard.append(str(sample.key_expr))),
+            other.declare_subscriber("t2/**", lambda sample: received.append(str(sample.key_expr))),
             room.declare_subscriber("t2/**", lambda sample: seen.append(str(sample.key_expr))),
         ]
-        until_heard(lambda: one.put("t2/v1/a/tel/x", b""), lambda: seen, "what the site sees")
-        until_heard(
-            lambda: room.put("t2/v1/a/tel/end", b""), lambda: "t2/v1/a/tel/end" in heard, "the end"
+        until_received(lambda: one.put("t2/v1/a/tel/x", b""), lambda: seen, "what the site sees")
+        until_received(
+            lambda: room.put("t2/v1/a/tel/end", b""),
+            lambda: "t2/v1/a/tel/end" in received,
+            "the end",
         )
-        assert set(heard) == {"t2/v1/a/tel/end"}
+        assert set(received) == {"t2/v1/a/tel/end"}
         for ear in ears:
             ear.undeclare()

@@ -14,7 +14,7 @@ import zenoh
 from common import keys
 from common.bus.session import client_config, router_config
 from common.settings import BusSettings
-from tests.common.bus_fixture import until_heard
+from tests.common.bus_fixture import until_received
 from verification.harness.bus import at, listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
@@ -91,8 +91,8 @@ def test_the_region_sees_all_and_a_site_its_own(tree: Tree) -> None:
         for name, session in tree.robots.items():
             session.put(keys.VELOCITY.on(name), b"")
 
-    until_heard(put, lambda: seen["region"] == set(ROBOTS), "all of them")
-    until_heard(put, lambda: len(seen["berlin"]) >= 2, "a site's own")
+    until_received(put, lambda: seen["region"] == set(ROBOTS), "all of them")
+    until_received(put, lambda: len(seen["berlin"]) >= 2, "a site's own")
     assert seen["berlin"] == {name for name in ROBOTS if name.startswith("berlin")}
     for subscriber in subscribers:
         subscriber.undeclare()
@@ -114,7 +114,7 @@ def test_the_region_calls_each_robot(tree: Tree) -> None:
 def test_the_region_stops_one_site_or_all(tree: Tree, target: str) -> None:
     expected = {name for name in ROBOTS if target == "*" or name.startswith("munich")}
     tree.stops.clear()
-    until_heard(
+    until_received(
         lambda: tree.region.put(keys.estop_key(target), b""),
         lambda: tree.stops >= expected,
         "all stops",

@@ -52,12 +52,12 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def came(rig: BusFixture) -> Iterator[list[zenoh.Sample]]:
+def came(buses: BusFixture) -> Iterator[list[zenoh.Sample]]:
     """All samples that arrive on the robot's keys."""
     found: list[zenoh.Sample] = []
-    session = rig.session()
+    session = buses.session()
     declared = [
-        session.declare_subscriber(f"t2/v1/{rig.robot}/{each}", found.append)
+        session.declare_subscriber(f"t2/v1/{buses.robot}/{each}", found.append)
         for each in ("**", "@cmd/**")
     ]
     yield found
@@ -111,31 +111,31 @@ def test_nothing_to_play_is_an_error(path: Path, tool: Tool) -> None:
 
 @pytest.mark.parametrize("service", ["bridge", "safety"])
 def test_refused_while_bridge_or_safety_run(
-    path: Path, came: list[zenoh.Sample], rig: BusFixture, tool: Tool, service: str
+    path: Path, came: list[zenoh.Sample], buses: BusFixture, tool: Tool, service: str
 ) -> None:
-    pretend(rig, service, {})
+    pretend(buses, service, {})
     result = tool("replay", str(path), *FAST)
     assert result.code == 1
-    assert f"{service} of robot {rig.robot} is running" in result.err
+    assert f"{service} of robot {buses.robot} is running" in result.err
     assert tool("replay", str(path), *FAST, robot="nobody").code == 0
     assert came == []
 
 
 def test_a_service_that_starts_ends_the_replay(
-    path: Path, rig: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
+    path: Path, buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     play = targets.BusTarget.play
 
     def start_safety(self: targets.BusTarget, path: str, it: Any) -> bool:
         if path == "tel/bridge/velocity":
-            pretend(rig, "safety", {})
+            pretend(buses, "safety", {})
             monkeypatch.setattr(targets.BusTarget, "play", play)
         return play(self, path, it)
 
     monkeypatch.setattr(targets.BusTarget, "play", start_safety)
     result = tool("replay", str(path), "--rate", "0.5")
     assert result.code == 1
-    assert f"safety of robot {rig.robot} is running" in result.err
+    assert f"safety of robot {buses.robot} is running" in result.err
 
 
 def state(heartbeat: int) -> Callable[[], m.SafetyState]:
@@ -150,12 +150,12 @@ def state(heartbeat: int) -> Callable[[], m.SafetyState]:
     [(None, "no bridge of robot"), ("10.7.5.224:4002", "is at 10.7.5.224:4002: a real one")],
 )
 def test_a_real_vehicle_is_refused(
-    path: Path, rig: BusFixture, tool: Tool, board: str | None, printed: str
+    path: Path, buses: BusFixture, tool: Tool, board: str | None, printed: str
 ) -> None:
     asked: list[m.Drive] = []
-    rig.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
+    buses.bus(lambda bus: bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), source="*"))
     if board:
-        pretend(rig, "bridge", {keys.LINK: lambda: link(board=board)})
+        pretend(buses, "bridge", {keys.LINK: lambda: link(board=board)})
     result = tool("replay", str(path), "--simulator", *FAST)
     assert result.code == 1
     assert printed in result.err
@@ -163,7 +163,7 @@ def test_a_real_vehicle_is_refused(
 
 
 def test_a_simulated_vehicle_receives_current_requests(
-    path: Path, rig: BusFixture, tool: Tool
+    path: Path, buses: BusFixture, tool: Tool
 ) -> None:
     asked: list[m.Drive] = []
     moved: list[Arrival[m.Motion]] = []
@@ -172,11 +172,11 @@ def test_a_simulated_vehicle_receives_current_requests(
     def declare(bus: Bus) -> None:
         bus.subscribe(keys.DRIVE, lambda a: asked.append(a.message), depth=64, source="*")
         bus.subscribe(keys.MOTION, moved.append)
-        bus.on_any(keys.estop_key(rig.robot), stops.append)
+        bus.on_any(keys.estop_key(buses.robot), stops.append)
 
-    rig.bus(declare)
-    pretend(rig, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
-    pretend(rig, "safety", {keys.SAFETY: state(77)})
+    buses.bus(declare)
+    pretend(buses, "bridge", {keys.LINK: lambda: link(board="127.0.0.1:4003")})
+    pretend(buses, "safety", {keys.SAFETY: state(77)})
     result = tool("replay", str(path), "--simulator", "--rate", "20")
     assert (result.code, result.err) == (0, "played 6 messages\n")
     wait_until(lambda: len(asked) == 5 and stops, "all that was asked, and the stop")
