@@ -30,10 +30,10 @@ class ConstantSource:
     def declare(self, bus: Bus) -> None:
         source = DriveSource(bus, "teleop")
 
-        def ask(_: int) -> None:
+        def publish(_: int) -> None:
             source.request(self.linear, 0.0)
 
-        self._loop.post(lambda: self._loop.every(0.05, ask))
+        self._loop.post(lambda: self._loop.every(0.05, publish))
 
 
 @pytest.fixture

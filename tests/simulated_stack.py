@@ -152,18 +152,18 @@ class SimulatedStack:
         if not self.odometry:
             return
         view = View(self.odometry[-1], self._told, self._pressed, self._refusal, self._granted)
-        ask = self.lap.advance(view, self.now_ns)
+        action = self.lap.advance(view, self.now_ns)
         if self.lap.index != self._index:
             self._index, self._refusal, self._granted = self.lap.index, None, False
-        self._request(ask, self._told.heartbeat)
+        self._request(action, self._told.heartbeat)
 
-    def _request(self, ask: Action, echo: int) -> None:
+    def _request(self, action: Action, echo: int) -> None:
         self._seq["drive"] += 1
-        linear, angular = ask.twist.linear, ask.twist.angular
+        linear, angular = action.twist.linear, action.twist.angular
         request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)
         self._decide(DriveRequest("demo", request, self.now_ns))
         assert self._told is not None
-        if ask.press == "reset":
+        if action.press == "reset":
             self._decide(Reset(echo, reset_request(self._told).causes))
-        elif ask.press == "release":  # the lap hits its box driving forward
+        elif action.press == "release":  # the lap hits its box driving forward
             self._decide(Hold(True, "backward", echo))

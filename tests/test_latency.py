@@ -29,19 +29,19 @@ WAYS = {
 }  # fmt: skip
 
 
-def told_once(stack: RunningStack) -> dict[str, Any]:
+def latency_once(stack: RunningStack) -> dict[str, Any]:
     """Return what ``t2 latency --once`` prints as JSON."""
     result = ran("latency", "--once", "-o", "json", *sets(f"bus.connect={stack.endpoint}"))
     assert result.returncode == 0, result.stderr
-    told: dict[str, Any] = json.loads(result.stdout)
-    return told
+    printed: dict[str, Any] = json.loads(result.stdout)
+    return printed
 
 
 @pytest.mark.skipif(not host_id(), reason="this system does not name its boot: clocks are not one")
 def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
     stack: RunningStack, source: ConstantSource, tmp_path: Path
 ) -> None:
-    before = told_once(stack)["durations"]
+    before = latency_once(stack)["durations"]
     assert before["contact_to_break"] == {"count": 0, "p50": None, "p99": None, "worst": None}
     drive_until_moving(stack, source)
     pressed_ns = time.monotonic_ns()
@@ -50,14 +50,14 @@ def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
     with running(t2("latency", "-o", "json", *sets(f"bus.connect={stack.endpoint}")), lines):
         wait_until(lambda: judged(lines), "the judged stop", PATIENCE_S)
     took_s = (time.monotonic_ns() - pressed_ns) / NS_PER_S
-    told = json.loads(lines.read_text(encoding="utf-8").split("\n")[-2])
-    durations = told["durations"]
+    printed = json.loads(lines.read_text(encoding="utf-8").split("\n")[-2])
+    durations = printed["durations"]
     assert durations["contact_to_break"]["count"] == 1
     assert 0 < durations["contact_to_break"]["worst"] < took_s
     assert durations["judged_stop"]["worst"] > durations["contact_to_break"]["worst"]
     assert durations["request_to_frame"]["count"] > 5
     assert durations["board_to_bridge"]["count"] > 50
-    assert "foreign_clock" not in told["not_counted"]
+    assert "foreign_clock" not in printed["not_counted"]
     for way, hops in WAYS.items():
         counts = {durations[f"{way}.{hop}"]["count"] for hop in hops}
         assert counts == {durations[way]["count"]}, way
@@ -65,7 +65,7 @@ def test_a_contact_and_the_requests_before_it_are_measured_hop_by_hop(
         parts = [durations[f"{way}.{hop}"]["worst"] for hop in WAYS[way]]
         assert sum(parts) == pytest.approx(durations[way]["worst"], abs=1e-6)
 
-    assert_the_terminal_shows(stack, told["durations"]["contact_to_break"]["worst"])
+    assert_the_terminal_shows(stack, printed["durations"]["contact_to_break"]["worst"])
 
 
 def judged(lines: Path) -> int:

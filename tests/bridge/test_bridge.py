@@ -45,17 +45,17 @@ def test_everything_the_board_says_reaches_the_bus_with_its_raw_frame(
 def test_nothing_is_published_twice_although_it_comes_to_both_ports(bridge: BridgeFixture) -> None:
     wait_until(lambda: bridge.newest("tel/bridge/link"), "a link")
 
-    def told(bits: int) -> list[m.Driver]:
+    def reported(bits: int) -> list[m.Driver]:
         return [d for d in bridge.seen.get("tel/bridge/driver/left", []) if d.bits == bits]
 
     bridge.board.say(reports.DriverReport(Side.LEFT, 0b1000))
-    wait_until(lambda: told(0b1000), "the fault, unasked")
+    wait_until(lambda: reported(0b1000), "the fault, unasked")
     wait_until(lambda: "driver_fault" in bridge.events(), "the event")
     for bits in (0b10000, 0b100000):  # the last one comes behind all copies of the first
         bridge.board.say(reports.DriverReport(Side.LEFT, bits))
-        wait_until(lambda: told(bits), "the next fault")  # noqa: B023
-    assert len(told(0b1000)) == 1
-    assert told(0b1000)[0].faults == ("under_voltage",)
+        wait_until(lambda: reported(bits), "the next fault")  # noqa: B023
+    assert len(reported(0b1000)) == 1
+    assert reported(0b1000)[0].faults == ("under_voltage",)
 
 
 def test_begins_with_stop_even_without_a_router() -> None:

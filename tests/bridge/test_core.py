@@ -68,8 +68,8 @@ class Bench:
     def move(self, command: Command = Command.RUN, linear: float = 0.0, **fields: Any) -> Output:
         """Let safety command a motion."""
         self.seq += 1
-        told = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
-        out = self.core.motion(m.Motion(command=command, **told), self.now_ns, self.now_ns)
+        values = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
+        out = self.core.motion(m.Motion(command=command, **values), self.now_ns, self.now_ns)
         self.outs.append(out)
         return out
 
@@ -198,18 +198,20 @@ def test_only_a_brake_is_the_judged_stop(bench: Bench, command: Command, is_judg
 # --- what comes from the board ------------------------------------------------------------------
 
 
-def test_a_driver_fault_that_is_told_on_the_other_port_alone_counts(bench: Bench) -> None:
-    told = []
+def test_a_driver_fault_that_is_reported_on_the_other_port_alone_counts(bench: Bench) -> None:
+    reported = []
     for port, bits in ((0, 0), (1, 1), (0, 0), (0, 1), (1, 0), (0, 3), (1, 3)):
         out = bench.answer(DriverReport(Side.LEFT, bits), port=port)
-        told += [message.bits for message in published(out, "driver_left")]
-    assert told == [0, 1, 0, 3]
+        reported += [message.bits for message in published(out, "driver_left")]
+    assert reported == [0, 1, 0, 3]
 
 
 def test_copies_are_dropped_and_counted(bench: Bench) -> None:
     came = ((0, STANDS), (1, STANDS), (1, STANDS + CLEAR), (0, STANDS))
-    told = [published(bench.receive(datagram, port=port), "velocity") for port, datagram in came]
-    assert [len(each) for each in told] == [1, 0, 0, 1]
+    velocities = [
+        published(bench.receive(datagram, port=port), "velocity") for port, datagram in came
+    ]
+    assert [len(each) for each in velocities] == [1, 0, 0, 1]
     assert bench.counters["other_port"] == 2
 
 
@@ -264,13 +266,13 @@ def settings_asked(out: Output) -> int:
 
 def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench) -> None:
     bench.arm()
-    told: list[m.Switches] = []
+    reported: list[m.Switches] = []
     for _ in range(5):
         assert bench.core.readiness.ready
         bench.receive(STANDS)
-        told += published(bench.tick(NS_PER_S // 5), "switches")
+        reported += published(bench.tick(NS_PER_S // 5), "switches")
     assert not bench.core.readiness.ready
-    assert told == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
+    assert reported == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
 
 
 def test_a_gap_of_some_velocity_periods_sends_the_brakes_again_at_once(bench: Bench) -> None:
@@ -313,12 +315,12 @@ def test_a_firmware_without_echoes_is_driven_when_that_is_accepted(
 
 def test_only_the_first_jump_of_a_sender_is_an_event(bench: Bench) -> None:
     bench.arm()
-    told = [
+    logged = [
         event
         for boot in (SAFETY, SAFETY, 2, 2)
         for event in events(bench.move(Command.STOP, seq=2**40, boot=boot))
     ]
-    assert told == ["seq_jump", "second_authority"]
+    assert logged == ["seq_jump", "second_authority"]
     assert bench.counters["motion_seq_jumps"] == 2
 
 

@@ -163,6 +163,6 @@ def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
     bridge._on_second(0)
     bridge._on_link(time.monotonic_ns())
     assert bridge._node.counters["send_errors"] == 3
-    told = bridge._publishers["link"].last
-    assert isinstance(told, Link)
-    assert told.send_errors == 3
+    link = bridge._publishers["link"].last
+    assert isinstance(link, Link)
+    assert link.send_errors == 3

@@ -241,12 +241,12 @@ def test_a_quantile_is_its_buckets_bound_but_never_more_than_the_worst() -> None
 def test_a_quantile_is_never_too_small_and_at_most_one_bucket_too_large(
     durations_ns: list[int], part: float
 ) -> None:
-    told = quantile(BOUNDS_S, histogram(*durations_ns), part)
+    reported = quantile(BOUNDS_S, histogram(*durations_ns), part)
     ranked = sorted(durations_ns)
     true_s = next(d for n, d in enumerate(ranked, 1) if n >= part * len(ranked)) / NS_PER_S
-    assert told is not None
+    assert reported is not None
     assert (
         true_s
-        <= told
-        <= max(10e-6, min(true_s * 1.34, ranked[-1] / NS_PER_S) if true_s <= 1 else told)
+        <= reported
+        <= max(10e-6, min(true_s * 1.34, ranked[-1] / NS_PER_S) if true_s <= 1 else reported)
     )

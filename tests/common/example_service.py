@@ -37,13 +37,13 @@ def build(node: Node[Shared]) -> None:
 
 def hang(node: Node[Shared]) -> Callable[[int], None]:
     """Return a timer that does not return while it is told to hang."""
-    told: list[int] = []
-    signal.signal(signal.SIGUSR1, lambda number, _: told.append(number))
+    signals: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, _: signals.append(number))
 
     def tick(_: int) -> None:
-        if len(told) % 2:
+        if len(signals) % 2:
             node.log.info("hangs")
-        while len(told) % 2:
+        while len(signals) % 2:
             signal.pause()
 
     return tick

@@ -29,7 +29,7 @@ def test_the_echo_is_zero_before_the_first_state_of_safety(bus: FakeBus) -> None
 def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
     source = DriveSource(bus, "demo")
     for heartbeat in (7, 8):
-        bus.tell(keys.SAFETY, safety_state(heartbeat=heartbeat))
+        bus.deliver(keys.SAFETY, safety_state(heartbeat=heartbeat))
     assert source.request(0.0, 0.0).echo == 8
 
 
@@ -76,7 +76,7 @@ def test_who_may_only_watch_is_barred(
     monkeypatch.setattr(Publisher, "passed_on", passed_on)
     source = DriveSource(bus, "demo")
     if has_heartbeat:
-        bus.tell(keys.SAFETY, safety_state(heartbeat=7))
+        bus.deliver(keys.SAFETY, safety_state(heartbeat=7))
     for _ in range(DENIED_AFTER - 1):
         source.request(0.1, 0.0)
     assert not source.denied

@@ -46,7 +46,7 @@ def posted(server: Server) -> None:
         assert answer.status == 200
 
 
-def worst_s(peer: Peer, ask: Callable[[], None]) -> float:
+def worst_s(peer: Peer, request_estop: Callable[[], None]) -> float:
     """Return the longest time from asking for an emergency stop to its arrival on the bus."""
     worst = 0.0
     for _ in range(TRIES):
@@ -55,7 +55,7 @@ def worst_s(peer: Peer, ask: Callable[[], None]) -> float:
         peer.estops.clear()
         peer.latched = ()
         began = time.monotonic()
-        ask()
+        request_estop()
         wait_until(lambda: peer.estops, "the emergency stop on the bus", 10)
         worst = max(worst, time.monotonic() - began)
     peer.latched = ("estop",)

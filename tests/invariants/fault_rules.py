@@ -67,10 +67,10 @@ class FaultRules(RuleBasedStateMachine):
         self.stack.vehicle.measured = None if linear is None else Twist(linear)
         self.stack.run(ms)
 
-    @rule(tells=st.booleans(), ms=SHORT | LONG)
-    def velocities(self, tells: bool, ms: int) -> None:
+    @rule(reports=st.booleans(), ms=SHORT | LONG)
+    def velocities(self, reports: bool, ms: int) -> None:
         """Stop or resume the velocity reports."""
-        self.stack.vehicle.tells_velocity = tells
+        self.stack.vehicle.reports_velocity = reports
         self.stack.run(ms)
 
     @rule(on=st.booleans())

@@ -37,9 +37,9 @@ def driving(linear: float = 0.5) -> Stack:
     """Return a stack that drives on request of teleop."""
     stack = Stack()
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
-    stack.sticks["teleop"].asks = (linear, 0.0)
+    stack.sticks["teleop"].requested = (linear, 0.0)
     stack.run(1500)
     assert stack.vehicle.twist.linear == pytest.approx(linear, abs=0.05)
     return stack
@@ -59,9 +59,9 @@ def safety_dies(stack: Stack) -> None:
 def estop(stack: Stack) -> None:
     stack.estop()
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def board_freezes(stack: Stack) -> None:
@@ -116,14 +116,14 @@ def safety_dies_latched(stack: Stack) -> None:
     stack.estop()
     stack.kill("safety", 20)
     stack.run(1500)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def reset_too_early(stack: Stack) -> None:
     """Reset a driver's fault after its first good sample; they come twice a second."""
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     stack.vehicle.fault(Side.LEFT, 1)
     stack.run(20)
@@ -131,7 +131,7 @@ def reset_too_early(stack: Stack) -> None:
     stack.run(600)
     stack.reset()
     stack.run(300)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def driver_blinks(stack: Stack) -> None:
@@ -146,20 +146,20 @@ def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False)
 
 
 def velocities_fall_silent(stack: Stack) -> None:
-    stack.vehicle.tells_velocity = False
+    stack.vehicle.reports_velocity = False
 
 
 def reset_without_a_velocity(stack: Stack) -> None:
     """Stop the velocities at standstill, then reset."""
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     stack.estop()
-    stack.vehicle.tells_velocity = False
+    stack.vehicle.reports_velocity = False
     stack.run(1000)
     stack.reset()
-    stack.vehicle.tells_velocity = True
+    stack.vehicle.reports_velocity = True
     stack.run(1000)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def however_old(inputs: Inputs, *_: object) -> Twist | None:
@@ -191,7 +191,7 @@ def successor_hits_something(stack: Stack) -> None:
     stack.vehicle.measured = Twist(0.2)  # still, so that a way off is known
     stack.run(40)
     stack.vehicle.pressed, stack.vehicle.measured = True, None
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
     stack.run(2500)
     hold(stack)
 
@@ -208,9 +208,9 @@ def successor_hears_of_no_latch(stack: Stack) -> None:
         )
 
     successor(stack, old)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def overwritten(lease: Lease, motion: m.Motion) -> int | None:

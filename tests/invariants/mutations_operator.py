@@ -12,7 +12,7 @@ from tests.invariants.stack import Stack
 
 def standing_pressed(stack: Stack) -> None:
     stack.vehicle.pressed = True
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
     stack.run(1500)
 
 
@@ -50,7 +50,7 @@ def pressed_again_and_again(stack: Stack) -> None:
 
 def reset_of_what_was_seen(stack: Stack) -> None:
     """Reset an emergency stop as it was seen before a contact that came meanwhile."""
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     stack.estop()
     stack.run(100)
@@ -61,12 +61,12 @@ def reset_of_what_was_seen(stack: Stack) -> None:
     stack.run(400)
     stack.reset(seen)
     stack.run(300)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def late_reset(stack: Stack) -> None:
     """Reset three seconds after what the operator saw; the bumper was touched meanwhile."""
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     for _ in range(2):
         stack.vehicle.pressed = True
@@ -77,7 +77,7 @@ def late_reset(stack: Stack) -> None:
     stack.run(3000)
     stack.reset(seen)
     stack.run(300)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
 
 
 def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) -> Release:

@@ -14,24 +14,24 @@ FAULT_MM = 0xFFFF
 
 def never_stops(stack: Stack) -> None:
     stack.vehicle.measured = Twist(0.28)
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
 
 
 def pushed(stack: Stack) -> None:
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
     stack.run(2500)
     stack.vehicle.measured = Twist(0.28)
 
 
 def nav_goes_on(stack: Stack) -> None:
     """Overrule nav by teleop, then end teleop's requests."""
-    stack.sticks["teleop"].asks, stack.sticks["nav"].asks = None, (0.0, 0.0)
+    stack.sticks["teleop"].requested, stack.sticks["nav"].requested = None, (0.0, 0.0)
     stack.run(1000)
-    stack.sticks["nav"].asks = (0.3, 0.0)
+    stack.sticks["nav"].requested = (0.3, 0.0)
     stack.run(300)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(300)
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
 
 
 def goes_on_blind(stack: Stack) -> None:

@@ -49,7 +49,7 @@ FLANKS = (0, 4)
 
 
 @dataclass(slots=True)
-class Wish:
+class SourceRequest:
     """The newest good request of one source."""
 
     boot: int
@@ -73,7 +73,7 @@ class SafetyBook:
     samples: dict[str, tuple[int, Message]] = field(default_factory=dict)
     ranges: deque[tuple[int, Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
     bumpers: deque[Bumper] = field(default_factory=lambda: deque(maxlen=3))
-    wishes: dict[str, Wish] = field(default_factory=dict)
+    requests: dict[str, SourceRequest] = field(default_factory=dict)
     zeros: dict[str, int] = field(default_factory=dict)  # source: its last request of zero
     unseen: dict[int, int] = field(default_factory=dict)  # sonar: since when it shows nothing
     rivals: dict[str, int] = field(default_factory=dict)
@@ -93,7 +93,7 @@ class SafetyBook:
             return
         if now_ns - sent_ns > ECHO_AGE_S * NS_PER_S:
             return
-        old = self.wishes.get(source)
+        old = self.requests.get(source)
         if old is not None and old.boot != drive.boot and self.is_fresh(source, now_ns):
             self.rivals[source] = now_ns
             return
@@ -102,7 +102,7 @@ class SafetyBook:
         if drive.linear == 0 == drive.angular:
             self.zeros[source] = now_ns
         since_ns = old.still_ns if old is not None and old.still else now_ns
-        self.wishes[source] = Wish(
+        self.requests[source] = SourceRequest(
             drive.boot, drive.seq, now_ns, drive.linear, drive.angular, since_ns
         )
 
@@ -170,20 +170,20 @@ class SafetyBook:
         if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S or tripped:
             self.neutral.clear()
             return
-        for source, wish in self.wishes.items():
-            if wish.still and self.is_fresh(source, now_ns):
-                self.neutral[source] = wish.at_ns
+        for source, request in self.requests.items():
+            if request.still and self.is_fresh(source, now_ns):
+                self.neutral[source] = request.at_ns
         for source in [source for source in self.neutral if self._better(source, now_ns)]:
             del self.neutral[source]  # overruled
 
     def _better(self, source: str, now_ns: int) -> list[str]:
         """Return the sources above this one that hold the wheel."""
-        higher = (one for one in self.wishes if PRIORITIES[one] > PRIORITIES[source])
+        higher = (one for one in self.requests if PRIORITIES[one] > PRIORITIES[source])
         return [one for one in higher if self.is_fresh(one, now_ns)]
 
     def is_fresh(self, source: str, now_ns: int) -> bool:
         """Tell whether the newest request of a source still holds."""
-        return now_ns - self.wishes[source].at_ns <= LEASES_S[source] * NS_PER_S
+        return now_ns - self.requests[source].at_ns <= LEASES_S[source] * NS_PER_S
 
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
         """Say why a motion must not run; trips are somebody else's."""
@@ -204,7 +204,8 @@ class SafetyBook:
         fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
         stands = fresh and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
         asked = any(
-            self.is_fresh(source, now_ns) and not wish.still for source, wish in self.wishes.items()
+            self.is_fresh(source, now_ns) and not request.still
+            for source, request in self.requests.items()
         )
         return stands and not asked
 
@@ -241,11 +242,11 @@ class SafetyBook:
         return bad
 
     def _of_source(self, source: str, now_ns: int) -> Iterator[str]:
-        if source not in self.wishes or not self.is_fresh(source, now_ns):
+        if source not in self.requests or not self.is_fresh(source, now_ns):
             yield f"no fresh request of {source!r}"
             return
-        wish = self.wishes[source]
-        if wish.still and now_ns - wish.still_ns > RAMP_S * NS_PER_S:
+        request = self.requests[source]
+        if request.still and now_ns - request.still_ns > RAMP_S * NS_PER_S:
             yield "nobody asks for motion"
         if better := self._better(source, now_ns):
             yield f"{better} go before {source}"

@@ -75,12 +75,12 @@ class Sockets:
 
 
 class Stick:
-    """Someone who asks to drive while ``asks`` is set."""
+    """A source that publishes drive requests while ``requested`` is set."""
 
     def __init__(self, name: str, process: Process) -> None:
         self.name = name
         self.process = process
-        self.asks: tuple[float, float] | None = None
+        self.requested: tuple[float, float] | None = None
         self.echo = 0
         self.seq = 0
         process.subscribe(keys.SAFETY, self._listen)
@@ -88,11 +88,11 @@ class Stick:
     def _listen(self, arrival: Any) -> None:
         self.echo = arrival.message.heartbeat
 
-    def ask(self) -> None:
-        """Put one request, if it asks at all."""
-        if self.asks is not None:
+    def request(self) -> None:
+        """Publish one request if one is set."""
+        if self.requested is not None:
             self.seq += 1
-            linear, angular = self.asks
+            linear, angular = self.requested
             self.put(m.Drive(linear=linear, angular=angular, echo=self.echo, seq=self.seq))
 
     def put(self, drive: m.Drive, source: str = "") -> None:
@@ -145,7 +145,7 @@ class Stack:
             self.net.turn()
         if self.net.now_ns % ASK_NS == 0:
             for stick in self.sticks.values():
-                stick.ask()
+                stick.request()
             self.net.turn()
         self.oracle.on_step(self.vehicle.silent)
 

@@ -57,20 +57,20 @@ class StackMachine(FaultRules):
     @rule(source=SOURCES, linear=SPEEDS, angular=TURNS, ms=SHORT | LONG)
     def off_we_go(self, source: str, linear: float, angular: float, ms: int) -> None:
         """Ask for zero until inputs have settled, then for motion: the way it is meant."""
-        self.stack.sticks[source].asks = (0.0, 0.0)
+        self.stack.sticks[source].requested = (0.0, 0.0)
         self.stack.run(650)
-        self.ask(source, linear, angular, ms)
+        self.drive(source, linear, angular, ms)
 
     # Hypothesis draws the first rule most often: that of the fewest arguments and the first name.
     @rule(linear=FAST)
     def ahead(self, linear: float) -> None:
         """Ask for motion without a neutral request, as someone who noticed nothing does."""
-        self.ask("teleop", linear, 0.0, 210)
+        self.drive("teleop", linear, 0.0, 210)
 
     def cure(self) -> None:
         """Cure everything, reset, and drive: there must be something at stake."""
         vehicle = self.stack.vehicle
-        vehicle.pressed, vehicle.measured, vehicle.tells_velocity = False, None, True
+        vehicle.pressed, vehicle.measured, vehicle.reports_velocity = False, None, True
         vehicle.ranges[:] = [NO_ECHO_MM] * 8
         for side in Side:
             vehicle.fault(side, 0)
@@ -90,11 +90,11 @@ class StackMachine(FaultRules):
         self.wait(ms)
         self.off_we_go("teleop", 1.0, 0.0, ms)
 
-    @rule(kind=KINDS, gone_ms=HASTY, asks=st.booleans())
-    def hasty_reset(self, kind: str, gone_ms: int, asks: bool) -> None:
+    @rule(kind=KINDS, gone_ms=HASTY, requested=st.booleans())
+    def hasty_reset(self, kind: str, gone_ms: int, requested: bool) -> None:
         """Trip something, cure it, and reset too early or with the stick still pushed."""
         self.trip(kind)
-        self.stack.sticks["teleop"].asks = (0.5, 0.0) if asks else (0.0, 0.0)
+        self.stack.sticks["teleop"].requested = (0.5, 0.0) if requested else (0.0, 0.0)
         self.stack.run(gone_ms)
         self.stack.reset()
         self.off_we_go("teleop", 1.0, 0.0, 400)
@@ -162,7 +162,7 @@ class StackMachine(FaultRules):
     def burst(self, linear: float, gap_ms: int) -> None:
         """Silence a source, then deliver its old requests all at once."""
         stick = self.stack.sticks["teleop"]
-        stick.asks, echo = None, stick.echo
+        stick.requested, echo = None, stick.echo
         self.stack.run(gap_ms)
         for speed in [0.0] * 5 + [linear] * 10:
             stick.seq += 1
@@ -176,15 +176,15 @@ class StackMachine(FaultRules):
         self.off_we_go(source, linear, 0.0, ms)
 
     @rule(source=SOURCES, linear=SPEEDS, angular=TURNS, ms=SHORT)
-    def ask(self, source: str, linear: float, angular: float, ms: int) -> None:
+    def drive(self, source: str, linear: float, angular: float, ms: int) -> None:
         """Ask for something, and go on asking."""
-        self.stack.sticks[source].asks = (linear, angular)
+        self.stack.sticks[source].requested = (linear, angular)
         self.stack.run(ms)
 
     @rule(source=SOURCES, ms=SHORT | LONG)
     def let_go(self, source: str, ms: int) -> None:
         """Stop requesting, as a source that has died."""
-        self.stack.sticks[source].asks = None
+        self.stack.sticks[source].requested = None
         self.stack.run(ms)
 
     @rule(ms=SHORT | LONG)
@@ -203,7 +203,7 @@ class StackMachine(FaultRules):
         """Ask for a reset, with the controls released or not."""
         if lets_go:
             for stick in self.stack.sticks.values():
-                stick.asks = None
+                stick.requested = None
             self.stack.run(500)
         self.stack.reset()
 
@@ -234,7 +234,7 @@ class StackMachine(FaultRules):
     def teardown(self) -> None:
         """When all sources fall silent, the vehicle is stopped and stays stopped."""
         for stick in self.stack.sticks.values():
-            stick.asks = None
+            stick.requested = None
         self.stack.kill("safety", 10_000)
         self.stack.run(1200)
         self.no_frame_breaks_an_invariant()

@@ -26,11 +26,11 @@ def test_a_hit_stops_and_only_reset_and_neutral_let_it_drive_again() -> None:
     runs = stack.oracle.runs
     stack.run(3000)
     assert (stack.oracle.runs, stack.vehicle.twist.linear) == (runs, 0.0)
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(600)
     assert stack.reset()
     stack.run(200)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
     stack.run(500)
     assert stack.oracle.runs > runs
     assert stack.oracle.violations == []
@@ -41,7 +41,7 @@ def stuck() -> Stack:
     stack = driving()
     stack.vehicle.pressed = True
     stack.estop()
-    stack.sticks["teleop"].asks = None
+    stack.sticks["teleop"].requested = None
     stack.run(2000)
     return stack
 
@@ -73,7 +73,7 @@ def test_the_operator_chooses_the_direction(direction: Direction) -> None:
 
 def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
     stack = driving()
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     stack.kill("safety", 3000)
     stack.run(1000)
@@ -84,14 +84,14 @@ def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
     assert stack.seen is not None
     assert "predecessor" in [cause.name for cause in stack.seen.causes]
     runs = stack.oracle.runs
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
     stack.run(1000)
     assert stack.oracle.runs == runs
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
     assert stack.reset()
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
     stack.run(500)
     assert stack.oracle.runs > runs
     assert stack.oracle.violations == []
@@ -139,11 +139,11 @@ def test_a_restarted_part_drives_after_a_neutral_request_and_not_before(name: st
     runs = stack.oracle.runs
     stack.run(1500)
     assert stack.oracle.runs == runs
-    stack.sticks["teleop"].asks = (0.0, 0.0)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
     assert stack.reset() == (name == "router")
     stack.run(700)
-    stack.sticks["teleop"].asks = (0.5, 0.0)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
     stack.run(500)
     assert stack.oracle.runs > runs
     assert stack.oracle.violations == []

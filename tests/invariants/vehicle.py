@@ -30,7 +30,7 @@ class Vehicle:
         self.measured: Twist | None = None  # reported instead of the true twist
         self.pressed = False
         self.silent_until_ns = 0
-        self.tells_velocity = True
+        self.reports_velocity = True
         self.inbox: deque[bytes] = deque()  # for the bridge
         self.on_motion: Callable[[MotionCommand, Complaints], None] = lambda *_: None
         self._net = net
@@ -80,7 +80,7 @@ class Vehicle:
             self._move()
         if self._stream_ns <= self._net.now_ns:
             self._stream_ns += STREAM_NS
-            if self.tells_velocity:
+            if self.reports_velocity:
                 self.say(self._velocity())
 
     def _take(self, datagram: bytes, complaints: Complaints) -> None:

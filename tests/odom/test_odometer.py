@@ -67,7 +67,7 @@ class World:
             distance=self.origin + SPEED * way, heading=TURNING * way, epoch=self.epoch
         )
 
-    def ask(self, request: m.PoseRequest) -> str:
+    def set_pose(self, request: m.PoseRequest) -> str:
         """Set the pose; return what was replied, or the refusal."""
         answers: list[str] = []
         done = threading.Event()
@@ -129,11 +129,11 @@ def test_the_drive_is_followed(endpoint: str, world: World) -> None:
 def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: World) -> None:
     bad = float("nan")
     wait_until(
-        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)),
+        lambda: "NaN" in world.set_pose(m.PoseRequest(x=bad, echo=world.heartbeat)),
         "a received heartbeat",
     )
     pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.heartbeat)
-    assert "x 10.000 m" in world.ask(pose)
+    assert "x 10.000 m" in world.set_pose(pose)
     wait_until(lambda: world.received[-1].epoch == 1, "the new pose")
     first = next(odometry for odometry in world.received if odometry.epoch == 1)
     assert first.x == pytest.approx(10.0, abs=2.0)
@@ -144,15 +144,15 @@ def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: Wo
 def test_a_pose_that_was_asked_late_is_refused(world: World) -> None:
     bad = float("nan")
     wait_until(
-        lambda: "NaN" in world.ask(m.PoseRequest(x=bad, echo=world.heartbeat)),
+        lambda: "NaN" in world.set_pose(m.PoseRequest(x=bad, echo=world.heartbeat)),
         "a received heartbeat",
     )
     late = m.PoseRequest(x=10.0, echo=world.heartbeat)
     due_s = time.monotonic() + 1.1
     wait_until(lambda: time.monotonic() > due_s, "a late call")
-    assert "allowed is 1 s" in world.ask(late)
-    assert "no echo" in world.ask(m.PoseRequest(x=10.0))
-    assert "unknown heartbeat" in world.ask(m.PoseRequest(x=10.0, echo=1))
+    assert "allowed is 1 s" in world.set_pose(late)
+    assert "no echo" in world.set_pose(m.PoseRequest(x=10.0))
+    assert "unknown heartbeat" in world.set_pose(m.PoseRequest(x=10.0, echo=1))
     assert world.received[-1].epoch == 0
 
 

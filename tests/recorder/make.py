@@ -64,12 +64,12 @@ def drive(stack: RunningStack) -> None:
         bus = closing_all.enter_context(closing(Bus(at(stack.endpoint), "001", loop.post)))
         source = DriveSource(bus, "demo")
 
-        def ask() -> None:
+        def publish() -> None:
             source.request(*twist)
 
         states: list[SafetyState] = []
         bus.subscribe(keys.SAFETY, lambda arrival: states.append(arrival.message))
-        loop.every(0.05, lambda _: ask())
+        loop.every(0.05, lambda _: publish())
         bus.open()
         closing_all.enter_context(running(loop))
         wait_until(lambda: bus.connected, "the bus")

@@ -118,7 +118,7 @@ class PolicyFixture:
             self.decide()
         return self.verdict
 
-    def ask(self, linear: float = 0.0, angular: float = 0.0, source: str = "teleop") -> Verdict:
+    def request(self, linear: float = 0.0, angular: float = 0.0, source: str = "teleop") -> Verdict:
         """Put one request."""
         self.driver_seq += 1
         drive = Drive(
@@ -140,7 +140,7 @@ class PolicyFixture:
         """Repeat a request at every tick for a while."""
         for _ in range(round(seconds / TICK_S)):
             self.tick()
-            self.ask(linear, angular, source)
+            self.request(linear, angular, source)
         return self.verdict
 
     def ready(self) -> "PolicyFixture":

@@ -20,7 +20,7 @@ AGE_NS = 400_000_000
 BEAT = Heartbeat(40).beat(0)  # sent 41 at time 0
 
 
-def ask(
+def request(
     arbiter: Arbiter,
     now_ns: int,
     *,
@@ -35,14 +35,14 @@ def ask(
 
 
 def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: float = 0.0) -> Arbiter:
-    arbiter, refused = ask(arbiter, now_ns, source=source, linear=linear)
+    arbiter, refused = request(arbiter, now_ns, source=source, linear=linear)
     assert refused == ""
     return arbiter
 
 
 @pytest.mark.parametrize("linear", [math.nan, math.inf, -math.inf])
 def test_a_non_finite_request_is_refused(linear: float) -> None:
-    assert ask(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
+    assert request(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
     wrong = Drive(linear=0.0, angular=linear, echo=41)
     assert Arbiter(SOURCES).accept(DriveRequest("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
 
@@ -58,46 +58,46 @@ def test_a_non_finite_request_is_refused(linear: float) -> None:
     ],
 )
 def test_a_late_or_unknown_echo_is_refused(echo: int, now_ns: int, reason: str) -> None:
-    assert ask(Arbiter(SOURCES), now_ns, echo=echo)[1] == reason
+    assert request(Arbiter(SOURCES), now_ns, echo=echo)[1] == reason
 
 
 @pytest.mark.parametrize(("seq", "reason"), [(4, "seq_not_rising"), (5, "seq_not_rising"), (6, "")])
 def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
-    arbiter, _ = ask(Arbiter(SOURCES), 0, seq=5)
-    assert ask(arbiter, 1, seq=seq)[1] == reason
+    arbiter, _ = request(Arbiter(SOURCES), 0, seq=5)
+    assert request(arbiter, 1, seq=seq)[1] == reason
 
 
 def test_unknown_sources_and_nonsense_are_refused() -> None:
-    assert ask(Arbiter(SOURCES), 0, source="nobody") == (Arbiter(SOURCES), "unknown_source")
+    assert request(Arbiter(SOURCES), 0, source="nobody") == (Arbiter(SOURCES), "unknown_source")
     assert Arbiter(SOURCES).accept(DriveRequest("web", None), BEAT, AGE_NS, 0)[1] == "not_a_request"
 
 
 def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
     lease_ns = round(SOURCES["teleop"].lease * NS_PER_S)
     arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
-    refused, reason = ask(arbiter, lease_ns, boot=2)
+    refused, reason = request(arbiter, lease_ns, boot=2)
     assert reason == "second_publisher"
     assert refused.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"
     assert refused.conflicts(lease_ns + CONFLICT_NS) == ""
-    taken, reason = ask(arbiter, lease_ns + 1, boot=2)
+    taken, reason = request(arbiter, lease_ns + 1, boot=2)
     assert reason == ""
     assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
-    taken, reason = ask(refused, lease_ns + 1, boot=2)
+    taken, reason = request(refused, lease_ns + 1, boot=2)
     assert reason == ""
     assert taken.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"  # the first may still be there
 
 
 @pytest.mark.parametrize("seq", [0, 1, 9])
 def test_a_new_boot_counts_anew(seq: int) -> None:
-    arbiter, _ = ask(Arbiter(SOURCES), 0, seq=5)
+    arbiter, _ = request(Arbiter(SOURCES), 0, seq=5)
     later = round(SOURCES["teleop"].lease * NS_PER_S) + 1
-    arbiter, reason = ask(arbiter, later, boot=2, seq=seq)
+    arbiter, reason = request(arbiter, later, boot=2, seq=seq)
     assert reason == ""
-    assert ask(arbiter, later, boot=2, seq=seq)[1] == "seq_not_rising"
+    assert request(arbiter, later, boot=2, seq=seq)[1] == "seq_not_rising"
 
 
 def test_the_wish_is_what_was_asked_for() -> None:
-    arbiter, _ = ask(Arbiter(SOURCES), 0)
+    arbiter, _ = request(Arbiter(SOURCES), 0)
     assert not arbiter.requests_motion(0)
     for linear, angular in ((0.1, -0.2), (0.0, 0.3), (0.4, 0.0)):
         drive = Drive(
@@ -112,7 +112,7 @@ def test_all_rivals_are_named() -> None:
     arbiter = Arbiter(SOURCES)
     for source in ("teleop", "web"):
         arbiter = accepted(arbiter, 0, source)
-        arbiter, _ = ask(arbiter, 0, source=source, boot=2)
+        arbiter, _ = request(arbiter, 0, source=source, boot=2)
     assert arbiter.conflicts(0) == "teleop, web"
 
 

@@ -35,23 +35,23 @@ def test_after_a_pause_the_ramp_begins_at_what_is_left_of_the_motion() -> None:
     fixture.linear = 0.8
     fixture.tick(20)
     assert fixture.verdict.command == "stop"
-    assert fixture.ask(1.0).twist.linear == pytest.approx(0.8)
+    assert fixture.request(1.0).twist.linear == pytest.approx(0.8)
 
 
 def test_a_request_holds_for_its_lease_and_not_longer() -> None:
     fixture = PolicyFixture().running()
     fixture.now_ns += round(0.1 * NS_PER_S)
     fixture.feed()
-    fixture.ask(0.5)
+    fixture.request(0.5)
     assert fixture.tick(15).command == "run"
     assert fixture.tick().name == "stop"
-    assert fixture.ask(0.5).command == "run"  # the next request drives on
+    assert fixture.request(0.5).command == "run"  # the next request drives on
 
 
 def test_two_publishers_stop_the_vehicle_until_one_is_left() -> None:
     fixture = PolicyFixture().running()
     fixture.driver_boot, fixture.driver_seq = 100, 0
-    assert fixture.ask(0.5).refused == "second_publisher"
+    assert fixture.request(0.5).refused == "second_publisher"
     assert fixture.verdict.command == "stop"
     fixture.driver_boot, fixture.driver_seq = 99, 10_000
     assert fixture.drive(0.5, seconds=0.4).command == "stop"
@@ -76,17 +76,17 @@ def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_re
     fixture.drive(source="nav")
     fixture.drive(0.2, source="nav", seconds=1.0)
     assert fixture.verdict.source == "nav"
-    assert fixture.ask(0.0, source="teleop").command == "run"
+    assert fixture.request(0.0, source="teleop").command == "run"
     assert fixture.verdict.source == "teleop"
     for _ in range(3):  # while teleop holds the wheel a neutral request does not count
-        fixture.ask(0.0, source="nav")
+        fixture.request(0.0, source="nav")
         fixture.drive(0.2, source="nav", seconds=0.08)
     fixture.drive(0.2, source="nav", seconds=3.0)
     assert fixture.verdict.source == "nav"
     assert fixture.verdict.name == "inhibited"
     text = "teleop was in control: nav needs a neutral request first."
     assert fixture.state.latches["neutral"].text == text
-    fixture.ask(0.0, source="nav")
+    fixture.request(0.0, source="nav")
     assert fixture.drive(0.2, source="nav").command == "run"
 
 

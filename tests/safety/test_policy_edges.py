@@ -62,7 +62,7 @@ def test_a_runaway_is_one_of_either_axis(linear: float, angular: float, trips: b
 def test_two_publishers_are_named() -> None:
     fixture = PolicyFixture().running()
     fixture.driver_boot, fixture.driver_seq = 100, 0
-    fixture.ask(0.5)
+    fixture.request(0.5)
     held = fixture.state.latches["two_publishers"]
     assert held.text == "Two publishers use teleop."
     assert held.token == (0, fixture.now_ns)
@@ -88,7 +88,7 @@ def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
     before = fixture.drive(0.5).twist.linear
     fixture.now_ns += NS_PER_S // 8
     fixture.feed()
-    after = fixture.ask(0.5).twist.linear
+    after = fixture.request(0.5).twist.linear
     assert after - before == pytest.approx(0.05)
 
 
@@ -98,7 +98,7 @@ def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str)
     fixture.now_ns += round(Safety().bumper_age * NS_PER_S) + late_ns
     fixture.feed()
     fixture.state = replace(fixture.state, heartbeat=fixture.state.heartbeat.beat(fixture.now_ns))
-    assert fixture.ask(0.5).command == command
+    assert fixture.request(0.5).command == command
     if late_ns:
         assert "stalled" in fixture.state.latches["silent"].text
         assert fixture.drive(0.5, seconds=2.0).command == "stop"
@@ -168,10 +168,10 @@ def test_a_request_that_is_stopped_commands_no_motion() -> None:
 
 def test_nothing_creeps_while_two_publishers_are_active() -> None:
     fixture = hit()
-    fixture.ask(0.0)
+    fixture.request(0.0)
     assert fixture.hold() == ""
     assert "release" in fixture.state.latches
     fixture.driver_boot, fixture.driver_seq = 100, 0
-    assert fixture.ask(0.0).refused == "second_publisher"
+    assert fixture.request(0.0).refused == "second_publisher"
     assert fixture.verdict.command == "brake"  # the release ends, and the bumper is still pressed
     assert "release" not in fixture.state.latches

@@ -94,9 +94,9 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     fixture.tick()
     for direction in DIRECTIONS:
         assert fixture.hold(direction=direction) == UNKNOWN
-    told = fixture.published().release
-    assert told is not None
-    assert told.left == 0.0
+    release = fixture.published().release
+    assert release is not None
+    assert release.left == 0.0
     assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
 
 

@@ -149,11 +149,11 @@ def test_a_rebound_before_the_bumper_does_not_choose_the_direction() -> None:
     fixture.linear = 0.0
     fixture.tick(40)
     fixture.linear = None
-    told = fixture.published().release
-    assert told is not None
-    assert told.believed_free == "backward"
-    assert told.travelled == pytest.approx(0.75, abs=0.03)
-    assert told.age == pytest.approx(0.86, abs=0.05)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert release.travelled == pytest.approx(0.75, abs=0.03)
+    assert release.age == pytest.approx(0.86, abs=0.05)
     fixture.hold()
     assert fixture.tick(10).twist.linear < 0
 
@@ -170,15 +170,15 @@ def test_pressed_again_while_it_moves_off_it_goes_no_farther_that_way() -> None:
         runs += fixture.tick().command == "run"
         assert fixture.hold() == forbidden("backward")
     assert runs == 0
-    told = fixture.published().release
-    assert told is not None
-    assert (told.believed_free, told.forbidden) == (None, ("backward",))
-    left = told.left
+    release = fixture.published().release
+    assert release is not None
+    assert (release.believed_free, release.forbidden) == (None, ("backward",))
+    left = release.left
     assert fixture.hold(direction="forward") == ""
     assert fixture.tick(5).twist.linear > 0
-    told = fixture.published().release
-    assert told is not None
-    assert 0 < told.left < left < 0.1
+    release = fixture.published().release
+    assert release is not None
+    assert 0 < release.left < left < 0.1
     fixture.pressed = False
     fixture.tick()
     fixture.pressed = True
@@ -251,10 +251,10 @@ def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
     assert fixture.published().release is None
     fixture.pressed = True
     fixture.tick()
-    told = fixture.published().release
-    assert told is not None
-    assert told.forbidden == ()
-    assert told.left == pytest.approx(0.15 - 0.025 - 0.1**2 / 1.2)
+    release = fixture.published().release
+    assert release is not None
+    assert release.forbidden == ()
+    assert release.left == pytest.approx(0.15 - 0.025 - 0.1**2 / 1.2)
     assert fixture.hold() == ""
 
 
@@ -265,11 +265,11 @@ def test_a_contact_after_an_hour_reports_the_age_and_nothing_moves_by_itself() -
     fixture.tick(60)
     fixture.pressed = True
     fixture.tick(40)
-    told = fixture.published().release
-    assert told is not None
-    assert told.believed_free == "backward"
-    assert told.age is not None
-    assert told.age > 3600
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert release.age is not None
+    assert release.age > 3600
     assert fixture.hold(direction=None) == CHOOSE
     assert fixture.tick(10).command == "brake"
     assert fixture.hold(direction="forward") == ""
@@ -355,14 +355,14 @@ def test_a_release_is_refused_while_two_publishers_bar_motion() -> None:
     fixture = hit()
     for boot in (1, 2):
         fixture.driver_boot = boot
-        fixture.ask()
+        fixture.request()
     assert fixture.hold() == "Two publishers use teleop."
     assert fixture.tick(3).command == "brake"
     fixture.tick(40)
     assert fixture.hold() == ""
     for boot in (3, 4):  # a release that is held ends, too
         fixture.driver_boot = boot
-        fixture.ask()
+        fixture.request()
     assert fixture.hold() == "Two publishers use teleop."
     assert fixture.verdict.command == "brake"
 
@@ -447,7 +447,7 @@ def test_a_reset_on_a_pressed_bumper_wants_all_that_a_reset_wants() -> None:
     assert fixture.reset() == "The vehicle still moves."
     fixture.linear = None
     fixture.tick()
-    fixture.ask(0.5)
+    fixture.request(0.5)
     assert fixture.reset() == "Motion is requested: release the controls first."
     fixture.tick(40)
     fixture.pressed = False
@@ -497,9 +497,9 @@ def test_pressed_from_the_start_no_way_is_believed_free_and_either_may_be_chosen
     fixture = PolicyFixture()
     fixture.pressed = True
     fixture.tick(50)
-    told = fixture.published().release
-    assert told is not None
-    assert (told.believed_free, told.travelled, told.age) == (None, 0.0, None)
+    release = fixture.published().release
+    assert release is not None
+    assert (release.believed_free, release.travelled, release.age) == (None, 0.0, None)
     assert fixture.reset() == f"Still present: {HOLD}"
     assert fixture.hold(direction="forward") == ""
     assert fixture.tick(5).twist.linear > 0
@@ -521,10 +521,10 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     fixture.linear = None
     fixture.pressed = True
     fixture.tick(2)
-    told = fixture.published().release
-    assert told is not None
-    assert told.believed_free == "forward"
-    assert told.travelled == pytest.approx(-1.0)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "forward"
+    assert release.travelled == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize("distance", [math.nan, math.inf])
@@ -536,7 +536,7 @@ def test_counters_that_are_no_numbers_stop_no_release_and_free_no_way(distance: 
     while not fixture.hold():
         fixture.tick()
     assert fixture.hold() == USED_UP
-    told = fixture.published().release
-    assert told is not None
-    assert told.believed_free == "backward"
-    assert math.isfinite(told.travelled)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert math.isfinite(release.travelled)

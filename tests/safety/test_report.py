@@ -165,11 +165,11 @@ def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:
 def test_causes_are_reported_with_their_identities() -> None:
     fixture = hit()
     fixture.estop()
-    told = fixture.published()
-    assert {cause.name: cause.id for cause in told.causes} == {
+    state = fixture.published()
+    assert {cause.name: cause.id for cause in state.causes} == {
         name: one.id for name, one in fixture.state.latches.items()
     }
-    assert len({cause.id for cause in told.causes}) == len(told.causes)
+    assert len({cause.id for cause in state.causes}) == len(state.causes)
 
 
 def test_the_release_is_reported_while_a_contact_is_latched() -> None:
@@ -185,6 +185,6 @@ def test_the_release_is_reported_while_a_contact_is_latched() -> None:
     assert later.age == pytest.approx(first.age + 1.0)
     forbid: frozenset[Direction] = frozenset({"backward", "forward"})
     fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
-    told = fixture.published().release
-    assert told is not None
-    assert (told.believed_free, told.forbidden) == (None, ("backward", "forward"))
+    release = fixture.published().release
+    assert release is not None
+    assert (release.believed_free, release.forbidden) == (None, ("backward", "forward"))

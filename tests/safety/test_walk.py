@@ -120,7 +120,7 @@ RAISE: dict[str, Change] = {
 }
 
 
-def tell(text: str) -> None:
+def report(text: str) -> None:
     """Show a number to ``pytest -s``."""
     sys.stdout.write(f"\n{text}\n")
 
@@ -168,7 +168,7 @@ def test_every_set_of_causes_stops_and_latches_as_it_must() -> None:
         assert set(fixture.state.latches) - {"sonar", "blocked"} == raised
         check_action(verdict, raised)
         later(fixture, raised)
-    tell(f"{walked} sets of causes, each with a request to drive, and an hour later")
+    report(f"{walked} sets of causes, each with a request to drive, and an hour later")
     few = sum(math.comb(15, size) for size in range(OTHERS + 1))
     few_without_arming = sum(math.comb(13, size - 2) for size in range(2, OTHERS + 1))
     assert walked == 2**15 - 2**13 + 2 * (few - few_without_arming)
@@ -311,7 +311,7 @@ def test_every_set_of_latches_under_every_request_and_call() -> None:
         walked += 1
         check_reset(case, verdict, fixture.state)
         check_run(case, verdict)
-    tell(f"{walked} sets of latches with requests, calls, releases and inhibitions")
+    report(f"{walked} sets of latches with requests, calls, releases and inhibitions")
     few = sum(math.comb(8, size) for size in range(OTHERS + 1))
     assert walked == (2**8 + few) * 3 * (10 + 5 + 5) * (1 + 3)
 
@@ -373,7 +373,7 @@ def test_every_set_of_blocked_sonars_under_every_way_to_move() -> None:
                 blocked = any(closes_in(name, twist) for name in bad)
                 assert ("blocked" in fixture.state.latches) == blocked, (bad, twist)
                 assert (verdict.command == "run") == (not blocked), (bad, twist)
-    tell(f"{walked} sets of blocked or faulty sonars with ways to move")
+    report(f"{walked} sets of blocked or faulty sonars with ways to move")
     assert walked == 2**8 * 2 * len(TWISTS)
 
 

@@ -32,7 +32,7 @@ class FakeBus(Bus):
         super().__init__(*args)
 
     def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
-        """Store the handler for ``tell``; the depth is ignored."""
+        """Store the handler for ``deliver``; the depth is ignored."""
         names.pop("depth", None)
         self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
 
@@ -48,7 +48,7 @@ class FakeBus(Bus):
         """Count the stop."""
         self.estops += 1
 
-    def tell(
+    def deliver(
         self,
         topic: Topic[Any],
         message: Message,

@@ -125,7 +125,7 @@ def test_keys_make_their_calls(screen: Screen) -> None:
 
 def tell_contact(screen: Screen) -> None:
     """Simulate a pressed bumper in safety's state."""
-    screen.node.fake.tell(keys.SAFETY, contact_state(), screen.now_ns)
+    screen.node.fake.deliver(keys.SAFETY, contact_state(), screen.now_ns)
     screen.controller.tick(screen.now_ns)
 
 
@@ -138,7 +138,7 @@ def test_a_reset_clears_what_the_screen_showed(screen: Screen) -> None:
         newest = contact_state(
             heartbeat=9, latched=("contact", "estop"), causes=(*newest.causes, later)
         )
-        screen.node.fake.tell(keys.SAFETY, newest, screen.now_ns)  # not drawn yet
+        screen.node.fake.deliver(keys.SAFETY, newest, screen.now_ns)  # not drawn yet
         await pilot.press("r")
         assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=9, causes=(42,)))]
 
@@ -266,9 +266,9 @@ def test_quitting_twice_does_not_wait(screen: Screen) -> None:
 def test_received_values_are_shown(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         fake = screen.node.fake
-        fake.tell(keys.SAFETY, safety_state(text="Driving, slowly."))
-        fake.tell(keys.LINK, link())
-        fake.tell(
+        fake.deliver(keys.SAFETY, safety_state(text="Driving, slowly."))
+        fake.deliver(keys.LINK, link())
+        fake.deliver(
             keys.ULTRASONIC, Ultrasonic(ranges=(1.5, *(None,) * 7), status=("ok", *("fault",) * 7))
         )
         screen.controller.tick(0)

@@ -64,12 +64,12 @@ class Operator:
         answer(self.controller, self.now_ns)
 
     def tell_safety(self, **fields: Any) -> None:
-        self.node.fake.tell(keys.SAFETY, safety_state(**fields), self.now_ns)
+        self.node.fake.deliver(keys.SAFETY, safety_state(**fields), self.now_ns)
 
     def tell_contact(self, **fields: Any) -> None:
         """Simulate a pressed bumper in safety's state and on the screen."""
         self.shown = contact_state(**{"boot": 5} | fields)
-        self.node.fake.tell(keys.SAFETY, self.shown, self.now_ns)
+        self.node.fake.deliver(keys.SAFETY, self.shown, self.now_ns)
 
     def ticks(self, count: int) -> list[Drive | None]:
         sent = []
@@ -106,7 +106,7 @@ def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
 
 
 def test_requests_carry_the_echo(operator: Operator) -> None:
-    operator.node.fake.tell(keys.SAFETY, safety_state(heartbeat=99))
+    operator.node.fake.deliver(keys.SAFETY, safety_state(heartbeat=99))
     operator.press("w")
     (request,) = operator.ticks(1)
     assert request is not None
@@ -484,11 +484,11 @@ def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driv
 
 def test_the_view_shows_fresh_values(operator: Operator) -> None:
     fake = operator.node.fake
-    fake.tell(keys.SAFETY, safety_state(text="Driving."))
-    fake.tell(keys.VELOCITY, Velocity(linear=0.2, angular=0.0))
-    fake.tell(keys.BUMPER, Bumper(pressed=False))
-    fake.tell(keys.LINK, link())
-    fake.tell(keys.DRIVER, Driver(faults=("encoder",), bits=4), side="right")
+    fake.deliver(keys.SAFETY, safety_state(text="Driving."))
+    fake.deliver(keys.VELOCITY, Velocity(linear=0.2, angular=0.0))
+    fake.deliver(keys.BUMPER, Bumper(pressed=False))
+    fake.deliver(keys.LINK, link())
+    fake.deliver(keys.DRIVER, Driver(faults=("encoder",), bits=4), side="right")
     operator.controller.tick(0)  # a clock behind the messages': nothing is old
     view = operator.controller.view
     assert view.safety is not None
@@ -507,8 +507,8 @@ def test_events_of_others_are_shown_and_own_ones_only_once(operator: Operator) -
     everyone = keys.EVENTS.on("001", service="*")
     contact = Event(name="contact", level="error", text="the bumper was hit", boot=5, t_ns=7)
     mine = Event(name="estop", level="info", text="mine", boot=fake.boot)
-    fake.tell(keys.EVENTS, contact, declared=everyone, service="safety")
-    fake.tell(keys.EVENTS, mine, declared=everyone, service="teleop")
+    fake.deliver(keys.EVENTS, contact, declared=everyone, service="safety")
+    fake.deliver(keys.EVENTS, mine, declared=everyone, service="teleop")
     (line,) = operator.node.event_log.last(9)
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
 

@@ -29,7 +29,7 @@ def trip() -> RoundTrip:
     return RoundTrip(LIMIT_S)
 
 
-def ask(trip: RoundTrip, number: int, sent_s: float, took_s: float) -> None:
+def probe(trip: RoundTrip, number: int, sent_s: float, took_s: float) -> None:
     trip.sent(number, at(sent_s))
     trip.answered(number, at(sent_s + took_s))
 
@@ -42,32 +42,32 @@ def test_before_the_first_answer_the_delay_is_unknown(trip: RoundTrip) -> None:
 
 @pytest.mark.parametrize(("took_s", "counts"), [(0.0, True), (0.15, True), (0.151, False)])
 def test_the_limit_applies_to_the_round_trip(trip: RoundTrip, took_s: float, counts: bool) -> None:
-    ask(trip, 1, 10, took_s)
+    probe(trip, 1, 10, took_s)
     assert (trip.refusal(at(10 + took_s)) == "") is counts
 
 
 def test_a_refusal_names_the_round_trip_and_the_limit(trip: RoundTrip) -> None:
-    ask(trip, 1, 10, 0.42)
+    probe(trip, 1, 10, 0.42)
     assert trip.refusal(at(10.42)) == "terminal too slow: 0.42 s, allowed 0.15 s"
 
 
 def test_a_key_before_the_answer_may_be_older_than_the_query(trip: RoundTrip) -> None:
-    ask(trip, 1, 10, 0.1)
+    probe(trip, 1, 10, 0.1)
     assert trip.refusal(at(10.099)) == UNKNOWN
     assert trip.refusal(at(10.1)) == ""
 
 
 def test_silence_counts_as_slow(trip: RoundTrip) -> None:
-    ask(trip, 1, 10, 0.01)
+    probe(trip, 1, 10, 0.01)
     last_s = 10 + LIMIT_S + 2 * PROBE_S
     assert trip.refusal(at(last_s)) == ""
     assert "too slow: 0.16 s" in trip.refusal(at(last_s + 0.01))
 
 
 def test_one_slow_answer_counts_for_a_while(trip: RoundTrip) -> None:
-    ask(trip, 1, 10, 0.5)
+    probe(trip, 1, 10, 0.5)
     for number in range(2, 30):
-        ask(trip, number, 10.5 + number * PROBE_S, 0.01)
+        probe(trip, number, 10.5 + number * PROBE_S, 0.01)
     assert "0.50 s" in trip.refusal(at(10.5 + RECOVER_S))
     assert trip.refusal(at(10.501 + RECOVER_S)) == ""
 
@@ -96,13 +96,13 @@ def test_a_reused_number_is_the_new_query(trip: RoundTrip) -> None:
 
 def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
     for number in range(3 * NUMBERS):
-        ask(trip, number, 10 + number, 0.01)
+        probe(trip, number, 10 + number, 0.01)
     assert len(trip._answers) == NUMBERS
 
 
 def test_an_unmeasurable_terminal_is_always_refused() -> None:
     trip = RoundTrip(LIMIT_S, "tmux hides it")
-    ask(trip, 1, 10, 0.0)
+    probe(trip, 1, 10, 0.0)
     assert trip.refusal(at(10)) == "tmux hides it"
 
 

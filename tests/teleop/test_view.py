@@ -10,11 +10,11 @@ from verification.harness.bus import at
 
 def test_a_value_is_shown_until_it_is_too_old() -> None:
     bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    ear = LatestTopic(bus, keys.BUMPER, 0.5)
-    assert ear.at(0) is None
-    bus.tell(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
-    assert ear.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
-    assert ear.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
+    topic = LatestTopic(bus, keys.BUMPER, 0.5)
+    assert topic.at(0) is None
+    bus.deliver(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
+    assert topic.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
+    assert topic.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
 
 
 def test_each_side_has_its_own_topic() -> None:

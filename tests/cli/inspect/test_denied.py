@@ -154,10 +154,10 @@ def test_members_reach_their_own_robots_through_the_sites_router(
         driver = connecting(site.settings("driver", "anna"), center)
         assert drives(member(join, driver), first)
         assert not drives(member(join, driver, "002"), second)
-        everybody = member(join, connecting(site.settings("fleet", "room"), center), "*")
+        fleet_client = member(join, connecting(site.settings("fleet", "room"), center), "*")
 
         def stopped() -> bool:
-            everybody.bus.estop()
+            fleet_client.bus.estop()
             return bool(first.estops and second.estops)
 
         wait_until(stopped, "all robots stopped")

@@ -56,14 +56,14 @@ class Viewer(threading.Thread):
         for channel in printed.get("channels", []):
             if channel["topic"] == self._topic:
                 self.channel = channel
-                self._ask(socket)
+                self._subscribe(socket)
         # The server advertises a channel shortly before it accepts subscriptions.
         if "Unknown channel" in printed.get("message", ""):
-            self._ask(socket)
+            self._subscribe(socket)
 
-    def _ask(self, socket: ClientConnection) -> None:
-        ask = {"id": 1, "channelId": self.channel["id"]}
-        socket.send(json.dumps({"op": "subscribe", "subscriptions": [ask]}))
+    def _subscribe(self, socket: ClientConnection) -> None:
+        subscription = {"id": 1, "channelId": self.channel["id"]}
+        socket.send(json.dumps({"op": "subscribe", "subscriptions": [subscription]}))
 
 
 @pytest.mark.parametrize(

@@ -188,12 +188,12 @@ def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int)
 def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
     names = [f"event_{number}" for number in range(20)]
     bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
-    tell = events(bus)
+    emit = events(bus)
     for name in names[:10]:
-        tell(name)  # before there is a session
+        emit(name)  # before there is a session
     buses.opened(bus)
     for name in names[10:]:
-        tell(name)
+        emit(name)
     received: list[str] = []
 
     def hear(arrival: Arrival[Event]) -> None:
@@ -201,7 +201,7 @@ def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
 
     buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
     wait_until(lambda: len(received) >= 20, "the events that were")
-    tell("one more")
+    emit("one more")
     wait_until(lambda: "one more" in received, "the next one")
     assert received == [*names, "one more"]
 

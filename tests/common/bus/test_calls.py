@@ -35,8 +35,8 @@ class Server:
             self.waiting.append(caller)
 
 
-class Asker:
-    """Asks on a bus, and keeps what comes of it."""
+class Client:
+    """Sends requests on a bus, and stores the answers."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -47,7 +47,7 @@ class Asker:
     def answers(self) -> int:
         return len(self.replies) + len(self.refusals)
 
-    def ask(self, *, held: bool = True, timeout_s: float = 20.0) -> None:
+    def request(self, *, held: bool = True, timeout_s: float = 20.0) -> None:
         self.bus.call(
             keys.RELEASE,
             ReleaseRequest(held=held),
@@ -56,12 +56,12 @@ class Asker:
             timeout_s,
         )
 
-    def ask_until_replied(self) -> None:
-        """Ask again until the server is known to the router."""
+    def request_until_replied(self) -> None:
+        """Repeat the request until the router knows the server."""
 
         def replied() -> bool:
             count = self.answers
-            self.ask()
+            self.request()
             wait_until(lambda: self.answers > count, "an answer")
             return bool(self.replies)
 
@@ -76,54 +76,54 @@ def server() -> Server:
 
 
 @pytest.fixture
-def asker(buses: BusFixture, server: Server) -> Asker:
+def client(buses: BusFixture, server: Server) -> Client:
     buses.bus(server.serve)
-    asker = Asker(buses.bus())
-    asker.ask_until_replied()
-    return asker
+    client = Client(buses.bus())
+    client.request_until_replied()
+    return client
 
 
-def test_a_call_is_replied_to(asker: Asker) -> None:
-    asker.ask()
-    wait_until(lambda: asker.answers, "an answer")
-    assert asker.replies == [Done(text="held")]
-    assert asker.refusals == []
+def test_a_call_is_replied_to(client: Client) -> None:
+    client.request()
+    wait_until(lambda: client.answers, "an answer")
+    assert client.replies == [Done(text="held")]
+    assert client.refusals == []
 
 
-def test_a_reply_may_come_later(asker: Asker, server: Server) -> None:
-    asker.ask(held=False)
+def test_a_reply_may_come_later(client: Client, server: Server) -> None:
+    client.request(held=False)
     wait_until(lambda: server.waiting, "the question")
-    assert asker.answers == 0
+    assert client.answers == 0
     server.waiting.pop().reply(Done(text="at last"))
-    wait_until(lambda: asker.answers, "an answer")
-    assert asker.replies == [Done(text="at last")]
+    wait_until(lambda: client.answers, "an answer")
+    assert client.replies == [Done(text="at last")]
 
 
-def test_a_refusal_brings_its_reason(asker: Asker, server: Server) -> None:
+def test_a_refusal_brings_its_reason(client: Client, server: Server) -> None:
     server.refuses = "the bumper is pressed: 撞"
-    asker.ask()
-    wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["the bumper is pressed: 撞"]
-    assert asker.replies == []
+    client.request()
+    wait_until(lambda: client.answers, "an answer")
+    assert client.refusals == ["the bumper is pressed: 撞"]
+    assert client.replies == []
 
 
-def test_who_does_not_answer_in_time_is_named(asker: Asker, server: Server) -> None:
-    asker.ask(held=False, timeout_s=0.3)
-    wait_until(lambda: asker.answers, "the timeout")
-    assert asker.refusals == ["safety does not answer; run `t2 doctor`"]
+def test_who_does_not_answer_in_time_is_named(client: Client, server: Server) -> None:
+    client.request(held=False, timeout_s=0.3)
+    wait_until(lambda: client.answers, "the timeout")
+    assert client.refusals == ["safety does not answer; run `t2 doctor`"]
     wait_until(lambda: server.waiting, "the question, however late")
     server.waiting.pop().reply(Done(text="too late"))  # harmless, and nobody hears it
-    asker.ask(timeout_s=20.0)
-    wait_until(lambda: asker.answers == 2, "the next answer")
-    assert asker.replies == [Done(text="held")]
+    client.request(timeout_s=20.0)
+    wait_until(lambda: client.answers == 2, "the next answer")
+    assert client.replies == [Done(text="held")]
 
 
-def test_the_router_s_own_timeout_is_no_refusal(asker: Asker) -> None:
+def test_the_router_s_own_timeout_is_no_refusal(client: Client) -> None:
     # Both the asking session and the router watch the time; which of them says it is chance.
     for count in range(1, 31):
-        asker.ask(held=False, timeout_s=0.02)
-        wait_until(lambda: asker.answers == count, "the timeout")  # noqa: B023
-    assert set(asker.refusals) == {"safety does not answer; run `t2 doctor`"}
+        client.request(held=False, timeout_s=0.02)
+        wait_until(lambda: client.answers == count, "the timeout")  # noqa: B023
+    assert set(client.refusals) == {"safety does not answer; run `t2 doctor`"}
 
 
 def test_a_refusal_needs_no_encoding(buses: BusFixture) -> None:
@@ -131,28 +131,28 @@ def test_a_refusal_needs_no_encoding(buses: BusFixture) -> None:
         query.reply_err("not with us")
 
     queryable = buses.session().declare_queryable(keys.RELEASE.on(buses.robot), answer)
-    asker = Asker(buses.bus())
+    client = Client(buses.bus())
 
     def refused() -> bool:
-        asker.ask()
-        return "not with us" in asker.refusals
+        client.request()
+        return "not with us" in client.refusals
 
     wait_until(refused, "the refusal")
     queryable.undeclare()
 
 
 def test_nobody_there_is_said_at_once(buses: BusFixture) -> None:
-    asker = Asker(buses.bus())
-    asker.ask(timeout_s=600.0)
-    wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["safety does not answer; run `t2 doctor`"]
+    client = Client(buses.bus())
+    client.request(timeout_s=600.0)
+    wait_until(lambda: client.answers, "an answer")
+    assert client.refusals == ["safety does not answer; run `t2 doctor`"]
 
 
 def test_no_router_is_said_at_once(buses: BusFixture) -> None:
-    asker = Asker(Bus(at(buses.endpoint), buses.robot, buses.loop.post))  # never opened
-    asker.ask()
-    wait_until(lambda: asker.answers, "an answer")
-    assert asker.refusals == ["not connected to a router"]
+    client = Client(Bus(at(buses.endpoint), buses.robot, buses.loop.post))  # never opened
+    client.request()
+    wait_until(lambda: client.answers, "an answer")
+    assert client.refusals == ["not connected to a router"]
 
 
 def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
@@ -162,15 +162,15 @@ def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
         query.reply(key, msgpack.packb({"text": 5}))
 
     queryable = buses.session().declare_queryable(key, answer)
-    asker = Asker(buses.bus())
+    client = Client(buses.bus())
 
     def refused() -> bool:
-        asker.ask()
-        return any(reason.startswith("not a Done: ") for reason in asker.refusals)
+        client.request()
+        return any(reason.startswith("not a Done: ") for reason in client.refusals)
 
     wait_until(refused, "the refusal")
     queryable.undeclare()
-    assert asker.replies == []
+    assert client.replies == []
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
     ids=["no msgpack", "wrong type", "unknown field", "deep", "big"],
 )
 def test_a_request_that_is_none_is_refused_with_its_fault(
-    buses: BusFixture, server: Server, asker: Asker, payload: bytes, reason: str
+    buses: BusFixture, server: Server, client: Client, payload: bytes, reason: str
 ) -> None:
     asked = len(server.asked)
     replies = list(buses.session().get(keys.RELEASE.on(buses.robot), payload=payload))
@@ -196,7 +196,7 @@ def test_a_request_that_is_none_is_refused_with_its_fault(
 
 
 def test_a_request_without_payload_is_one_of_defaults(
-    buses: BusFixture, server: Server, asker: Asker
+    buses: BusFixture, server: Server, client: Client
 ) -> None:
     (reply,) = buses.session().get(keys.RELEASE.on(buses.robot))
     assert reply.ok is not None
@@ -239,12 +239,12 @@ def test_what_a_newcomer_asks_is_answered_as_it_stands(buses: BusFixture) -> Non
     buses.bus(
         lambda bus: bus.answer(info_key(buses.robot, "bridge", "config"), lambda: b"{}", "text")
     )
-    asker = buses.bus()
+    client = buses.bus()
     answers: list[bytes] = []
 
     def once() -> bool:
         refusals: list[str] = []
-        asker.look_up("bridge", "config", answers.append, refusals.append)
+        client.look_up("bridge", "config", answers.append, refusals.append)
         wait_until(lambda: answers or refusals, "an answer")
         return bool(answers)
 

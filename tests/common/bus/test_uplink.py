@@ -55,7 +55,7 @@ class Room:
         )
         bus.watch_live(keys.live_key("berlin-$*", "*", "*"), lambda key, _: self.tokens.append(key))
 
-    def ask(self) -> None:
+    def request(self) -> None:
         self.bus.call(keys.RESET, ResetRequest(), self.replies.append, print)
 
 
@@ -72,7 +72,7 @@ def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixtur
                 until_received(onboard.put, lambda r=room: r.received, "a bumper")  # type: ignore[misc]
                 wait_until(lambda r=room: r.tokens, "the token")  # type: ignore[misc]
                 wait_until(lambda r=room: r.late, "the event")  # type: ignore[misc]
-                until_received(room.ask, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
+                until_received(room.request, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
                 until_received(
                     lambda s=session: s.put(keys.estop_key("berlin-$*"), b""),  # type: ignore[misc]
                     lambda: onboard.stops,
@@ -87,7 +87,7 @@ def test_without_its_site_a_robot_is_whole(buses: BusFixture) -> None:
         room, onboard = Room(buses), Onboard(buses)
         until_received(onboard.put, lambda: room.received, "a bumper")
         until_received(onboard.bus.estop, lambda: onboard.stops, "a stop")
-        until_received(room.ask, lambda: room.replies, "a reply")
+        until_received(room.request, lambda: room.replies, "a reply")
         for bus in (room.bus, onboard.bus):
             bus.close()
 
@@ -103,7 +103,7 @@ def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
         )
         received: list[str] = []
         seen: list[str] = []
-        ears = [
+        subscribers = [
             other.declare_subscriber("t2/**", lambda sample: received.append(str(sample.key_expr))),
             room.declare_subscriber("t2/**", lambda sample: seen.append(str(sample.key_expr))),
         ]
@@ -114,5 +114,5 @@ def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
             "the end",
         )
         assert set(received) == {"t2/v1/a/tel/end"}
-        for ear in ears:
-            ear.undeclare()
+        for subscriber in subscribers:
+            subscriber.undeclare()

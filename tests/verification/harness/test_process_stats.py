@@ -22,8 +22,8 @@ threading.Thread(target=start).start()
 def test_a_sample_has_memory_threads_and_descriptors(tmp_path: Path) -> None:
     found = sample_process("me", os.getpid(), 3.0)
     assert found is not None
-    life, before = found
-    assert (life.name, life.pid, before.at_s) == ("me", os.getpid(), 3.0)
+    process, before = found
+    assert (process.name, process.pid, before.at_s) == ("me", os.getpid(), 3.0)
     assert before.rss > 10 * 2**20
     let_go = threading.Event()
     thread = threading.Thread(target=let_go.wait)
@@ -33,7 +33,7 @@ def test_a_sample_has_memory_threads_and_descriptors(tmp_path: Path) -> None:
     let_go.set()
     thread.join()
     assert again is not None
-    assert again[0] == life, "the same incarnation"
+    assert again[0] == process, "the same incarnation"
     assert again[1].threads == before.threads + 1
     assert again[1].descriptors == before.descriptors + 1
 

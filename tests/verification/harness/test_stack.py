@@ -38,8 +38,8 @@ SILENCE_S = 1.0
 class KeyPresser:
     """Holds W in ``t2 drive``."""
 
-    def __init__(self, seat: Terminal) -> None:
-        self._seat = seat
+    def __init__(self, drive_terminal: Terminal) -> None:
+        self._terminal = drive_terminal
         self._held = threading.Event()
         self._gone = threading.Event()
         self._thread = threading.Thread(target=self._type, daemon=True)
@@ -59,16 +59,16 @@ class KeyPresser:
 
     def _type(self) -> None:
         while not self._gone.wait(0.05):
-            self._seat.read()
-            if self._held.is_set() and self._seat.process.poll() is None:
-                self._seat.type("w")
+            self._terminal.read()
+            if self._held.is_set() and self._terminal.process.poll() is None:
+                self._terminal.type("w")
 
 
 @pytest.fixture
 def presser(stack: RunningStack) -> Iterator[KeyPresser]:
-    with terminal(stack.endpoint) as seat:
-        stack.processes["teleop"] = seat.process
-        presser = KeyPresser(seat)
+    with terminal(stack.endpoint) as drive_terminal:
+        stack.processes["teleop"] = drive_terminal.process
+        presser = KeyPresser(drive_terminal)
         yield presser
         presser.stop()
 

@@ -22,7 +22,7 @@ from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
 BEAT_NS = NS_PER_S // 20
 
 
-class Desk(Bus):
+class FakeBus(Bus):
     """A bus without a router, whose calls are answered by hand."""
 
     def __init__(self) -> None:
@@ -64,8 +64,8 @@ class DriverFixture:
     """An operator, his bus and his vehicle, at a clock of their own."""
 
     def __init__(self) -> None:
-        self.desk, self.vehicle, self.now_ns = Desk(), Vehicle(), 100 * NS_PER_S
-        self.operator = Operator(self.desk, cast("Control", self.vehicle), QUICK)
+        self.bus, self.vehicle, self.now_ns = FakeBus(), Vehicle(), 100 * NS_PER_S
+        self.operator = Operator(self.bus, cast("Control", self.vehicle), QUICK)
         self.driver = self.operator._driver
         self.driver.safety = safety("neutral")
 
@@ -82,7 +82,7 @@ class DriverFixture:
 
     def drives(self) -> bool:
         """Run one control step; return whether a request was sent."""
-        (source,) = (p for p in self.desk.publishers if p.topic is keys.DRIVE)
+        (source,) = (p for p in self.bus.publishers if p.topic is keys.DRIVE)
         before = source.last
         self.beat()
         return source.last is not before
@@ -91,7 +91,7 @@ class DriverFixture:
         """Let the operator set right what he wants to."""
         self.now_ns += TRY_NS
         self.beat()
-        self.desk.reply(m.Done(text="the pose is set"))
+        self.bus.reply(m.Done(text="the pose is set"))
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def fixture() -> DriverFixture:
 def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: DriverFixture) -> None:
     assert not fixture.drives()
     assert fixture.vehicle.done == [Place(x=0.0, y=0.0)]
-    assert fixture.desk.asked == [m.PoseRequest(echo=1)]
+    assert fixture.bus.asked == [m.PoseRequest(echo=1)]
     assert not fixture.drives()
     fixture.ready()
     assert fixture.drives()
@@ -111,28 +111,28 @@ def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: Driv
 def test_what_cannot_be_set_right_is_tried_again(fixture: DriverFixture) -> None:
     fixture.vehicle.there = False
     fixture.beat(2.0)
-    assert fixture.desk.asked == []
+    assert fixture.bus.asked == []
     fixture.vehicle.there = True
     fixture.beat(1.0)
-    fixture.desk.refuse("there is no router")
+    fixture.bus.refuse("there is no router")
     fixture.beat(2 * TRY_NS / NS_PER_S)
-    assert len(fixture.desk.asked) >= 3
+    assert len(fixture.bus.asked) >= 3
     assert not fixture.drives()
 
 
 def test_a_new_odometry_gets_the_true_pose_once_the_vehicle_stands(fixture: DriverFixture) -> None:
     fixture.ready()
     assert fixture.drives()
-    fixture.desk.asked.clear()
+    fixture.bus.asked.clear()
     fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
     fixture.beat(2.0, boot=6)
-    assert fixture.desk.asked == []
+    assert fixture.bus.asked == []
     fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
     fixture.beat(1.0, boot=6)
-    pose = fixture.desk.asked[0]
+    pose = fixture.bus.asked[0]
     assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, 7.0 - math.tau))
     index = fixture.driver.lap.index
-    fixture.desk.reply(m.Done(text="the pose is set"))
+    fixture.bus.reply(m.Done(text="the pose is set"))
     fixture.beat(boot=6)
     assert fixture.driver.lap.index >= index, "the lap goes on"
 
@@ -140,7 +140,7 @@ def test_a_new_odometry_gets_the_true_pose_once_the_vehicle_stands(fixture: Driv
 def test_without_odometry_nobody_asks_to_move(fixture: DriverFixture) -> None:
     fixture.ready()
     assert fixture.drives()
-    (source,) = (p for p in fixture.desk.publishers if p.topic is keys.DRIVE)
+    (source,) = (p for p in fixture.bus.publishers if p.topic is keys.DRIVE)
     before = source.last
     fixture.operator.on_beat(fixture.now_ns + OLD_NS + 1)
     assert source.last is before

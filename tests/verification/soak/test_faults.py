@@ -46,11 +46,11 @@ def test_every_fault_can_be_done_and_undone(seed: int) -> None:
 def test_what_does_not_end_by_itself_is_undone() -> None:
     by_name = {fault.name: fault for fault in drawn(5, ROUND)}
     assert by_name["wire drop"].end == Wire()
-    broken, mended = by_name["driver fault"].begin, by_name["driver fault"].end
+    broken, cleared = by_name["driver fault"].begin, by_name["driver fault"].end
     assert isinstance(broken, Driver)
-    assert isinstance(mended, Driver)
+    assert isinstance(cleared, Driver)
     assert broken.bits
-    assert (mended.side, mended.bits) == (broken.side, 0)
+    assert (cleared.side, cleared.bits) == (broken.side, 0)
     assert {name for name, fault in by_name.items() if fault.end is None and not fault.kills} == {
         "freeze", "power cycle",
     }  # fmt: skip

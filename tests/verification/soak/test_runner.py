@@ -211,7 +211,7 @@ def test_all_that_can_be_seen_is_recorded(soak: SoakFixture) -> None:
     assert isinstance(record.progress[0], Progress)
     assert record.tracebacks == 1
     assert record.log[0][1] == soak.log.stat().st_size
-    assert {life.name for life in record.lives} == {"safety"}
+    assert {process.name for process in record.lives} == {"safety"}
     assert soak.reports == ["begun anew release hit"]
 
 

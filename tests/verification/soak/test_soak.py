@@ -46,7 +46,7 @@ def test_a_short_soak(tmp_path: Path) -> None:
         file.name for file in out.iterdir()
     }
     lives = msgspec.json.decode((out / "samples.json").read_bytes())["lives"]
-    assert {life["name"] for life, _ in lives} >= {"router", "safety", "driver"}
+    assert {process["name"] for process, _ in lives} >= {"router", "safety", "driver"}
 
 
 @pytest.mark.parametrize("minutes", ["0", "-1", "nan", "1e9", "long"])

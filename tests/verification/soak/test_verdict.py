@@ -17,7 +17,7 @@ LIMITS = Limits(warm_up_s=60.0, lap_s=120.0, stuck_s=75.0)
 SAFETY = Life("safety", 10, 1)
 
 
-def life(
+def samples_of(
     seconds: int, rss_per_s: float = 0.0, threads_at: int = 10**9, since_s: int = 0
 ) -> list[Sample]:
     """Return a sample a second; one thread more from some second on."""
@@ -30,7 +30,7 @@ def life(
 def well(seconds: int = 300) -> Record:
     """Return a soak in which nothing is wrong."""
     return Record(
-        lives={SAFETY: life(seconds)},
+        lives={SAFETY: samples_of(seconds)},
         progress=[
             Progress(s, what) for s in range(0, seconds, 10) for what in ("step", "lap finished")
         ],
@@ -70,14 +70,14 @@ def test_a_soak_that_saw_nothing_is_not_good() -> None:
     ],
 )
 def test_growth_is_that_of_the_medians(seconds: int, rss_per_s: float, megabytes: float) -> None:
-    span = growth(life(seconds, rss_per_s), 60.0)
+    span = growth(samples_of(seconds, rss_per_s), 60.0)
     assert span is not None
     assert (span[1].rss - span[0].rss) / MB == pytest.approx(megabytes, abs=0.02)
 
 
 @pytest.mark.parametrize("seconds", [1, 60, 69])
 def test_a_short_life_is_not_judged(seconds: int) -> None:
-    assert growth(life(seconds), 60.0) is None
+    assert growth(samples_of(seconds), 60.0) is None
 
 
 def test_what_is_taken_while_warming_up_is_no_growth() -> None:
@@ -93,30 +93,30 @@ def test_what_is_taken_while_warming_up_is_no_growth() -> None:
 )
 def test_memory_may_grow_by_less_than_the_limit(rss_per_s: float, fine: bool) -> None:
     record = well()
-    record.lives = {SAFETY: life(300, rss_per_s)}
+    record.lives = {SAFETY: samples_of(300, rss_per_s)}
     assert row(record, "safety: memory")[2] is fine
 
 
 @pytest.mark.parametrize(("threads_at", "fine"), [(30, True), (150, False), (299, True)])
 def test_a_thread_that_stays_is_growth(threads_at: int, fine: bool) -> None:
     record = well()
-    record.lives = {SAFETY: life(300, threads_at=threads_at)}
+    record.lives = {SAFETY: samples_of(300, threads_at=threads_at)}
     assert row(record, "safety: threads, descriptors")[2] is fine
 
 
 @pytest.mark.parametrize(("seconds", "fine"), [(151, False), (149, True)])
 def test_the_longest_of_several_lives_counts(seconds: int, fine: bool) -> None:
     record = well()
-    grows = life(seconds, rss_per_s=MB / 10, threads_at=120, since_s=150)
+    grows = samples_of(seconds, rss_per_s=MB / 10, threads_at=120, since_s=150)
     for lives in ([SAFETY, Life("safety", 11, 5)], [Life("safety", 11, 5), SAFETY]):
-        record.lives = {one: life(150) if one is SAFETY else grows for one in lives}
+        record.lives = {one: samples_of(150) if one is SAFETY else grows for one in lives}
         assert row(record, "safety: memory")[2] is fine
         assert row(record, "safety: threads, descriptors")[2] is fine
 
 
 def test_short_lives_beside_a_long_one_are_not_judged_and_alone_are_wrong() -> None:
     record = well()
-    record.lives = {Life("safety", 9, 0): life(20, rss_per_s=MB), SAFETY: life(200)}
+    record.lives = {Life("safety", 9, 0): samples_of(20, rss_per_s=MB), SAFETY: samples_of(200)}
     assert row(record, "safety: memory")[2] is True
     del record.lives[SAFETY]
     assert row(record, "safety: memory")[1:] == ("no run was long enough", False)
