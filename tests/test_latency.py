@@ -1,4 +1,4 @@
-"""Reaction times of the whole stack: what is counted, and what ``t2 latency`` says of it."""
+"""Reaction times of the whole stack: the histograms and the output of ``t2 latency``."""
 
 import json
 import time

@@ -29,7 +29,7 @@ THERE = {
     "t2 dashboard": "curl --silent --fail --output /dev/null $DASHBOARD",
 }
 PATIENCE_S = 60.0
-TRIES = 3  # the doctor is right to complain of a machine that holds processes up
+TRIES = 3  # the doctor reports scheduling stalls of a busy machine
 KEY_S = 0.05  # between two repeats of a held key
 PAUSE_S = 1.0  # a "-" among the keys
 
@@ -114,7 +114,7 @@ def elsewhere() -> dict[str, str]:
     ]
     named = (one.split("=", 1) for one in settings)
     env = {f"T2__{path.upper().replace('.', '__')}": value for path, value in named}
-    # The environment that this very test runs in is not to be made anew.
+    # Keep the virtual environment: this test runs in it.
     made = "--assume-old=.venv/.installed"
     return {**env, "DASHBOARD": f"http://127.0.0.1:{page}/", "MAKEFLAGS": made}
 

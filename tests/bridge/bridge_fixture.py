@@ -71,11 +71,11 @@ class BridgeFixture:
             self.motion.put(m.Motion(**{**fields, **judged}))
 
     def command(self, command: Command, linear: float = 0.0) -> None:
-        """Say this at 20 Hz from now on, as safety would."""
+        """Publish this command at 20 Hz, as safety does."""
         self.driving = m.Motion(command=command, linear=linear, source="test")
 
     def silence(self) -> None:
-        """Say nothing any more."""
+        """Stop publishing commands."""
         self.driving = None
 
     def newest(self, name: str) -> Any:
@@ -106,7 +106,7 @@ def bridge_command(made: Board, endpoint: str, *sets: str) -> list[str]:
         f"board.port={made.address[1]}",
         f"board.listen_ports={made.ports}",
         f"bus.connect={endpoint}",
-        # Patient: these machines hold processes up for tenths of a second.
+        # Long limits: on test machines, processes stall for tenths of a second.
         "bridge.unsafe_overrides=lease,silence,heartbeat",
         "bridge.heartbeat=2.0",
         "bridge.lease=0.8",

@@ -41,7 +41,7 @@ def test_what_is_not_answered_is_told_with_what_is_waited_for(bridge: BridgeFixt
     bridge.board.answers_to = []
     wait_until(
         lambda: (link := bridge.link()) and "no answers to: bumper, mileage" in link.waiting,
-        "says what is not answered",
+        "the link names the missing answers",
     )
     bridge.board.answers_to = [1]
     bridge.drive()

@@ -60,8 +60,8 @@ def test_nothing_is_published_twice_although_it_comes_to_both_ports(bridge: Brid
 
 def test_begins_with_stop_even_without_a_router() -> None:
     with board() as made, bridge_process(made, "tcp/127.0.0.1:1"):
-        # BREAK is the guard's, until the bridge has said its first STOP; and the bridge's own while
-        # it hears no velocity, for the test's board may be held up.
+        # The guard sends BREAK until the first STOP of the bridge. The bridge sends BREAK while it
+        # receives no velocity: the test's board may stall.
         wait_until(lambda: [motion.kind for motion in made.motions[-10:]] == STOPS, "STOP at 20 Hz")
         assert {motion.kind for motion in made.motions} <= {MotionKind.BREAK, MotionKind.STOP}
 
@@ -113,7 +113,7 @@ def test_leaving_a_standstill_without_a_command_breaks_until_safety_latches_it(
     bridge.rearms = False
     bridge.command(Command.RUN, 0.5)
     wait_until(lambda: (link := bridge.link()) and "without a command" in link.waiting, "waits")
-    wait_until(lambda: breaks(bridge) == 20, "BREAK although a RUN is asked for")
+    wait_until(lambda: breaks(bridge) == 20, "BREAK although a RUN is requested")
     bridge.command(Command.STOP)
     seen = len(bridge.board.motions)
     wait_until(lambda: len(bridge.board.motions) > seen + 40, "two seconds of STOP asked for")
@@ -189,7 +189,7 @@ def test_a_silent_board_is_lost_and_its_return_needs_switches_and_a_neutral(
     bridge.rearms = False
     bridge.board.silent = False
     wait_until(lambda: (link := bridge.link()) and link.state == "up", "link up")
-    wait_until(lambda: bridge.board.switch_asks > asked, "the switches are asked for again")
+    wait_until(lambda: bridge.board.switch_asks > asked, "the next request for the switches")
     wait_until(lambda: (link := bridge.link()) and "neutral" in link.waiting, "waits for a neutral")
     assert bridge.board.last().kind is MotionKind.STOP  # type: ignore[union-attr]
     bridge.rearms = True
@@ -205,7 +205,9 @@ def test_a_board_that_does_not_echo_is_not_driven(bridge: BridgeFixture) -> None
     wait_until(lambda: "switches_unverified" in bridge.events(), "the event")
     bridge.command(Command.STOP)
     hint = "both on and echoed; a firmware without echoes needs bridge.require_switches = false"
-    wait_until(lambda: (link := bridge.link()) and hint in link.waiting, "says what it waits for")
+    wait_until(
+        lambda: (link := bridge.link()) and hint in link.waiting, "the link names what it waits for"
+    )
     bridge.board.echo = True
     bridge.drive()
 

@@ -29,7 +29,7 @@ HIT, CLEAR, STANDS = map(
 
 
 class Bench:
-    """A core, and what it has led to so far."""
+    """A core and its output so far."""
 
     def __init__(self, *sets: str) -> None:
         self.counters: Counter[str] = Counter()
@@ -40,7 +40,7 @@ class Bench:
         self.outs: list[Output] = [self.core.start()]
 
     def receive(self, *datagrams: bytes, port: int = 0) -> Output:
-        """Let these come to a port, as the shell does; return what all of them led to."""
+        """Pass datagrams to the core as the shell does; return the combined output."""
         made = Output()
         for datagram in datagrams:
             brake = self.core.reflex(datagram)
@@ -55,18 +55,18 @@ class Bench:
         return made
 
     def answer(self, *frames: Frame, port: int = 0) -> Output:
-        """Let these frames come, a datagram each."""
+        """Receive these frames, one datagram for each."""
         return self.receive(*map(FRAMING.pack, frames), port=port)
 
     def tick(self, after_ns: int = 10 * MS, send_errors: int = 0) -> Output:
-        """Let time pass, and tick."""
+        """Advance the time, and tick."""
         self.now_ns += after_ns
         out = self.core.tick(self.now_ns, send_errors)
         self.outs.append(out)
         return out
 
     def move(self, command: Command = Command.RUN, linear: float = 0.0, **fields: Any) -> Output:
-        """Let safety command a motion."""
+        """Receive a motion from safety."""
         self.seq += 1
         values = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
         out = self.core.motion(m.Motion(command=command, **values), self.now_ns, self.now_ns)
@@ -74,7 +74,7 @@ class Bench:
         return out
 
     def arm(self) -> None:
-        """Let the board answer and echo, and safety command a stop."""
+        """Receive all answers and echoes of the board, then a stop from safety."""
         echoes = reports.UltrasonicBrakeReport(True), reports.BumperBrakeReport(True)
         self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *echoes)
         self.receive(CLEAR, CLEAR, CLEAR)
@@ -305,7 +305,7 @@ def test_a_firmware_without_echoes_is_driven_when_that_is_accepted(
             bench.answer(kind(position))
     assert readiness.ready is ready
     assert (readiness.waiting() == "") is ready
-    assert settings_asked(bench.tick()), "they are asked for all the same"
+    assert settings_asked(bench.tick()), "the settings are requested in any case"
     readiness.want(None, False, bench.now_ns)
     assert not readiness.ready
 

@@ -1,4 +1,4 @@
-"""The guard with real processes: whatever becomes of the bridge, the board is told BREAK."""
+"""The guard with real processes: the board receives BREAK whenever the bridge fails."""
 
 import errno
 import itertools
@@ -92,7 +92,11 @@ def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: Bridg
     assert "guard_gone" in bridge.events()
     count = len(bridge.board.motions)
     with pytest.raises(AssertionError):
-        wait_until(lambda: len(bridge.board.motions) > count, "a frame of nobody's", patience_s=0.3)
+        wait_until(
+            lambda: len(bridge.board.motions) > count,
+            "a frame after both have ended",
+            patience_s=0.3,
+        )
 
 
 def test_the_next_guard_waits_for_the_ports_of_an_orphan(bridge: BridgeFixture) -> None:

@@ -1,4 +1,4 @@
-"""A bridge that computes for ever, ahead of all ordinary processes, on the only core there is."""
+"""A bridge in an endless loop, as a real-time process on the only CPU core."""
 
 import subprocess
 import sys

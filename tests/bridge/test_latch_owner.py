@@ -32,7 +32,7 @@ def test_a_latch_is_remembered_until_it_is_reset_by_who_holds_it() -> None:
     latched, _, _ = obey(ARMED, replace_message(brake(), latched=True))
     assert latched.latched_by == 1
     later = NOW + LEASE + 1
-    started, _, _ = obey(latched, stop(1, boot=2), later)  # has not heard of it yet
+    started, _, _ = obey(latched, stop(1, boot=2), later)  # has not received the latch yet
     assert (started.boot, started.latched_by) == (2, 1)
     other, _, _ = obey(started, taking_on(brake(2, boot=2), None), later)  # for its own reason
     assert other.latched_by == 1
@@ -40,7 +40,9 @@ def test_a_latch_is_remembered_until_it_is_reset_by_who_holds_it() -> None:
     assert free.latched_by == 1
     taken, _, _ = obey(other, taking_on(brake(3, boot=2), 1), later)
     assert taken.latched_by == 2
-    again, _, _ = obey(taken, taking_on(brake(4, boot=2), 1), later)  # has not heard of itself yet
+    again, _, _ = obey(
+        taken, taking_on(brake(4, boot=2), 1), later
+    )  # has not received its own latch yet
     assert again.latched_by == 2
     reset, _, _ = obey(again, stop(5, boot=2), later)
     assert reset.latched_by is None

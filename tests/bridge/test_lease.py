@@ -217,7 +217,7 @@ def test_moving_without_a_command_breaks_at_once_and_holds() -> None:
 def test_moving_without_a_command_wants_a_reset_of_safety(owed: int | None) -> None:
     over = replace(ARMED, over_since_ns=NOW - NS_PER_S, neutral=False, latched_by=owed)
     moved, _ = on_uncommanded(over, NOW, OWN_BOOT)
-    back, order, _ = obey(moved, stop(seq=11))  # it has not heard of it yet
+    back, order, _ = obey(moved, stop(seq=11))  # it has not received the latch yet
     assert (order, back.uncommanded, back.latched_by) == (Command.BRAKE, True, OWN_BOOT)
     latched, order, _ = obey(back, taking_on(brake(seq=12), OWN_BOOT))
     assert (order, latched.uncommanded, latched.latched_by) == (Command.BRAKE, False, 1)

@@ -83,7 +83,7 @@ def test_commands_leave_from_where_the_velocity_comes_to() -> None:
     made = ports()
     assert made.main == 0
     come(made, BumperReport, 1, NS_PER_S)
-    assert made.main == 1, "the only one that was heard"
+    assert made.main == 1, "the only port with frames"
     come(made, VelocityReport, 0, NS_PER_S)
     assert made.main == 0
     come(made, BumperReport, 1, NS_PER_S)

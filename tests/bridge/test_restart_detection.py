@@ -1,4 +1,4 @@
-"""When the board's counters have started anew."""
+"""Detection of a restart of the board's counters."""
 
 import math
 

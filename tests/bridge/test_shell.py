@@ -117,8 +117,8 @@ def refusing(bridge: Bridge, times: int) -> Refusing:
     return made
 
 
-def moves(bridge: Bridge, command: Command, seq: int = 1) -> None:
-    """Let safety command this."""
+def receive_motion(bridge: Bridge, command: Command, seq: int = 1) -> None:
+    """Receive this command from safety."""
     motion = Motion(command=command, seq=seq, boot=1)
     bridge._on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
 
@@ -131,13 +131,13 @@ def ticks(bridge: Bridge) -> None:
 @pytest.mark.parametrize("times", [0, 1, 3])
 def test_a_brake_that_cannot_be_sent_is_tried_again_at_once(bridge: Bridge, times: int) -> None:
     made = refusing(bridge, times)
-    moves(bridge, Command.BRAKE)
+    receive_motion(bridge, Command.BRAKE)
     assert (made.sent, bridge._sockets.send_errors) == ([BREAK], times)
 
 
 def test_a_brake_that_cannot_be_sent_at_once_is_tried_again_at_each_tick(bridge: Bridge) -> None:
     made = refusing(bridge, 4)
-    moves(bridge, Command.BRAKE)
+    receive_motion(bridge, Command.BRAKE)
     assert made.motions == []
     made.times = 10**9
     ticks(bridge)
@@ -150,8 +150,8 @@ def test_a_brake_that_cannot_be_sent_at_once_is_tried_again_at_each_tick(bridge:
 
 def test_a_newer_order_takes_the_place_of_a_brake_that_could_not_be_sent(bridge: Bridge) -> None:
     made = refusing(bridge, 4)
-    moves(bridge, Command.BRAKE)
-    moves(bridge, Command.STOP, seq=2)
+    receive_motion(bridge, Command.BRAKE)
+    receive_motion(bridge, Command.STOP, seq=2)
     ticks(bridge)
     assert made.motions == [STOP]
 
@@ -159,7 +159,7 @@ def test_a_newer_order_takes_the_place_of_a_brake_that_could_not_be_sent(bridge:
 def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
     refusing(bridge, 3)
     for seq in (1, 2, 3):
-        moves(bridge, Command.STOP, seq)
+        receive_motion(bridge, Command.STOP, seq)
     bridge._on_second(0)
     bridge._on_link(time.monotonic_ns())
     assert bridge._node.counters["send_errors"] == 3

@@ -71,7 +71,7 @@ def test_a_board_that_echoes_the_other_position_is_asked_again() -> None:
 
 
 def sends(switches: Switches, count: int, now_ns: int = NS_PER_S) -> Switches:
-    """Let so many sends go out."""
+    """Run ticks that send the commands ``count`` times."""
     for number in range(count):
         switches, frames = on_tick(switches, now_ns + number * AGAIN_NS)
         assert frames

@@ -58,7 +58,7 @@ def test_a_datagram_came_when_the_kernel_got_it_not_when_it_was_read(peer: socke
             before_ns = time.monotonic_ns()
             peer.sendto(b"frame", sockets.sockets[0].getsockname())
             after_ns = time.monotonic_ns()
-            time.sleep(HELD_S)  # a bridge that is held up
+            time.sleep(HELD_S)  # a bridge that stalls
             datagram, receipt = received(sockets)
             assert datagram == b"frame"
             assert receipt.kernel_ns is not None

@@ -36,7 +36,7 @@ def build(node: Node[Shared]) -> None:
 
 
 def hang(node: Node[Shared]) -> Callable[[int], None]:
-    """Return a timer that does not return while it is told to hang."""
+    """Return a timer callback that blocks between two SIGUSR1."""
     signals: list[int] = []
     signal.signal(signal.SIGUSR1, lambda number, _: signals.append(number))
 

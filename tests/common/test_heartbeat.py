@@ -1,4 +1,4 @@
-"""How old an echo may be, and what an operator is told about one that is refused."""
+"""The age limit of an echo, and the text of a refusal."""
 
 from common.freshness import NS_PER_S
 from common.heartbeat import CAPACITY, Heartbeat

@@ -197,4 +197,4 @@ def test_a_file_that_is_gone_loses_lines_only(pipe: tuple[int, TextIO]) -> None:
     lines.handle(record(logging.INFO, "nor this"))
     lines.drain(PATIENCE_S)
     assert not pipe[1].closed
-    pipe[1].flush()  # as Python does on its way out: what is left there would be its exit code
+    pipe[1].flush()  # as Python does on exit: an error here would change the exit code

@@ -16,7 +16,7 @@ from verification.harness.waiting import wait_until
 
 
 class Clock:
-    """Time that passes when the test says so."""
+    """A clock that the test advances."""
 
     def __init__(self) -> None:
         self.now_ns = 100 * NS_PER_S
@@ -43,7 +43,7 @@ def loop() -> Iterator[Loop]:
 
 
 def turn(loop: Loop) -> None:
-    """Let the loop do what is due, once."""
+    """Run what is due in the loop once."""
     loop.post(loop.stop)
     loop.run()
 

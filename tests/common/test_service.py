@@ -59,7 +59,7 @@ def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
 
 
 class Witness:
-    """Hears what a service says of itself."""
+    """Receives health, events and liveliness tokens of a service."""
 
     def __init__(self, robot: str) -> None:
         self.health: list[Health] = []

@@ -17,7 +17,7 @@ LIMITS = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
         ({"margin": 0.05, "lease": 0.5}, ()),  # both ends are allowed
         ({"margin": 10.0, "lease": 0.0}, ()),
         ({"margin": 0.0, "lease": 0.5}, ("margin",)),
-        ({"margin": 0.2, "lease": 0.2}, ("margin",)),  # owned up to in vain
+        ({"margin": 0.2, "lease": 0.2}, ("margin",)),  # an override does not help
     ],
 )
 def test_protections_may_be_kept_or_owned_up_to(

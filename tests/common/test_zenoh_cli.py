@@ -49,7 +49,7 @@ def watching(buses: BusFixture) -> Iterator["subprocess.Popen[str]"]:
 def test_it_shows_our_messages(buses: BusFixture, watching: "subprocess.Popen[str]") -> None:
     bus = buses.bus()
     publisher = bus.publisher(keys.BUMPER)
-    # What is put before it has subscribed is lost; a match tells that it has.
+    # Samples put before the subscription are lost; a match confirms the subscription.
     until_received(
         lambda: publisher.put(Bumper(pressed=True)),
         lambda: publisher.passed_on,
@@ -70,7 +70,9 @@ def test_it_shows_what_is_no_message_and_lives_on(
     buses: BusFixture, watching: "subprocess.Popen[str]"
 ) -> None:
     key = f"t2/v1/{buses.robot}/tel/mine"
-    publisher: Any = buses.session().declare_publisher(key)  # its type says that matching is a bool
+    publisher: Any = buses.session().declare_publisher(
+        key
+    )  # annotated Any: its type hint declares a bool
     wait_until(lambda: publisher.matching_status.matching, "the subscription")
     publisher.put(b"\xc1")
     publisher.delete()

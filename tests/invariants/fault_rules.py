@@ -57,7 +57,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(side=st.sampled_from(Side), bits=st.sampled_from([0, 1, 1 << 31]), ms=SHORT)
     def driver(self, side: Side, bits: int, ms: int) -> None:
-        """Let a motor driver report a fault, or none."""
+        """Report a fault of a motor driver, or its end."""
         self.stack.vehicle.fault(side, bits)
         self.stack.run(ms)
 
@@ -186,7 +186,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(forged=st.sampled_from(FORGED), seq=st.integers(1, 2**62), copies=st.booleans())
     def forged_motion(self, forged: list[m.Motion], seq: int, copies: bool) -> None:
-        """Let a client of the router publish motions, under safety's boot or another."""
+        """Publish motions as a client of the router, with safety's boot or another."""
         boot = self.stack.safety.boot if copies else 1
         for step, motion in enumerate(forged):
             self.forge(keys.MOTION, replace(motion, seq=seq + step, boot=boot))
@@ -194,7 +194,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(pressed=st.booleans(), linear=st.sampled_from([0.0, 3.0]), seq=st.integers(1, 2**62))
     def forged_samples(self, pressed: bool, linear: float, seq: int) -> None:
-        """Let a client of the router publish measurements under the bridge's boot."""
+        """Publish measurements as a client of the router, with the bridge's boot."""
         boot = self.stack.bridge.boot
         self.forge(keys.BUMPER, m.Bumper(pressed=pressed, seq=seq, boot=boot))
         self.forge(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0, seq=seq, boot=boot))

@@ -17,7 +17,7 @@ def standing_pressed(stack: Stack) -> None:
 
 
 def late_holds(stack: Stack) -> None:
-    """Let calls that hold the release arrive two seconds late."""
+    """Deliver calls that hold the release two seconds late."""
     standing_pressed(stack)
     seen = stack.seen
     stack.run(2000)
@@ -37,7 +37,7 @@ def pressed_again(stack: Stack) -> None:
 
 
 def pressed_again_and_again(stack: Stack) -> None:
-    """Let the bumper come free now and then while the vehicle stands, and use each way up."""
+    """Free the bumper repeatedly at standstill, and use the whole distance of each release."""
     standing_pressed(stack)
     for _ in range(4):
         hold(stack)

@@ -182,11 +182,11 @@ class SafetyBook:
         return [one for one in higher if self.is_fresh(one, now_ns)]
 
     def is_fresh(self, source: str, now_ns: int) -> bool:
-        """Tell whether the newest request of a source still holds."""
+        """Return whether the newest request of a source is still valid."""
         return now_ns - self.requests[source].at_ns <= LEASES_S[source] * NS_PER_S
 
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
-        """Say why a motion must not run; trips are somebody else's."""
+        """Yield the reasons why a motion must not run, except trips."""
         yield from (f"bad input: {bad}" for bad in self._what_is_bad(now_ns))
         if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S:
             yield "inputs have not settled"
@@ -199,7 +199,7 @@ class SafetyBook:
         yield from self._of_zones(motion, now_ns)
 
     def may_reset(self, now_ns: int) -> bool:
-        """Tell whether a reset may be granted at all: standing, nobody asking."""
+        """Return whether a reset may be granted: at standstill, without a drive request."""
         at_ns, velocity = self.samples.get("velocity", (0, None))
         fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
         stands = fresh and isinstance(velocity, Velocity) and abs(velocity.linear) < 0.02
@@ -210,7 +210,7 @@ class SafetyBook:
         return stands and not asked
 
     def is_gone(self, trip: str) -> bool:
-        """Tell whether the cause of a trip is gone, so that a reset may clear it."""
+        """Return whether the cause of a trip is gone, so that a reset may clear it."""
         if trip == "contact":
             return len(self.bumpers) == 3 and not any(one.pressed for one in self.bumpers)
         if trip == "driver":
@@ -247,7 +247,7 @@ class SafetyBook:
             return
         request = self.requests[source]
         if request.still and now_ns - request.still_ns > RAMP_S * NS_PER_S:
-            yield "nobody asks for motion"
+            yield "no source requests motion"
         if better := self._better(source, now_ns):
             yield f"{better} go before {source}"
         if source not in self.neutral:

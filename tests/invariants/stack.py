@@ -188,11 +188,11 @@ class Stack:
             self.vehicle.inbox.clear()
 
     def stall(self, name: str, duration_ms: int) -> None:
-        """Let a process do nothing for so long."""
+        """Stall a process for this time."""
         getattr(self, name).stalled_until_ns = self.net.now_ns + duration_ms * MS
 
     def power_cycle(self, duration_ms: int) -> None:
-        """Start the board anew."""
+        """Restart the board."""
         self.vehicle.power_cycle(duration_ms)
         self.oracle.on_power_cycle()
         self.run(duration_ms)
@@ -253,7 +253,7 @@ class Stack:
 
     @contextmanager
     def time(self) -> Iterator[None]:
-        """Let the services' code see the simulated time; contexts may stand in each other."""
+        """Replace the services' clock by the simulated time; contexts may be nested."""
         before = [(module, module.time) for module in TIMED]
         clock = Clock(self.net)
         try:

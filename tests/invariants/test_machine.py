@@ -112,7 +112,7 @@ class StackMachine(FaultRules):
 
     @rule(direction=DIRECTIONS, ms=SHORT | LONG, times=st.integers(1, 8))
     def late_release(self, direction: m.Direction, ms: int, times: int) -> None:
-        """Let calls that hold the release arrive late, all at once, and perhaps after its end."""
+        """Deliver calls that hold the release late, all at once, and perhaps after its end."""
         seen = self.stack.seen
         self.release(times // 2, direction)
         self.stack.hold(False)

@@ -1,4 +1,4 @@
-"""A board that drives a known way, and an estimator that hears some of it."""
+"""A board that drives a known path, and an estimator that receives part of its samples."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ parts = st.lists(st.tuples(speeds, turnings, losses), max_size=5)
 
 @dataclass
 class Board:
-    """Drives exact arcs tick by tick, counts as the real one does, tells what it does."""
+    """A simulated board: drives exact arcs, and reports counters and velocities."""
 
     distance: float = 0.0
     heading: float = 0.0

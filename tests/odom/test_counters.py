@@ -1,4 +1,4 @@
-"""From one counter sample to the next: steps over the wraps, and what is none."""
+"""Steps between two counter samples: wraparounds and invalid steps."""
 
 import math
 

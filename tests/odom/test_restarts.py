@@ -1,4 +1,4 @@
-"""Who starts anew: board, bridge, host, or an operator who sets the pose."""
+"""Restarts of board, bridge and host, and a pose set by an operator."""
 
 import math
 

@@ -52,7 +52,7 @@ def test_what_no_velocity_saw_is_not_compared() -> None:
 
 
 def test_the_way_after_a_gap_is_not_compared() -> None:
-    """Counters that were held up tell of the gap in the next sample."""
+    """After a stall of the counters, the next sample covers the gap."""
     detector = SlipDetector(Odom())
     detector.add(1 * TICK_NS, way(0.0), way(0.0, seen=False))
     detector.add(2 * TICK_NS, way(0.5), way(0.01))

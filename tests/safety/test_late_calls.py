@@ -39,7 +39,7 @@ class Operator(Peers):
 
 
 def wait(seconds: float) -> None:
-    """Let time pass, whatever happens."""
+    """Wait unconditionally."""
     end_s = time.monotonic() + seconds
     wait_until(lambda: time.monotonic() > end_s, "a while")
 

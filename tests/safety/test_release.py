@@ -189,7 +189,7 @@ def test_pressed_again_while_it_moves_off_it_goes_no_farther_that_way() -> None:
 
 
 def press_again(fixture: PolicyFixture, direction: Direction) -> None:
-    """Let the bumper be free for a moment while it moves off this way."""
+    """Hold the release in this direction, and free the bumper for one tick."""
     for _ in range(10):
         fixture.tick()
         fixture.hold(direction=direction)
@@ -394,7 +394,7 @@ def test_a_press_long_after_a_release_forbids_nothing() -> None:
 
 
 def blink(fixture: PolicyFixture, field: str) -> None:
-    """Let a motor driver report a fault once."""
+    """Report a fault of a motor driver once."""
     setattr(fixture, field, 1)
     fixture.tick()
     setattr(fixture, field, 0)

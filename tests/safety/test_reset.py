@@ -70,7 +70,7 @@ def stopped() -> PolicyFixture:
 
 
 def blink(fixture: PolicyFixture) -> int:
-    """Let a motor driver report a fault once; return its identity."""
+    """Report a fault of a motor driver once; return its identity."""
     fixture.left_bits = 1
     fixture.tick()
     fixture.left_bits = 0

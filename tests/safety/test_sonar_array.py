@@ -82,7 +82,7 @@ def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
 
 
 def drive(count: int, twist: Twist, **readings: float) -> SonarArray:
-    """Let sonars keep a reading for so many samples; the others hear no echo."""
+    """Repeat a reading of some sonars for ``count`` samples; the others have no echo."""
     array = SonarArray()
     ranges, status = list(FREE), list(NO_ECHO)
     for name, reading in readings.items():

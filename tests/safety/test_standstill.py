@@ -30,7 +30,7 @@ class Board:
     def step(
         self, linear: float | None = 0.0, angular: float = 0.0, commanded: bool = True
     ) -> Standstill:
-        """Let a tick pass with one velocity, or with none."""
+        """Run a tick with one velocity, or without one."""
         self.now_ns += TICK_NS
         known = None if linear is None else Latest(Twist(linear, angular), self.now_ns)
         counters = Mileage(

@@ -10,7 +10,7 @@ from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit
 
 
 def until(fixture: PolicyFixture, command: str) -> None:
-    """Let time pass until safety commands it."""
+    """Advance the time until safety commands this."""
     for _ in range(200):
         if fixture.tick().command == command:
             return
@@ -108,7 +108,7 @@ def test_counters_that_are_not_finite_are_ignored(value: float) -> None:
 
 
 def creeps(fixture: PolicyFixture, ticks: int = 10) -> None:
-    """Let the counters creep while the velocity says standstill."""
+    """Advance the counters slowly while the velocity is zero."""
     fixture.linear = fixture.angular = 0.0
     for _ in range(ticks):
         fixture.distance += 0.01

@@ -344,7 +344,7 @@ TWISTS = [Twist(0.3), Twist(-0.3), Twist(0, 0.3), Twist(0, -0.3), Twist(0.3, 0.3
 
 
 def closes_in(name: str, twist: Twist) -> bool:
-    """Tell whether a twist moves the vehicle toward what a sonar sees."""
+    """Return whether a twist moves the vehicle toward what a sonar sees."""
     yaw = LOOKS[name]
     x = 0.55 * (round(math.cos(yaw), 3) > 0) - 0.55 * (round(math.cos(yaw), 3) < 0)
     y = 0.35 * (round(math.sin(yaw), 3) > 0) - 0.35 * (round(math.sin(yaw), 3) < 0)

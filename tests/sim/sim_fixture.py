@@ -1,4 +1,4 @@
-"""A simulated vehicle on a bench: no sockets, no clock, and a PC that says what it is told to."""
+"""A simulated vehicle without sockets and clock, and a PC controlled by the test."""
 
 import math
 from typing import Any
@@ -66,7 +66,7 @@ class SimFixture:
         self.say(MotionCommand(MotionKind.STOP))
 
     def after(self, seconds: float) -> list[Frame]:
-        """Let time go by in ticks of 10 ms and return what the board said meanwhile."""
+        """Advance the time in ticks of 10 ms; return the frames sent by the board."""
         end_ns = self.now_ns + round(seconds * NS_PER_S)
         said = []
         while self.now_ns < end_ns:

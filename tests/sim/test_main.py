@@ -150,7 +150,7 @@ def meanwhile(bench: Bench) -> Iterator[list[BaseException]]:
 
 
 def answers(port: int) -> bool:
-    """Tell whether a simulator serves there."""
+    """Return whether a simulator answers at this address."""
     with suppress(LinkError):
         Control(port, timeout_s=0.5).truth()
         return True

@@ -35,7 +35,7 @@ def completed(line: str, **environment: str) -> str:
 
 
 def offered(shell_script: str, *words: str) -> set[str]:
-    """Return the candidates of bash for the last word."""
+    """Return the candidates of bash for the word at the cursor."""
     program = f"{shell_script}\n_python_argcomplete t2; printf '%s\\n' \"${{COMPREPLY[@]}}\""
     return set(completed(" ".join(("t2", *words)), program=program).split())
 

@@ -38,7 +38,7 @@ def test_a_site_has_no_robot_id() -> None:
 
 
 @pytest.mark.parametrize(
-    ("who", "routers", "dialled"),
+    ("who", "routers", "endpoints"),
     [
         (ANNA, [ROBOT, OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
         (ANNA, [OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
@@ -47,11 +47,11 @@ def test_a_site_has_no_robot_id() -> None:
         (Profile("viewer", "b"), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
     ],
 )
-def test_other_members_connect(who: Profile, routers: list[Profile], dialled: list[str]) -> None:
+def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: list[str]) -> None:
     text = bus_toml(who, routers)
-    assert tomllib.loads(text)["bus"] == {"connect": dialled[:1], **FILES}
+    assert tomllib.loads(text)["bus"] == {"connect": endpoints[:1], **FILES}
     assert [line for line in text.splitlines() if line.startswith("# or: ")] == [
-        f'# or: connect = ["{other}"]' for other in dialled[1:]
+        f'# or: connect = ["{other}"]' for other in endpoints[1:]
     ]
 
 

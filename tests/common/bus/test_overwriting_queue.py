@@ -38,7 +38,7 @@ class Meddled(deque[int]):
 
 
 def test_what_is_taken_while_another_is_added_is_the_newest() -> None:
-    """Else ``add`` says that an older one went, nobody is woken, and the newest stays for good."""
+    """Otherwise ``add`` wakes no consumer, and the newest item stays in the queue."""
     items: OverwritingQueue[int] = OverwritingQueue(1)
     meddled = items._items = Meddled(items, 1)
     assert not items.add(1)

@@ -1,4 +1,4 @@
-"""Publishing: the header that is put on, what is kept, and how Zenoh is told to carry it."""
+"""Publishing: the message header, the stored samples and the Zenoh settings."""
 
 from collections import Counter
 from typing import Any, cast

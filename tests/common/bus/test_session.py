@@ -28,7 +28,7 @@ def nowhere() -> str:
 
 @pytest.fixture
 def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Let the tries follow each other quickly, and tell when each was."""
+    """Shorten the pause between connection attempts; return their times."""
     made: list[float] = []
 
     def config(where: settings.BusSettings, turn: int) -> zenoh.Config:
@@ -80,7 +80,7 @@ def test_a_router_that_comes_later_is_found(buses: BusFixture, lines: Lines) -> 
     receiver = Bus(at(where), buses.robot, buses.loop.post)
     receiver.subscribe(keys.BUMPER, received.append)
     receiver.open()
-    wait_until(lambda: lines, "the line that says so")
+    wait_until(lambda: lines, "a log line about the missing router")
     with router(listening(where)):
         publisher = buses.bus().publisher(keys.BUMPER)
         until_received(lambda: publisher.put(Bumper(pressed=True)), lambda: received, "a bumper")

@@ -1,4 +1,4 @@
-"""A robot's router that dials its site's: what the site sees, and what the robots do not."""
+"""The uplink of a robot's router: visible to the site, hidden from other robots."""
 
 from contextlib import ExitStack
 
@@ -39,7 +39,7 @@ class Onboard:
 
 
 class Room:
-    """Somebody at the site."""
+    """A client at the site."""
 
     def __init__(self, buses: BusFixture) -> None:
         self.received: list[Arrival[Bumper]] = []

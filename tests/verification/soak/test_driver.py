@@ -88,7 +88,7 @@ class DriverFixture:
         return source.last is not before
 
     def ready(self) -> None:
-        """Let the operator set right what he wants to."""
+        """Run the setup steps of the operator, and confirm the pose."""
         self.now_ns += TRY_NS
         self.beat()
         self.bus.reply(m.Done(text="the pose is set"))

@@ -62,7 +62,7 @@ class SoakFixture:
         self.supervisor.look(0.0)
 
     def begin(self, fault: Fault) -> None:
-        """Let this fault be the next one, and begin it."""
+        """Select this fault as the next one, and begin it."""
         self.runner._faults.next = lambda kills: fault  # type: ignore[method-assign]
         self.runner.disturb(time.monotonic_ns() + round(FIRST_S * NS_PER_S), kills=True)
 
@@ -70,7 +70,7 @@ class SoakFixture:
         self.runner.disturb(time.monotonic_ns() + NS_PER_S, kills=True)
 
     def runs(self) -> None:
-        """Let the board take a command that moves the vehicle, now."""
+        """Append a motion command to the trace of the board, dated now."""
         line = t.Command(mono_ns=time.monotonic_ns(), kind=Command.RUN, linear=0.5, angular=0.0)
         with self.trace.open("ab") as file:
             file.write(msgspec.json.encode(line) + b"\n")
