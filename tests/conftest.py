@@ -11,7 +11,7 @@ from common import log
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
 
-# Two noisy cores: how long an example takes says nothing.
+# On two busy cores, the duration of an example is not meaningful.
 settings.register_profile("t2", deadline=None)
 settings.load_profile("t2")
 # Four tests at a time share the cores: none may go ahead of the board that another one simulates.

@@ -1,4 +1,4 @@
-"""What runs on board starts fast and small: none of it brings along what it does not use."""
+"""On-board programs start fast and small: they import no unused packages."""
 
 import os
 import re

@@ -37,7 +37,7 @@ pytestmark = [pytest.mark.campaign, pytest.mark.timeout(300)]
 
 
 class Newcomer:
-    """Somebody with a checkout, and as many terminals as the page asks for."""
+    """A user with a checkout and one terminal for each command."""
 
     def __init__(self, folder: Path, env: Mapping[str, str]) -> None:
         self.folder = folder

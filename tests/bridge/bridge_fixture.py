@@ -38,7 +38,7 @@ class BridgeFixture:
     raw: dict[str, bytes] = field(default_factory=dict)
     driving: m.Motion | None = None
     heartbeat: int = 1000
-    rearms: bool = True  # say STOP until the bridge is armed, and latch for it, as safety does
+    rearms: bool = True  # send STOP until the bridge is armed, and latch for it, as safety does
 
     def declare(self, bus: Bus) -> None:
         self.bus = bus

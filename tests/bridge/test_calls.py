@@ -1,4 +1,4 @@
-"""What a running bridge is asked, and what it answers: switches and lamps."""
+"""Calls of a running bridge: switches and lamps."""
 
 import threading
 import time

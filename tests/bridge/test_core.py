@@ -107,7 +107,7 @@ def published(out: Output, stream: str) -> list[Any]:
 
 
 def pressed(out: Output) -> list[bool]:
-    """Return what the bumper messages say."""
+    """Return the contents of the bumper messages."""
     return [message.pressed for message in published(out, "bumper")]
 
 

@@ -138,7 +138,7 @@ def test_the_guard_knows_nothing_of_the_bus(bridge: BridgeFixture) -> None:
 
 @contextmanager
 def guarded_rig(heartbeat_s: float) -> Iterator[tuple[Board, "subprocess.Popen[bytes]"]]:
-    """Run guard and bridge without a router; the bridge says STOP."""
+    """Run guard and bridge without a router; the bridge sends STOP."""
     with (
         board() as made,
         bridge_process(made, "tcp/127.0.0.1:1", f"bridge.heartbeat={heartbeat_s}") as process,

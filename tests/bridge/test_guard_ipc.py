@@ -1,4 +1,4 @@
-"""What the guard hands down, and the heartbeat that comes back."""
+"""The pipe between guard and bridge: inherited descriptors and the heartbeat."""
 
 import os
 from collections.abc import Iterator

@@ -15,9 +15,9 @@ from services.bridge.timing import BOUNDS_NS, LONGEST_NS, Histogram, Timings, qu
 MS = 1_000_000
 BOUNDS_S = [bound / NS_PER_S for bound in BOUNDS_NS]
 HIT = Receipt(kernel_ns=100 * MS, read_ns=101 * MS)
-# Asked at 10 ms, heard at 12, sent at 15.
+# Requested at 10 ms, received at 12, sent at 15.
 ANSWER = Motion(command=Command.RUN, asked_ns=10 * MS, heard_ns=12 * MS, mono_ns=15 * MS)
-# The hit in sample 7: heard at 105 ms, judged and sent at 109.
+# The hit in sample 7: received at 105 ms, judged and sent at 109.
 VERDICT = Motion(command=Command.BRAKE, judged=7, judged_ns=105 * MS, mono_ns=109 * MS)
 
 

@@ -1,4 +1,4 @@
-"""Where settings come from, which of them wins, and what is said when one is wrong."""
+"""Sources of settings, their precedence, and the error texts."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What cannot be read as settings at all: no TOML, no text, too deep, too long."""
+"""Unreadable settings files: invalid TOML, binary data, too deep, too long."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What is written to standard error, and in which form."""
+"""Log output on standard error and its format."""
 
 import contextlib
 import io

@@ -90,7 +90,7 @@ Lived = tuple[BusFixture, Program, Witness]
 
 
 def info(buses: BusFixture, part: str) -> dict[str, object]:
-    """Ask the service what it tells newcomers."""
+    """Return the reply of the service to an info query."""
     session: zenoh.Session = buses.session()
     (reply,) = session.get(keys.info_key(buses.robot, "specimen", part))
     assert reply.ok is not None

@@ -104,7 +104,7 @@ class FaultRules(RuleBasedStateMachine):
 
     @rule(ms=st.sampled_from([300, 600, 1000]))
     def power_cycle(self, ms: int) -> None:
-        """Start the board anew."""
+        """Restart the board."""
         self.stack.power_cycle(ms)
 
     @rule(garbage=st.binary(max_size=40))

@@ -166,8 +166,10 @@ def however_old(inputs: Inputs, *_: object) -> Twist | None:
     return inputs.measured
 
 
-def successor(stack: Stack, hear: Callable[[Callable[[Envelope], None], Envelope], None]) -> None:
-    """Kill safety with a latched emergency stop; ``hear`` delivers the link to its successor."""
+def successor(
+    stack: Stack, deliver: Callable[[Callable[[Envelope], None], Envelope], None]
+) -> None:
+    """Kill safety with a latched emergency stop; ``deliver`` passes the link to its successor."""
     stack.estop()
     stack.kill("safety", 20)
     stack.run(25)
@@ -176,7 +178,7 @@ def successor(stack: Stack, hear: Callable[[Callable[[Envelope], None], Envelope
         if subscription.owner is stack.safety and subscription.matches(keys.LINK.on(ROBOT))
     ]  # fmt: skip
     take = subscription.take
-    subscription.take = lambda envelope: hear(take, envelope)
+    subscription.take = lambda envelope: deliver(take, envelope)
 
 
 def successor_hits_something(stack: Stack) -> None:

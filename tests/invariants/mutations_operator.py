@@ -81,7 +81,7 @@ def late_reset(stack: Stack) -> None:
 
 
 def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) -> Release:
-    """Return what a new press has anew when it forgets those before."""
+    """Update a release, but forget earlier presses at each new press."""
     anew = contact.good == 0 and old is not None and old.good > 0
     return AFTER(Release() if anew else release, None if anew else old, contact, *rest)
 

@@ -24,7 +24,7 @@ Hold = tuple[Direction, int]  # the direction, and when
 
 @dataclass(slots=True)
 class OperatorBook:
-    """What operators saw of one safety service, and asked of it."""
+    """States of one safety service that operators saw, and their calls."""
 
     beats: dict[int, int] = field(default_factory=dict)  # heartbeat: when it was sent
     names: dict[int, str] = field(default_factory=dict)  # of causes, by identity

@@ -71,7 +71,7 @@ class OdomFixture:
         self.estimator = Estimator(settings or Odom())
 
     def update(self, *, counters: bool = True, velocity: bool = True) -> Outcome | None:
-        """Take what the board says now, in the order in which the bridge publishes it."""
+        """Take the samples of the board in the order in which the bridge publishes them."""
         outcome = None
         if counters:
             outcome = self.estimator.on_mileage(self.board.mileage(), self.board.now_ns)
@@ -115,7 +115,7 @@ def minors(rows: Sequence[float]) -> list[float]:
 
 
 def started(**board: float) -> OdomFixture:
-    """Return a odom that has heard the counters once, beside a board at rest."""
+    """Return an estimator after its first counter sample."""
     odom = OdomFixture(Board(**board))  # type: ignore[arg-type]
     odom.update()
     return odom

@@ -26,7 +26,7 @@ ZERO = PoseEstimate(Pose(0.0, 0.0, 0.0), START)
 
 
 def counted(distance: float, turn: float, gap: bool = False) -> ProcessNoise:
-    """Return what the settings say of a way that was counted."""
+    """Return the configured noise of a path measured by counters."""
     return ProcessNoise(
         0.011**2 * abs(distance),
         0.023**2 * abs(turn) + 0.017**2 * abs(distance),
@@ -35,7 +35,7 @@ def counted(distance: float, turn: float, gap: bool = False) -> ProcessNoise:
 
 
 def followed(distance: float, turn: float, time_s: float, gap_s: float = 0.0) -> ProcessNoise:
-    """Return what the settings say of a way that only velocities told."""
+    """Return the configured noise of a path measured by velocities only."""
     known = counted(distance, turn)
     return ProcessNoise(
         known.distance + 0.029**2 * time_s,

@@ -55,7 +55,7 @@ def test_asking_does_not_change_the_answer() -> None:
 def test_after_lost_frames_distance_and_heading_are_those_of_the_counters(
     way: list[tuple[float, float, list[tuple[bool, bool]]]], coarse: bool
 ) -> None:
-    """Whatever is lost: the heading is the counters', and the way is no longer than they say."""
+    """For any loss, the heading equals the counters' and the distance is at most theirs."""
     odom = started()
     odom.board.coarse = coarse
     for linear, angular, received in way:

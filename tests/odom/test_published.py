@@ -1,4 +1,4 @@
-"""What is published, when, and with how much doubt; and what is refused."""
+"""Published odometry, its covariance, and refused samples."""
 
 import math
 

@@ -44,7 +44,7 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     motion = motion_message(fixture.state, fixture.inputs)
     assert (motion.latched, motion.predecessor) == (True, OLD)
     assert fixture.reset() == "Still present: Safety restarted while a reset was due."
-    fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has heard of it from us
+    fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has received our latch
     fixture.tick(100)
     assert fixture.reset() == ""
     fixture.link = with_fields(fixture.link, latched_by=None)

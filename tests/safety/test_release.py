@@ -281,7 +281,7 @@ def test_the_counters_end_the_way_when_wheels_slip() -> None:
     began = fixture.distance
     while not fixture.hold():
         fixture.tick()
-        fixture.distance -= 0.006  # three times as fast as the velocity says
+        fixture.distance -= 0.006  # three times the reported velocity
     assert fixture.hold() == USED_UP
     assert 0.1 < began - fixture.distance < 0.15
 

@@ -1,4 +1,4 @@
-"""What a reset wants besides that the causes are gone."""
+"""Conditions of a reset, besides the end of all causes."""
 
 import copy
 import math

@@ -157,7 +157,7 @@ def test_every_set_of_causes_stops_and_latches_as_it_must() -> None:
     before, walked = fixture.state, 0
     for raised in crossed(LATCHING | INHIBITING):
         if {"link", "unarmed"} <= raised:
-            continue  # a link that is lost says nothing about arming
+            continue  # arming is unknown while the link is lost
         fresh(fixture, before, AHEAD, armed=True)
         for name in raised:
             RAISE[name](fixture)
@@ -183,7 +183,7 @@ def check_action(verdict: Verdict, raised: set[str]) -> None:
 
 
 def later(fixture: PolicyFixture, raised: set[str]) -> None:
-    """An hour later all is well again and somebody asks to drive: what latched still holds."""
+    """An hour later, all inputs are good and a source requests motion: latches persist."""
     fixture.now_ns += HOUR_NS
     state = replace(
         fixture.state, decided_ns=fixture.now_ns, linear=Axis(), fault_budget=FaultBudget()
@@ -289,7 +289,7 @@ class Case:
 
     @property
     def cleared(self) -> set[str]:
-        """What a reset clears; nothing when it is refused."""
+        """Return the causes that a reset clears; none if it is refused."""
         if self.call not in ("reset", "reset one") or self.asked == "motion":
             return set()
         if self.pressed and "contact" not in self.held:

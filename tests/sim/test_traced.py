@@ -1,4 +1,4 @@
-"""What the simulation writes down while it runs, and that it is the same for the same seed."""
+"""The trace of a simulation: its contents, and equality for equal seeds."""
 
 import itertools
 import math

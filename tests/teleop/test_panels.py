@@ -77,7 +77,7 @@ def test_a_long_line_is_wrapped() -> None:
     assert [len(row) for row in shown] == [22, 76, 76, 46]
     assert shown[2].startswith(" " * 17 + "word")
     cut = panels.events(view(lines=lines), 2, 76).plain.split("\n")
-    assert cut == shown[1:3]  # its beginning says most
+    assert cut == shown[1:3]  # the beginning has the most important part
     assert panels.events(view(lines=(Line(0, "safety", "info", ""),)), 2, 10).plain.strip()
 
 

@@ -84,7 +84,7 @@ def test_a_pressed_bumper_and_a_faulty_sonar(stack: RunningStack, doctor: Doctor
 
 
 def reset(doctor: Doctor, stack: RunningStack) -> None:
-    """Reset as the remedy says, until safety does."""
+    """Reset as the remedy describes, until safety accepts."""
     from cli.__main__ import main
 
     where = ["--set", f"bus.connect={stack.endpoint}"]

@@ -207,7 +207,7 @@ def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
 
 
 def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
-    """What moves the robot is never replayed."""
+    """Messages that move the robot are never replayed."""
     sender = buses.bus()
     drive, bump = sender.publisher(keys.DRIVE, source="web"), sender.publisher(keys.BUMPER)
     for _ in range(20):

@@ -112,14 +112,14 @@ def test_who_does_not_answer_in_time_is_named(client: Client, server: Server) ->
     wait_until(lambda: client.answers, "the timeout")
     assert client.refusals == ["safety does not answer; run `t2 doctor`"]
     wait_until(lambda: server.waiting, "the question, however late")
-    server.waiting.pop().reply(Done(text="too late"))  # harmless, and nobody hears it
+    server.waiting.pop().reply(Done(text="too late"))  # harmless: no caller receives it
     client.request(timeout_s=20.0)
     wait_until(lambda: client.answers == 2, "the next answer")
     assert client.replies == [Done(text="held")]
 
 
 def test_the_router_s_own_timeout_is_no_refusal(client: Client) -> None:
-    # Both the asking session and the router watch the time; which of them says it is chance.
+    # Both the calling session and the router have a timeout; either one may expire first.
     for count in range(1, 31):
         client.request(held=False, timeout_s=0.02)
         wait_until(lambda: client.answers == count, "the timeout")  # noqa: B023

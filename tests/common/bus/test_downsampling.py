@@ -1,4 +1,4 @@
-"""What laptops get of the robot's streams."""
+"""Downsampling of the robot's streams for laptops."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""A host's number: the same for all its processes, and none where the system does not tell."""
+"""The host id: equal in all processes of a host, and 0 without a boot id."""
 
 import subprocess
 import sys

@@ -20,7 +20,7 @@ def somewhere() -> str:
 
 
 class Onboard:
-    """What is on a robot."""
+    """The bus clients on a robot."""
 
     def __init__(self, buses: BusFixture) -> None:
         self.stops: list[int] = []

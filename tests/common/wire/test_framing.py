@@ -119,7 +119,7 @@ def test_a_crc_over_the_header_refuses_every_flipped_bit(kinds: Kinds, frame: Fr
 
 
 def test_the_header_is_not_protected() -> None:
-    """An id that is flipped to another one of the same size is believed: nothing can tell."""
+    """A bit flip to another id of the same size is accepted: it cannot be detected."""
     raw = bytearray(framing.pack(BumperReport(True)))
     raw[4] ^= 1  # 0x7602 becomes 0x7603
     assert [type(frame).__name__ for frame in frames(read(bytes(raw), FROM_BOARD))] == [

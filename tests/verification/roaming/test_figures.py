@@ -1,4 +1,4 @@
-"""What entries come to, and what is said of it."""
+"""Summaries of roaming results and their text."""
 
 import math
 from dataclasses import replace

@@ -24,7 +24,7 @@ def soak_command(*words: str) -> list[str]:
 @pytest.mark.campaign
 @pytest.mark.timeout(PATIENCE_S + 20)
 def test_a_short_soak(tmp_path: Path) -> None:
-    """Half a minute of life says nothing of growth, so that alone may be called wrong."""
+    """Half a minute is too short to measure growth, so only that result may fail."""
     out = tmp_path / "out"
     result = subprocess.run(
         soak_command("--minutes", str(SOAK_S / 60), "--seed", "19", "--out", str(out)),

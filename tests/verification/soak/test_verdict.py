@@ -1,4 +1,4 @@
-"""What is called good and what wrong, in tables."""
+"""Tables of good and failed soak results."""
 
 import pytest
 
