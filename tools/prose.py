@@ -70,21 +70,6 @@ class Interface(NamedTuple):
 RULES = (
     Rule(r"\broads?\b", "path"),
     Rule(r"\b(?:is|are|was) had (?:from|where|by)\b|\bhad where\b", "installed from, available"),
-)
-
-# Identifiers and the stems of file names, matched as a whole.
-NAMES = (
-    Rule(r"i_accept", "unsafe_overrides"),
-    Rule(r"last_words", "on_exit"),
-    Rule(r"holdup|hold_up", "host_stalls"),
-    Rule(r"heir", "child"),
-    Rule(r"run_behind", "run_optional_service"),
-    Rule(r"[Rr]oster", "members"),
-    Rule(r"enclosure", "namespaces"),
-)
-
-# Enforced in Markdown, not yet enforced in code: move a rule up once `--later` reports no match.
-LATER = (
     Rule(r"\bno good\b", "invalid"),
     Rule(r"\bso manieth\b", "every n-th"),
     Rule(r"\bowned? up to\b", "named in `unsafe_overrides`"),
@@ -113,7 +98,16 @@ LATER = (
     Rule(r"\b(?:thinned|thinning)\b", "downsampled"),
     Rule(DOCSTRING + r"(?:Tell|Say|Hear|Let|Mend)\b", "Report, Log, Return, Read, Allow"),
 )  # fmt: skip
-LATER_NAMES = (
+
+# Identifiers and the stems of file names, matched as a whole.
+NAMES = (
+    Rule(r"i_accept", "unsafe_overrides"),
+    Rule(r"last_words", "on_exit"),
+    Rule(r"holdup|hold_up", "host_stalls"),
+    Rule(r"heir", "child"),
+    Rule(r"run_behind", "run_optional_service"),
+    Rule(r"[Rr]oster", "members"),
+    Rule(r"enclosure", "namespaces"),
     Rule(r"at_rest", "is_stopped"),
     Rule(r"[Ss]eat(?:ed)?", "BusSession, open_session"),
     Rule(r"[Cc]lockwork", "simulated_stack"),
@@ -133,7 +127,8 @@ LATER_NAMES = (
     Rule(r"thinning", "downsampling"),
     Rule(r"[Aa]sk|[Ww]ish", "DriveRequest, requested twist"),
     Rule(r"mend(?:ed)?|tells?|told|somebody|nobody|anybody|everybody", "fix, report, or the role"),
-)
+)  # fmt: skip
+
 
 INTERFACES = (
     Interface("tell", ("services/recorder/",), "method of Python's files"),
@@ -153,14 +148,8 @@ def main(words: Sequence[str] | None = None) -> int:
     """Check the tracked files, or those named; 0: no finding, 1: findings."""
     parser = argparse.ArgumentParser(prog="python -m tools.prose", description=__doc__)
     parser.add_argument("files", nargs="*", help="paths from the root; default: all tracked files")
-    parser.add_argument("--later", action="store_true", help="apply the rules not yet enforced too")
     args = parser.parse_args(words)
-    names = NAMES + LATER_NAMES if args.later else NAMES
-    found = [
-        finding
-        for file in args.files or tracked()
-        for finding in check(file, RULES + LATER if args.later else rules_of(file), names)
-    ]
+    found = [finding for file in args.files or tracked() for finding in check(file, RULES, NAMES)]
     for finding in found:
         print(finding)
     return 1 if found else 0
@@ -172,11 +161,6 @@ def tracked() -> list[str]:
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
     )
     return [file for file in listed.stdout.split("\0") if file and (ROOT / file).is_file()]
-
-
-def rules_of(file: str) -> tuple[Rule, ...]:
-    """Return the enforced rules of a file."""
-    return RULES + LATER if file.endswith(".md") else RULES
 
 
 def check(file: str, rules: Iterable[Rule], names: Iterable[Rule]) -> Iterator[Finding]:

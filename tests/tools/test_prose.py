@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tools import prose
-from tools.prose import LATER, NAMES, RULES, Finding, Rule
+from tools.prose import NAMES, RULES, Finding, Rule
 
 STALL = Rule(r"\bhold up\b", "stall")
 OPENING = Rule(prose.DOCSTRING + r"(?:Tell|Say)\b", "Report")
@@ -80,11 +80,6 @@ def test_names_of_files_and_identifiers_as_a_whole(root: Path) -> None:
     assert found(root, "a.py", "\nheir = 'heir'\n", names=names) == ["a.py:2: heir -> child"]
 
 
-def test_code_has_fewer_rules_than_documents() -> None:
-    assert prose.rules_of("a.py") == RULES
-    assert prose.rules_of("docs/a.md") == RULES + LATER
-
-
 @pytest.mark.parametrize(
     "phrase",
     [
@@ -94,7 +89,7 @@ def test_code_has_fewer_rules_than_documents() -> None:
     ],
 )  # fmt: skip
 def test_banned_phrases(root: Path, phrase: str) -> None:
-    assert found(root, "a.md", phrase, *RULES, *LATER) != []
+    assert found(root, "a.md", phrase, *RULES) != []
 
 
 @pytest.mark.parametrize(
@@ -105,7 +100,7 @@ def test_banned_phrases(root: Path, phrase: str) -> None:
     ],
 )  # fmt: skip
 def test_no_false_alarm(root: Path, phrase: str) -> None:
-    assert found(root, "a.md", phrase, *RULES, *LATER) == []
+    assert found(root, "a.md", phrase, *RULES) == []
 
 
 def test_a_phrase_of_an_interface_is_allowed_in_its_files(root: Path) -> None:
@@ -116,7 +111,7 @@ def test_a_phrase_of_an_interface_is_allowed_in_its_files(root: Path) -> None:
 
 
 def test_every_rule_suggests_something_else() -> None:
-    for rule in (*RULES, *LATER, *NAMES):
+    for rule in (*RULES, *NAMES):
         assert rule.suggestion
 
 
@@ -127,12 +122,6 @@ def test_a_finding_fails_the_run(root: Path, capsys: pytest.CaptureFixture[str])
     (root / "a.md").write_text("It stalls.\n", encoding="utf-8")
     assert prose.main(["a.md"]) == 0
     assert capsys.readouterr().out == ""
-
-
-def test_rules_for_later_are_applied_on_request(root: Path) -> None:
-    (root / "a.py").write_text('"""Tell it."""\n', encoding="utf-8")
-    assert prose.main(["a.py"]) == 0
-    assert prose.main(["--later", "a.py"]) == 1
 
 
 def test_the_tree_passes() -> None:
