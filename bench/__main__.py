@@ -52,7 +52,7 @@ BENCHMARKS = {
         reaction_measure.measure,
         reaction_measure.versions,
         reaction_page.blocks,
-        partial(reaction_plot.draw, what="contact to BREAK"),
+        partial(reaction_plot.draw, what="contact to BRAKE"),
     ),
     "start": Benchmark(
         start_measure.measure, start_measure.versions, start_page.blocks, start_plot.draw

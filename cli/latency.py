@@ -33,14 +33,14 @@ PATIENCE_S = 5.0  # the bridge publishes its health once a second
 SILENCE = f"no health from the bridge for {PATIENCE_S:g} s"
 NAMES = {
     "board_to_bridge": "board → bridge",
-    "bridge_to_break": "bridge → BREAK",
+    "bridge_to_break": "bridge → BRAKE",
     "bridge_to_safety": "bridge → safety",
     "driver_to_safety": "driver → safety",
     "in_safety": "safety's decision",
     "safety_to_bridge": "safety → bridge",
     "bridge_to_frame": "bridge → frame",
-    "contact_to_break": "contact → BREAK, the reflex",
-    "judged_stop": "contact → BREAK, judged",
+    "contact_to_break": "contact → BRAKE, the reflex",
+    "judged_stop": "contact → BRAKE, judged",
     "request_to_frame": "request → frame",
 }
 

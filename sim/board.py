@@ -4,7 +4,7 @@ It holds the last motion command indefinitely: no watchdog is documented. It has
 brakes, off at power-on, which override that command. The real behaviour is unknown; here it is:
 
 =================== ===============================================================================
-brake               while active, the board does BREAK instead of the command
+brake               while active, the board does BRAKE instead of the command
 =================== ===============================================================================
 ultrasonic (0x7603) a sonar in the direction of motion, measured or commanded, is nearer than the
                     brake range, or too near to measure
@@ -78,7 +78,7 @@ class Board:
         return Twist(command.linear_mmps / 1000, command.angular_raw * self._command_unit)
 
     def drive(self) -> c.MotionCommand:
-        """Return the command to the motors: the last one received, or BREAK."""
+        """Return the command to the motors: the last one received, or BRAKE."""
         return BREAK if self.braking() else self.command
 
     def braking(self) -> bool:

@@ -155,7 +155,7 @@ def test_a_number_far_ahead_does_not_lock_safety_out(
     observer.linear = 0.3
     wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
     observer.bus.estop()
-    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
 
 
 def test_copied_measurements_are_no_inputs_of_safety(
@@ -192,7 +192,7 @@ def test_without_a_router_it_brakes_until_a_reset(stack: RunningStack, observer:
     wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
     count = len(stack.trace().commands)
     killed_ns = stack.kill("router")
-    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
     braked = next(c for c in stack.trace().commands[count:] if c.kind == "brake")
     assert (braked.mono_ns - killed_ns) / 1e9 < stack.config.bridge.lease
     observer.linear = 0.0

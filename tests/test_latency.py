@@ -76,7 +76,7 @@ def judged(lines: Path) -> int:
 
 def assert_the_terminal_shows(stack: RunningStack, worst_s: float) -> None:
     """Look at the table that ``t2 latency`` draws on a terminal."""
-    words = ["Reactions in ms", "contact → BREAK, the reflex", f"{worst_s * 1000:.3f}", "p99 ≤",
+    words = ["Reactions in ms", "contact → BRAKE, the reflex", f"{worst_s * 1000:.3f}", "p99 ≤",
              "driver → safety"]  # fmt: skip
     with terminal(stack.endpoint, "cli", "latency") as screen:
         wait_until(

@@ -68,6 +68,8 @@ class Interface(NamedTuple):
 
 # A space in a pattern matches any white space, line breaks of a comment included.
 RULES = (
+    Rule(r"\bBREAKs?\b", "BRAKE: the manual's spelling stays in common/wire"),
+    Rule(r"\b(?:stands?|standing) beside\b", "is next to, is added to"),
     Rule(r"\broads?\b", "path"),
     Rule(r"\b(?:is|are|was) had (?:from|where|by)\b|\bhad where\b", "installed from, available"),
     Rule(r"\bno good\b", "invalid"),
@@ -139,6 +141,20 @@ INTERFACES = (
         "not heard",
         ("verification/faults/catalogue.py", "tests/verification/faults/test_core.py"),
         "name of a fault in docs/faults.md",
+    ),
+    Interface(
+        "BREAK",
+        (
+            "common/wire/",
+            "tests/common/wire/",
+            "verification/outside/",
+            "docs/adr/",
+            "docs/checkout.md",
+            "docs/safety.md",
+            "services/bridge/README.md",
+            "CHANGELOG.md",
+        ),
+        "the manual's spelling, where it is explained or quoted",
     ),
     Interface("thinned", ("verification/roaming/conditions.py",), "name in docs/roaming.md"),
 )

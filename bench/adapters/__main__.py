@@ -1,7 +1,7 @@
 """``python -m bench.adapters NAME board PORT WHERE | NAME decide WHERE``: react to a bumper hit.
 
 One process at the board, one that decides, and a bus between them. The first one reads the board's
-datagrams and publishes each hit; the second one answers each hit; the first one then sends BREAK.
+datagrams and publishes each hit; the second one answers each hit; the first one then sends BRAKE.
 To all other datagrams the first one answers STOP.
 """
 

@@ -64,7 +64,7 @@ class BoardSocket:
         return False
 
     def brake(self) -> None:
-        """Send BREAK; callable from any thread."""
+        """Send BRAKE; callable from any thread."""
         self.sock.sendto(self._brake, self._board)
 
 

@@ -1,1 +1,1 @@
-"""Contact to BREAK: reaction time from a bumper hit at the board to BREAK."""
+"""Contact to BRAKE: reaction time from a bumper hit at the board to BRAKE."""

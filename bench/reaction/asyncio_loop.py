@@ -8,7 +8,7 @@ from bench.reaction.loop import BREAK, STOP, command, is_hit
 
 
 class Answering(asyncio.DatagramProtocol):
-    """Answers a bumper hit with BREAK and everything else with STOP."""
+    """Answers a bumper hit with BRAKE and everything else with STOP."""
 
     def __init__(self) -> None:
         self._stop, self._brake = command(STOP), command(BREAK)

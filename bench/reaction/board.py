@@ -32,7 +32,7 @@ class Programs:
         return str(self.folder / "echo")
 
     def hits(self, board: int, to: int, rounds: int, warm: int) -> list[int]:
-        """Report hits from one port to another; return the ns until each BREAK.
+        """Report hits from one port to another; return the ns until each BRAKE.
 
         Raise ``RuntimeError`` when a hit is not answered.
         """

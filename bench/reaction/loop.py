@@ -1,6 +1,6 @@
 """``python -m bench.reaction.loop PORT``: one process with a loop over a socket.
 
-It knows frames and CRC, answers a bumper hit with BREAK and everything else with STOP.
+It knows frames and CRC, answers a bumper hit with BRAKE and everything else with STOP.
 """
 
 import math

@@ -1,6 +1,6 @@
 """``python -m bench.reaction.no_reflex``: the bridge without its reflex.
 
-It publishes a hit, and sends BREAK when safety's motion commands it. Nothing else differs.
+It publishes a hit, and sends BRAKE when safety's motion commands it. Nothing else differs.
 """
 
 import sys

@@ -23,7 +23,7 @@ from verification.harness.waiting import PATIENCE_S
 Name = tuple[str, str]  # process, event
 Times = dict[Name, int]  # ns
 
-FIRST_STOP, FIRST_BREAK, ON_BUS = "first STOP", "first BREAK", "on the bus"
+FIRST_STOP, FIRST_BREAK, ON_BUS = "first STOP", "first BRAKE", "on the bus"
 NOTHING: Name = ("`python -c pass`", "its end")
 BARE: Name = ("Python, a script", FIRST_STOP)
 BRIDGE = "T2, guard and bridge"
@@ -110,7 +110,7 @@ def bare(_: Site) -> Times:
 
 
 def bridge(site: Site) -> Times:
-    """Time guard and bridge until BREAK, STOP and presence on the bus."""
+    """Time guard and bridge until BRAKE, STOP and presence on the bus."""
     site.forget()
     with board() as sock:
         given = set_options(

@@ -40,7 +40,7 @@ class Trace:
 class Stop:
     """A bumper hit with its reaction."""
 
-    reaction_s: float | None  # from the bumper frame to the BREAK frame
+    reaction_s: float | None  # from the bumper frame to the BRAKE frame
     distance_m: float | None  # from that frame to standstill; None without standstill
     speed_mps: float  # at the hit
 
@@ -101,7 +101,7 @@ def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) ->
         took = "never" if reaction is None else f"{reaction * 1000:.1f} ms"
         way = "never" if driven is None else f"{driven * 100:.1f} cm"
         rows += [
-            (f"contact {number}: frame to BREAK frame", took,
+            (f"contact {number}: frame to BRAKE frame", took,
              reaction is not None and reaction < REACTION_MAX),
             (f"contact {number}: stopped within", f"{way} from {stop.speed_mps:.2f} m/s",
              driven is not None and driven < STOP_MAX),

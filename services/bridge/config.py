@@ -50,8 +50,8 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port takes over
     # s without a heartbeat of the bridge until the guard brakes
     heartbeat: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2
-    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP at most until BREAK
-    deceleration: Positive = 0.6  # m/s^2 that a STOP must reach, or it becomes BREAK sooner
+    coast: Annotated[float, Meta(ge=0.1, le=10.0)] = 1.0  # s of STOP at most until BRAKE
+    deceleration: Positive = 0.6  # m/s^2 that a STOP must reach, or it becomes BRAKE sooner
     angular_deceleration: Positive = 1.0  # rad/s^2, likewise
     max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
     max_angular: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # rad/s

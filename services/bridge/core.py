@@ -174,7 +174,7 @@ class Core:
             self.motions.on_hit(out.hit, now_ns)
             if not out.braked:
                 out.sends.append(self.motions.brake())
-            out.event("contact", "error", "the bumper is hit: BREAK")
+            out.event("contact", "error", "the bumper is hit: BRAKE")
         self._poll.answered("bumper", now_ns)
         if message is not None:
             # A short hit stays in the samples until safety has acknowledged one: some may be lost.

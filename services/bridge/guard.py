@@ -1,15 +1,15 @@
-"""The bridge's parent process: sends BREAK whenever the bridge does not work.
+"""The bridge's parent process: sends BRAKE whenever the bridge does not work.
 
 It opens the sockets to the board, so that source port and receive queue survive a restart, starts
-the bridge as its child and reads its heartbeat. Without a heartbeat it sends BREAK at 20 Hz through
+the bridge as its child and reads its heartbeat. Without a heartbeat it sends BRAKE at 20 Hz through
 the socket that the bridge used:
 
 ============== =============================== ==============================================
-phase          BREAK                           ends with
+phase          BRAKE                           ends with
 ============== =============================== ==============================================
 starting       until the first heartbeat, that a heartbeat: alive; none in 10 s: killed
                follows the bridge's first STOP
-alive          from 200 ms without one         five BREAKs without one: killed; the pipe's end
+alive          from 200 ms without one         five BRAKEs without one: killed; the pipe's end
 ending, killed until the child has exited      exit: restarted, the first time at once
 not started    until it could be started       started; retried after 0 to 5 s (no memory)
 ============== =============================== ==============================================
@@ -39,9 +39,9 @@ from services.bridge.guard_ipc import Inherited
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
-HANG_BRAKES_MAX = 5  # BREAKs without a heartbeat, until the bridge is killed
+HANG_BRAKES_MAX = 5  # BRAKEs without a heartbeat, until the bridge is killed
 START_BRAKES_MAX = 200
-EXIT_BRAKES_MAX = 20  # BREAKs after the bridge closed its pipe, until it is killed
+EXIT_BRAKES_MAX = 20  # BRAKEs after the bridge closed its pipe, until it is killed
 NOT_STARTED = 1  # exit code when the bridge could not be started
 STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
 
@@ -76,7 +76,7 @@ class Guard:
         return code
 
     def brake(self) -> None:
-        """Send BREAK as the bridge does, and report to the watchdog."""
+        """Send BRAKE as the bridge does, and report to the watchdog."""
         self._systemd.beat(time.monotonic_ns())
         self._sockets.send(self._brake, self._port, BRAKE_ATTEMPTS)
 
@@ -85,7 +85,7 @@ class Guard:
         try:
             child, heartbeat = self._start()
         except (OSError, MemoryError, subprocess.SubprocessError) as error:
-            self._log.error("the bridge cannot be started; sending BREAK", error=str(error))
+            self._log.error("the bridge cannot be started; sending BRAKE", error=str(error))
             return NOT_STARTED
         self._watch(child, heartbeat)
         os.close(heartbeat)

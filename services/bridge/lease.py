@@ -11,22 +11,22 @@ ready        link lost, switches unverified, both emergency switches on and echo
              board restarted, stopping
 neutral      start, not ready, lease over,   a STOP or a RUN of zero from the authority, while
              a new authority                 ready: no motion on reconnect alone
-acked        a bumper hit (the reflex: BREAK a motion message whose ``judged`` covers that hit:
-             at once)                        a RUN that was already sent must not undo the BREAK
+acked        a bumper hit (the reflex: BRAKE a motion message whose ``judged`` covers that hit:
+             at once)                        a RUN that was already sent must not undo the BRAKE
 standstill   0.05 m or 0.05 rad away from a  a motion message with safety's latch for this:
              standstill while the lease was  its ``predecessor`` is the bridge itself
-             over: BREAK at once
+             over: BRAKE at once
 latch owner  an authority that ended with a  its successor has latched in its place, and names
              latch that was not reset        the owner of that latch in ``predecessor``
 ============ =============================== =================================================
 
-When the lease is over: STOP at once and then at 20 Hz, and BREAK from ``coast_ns`` on while the
-vehicle is not known to be at standstill (``standstill`` defines that time). BREAK continues if it
+When the lease is over: STOP at once and then at 20 Hz, and BRAKE from ``coast_ns`` on while the
+vehicle is not known to be at standstill (``standstill`` defines that time). BRAKE continues if it
 was the authority's last order. The authority is identified by the ``boot`` of the sender; until its
 lease is over, others are refused.
 
 The lease counts from reception of a motion, not from its handling: a message that was queued for
-longer than the lease renews nothing and is not obeyed, except a BREAK. Within the lease, ``seq``
+longer than the lease renews nothing and is not obeyed, except a BRAKE. Within the lease, ``seq``
 may rise by 2^20 at most: a copied ``boot`` with a huge ``seq`` must not lock the authority out. An
 authority that was silent for hours is accepted again.
 
@@ -76,12 +76,12 @@ class Lease(Struct, frozen=True):
     sent_ns: int = 0
     # Owner of the latch that was not reset: an authority, or the bridge.
     latched_by: int | None = None
-    braked: bool = False  # whether the authority's last order was BREAK
+    braked: bool = False  # whether the authority's last order was BRAKE
     uncommanded: bool = False  # moved from standstill; safety has not latched it yet
 
     @property
     def braking(self) -> bool:
-        """Whether BREAK continues, even at standstill."""
+        """Whether BRAKE continues, even at standstill."""
         return self.hit is not None or self.uncommanded or self.braked
 
     @property

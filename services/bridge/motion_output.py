@@ -106,7 +106,7 @@ class MotionOutput:
         self.lease, order = lease.on_uncommanded(self.lease, now_ns, self._boot)
         if order is not None:
             self.order(order, out)
-            text = "moved from standstill without a command: BREAK"
+            text = "moved from standstill without a command: BRAKE"
             out.event("uncommanded_motion", "error", text)
 
     def stop(self, now_ns: int, out: Output) -> None:

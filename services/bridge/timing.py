@@ -7,9 +7,9 @@ that the hops of one reaction add up to the whole:
 reaction         times
 ================ ================================================================================
 board_to_bridge  the kernel received a datagram of the board, the bridge read it
-contact_to_break the same of the one with the hit, BREAK was handed to the socket: the reflex
+contact_to_break the same of the one with the hit, BRAKE was handed to the socket: the reflex
 judged_stop      the same of that one, safety received the bumper message, sent its verdict,
-                 the bridge received it, BREAK was handed to the socket
+                 the bridge received it, BRAKE was handed to the socket
 request_to_frame the request was sent, safety received it, sent its motion, the bridge received
                  it, the frame was handed to the socket
 ================ ================================================================================
@@ -97,7 +97,7 @@ class Timings:
         self._add(READ, receipt.kernel_ns, (receipt.kernel_ns, receipt.read_ns))
 
     def on_reflex(self, seq: int, hit: Receipt, sent_ns: int) -> None:
-        """Record the BREAK sent at ``sent_ns`` for the hit in the sample ``seq``."""
+        """Record the BRAKE sent at ``sent_ns`` for the hit in the sample ``seq``."""
         self._hit = seq, hit
         self._add(CONTACT, hit.earliest_ns, (hit.kernel_ns, hit.read_ns, sent_ns))
 
@@ -112,7 +112,7 @@ class Timings:
         self._add(REQUEST, times[0], (*times, received_ns, sent_ns))
 
     def on_acked(self, motion: Motion, shared: bool, received_ns: int, sent_ns: int) -> None:
-        """Record the BREAK of the motion that acknowledged the hit."""
+        """Record the BRAKE of the motion that acknowledged the hit."""
         if self._hit is None:
             return
         (seq, hit), self._hit = self._hit, None

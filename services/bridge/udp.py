@@ -21,7 +21,7 @@ DATAGRAM_MAX = 2048
 # Limit of datagrams per round, so that a flood does not delay the loop's timers.
 BURST = 64
 BURST_PAUSE_S = 20e-6
-BRAKE_ATTEMPTS = 4  # attempts when the system refuses to send a BREAK
+BRAKE_ATTEMPTS = 4  # attempts when the system refuses to send a BRAKE
 
 Ancillary = list[tuple[int, int, bytes]]
 

@@ -1,6 +1,6 @@
 """Codec between samples of the bus and messages of an MCAP file; lossless to the byte. Pure.
 
-A message is stored as JSON, so that every viewer can show it. Three reserved names may stand beside
+A message is stored as JSON, so that every viewer can show it. Three reserved names may be added to
 its fields; no message of T2 uses them:
 
 - ``_raw``: the attachment (the board's raw frame) in base64;

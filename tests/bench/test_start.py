@@ -77,7 +77,7 @@ def test_the_table_is_in_the_order_of_the_starts() -> None:
     assert found["table"].splitlines()[2:] == [
         "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |",
         "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |",
-        "| T2, guard and bridge | first BREAK | 100 | 100 |  | × 2.5 |",
+        "| T2, guard and bridge | first BRAKE | 100 | 100 |  | × 2.5 |",
         "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 |",
     ]
     assert found["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"

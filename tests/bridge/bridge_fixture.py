@@ -136,5 +136,5 @@ def bridge_pid(guard: "subprocess.Popen[bytes]") -> int:
 
 
 def breaks_since(made: Board, count: int) -> int:
-    """Return how many BREAKs the board got after that many commands."""
+    """Return how many BRAKEs the board got after that many commands."""
     return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)

@@ -60,7 +60,7 @@ def test_nothing_is_published_twice_although_it_comes_to_both_ports(bridge: Brid
 
 def test_begins_with_stop_even_without_a_router() -> None:
     with board() as made, bridge_process(made, "tcp/127.0.0.1:1"):
-        # The guard sends BREAK until the first STOP of the bridge. The bridge sends BREAK while it
+        # The guard sends BRAKE until the first STOP of the bridge. The bridge sends BRAKE while it
         # receives no velocity: the test's board may stall.
         wait_until(lambda: [motion.kind for motion in made.motions[-10:]] == STOPS, "STOP at 20 Hz")
         assert {motion.kind for motion in made.motions} <= {MotionKind.BREAK, MotionKind.STOP}
@@ -109,11 +109,11 @@ def test_leaving_a_standstill_without_a_command_breaks_until_safety_latches_it(
         bridge.board.speed_mmps = 0
     bridge.board.wait_for(MotionKind.BREAK)
     wait_until(lambda: "uncommanded_motion" in bridge.events(), "the event")
-    wait_until(lambda: breaks(bridge) == 20, "BREAK for a second")
+    wait_until(lambda: breaks(bridge) == 20, "BRAKE for a second")
     bridge.rearms = False
     bridge.command(Command.RUN, 0.5)
     wait_until(lambda: (link := bridge.link()) and "without a command" in link.waiting, "waits")
-    wait_until(lambda: breaks(bridge) == 20, "BREAK although a RUN is requested")
+    wait_until(lambda: breaks(bridge) == 20, "BRAKE although a RUN is requested")
     bridge.command(Command.STOP)
     seen = len(bridge.board.motions)
     wait_until(lambda: len(bridge.board.motions) > seen + 40, "two seconds of STOP asked for")
@@ -123,7 +123,7 @@ def test_leaving_a_standstill_without_a_command_breaks_until_safety_latches_it(
 
 
 def breaks(bridge: BridgeFixture) -> int:
-    """Return how many of the last 20 commands were BREAK."""
+    """Return how many of the last 20 commands were BRAKE."""
     return sum(motion.kind is MotionKind.BREAK for motion in bridge.board.motions[-20:])
 
 

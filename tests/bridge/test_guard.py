@@ -1,4 +1,4 @@
-"""The guard with real processes: the board receives BREAK whenever the bridge fails."""
+"""The guard with real processes: the board receives BRAKE whenever the bridge fails."""
 
 import errno
 import itertools
@@ -53,7 +53,7 @@ def test_a_bridge_that_dies_is_braked_for_and_started_again(
     first = bridge_pid(bridge.process)
     count = len(bridge.board.motions)
     os.kill(first, number)
-    wait_until(lambda: breaks_since(bridge.board, count), "BREAK")
+    wait_until(lambda: breaks_since(bridge.board, count), "BRAKE")
     wait_until(lambda: bridge_pid(bridge.process) != first, "the next bridge")
     bridge.board.wait_for(MotionKind.STOP)
     bridge.drive()
@@ -65,7 +65,7 @@ def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
         first = bridge_pid(process)
         count = len(made.motions)
         os.kill(first, signal.SIGSTOP)
-        wait_until(lambda: breaks_since(made, count) > 3, "BREAK, again and again")
+        wait_until(lambda: breaks_since(made, count) > 3, "BRAKE, again and again")
         wait_until(lambda: bridge_pid(process) != first, "the next bridge")
         made.wait_for(MotionKind.STOP)
 
@@ -76,7 +76,7 @@ def test_a_bridge_that_was_only_held_up_lives_on() -> None:
         first = bridge_pid(process)
         count = len(made.motions)
         os.kill(first, signal.SIGSTOP)
-        wait_until(lambda: breaks_since(made, count), "BREAK")
+        wait_until(lambda: breaks_since(made, count), "BRAKE")
         os.kill(first, signal.SIGCONT)
         made.wait_for(MotionKind.STOP)
         wait_until(lambda: {sent.kind for sent in made.motions[-20:]} == {MotionKind.STOP}, "STOPs")
@@ -207,7 +207,7 @@ time.sleep(1000)
 
 def test_breaks_leave_from_the_port_that_the_bridge_used(made: Board) -> None:
     assert run(guard_of(made, BEAT + f"sys.exit({EXIT_LINK})")) == EXIT_LINK
-    wait_until(lambda: made.sources[-1][1] == made.ports[1], "BREAK from the second port")
+    wait_until(lambda: made.sources[-1][1] == made.ports[1], "BRAKE from the second port")
 
 
 def test_a_crash_is_waited_for_longer_each_time(
@@ -259,7 +259,7 @@ def test_it_brakes_while_it_waits(made: Board) -> None:
     count = len(made.motions)
     guard._await_restart(1, 0.0)
     guard._sockets.close()
-    wait_until(lambda: breaks_since(made, count) >= 5, "BREAK at 20 Hz for half a second")
+    wait_until(lambda: breaks_since(made, count) >= 5, "BRAKE at 20 Hz for half a second")
 
 
 # --- the program --------------------------------------------------------------------------------

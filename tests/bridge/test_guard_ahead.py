@@ -46,7 +46,7 @@ def test_a_bridge_that_runs_away_is_braked_for_and_killed() -> None:
                 assert guard.stderr is not None
                 said = guard.stderr.readline()
                 count = len(made.motions)
-                wait_until(lambda: len(made.motions) > count, "BREAK")
+                wait_until(lambda: len(made.motions) > count, "BRAKE")
             finally:
                 guard.terminate()
     # A guard that had to wait would have found that Linux had ended it, after a second.

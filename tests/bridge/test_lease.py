@@ -78,7 +78,7 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (replace(ARMED, neutral=False), run(0.0, 0.1), Command.STOP, Refusal.NOT_NEUTRAL),
         (replace(ARMED, neutral=False), run(0.0, 0.0), Command.RUN, None),
         (replace(ARMED, neutral=False), brake(), Command.BRAKE, None),
-        # an unjudged hit: BREAK, whatever is asked
+        # an unjudged hit: BRAKE, whatever is asked
         (HIT, run(), Command.BRAKE, Refusal.NOT_ACKED),
         (HIT, stop(), Command.BRAKE, None),
         (HIT, brake(), Command.BRAKE, None),
@@ -94,7 +94,7 @@ def test_at_once_is_at_once_even_when_the_clock_has_just_begun() -> None:
         (ARMED, run(seq=10 + SEQ_STEP_MAX), Command.RUN, None),
         (ARMED, run(seq=11 + SEQ_STEP_MAX), None, Refusal.JUMP),
         (ARMED, brake(seq=2**62), None, Refusal.JUMP),
-        # the vehicle moved without a command: BREAK until safety has latched that
+        # the vehicle moved without a command: BRAKE until safety has latched that
         (MOVED, run(), Command.BRAKE, Refusal.NOT_LATCH_OWNER),
         (MOVED, run(0.0, 0.0), Command.BRAKE, Refusal.NOT_LATCH_OWNER),
         (MOVED, stop(), Command.BRAKE, None),

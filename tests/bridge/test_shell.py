@@ -54,7 +54,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
         bridge._read(time.monotonic_ns())
         return made.motions[-1:] != [] and made.motions[-1].kind is MotionKind.BREAK
 
-    wait_until(brakes, "BREAK")
+    wait_until(brakes, "BRAKE")
     timing = bridge._node.timing()
     assert timing is not None
     assert sum(timing.durations["contact_to_break"].counts) == 1

@@ -53,7 +53,7 @@ def test_the_guard_beats_though_the_bridge_hangs_and_not_when_it_hangs(watched: 
     wait_until(lambda: "READY=1" in manager.read(), "that it is ready")
     first, count = bridge_pid(process), len(made.motions)
     os.kill(first, signal.SIGSTOP)
-    wait_until(lambda: breaks_since(made, count), "BREAK")
+    wait_until(lambda: breaks_since(made, count), "BRAKE")
     beats = manager.beats()
     wait_until(lambda: manager.beats() > beats, "a beat while it brakes")
     wait_until(lambda: bridge_pid(process) != first, "the next bridge")
@@ -81,7 +81,7 @@ def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
         count, killed_s = len(made.motions), time.monotonic()
         supervisor.kill()
         supervisor.wait()
-        wait_until(lambda: breaks_since(made, count), "BREAK, not the STOP of a normal end")
+        wait_until(lambda: breaks_since(made, count), "BRAKE, not the STOP of a normal end")
         wait_until(lambda: is_quiet(made), "the end of guard and bridge")
         made.wait_for(MotionKind.BREAK)
         assert made.times[-1] - killed_s < 5.0

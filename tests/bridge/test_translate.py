@@ -104,9 +104,7 @@ def test_what_is_not_finite_is_refused(value: float) -> None:
     with pytest.raises(MessageError, match="not finite"):
         check_finite(run(0.0, value))
     check_finite(run(1e300, -1e300))
-    check_finite(
-        Motion(command=Command.BRAKE, linear=value)
-    )  # a stop stops, whatever stands beside it
+    check_finite(Motion(command=Command.BRAKE, linear=value))  # a stop ignores the other fields
 
 
 @given(st.integers(-5000, 5000), st.integers(-5729, 5729))

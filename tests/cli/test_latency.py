@@ -75,8 +75,8 @@ def test_the_table_in_milliseconds() -> None:
              if line.startswith("│")}  # fmt: skip
     cells = {name: [cell.strip() for cell in row] for name, row in lines.items()}
     assert cells == {
-        "contact → BREAK, the reflex": ["1", "4.200", "4.200", "4.200"],
-        "bridge → BREAK": ["100", "1.000", "10.000", "250.000"],
+        "contact → BRAKE, the reflex": ["1", "4.200", "4.200", "4.200"],
+        "bridge → BRAKE": ["100", "1.000", "10.000", "250.000"],
         "request → frame": ["0", "", "", ""],
         "of_a_newer_bridge": ["1", "0.500", "0.500", "0.500"],
     }

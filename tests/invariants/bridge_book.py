@@ -27,7 +27,7 @@ class BridgeBook:
     neutral: bool = False
     clear: int = CLEAR_SAMPLES  # samples in a row
     published: int = 0  # bumper samples
-    brake_due: bool = False  # whether a hit was delivered and no BREAK has been sent yet
+    brake_due: bool = False  # whether a hit was delivered and no BRAKE has been sent yet
 
     def on_report(self, frame: Frame, now_ns: int) -> bool:
         """Record a frame of the board; return whether a hit begins with it."""

@@ -308,6 +308,6 @@ MUTATIONS: dict[str, Mutation] = {
         DriveEnd, "subscribe", from_anybody, authority_is_copied, "a RUN that no safety sent",
     ),
     "the reflex does not brake": (
-        Core, "reflex", claims_to_brake, hit_while_a_run_is_under_way, "without a BREAK",
+        Core, "reflex", claims_to_brake, hit_while_a_run_is_under_way, "without a BRAKE",
     ),
 }  # fmt: skip

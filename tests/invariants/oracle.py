@@ -221,7 +221,7 @@ class Oracle(Watch):
             if not isinstance(part.frame, MotionCommand):
                 continue
             if bridge_book.brake_due and part.frame.kind is not MotionKind.BREAK:
-                self.violations.append("a hit without a BREAK at once")
+                self.violations.append("a hit without a BRAKE at once")
             bridge_book.brake_due = False
             if part.frame.kind is MotionKind.RUN and moves_vehicle(part.frame):
                 return tuple(self._of_frame(bridge_book, process.taking, part.frame))
@@ -268,7 +268,7 @@ class Oracle(Watch):
             self.violations.append(f"a RUN is held for more than {budget_ns / MS:.0f} ms")
         for bridge_book in self.bridge_books.values():
             if bridge_book.brake_due:
-                self.violations.append("a hit without a BREAK at once")
+                self.violations.append("a hit without a BRAKE at once")
 
 
 def moves(motion: m.Motion) -> bool:

@@ -35,7 +35,7 @@ def test_it_drives_and_an_emergency_stop_stops_it(
     drive_until_moving(stack, source)
     code, said = t2(stack, "estop")
     assert code == 0, said
-    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
     assert not moves_since(stack, len(stack.trace().commands))
     source.linear = 0.0

@@ -147,7 +147,7 @@ Made by `make faults` on {date}: {machine}, Python {python}, {minutes} minutes.
 Real processes, real UDP, the simulated board, 0.8 m/s on an empty plane while motion is requested.
 
 - *p50, p99, worst*: time from the fault to the last command at the board that moves the vehicle, or
-  to the first STOP or BREAK if that is later.
+  to the first STOP or BRAKE if that is later.
 - *stall*: the longest time that the host kept a sleeping process from running during a sample.
   After SIGKILL it includes the time that the kernel took to end the process: other processes detect
   the end by its pipes, which the kernel closes last. A sample may exceed its budget by this time.

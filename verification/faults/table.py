@@ -51,7 +51,7 @@ class Row:
 def times(samples: Sequence[Sample]) -> list[float]:
     """Return the reaction time of each sample, in seconds.
 
-    It is the later one of the first STOP or BREAK and the last command that moves the vehicle.
+    It is the later one of the first STOP or BRAKE and the last command that moves the vehicle.
     """
     return [max(math.inf if s.stopped_s is None else s.stopped_s, s.moved_s) for s in samples]
 

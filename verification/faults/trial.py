@@ -22,7 +22,7 @@ LATCHED_S = 0.3
 class Sample:
     """The result of a trial."""
 
-    stopped_s: float | None  # until the first STOP or BREAK
+    stopped_s: float | None  # until the first STOP or BRAKE
     moved_s: float  # until the last command that moves the vehicle, while the fault lasted
     outcome: Outcome | None  # None: it does not drive again
     fault_ns: int

@@ -63,7 +63,7 @@ def moves(command: Command) -> bool:
 def first_stop_s(
     commands: Sequence[Command], since_ns: int, kinds: Collection[str] = ("stop", "brake")
 ) -> float | None:
-    """Return the time until the first STOP or BREAK, in seconds; None without one."""
+    """Return the time until the first STOP or BRAKE, in seconds; None without one."""
     stops = [c.mono_ns for c in commands if c.kind in kinds and c.mono_ns >= since_ns]
     return (stops[0] - since_ns) / NS_PER_S if stops else None
 

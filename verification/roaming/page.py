@@ -26,7 +26,7 @@ def driving(drives: DriveRows, asked_mps: float) -> str:
         "stops",
         "presses",
         "speed",
-        "E: BREAK",
+        "E: BRAKE",
         "E: confirmed",
     )
     rows = [

@@ -35,7 +35,7 @@ class DriveResult:
     state: Stream
     odometry: Stream
     chain: ControlChain
-    braked_s: float | None  # from E to BREAK at the board
+    braked_s: float | None  # from E to BRAKE at the board
     confirmed_s: float | None  # from E to the latched state on the laptop
     load_bps: float  # bit/s from the robot to the laptop
     since_ns: int = 0

@@ -135,7 +135,7 @@ def restarts_after_kill(m: Machine) -> str:
 
 
 def stops_in_order(m: Machine) -> str:
-    """Stop all units while driving: the bridge first, and the board holds STOP or BREAK."""
+    """Stop all units while driving: the bridge first, and the board holds STOP or BRAKE."""
     speed = drives(m)
     m.run("systemctl", "stop", "t2.target", "t2-sim.service", *UNITS)
     ends = {
@@ -150,7 +150,7 @@ def stops_in_order(m: Machine) -> str:
     ]
     last = [line for line in lines if line["event"] == "command"][-1]
     truth = [line for line in lines if line["event"] == "truth"][-1]
-    # BREAK, when stalls of the host kept the bridge from detecting standstill.
+    # BRAKE, when stalls of the host kept the bridge from detecting standstill.
     assert last["kind"] in ("stop", "brake"), last
     results = {m.unit(name)["Result"] for name in UNITS}
     assert results == {"success"}, results
@@ -272,4 +272,4 @@ def moving(m: Machine) -> float:
 
 def wait_for_stop(m: Machine) -> None:
     """Wait until the board does not hold a RUN."""
-    wait_until(lambda: m.truth()["holds"] != "run", "a STOP or BREAK", PATIENCE_S)
+    wait_until(lambda: m.truth()["holds"] != "run", "a STOP or BRAKE", PATIENCE_S)

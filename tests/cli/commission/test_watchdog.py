@@ -168,7 +168,7 @@ def test_a_killed_or_stopped_process_brakes(
         begin(it)
         wait_until(vehicle.runs, "a RUN")
         it.signal(number)
-        wait_until(vehicle.is_braked, "BREAK at the board, and standstill", PATIENCE_S)
+        wait_until(vehicle.is_braked, "BRAKE at the board, and standstill", PATIENCE_S)
 
 
 def test_a_board_that_falls_silent_brakes(vehicle: Vehicle, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_a_board_that_falls_silent_brakes(vehicle: Vehicle, tmp_path: Path) -> N
         wait_until(vehicle.runs, "a RUN")
         vehicle.control.do(Freeze(seconds=1.5))
         it.wait("Ended early: The board was silent")
-        wait_until(vehicle.is_braked, "BREAK at the board, and standstill")
+        wait_until(vehicle.is_braked, "BRAKE at the board, and standstill")
 
 
 def test_no_motion_without_confirmation(vehicle: Vehicle, tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def command(at_ns: int, kind: motion.Command, linear: float = 0.0) -> t.Command:
 
 
 def hit_lap(stands: bool = True, brakes: bool = True) -> Trace:
-    """Return 2 m at 0.8 m/s, a hit at tick 50, BREAK 20 ms later, standstill after 4 cm."""
+    """Return 2 m at 0.8 m/s, a hit at tick 50, BRAKE 20 ms later, standstill after 4 cm."""
     hit_ns = 50 * TICK_NS
     driving = [truth(n, x=n * 0.04, distance=n * 0.04, linear=0.8) for n in range(51)]
     still = [truth(51 + n, x=2.04, distance=2.04, linear=0.0, contact=True) for n in range(40)]

@@ -35,7 +35,7 @@ def test_a_good_lap() -> None:
         "closest to an obstacle": ("1.00 m", True),
         "odometry error, driving": ("0.0 cm at most", None),
         "odometry error, at rest": ("0.0 cm at most", True),
-        "contact 1: frame to BREAK frame": ("20.0 ms", True),
+        "contact 1: frame to BRAKE frame": ("20.0 ms", True),
         "contact 1: stopped within": ("4.0 cm from 0.80 m/s", True),
         "unplanned latches": ("none", None),
     }
@@ -55,7 +55,7 @@ def test_an_unfinished_lap() -> None:
 
 def test_a_vehicle_that_brakes_without_a_frame() -> None:
     trace = hit_lap(brakes=False)
-    assert wrong(trace) == {"contact 1: frame to BREAK frame"}
+    assert wrong(trace) == {"contact 1: frame to BRAKE frame"}
     assert stops(trace)[0].reaction_s is None
 
 
@@ -69,7 +69,7 @@ def test_a_vehicle_without_standstill() -> None:
 def test_a_trace_cut_off_at_the_hit() -> None:
     whole = hit_lap()
     cut = Trace(whole.truth[:51], whole.commands[:1], whole.bumper)
-    assert wrong(cut) == {"contact 1: frame to BREAK frame", "contact 1: stopped within"}
+    assert wrong(cut) == {"contact 1: frame to BRAKE frame", "contact 1: stopped within"}
 
 
 def test_a_hit_before_the_first_truth() -> None:

@@ -85,7 +85,7 @@ def drives(stack: RunningStack, presser: KeyPresser) -> None:
             wait_until(moving, "the vehicle moves", patience_s=3)
         except AssertionError:
             presser.release()
-            wait_until(lambda: stack.last() != "run", "STOP or BREAK at the board")
+            wait_until(lambda: stack.last() != "run", "STOP or BRAKE at the board")
         else:
             return
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
@@ -140,7 +140,7 @@ def test_a_hit_is_latched_until_a_reset_whatever_is_asked(
 ) -> None:
     drive_until_moving(stack, source)
     stack.control.do(Bumper(pressed=True))
-    wait_until(lambda: stack.last() == "brake", "BREAK at the board")
+    wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
     stack.control.do(Bumper(pressed=False))
     source.linear = 0.0
     count = len(stack.trace().commands)

@@ -25,8 +25,8 @@ from verification.soak.faults import Fault
 from verification.soak.record import Progress, Record
 from verification.soak.runner import FIRST_S, SoakRunner
 
-BROKEN, MENDED = Driver(side="left", bits=1), Driver(side="left", bits=0)
-DRIVER_FAULT = Fault("driver fault", 0.0, BROKEN, MENDED, still=True)
+FAULT_BIT, NO_FAULT = Driver(side="left", bits=1), Driver(side="left", bits=0)
+DRIVER_FAULT = Fault("driver fault", 0.0, FAULT_BIT, NO_FAULT, still=True)
 KILL = Fault("kill safety", 0.0, kills="safety", still=True)
 PARENT = ["sh", "-c", "sleep 1000 & wait"]
 
@@ -91,13 +91,13 @@ def test_a_fault_is_done_and_undone(soak: SoakFixture) -> None:
     soak.runner.disturb(time.monotonic_ns(), kills=True)
     assert soak.record.faults == [], "not before its time"
     soak.begin(DRIVER_FAULT)
-    assert soak.vehicle.done == [BROKEN]
+    assert soak.vehicle.done == [FAULT_BIT]
     soak.finish()
-    assert soak.vehicle.done == [BROKEN, MENDED]
+    assert soak.vehicle.done == [FAULT_BIT, NO_FAULT]
     assert [name for _, name in soak.record.faults] == ["driver fault"]
     assert soak.reports == ["driver fault, 0.0 s"]
     soak.finish()
-    assert soak.vehicle.done == [BROKEN, MENDED], "then all is well for a while"
+    assert soak.vehicle.done == [FAULT_BIT, NO_FAULT], "no fault for a while"
 
 
 def test_what_the_vehicle_does_not_take_is_tried_again(soak: SoakFixture) -> None:
@@ -111,7 +111,7 @@ def test_what_the_vehicle_does_not_take_is_tried_again(soak: SoakFixture) -> Non
     soak.finish()
     soak.vehicle.there = True
     soak.finish()
-    assert soak.vehicle.done == [BROKEN, MENDED]
+    assert soak.vehicle.done == [FAULT_BIT, NO_FAULT]
     assert len(soak.record.windows) == 1
 
 
