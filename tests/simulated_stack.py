@@ -20,7 +20,7 @@ from services.odom.config import Odom
 from services.odom.estimator import Estimator
 from services.safety.config import SafetyConfig
 from services.safety.inputs import DriveRequest, Event, Hold, Inputs, Reset
-from services.safety.policy import Policy
+from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import motion_message, state_message
 from sim import trace as t
 from sim.config import Config, load_plan
@@ -72,12 +72,12 @@ class SimulatedStack:
     def _deliver(self) -> None:
         for datagram in self.sim.take_sent(self.now_ns):
             port = self._ports.index(datagram.port)
-            brake = self._bridge.reflex(datagram.payload)
-            if brake is not None:
-                self._send(brake)
-            self._do(
-                self._bridge.datagram(datagram.payload, port, self.now_ns, braked=brake is not None)
-            )
+            hit = self._bridge.reflex(datagram.payload)
+            if hit is not None:
+                self._send(hit.brake)
+                self._do(self._bridge.hit(hit, self.now_ns))
+            reported = hit is not None
+            self._do(self._bridge.datagram(datagram.payload, port, self.now_ns, reported=reported))
         self.records += self.sim.take_records()
 
     def _do(self, out: Output) -> None:
@@ -100,6 +100,9 @@ class SimulatedStack:
             self._pressed = message.pressed
         self._keep(**{stream.removeprefix("driver_"): message})
         if stream in ("bumper", "ultrasonic"):
+            brake = brake_for_contact(self._state, self._inputs)
+            if brake is not None:
+                self._move(brake)
             self._decide()
 
     # --- safety ---------------------------------------------------------------------------
@@ -119,8 +122,11 @@ class SimulatedStack:
             self._refusal = None if verdict.reply.done else verdict.reply.text
             self._granted = verdict.reply.done
             self.answers.append((type(event).__name__, verdict.reply.done, verdict.reply.text))
+        self._move(motion_message(self._state, inputs))
+
+    def _move(self, motion: m.Motion) -> None:
         self._seq["motion"] += 1
-        motion = replace(motion_message(self._state, inputs), seq=self._seq["motion"], boot=1)
+        motion = replace(motion, seq=self._seq["motion"], boot=1)
         self._do(self._bridge.motion(motion, self.now_ns, self.now_ns))
 
     # --- by time --------------------------------------------------------------------------

@@ -26,9 +26,11 @@ def main() -> int:
         return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE)
 
 
-def unbraked(core: Core, datagram: bytes, port: int, now_ns: int, *, braked: bool) -> Output:
-    """Process a datagram as if the reflex had sent BRAKE for it."""
-    return take(core, datagram, port, now_ns, braked=True)
+def unbraked(core: Core, datagram: bytes, port: int, now_ns: int, *, reported: bool) -> Output:
+    """Process a datagram, and send no BRAKE for it."""
+    out = take(core, datagram, port, now_ns, reported=False)
+    out.sends.clear()
+    return out
 
 
 if __name__ == "__main__":

@@ -61,16 +61,14 @@ class BoardMaster:
 
     def listen(self, seconds: float) -> Iterator[Frame]:
         """Wait for frames of the board, at most for a time, and yield them."""
-        ready, _, _ = select.select(self._sockets.sockets, [], [], seconds)
-        for sock in ready:
-            port = self._sockets.sockets.index(sock)
-            for datagram, _, _ in self._sockets.read(port):
-                for part in self._framing.read(datagram, reports.FROM_BOARD):
-                    if isinstance(part, Received):
-                        self._port = port
-                        yield part.frame
-                    else:
-                        self.rejected += 1
+        select.select(self._sockets.sockets, [], [], seconds)
+        for port, datagram, _, _ in self._sockets.read(self._port):
+            for part in self._framing.read(datagram, reports.FROM_BOARD):
+                if isinstance(part, Received):
+                    self._port = port
+                    yield part.frame
+                else:
+                    self.rejected += 1
 
     def velocities(self, seconds: float) -> Iterator[Sample]:
         """Wait for frames likewise, and yield the velocities."""

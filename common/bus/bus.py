@@ -257,7 +257,7 @@ class Bus:
         items: OverwritingQueue[tuple[zenoh.Sample, int]] = OverwritingQueue(depth)
 
         def drain() -> None:
-            came = items.take()
+            came = None if self._closed else items.take()
             if came:
                 take(*came)
 
@@ -265,7 +265,7 @@ class Bus:
             if items.add((sample, time.monotonic_ns())):
                 self.counters["overrun"] += 1
             else:
-                self._hand_over(drain)
+                self.post(drain)
 
         def declare(session: zenoh.Session) -> Any:
             if not history:

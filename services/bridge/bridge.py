@@ -1,7 +1,8 @@
 """The bridge's shell: sockets, bus and clock around the core.
 
-The shell carries out what the core returns. The reflex has priority: BRAKE is sent before the rest
-of the datagram with the hit is read. Receive timestamps and reaction times are measured here.
+The shell carries out what the core returns. The reflex has priority: BRAKE is sent, and the hit is
+published, before the rest of its datagram is read. Receive timestamps and reaction times are
+measured here, after all of that.
 """
 
 import time
@@ -18,7 +19,6 @@ from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
 from services.bridge.guard_ipc import Heartbeat, Inherited
 from services.bridge.output import Output, Send
-from services.bridge.rx_timestamp import Receipt
 from services.bridge.timing import Timings
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
@@ -71,17 +71,21 @@ class Bridge:
 
     def _read(self, now_ns: int) -> None:
         """Process the datagrams waiting in the sockets."""
-        # The main port first: after a stall both ports have datagrams, and the other one must not
-        # take over only because it is read first.
-        main = self._core.port
-        for port in (main, *(p for p in range(len(self._sockets.sockets)) if p != main)):
-            for datagram, ancillary, read_ns in self._sockets.read(port):
-                brake = self._core.reflex(datagram)
-                braked_ns = self._brake(brake) if brake else None
-                receipt = self._sockets.receipt(ancillary, read_ns)
-                out = self._core.datagram(datagram, port, now_ns, braked=brake is not None)
-                self._do(out)
-                self._observe(out, receipt, braked_ns)
+        # The port of the commands first: after a stall both ports have datagrams, and the other one
+        # must not take over only because it is read first.
+        for port, datagram, ancillary, read_ns in self._sockets.read(self._core.motions.port):
+            hit, braked_ns, seq = self._core.reflex(datagram), 0, None
+            if hit is not None:
+                braked_ns = self._brake(hit.brake)
+                reported = self._core.hit(hit, now_ns)
+                seq = reported.hit
+                self._do(reported)
+            out = self._core.datagram(datagram, port, now_ns, reported=hit is not None)
+            self._do(out)
+            receipt = self._sockets.receipt(ancillary, read_ns)
+            if seq is not None:
+                self._timings.on_reflex(seq, receipt, braked_ns)
+            self._timings.on_read(receipt)
 
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
         motion = arrival.message
@@ -153,13 +157,7 @@ class Bridge:
         self._unsent = None if sent else brake
         return time.monotonic_ns()
 
-    # --- measurements and counters ----------------------------------------------------------
-
-    def _observe(self, out: Output, receipt: Receipt, braked_ns: int | None) -> None:
-        if out.hit is not None:
-            sent_ns = time.monotonic_ns() if braked_ns is None else braked_ns
-            self._timings.on_reflex(out.hit, receipt, sent_ns)
-        self._timings.on_read(receipt)
+    # --- counters ---------------------------------------------------------------------------
 
     def _report_sockets(self) -> None:
         sockets, counters = self._sockets, self._node.counters

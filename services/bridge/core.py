@@ -4,6 +4,7 @@
 entry      called by the shell for            returns
 ========== ================================== ==================================================
 reflex     each datagram, first               BRAKE, when it holds a new bumper hit
+hit        that hit, once BRAKE is sent       the bumper message; an event
 datagram   the same datagram                  messages; answers of calls; events
 motion     each message on ``@cmd/motion``    the frame that the lease allows
 switches,  an operator's calls                frames; the board's echo answers them later
@@ -32,10 +33,10 @@ from services.bridge.config import ANSWERS, ASKED, STEADY, BridgeConfig, ports_o
 from services.bridge.link_report import LinkReport
 from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
-from services.bridge.output import Output, Send
+from services.bridge.output import Output
 from services.bridge.poll import Poll
 from services.bridge.readiness import Readiness
-from services.bridge.reflex import Reflex
+from services.bridge.reflex import Hit, Reflex
 from services.bridge.restart_detection import restarted
 from services.bridge.translate import BumperFilter, Translator, driver
 
@@ -67,6 +68,7 @@ class Core:
         self._poll = Poll(queries(settings), settings.answer_timeout, STEADY)
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message
+        self._lost = 0  # bumper polls lost, at the newest sample
         self._mileage: Latest[m.Mileage] | None = None
         self._faults: dict[Side, int] = {}
         parts = self.readiness, self.motions, self._ports, self._poll
@@ -87,22 +89,31 @@ class Core:
         }
         self._reflex = Reflex(self._framing)
 
-    @property
-    def port(self) -> int:
-        """The index of the UDP port that commands leave from; read it first."""
-        return self._ports.main
-
     # --- input from the board ----------------------------------------------------------
 
-    def reflex(self, datagram: bytes) -> Send | None:
-        """Return BRAKE when a datagram, on either port, holds a new hit."""
+    def reflex(self, datagram: bytes) -> Hit | None:
+        """Return the hit with its BRAKE when a datagram, on either port, holds a new one."""
         if self._bumper.pressed:
             return None
         return self._reflex.answer(datagram, self.motions.port)
 
-    def datagram(self, datagram: bytes, port: int, now_ns: int, *, braked: bool) -> Output:
-        """Process a datagram received on this port; ``braked``: ``reflex`` returned BRAKE."""
-        out = Output(braked=braked)
+    def hit(self, hit: Hit, now_ns: int) -> Output:
+        """Report a hit of ``reflex``, before the rest of its datagram is read."""
+        out = Output()
+        self._bumper.take(True)
+        self._report_hit(hit.raw, now_ns, out)
+        return out
+
+    def _report_hit(self, raw: bytes, now_ns: int, out: Output) -> None:
+        self._bumper_seq += 1
+        out.hit = self._bumper_seq
+        self.motions.on_hit(out.hit, now_ns)
+        out.publish("bumper", m.Bumper(pressed=True, lost=self._lost), raw)
+        out.event("contact", "error", "the bumper is hit: BRAKE")
+
+    def datagram(self, datagram: bytes, port: int, now_ns: int, *, reported: bool) -> Output:
+        """Process a datagram received on this port; ``reported``: ``hit`` handled its hit."""
+        out = Output(reported=reported)
         if port != self._ports.main and self._is_copy(datagram, port, now_ns):
             self._counters["other_port"] += 1
             return out
@@ -125,7 +136,7 @@ class Core:
 
     def _on_frame(self, part: Received, port: int, now_ns: int, out: Output) -> None:
         frame, kind = part.frame, type(part.frame)
-        news = self._is_urgent(frame)
+        news = self._is_urgent(frame, out)
         if not (self._ports.takes(kind, port, now_ns) or news):
             self._counters["other_port"] += 1
             return
@@ -143,13 +154,13 @@ class Core:
             text = f"{kind.__name__} is now taken from UDP port {number}"
             out.event("port_changed", "warning", text, port=number, frame=kind.__name__)
 
-    def _is_urgent(self, frame: Frame) -> bool:
+    def _is_urgent(self, frame: Frame, out: Output) -> bool:
         """Return whether a frame on either port reports a new hit or driver fault."""
         if isinstance(frame, reports.DriverReport):
             return bool(frame.fault_bits & ~self._faults.get(frame.side, 0))
         if not isinstance(frame, reports.BumperReport) or not frame.on:
             return False
-        if self._bumper.pressed:
+        if self._bumper.pressed and not out.reported:
             self._bumper.take(True)  # a hit on either port restarts the count of clear samples
             return False
         return True
@@ -169,19 +180,18 @@ class Core:
 
     def _on_bumper(self, frame: reports.BumperReport, raw: bytes, now_ns: int, out: Output) -> None:
         message, hit = self._bumper.take(frame.on)
-        if hit:
-            out.hit = self._bumper_seq + 1
-            self.motions.on_hit(out.hit, now_ns)
-            if not out.braked:
-                out.sends.append(self.motions.brake())
-            out.event("contact", "error", "the bumper is hit: BRAKE")
         self._poll.answered("bumper", now_ns)
-        if message is not None:
+        self._lost = self._poll.lost("bumper", now_ns)
+        if out.reported and frame.on:
+            out.reported = False
+        elif hit:
+            out.sends.append(self.motions.brake())
+            self._report_hit(raw, now_ns, out)
+        elif message is not None:
             # A short hit stays in the samples until safety has acknowledged one: some may be lost.
             pressed = message.pressed or self.motions.lease.hit is not None
-            lost = self._poll.lost("bumper", now_ns)
             self._bumper_seq += 1
-            out.publish("bumper", m.Bumper(pressed=pressed, lost=lost), raw)
+            out.publish("bumper", m.Bumper(pressed=pressed, lost=self._lost), raw)
 
     def _on_distance(
         self, frame: reports.DistanceReport, raw: bytes, now_ns: int, out: Output

@@ -2,10 +2,10 @@
 
 from collections import Counter
 
-from common.errors import MessageError
+from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Motion, Velocity
-from common.motion import BRAKE, STOP, Command, is_standing
+from common.motion import BRAKE, RUN, STOP, Command, is_standing
 from common.wire.frame import Frame
 from common.wire.framing import Framing
 from services.bridge import lease
@@ -13,7 +13,7 @@ from services.bridge.config import Bridge as Settings
 from services.bridge.lease import Lease, Refusal
 from services.bridge.output import Output, Send
 from services.bridge.standstill import Standstill
-from services.bridge.translate import Translator, check_finite
+from services.bridge.translate import Translator
 
 REPORTED_MAX = 20  # limit: a sender that keeps changing its boot must not fill memory and events
 STOP_TIMEOUT_NS = NS_PER_S  # until a stopping bridge no longer waits for standstill
@@ -55,11 +55,11 @@ class MotionOutput:
 
     def on_motion(self, motion: Motion, received_ns: int, now_ns: int, out: Output) -> None:
         """Process a motion message and send one frame."""
-        try:
-            check_finite(motion)
-        except MessageError as error:
+        if motion.command is RUN and not finite(motion.linear, motion.angular):
             self._counters["motion_not_finite"] += 1
-            out.warnings.append(str(error))
+            out.warnings.append(
+                f"motion of {motion.linear} m/s, {motion.angular} rad/s is not finite"
+            )
             return
         hit = self.lease.hit
         self.lease, order, refusal = lease.on_motion(
@@ -69,7 +69,8 @@ class MotionOutput:
             self.order(order, out, motion)
             out.obeyed = True
             out.acked = hit is not None and self.lease.hit is None and order is BRAKE
-        self._report(refusal, motion, out)
+        if refusal is not None:
+            self._report(refusal, motion, out)
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
         """Process a measured velocity."""
@@ -154,9 +155,8 @@ class MotionOutput:
         fresh = now_ns - measured_ns <= self._silence_ns
         return fresh and is_standing(velocity.linear, velocity.angular)
 
-    def _report(self, refusal: Refusal | None, motion: Motion, out: Output) -> None:
-        if refusal is not None:
-            self._counters[f"motion_{refusal}"] += 1
+    def _report(self, refusal: Refusal, motion: Motion, out: Output) -> None:
+        self._counters[f"motion_{refusal}"] += 1
         if refusal not in (Refusal.JUMP, Refusal.SECOND_AUTHORITY):
             return
         if len(self._reported) >= REPORTED_MAX or (refusal, motion.boot) in self._reported:

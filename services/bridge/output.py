@@ -48,7 +48,7 @@ class Output(Struct):
     events: list[Event] = field(default_factory=list)
     answers: list[Answer] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)  # for the log alone
-    braked: bool = False  # whether the reflex has sent BRAKE for this datagram
+    reported: bool = False  # whether ``Core.hit`` has handled a hit of this datagram
     hit: int | None = None  # ``seq`` of the bumper message that reports a new hit
     obeyed: bool = False  # whether a motion message became a frame
     acked: bool = False  # whether that motion acknowledged the hit, and brakes

@@ -1,10 +1,19 @@
 """The reflex: BRAKE for a bumper hit, before the rest of its datagram is read. Pure."""
 
+from msgspec import Struct
+
 from common.motion import Command
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport
 from services.bridge.output import Send
+
+
+class Hit(Struct, frozen=True):
+    """A bumper hit: its frame, and the BRAKE to send at once."""
+
+    raw: bytes
+    brake: Send
 
 
 class Reflex:
@@ -16,15 +25,17 @@ class Reflex:
         self._hit = framing.pack(BumperReport(True))
         self._clear = framing.pack(BumperReport(False))
 
-    def answer(self, datagram: bytes, port: int) -> Send | None:
-        """Return BRAKE, from this port, when a datagram holds a pressed bumper."""
-        return Send(self._brake, port, Command.BRAKE) if self._is_hit(datagram) else None
+    def answer(self, datagram: bytes, port: int) -> Hit | None:
+        """Return the hit with its BRAKE, from this port, when a datagram holds a pressed bumper."""
+        raw = datagram if datagram == self._hit else self._search(datagram)
+        return Hit(raw, Send(self._brake, port, Command.BRAKE)) if raw else None
 
-    def _is_hit(self, datagram: bytes) -> bool:
-        if datagram == self._hit:
-            return True
+    def _search(self, datagram: bytes) -> bytes:
+        """Return the first frame with a pressed bumper, otherwise empty."""
         if datagram == self._clear or BumperReport.OPENING not in datagram:
-            return False
-        parts = self._framing.read(datagram, FROM_BOARD)
-        frames = (part.frame for part in parts if isinstance(part, Received))
-        return any(isinstance(frame, BumperReport) and frame.on for frame in frames)
+            return b""
+        for part in self._framing.read(datagram, FROM_BOARD):
+            frame = part.frame if isinstance(part, Received) else None
+            if isinstance(frame, BumperReport) and frame.on:
+                return part.raw
+        return b""

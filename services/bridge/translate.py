@@ -7,8 +7,7 @@ does not cover everything.
 
 import math
 
-from common.codec import finite
-from common.errors import MessageError, WireError
+from common.errors import WireError
 from common.messages import Bumper, Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
 from common.motion import BRAKE, RUN, STOP, Command, clamp
 from common.settings import Vehicle, Wire
@@ -83,12 +82,6 @@ class Translator:
         if raw_mm < self._near_mm:
             return "too_near"
         return "no_echo" if raw_mm >= self._far_mm else "ok"
-
-
-def check_finite(motion: Motion) -> None:
-    """Raise ``MessageError`` for NaN and infinity in a RUN, which pass a typed decode."""
-    if motion.command is RUN and not finite(motion.linear, motion.angular):
-        raise MessageError(f"motion of {motion.linear} m/s, {motion.angular} rad/s is not finite")
 
 
 def driver(frame: DriverReport) -> Driver:

@@ -46,27 +46,32 @@ class Sockets:
         self.wall = WallClock()
         for sock in self.sockets:
             enable_timestamps(sock)
+        ports = range(len(self.sockets))
+        # By the port to read first: all of them, in that order.
+        self._orders = [(first, *(p for p in ports if p != first)) for first in ports]
 
-    def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
-        """Yield datagrams of the board on the port of this index: bytes, ancillary data, read time.
+    def read(self, first: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
+        """Yield the board's datagrams: port, bytes, ancillary data, read time.
 
-        A full burst ends with a short sleep: without it, Linux kills a SCHED_FIFO process in a
-        flood (``realtime.limit``).
+        The port of the index ``first`` is read first. A full burst ends with a short sleep: without
+        it, Linux kills a SCHED_FIFO process in a flood (``realtime.limit``).
         """
-        sock = self.sockets[port]
-        for _ in range(BURST):
-            try:
-                datagram, ancillary, _, source = sock.recvmsg(DATAGRAM_MAX, ANCILLARY_MAX)
-            except BlockingIOError:
-                return
-            except OSError:
-                continue  # ICMP error of an earlier send: no board, or no network
-            if source == self._board or (self._any_port and source[0] == self._board[0]):
-                yield datagram, ancillary, time.monotonic_ns()
+        for port in self._orders[first]:
+            sock = self.sockets[port]
+            for _ in range(BURST):
+                try:
+                    datagram, ancillary, _, source = sock.recvmsg(DATAGRAM_MAX, ANCILLARY_MAX)
+                except BlockingIOError:
+                    break
+                except OSError:
+                    continue  # ICMP error of an earlier send: no board, or no network
+                if source == self._board or (self._any_port and source[0] == self._board[0]):
+                    yield port, datagram, ancillary, time.monotonic_ns()
+                else:
+                    self.refused += 1
+                    self.last_foreign_source = source
             else:
-                self.refused += 1
-                self.last_foreign_source = source
-        time.sleep(BURST_PAUSE_S)
+                time.sleep(BURST_PAUSE_S)
 
     def receipt(self, ancillary: Ancillary, read_ns: int) -> Receipt:
         """Return the receive times of a datagram read with this ancillary data."""

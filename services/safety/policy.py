@@ -11,7 +11,8 @@ arrives with it:
 6. conclude  plan the requested motion (``motion.py``), then apply the worst action (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
-request exists.
+request exists. A sample that shows a new contact needs none of this: ``brake_for_contact`` answers
+it first, and the decision that follows on the same inputs latches the contact.
 """
 
 from collections.abc import Iterable
@@ -19,6 +20,7 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
+from common.messages import Motion
 from common.messages import Verdict as VerdictName
 from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
@@ -188,6 +190,21 @@ class Policy:
             acked=_acked(inputs),
         )
         return state, verdict
+
+
+def brake_for_contact(state: State, inputs: Inputs) -> Motion | None:
+    """Return BRAKE when the bumper sample shows a contact that is not held yet."""
+    bumper = inputs.bumper
+    if bumper is None or not bumper.value.pressed or "contact" in state.latches:
+        return None
+    return Motion(
+        command=BRAKE,
+        judged=bumper.value.seq,
+        judged_boot=bumper.value.boot,
+        judged_ns=bumper.received_ns,
+        latched=True,
+        predecessor=inputs.link.value.latched_by if inputs.link else None,
+    )
 
 
 def _worst(names: Iterable[str]) -> VerdictName:

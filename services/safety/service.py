@@ -15,11 +15,19 @@ from common.bus.calls import Caller
 from common.errors import MessageError
 from common.freshness import Latest
 from common.heartbeat import Heartbeat
-from common.messages import Done, Drive, Message, ReleaseRequest, ResetDone, ResetRequest
+from common.messages import (
+    Bumper,
+    Done,
+    Drive,
+    Message,
+    ReleaseRequest,
+    ResetDone,
+    ResetRequest,
+)
 from common.service import Node
 from services.safety.config import SafetyConfig
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
-from services.safety.policy import Policy
+from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import motion_message, signature, state_message, transitions, with_times
 from services.safety.state import Reply
 
@@ -77,7 +85,7 @@ class SafetyService:
         drive.subscribe(keys.VELOCITY, self._store("velocity"))
         drive.subscribe(keys.MILEAGE, self._store("mileage"))
         drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic", at_once=True))
-        drive.subscribe(keys.BUMPER, self._store("bumper", at_once=True), depth=LATCHING_DEPTH)
+        drive.subscribe(keys.BUMPER, self._on_bumper, depth=LATCHING_DEPTH)
         for side in ("left", "right"):
             drive.subscribe(
                 keys.DRIVER, self._store(side, at_once=True), depth=LATCHING_DEPTH, side=side
@@ -95,6 +103,14 @@ class SafetyService:
                 self._decide()
 
         return store
+
+    def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
+        latest = Latest(arrival.message, arrival.received_ns)
+        self._inputs = replace(self._inputs, bumper=latest)
+        brake = brake_for_contact(self._state, self._inputs)
+        if brake is not None:
+            self._motion_publisher.put(brake)
+        self._decide()
 
     def _on_drive(self, arrival: Arrival[Drive]) -> None:
         source, drive = source_of(arrival.key), arrival.message

@@ -1,5 +1,6 @@
 """The bridge's core through its entries: what each input leads to."""
 
+import math
 from collections import Counter
 from typing import Any
 
@@ -43,14 +44,19 @@ class Bench:
         """Pass datagrams to the core as the shell does; return the combined output."""
         made = Output()
         for datagram in datagrams:
-            brake = self.core.reflex(datagram)
-            out = self.core.datagram(datagram, port, self.now_ns, braked=brake is not None)
-            made.sends += [brake] if brake else []
-            made.sends += out.sends
-            made.messages += out.messages
-            made.events += out.events
-            made.answers += out.answers
-            made.hit = made.hit or out.hit
+            hit = self.core.reflex(datagram)
+            outs = []
+            if hit is not None:
+                made.sends.append(hit.brake)
+                outs.append(self.core.hit(hit, self.now_ns))
+            reported = hit is not None
+            outs.append(self.core.datagram(datagram, port, self.now_ns, reported=reported))
+            for out in outs:
+                made.sends += out.sends
+                made.messages += out.messages
+                made.events += out.events
+                made.answers += out.answers
+                made.hit = made.hit or out.hit
         self.outs.append(made)
         return made
 
@@ -141,7 +147,7 @@ def test_a_hit_is_braked_for_once_alone_in_its_datagram_or_not(
 
 
 def test_a_hit_that_the_reflex_did_not_see_is_braked_for_all_the_same(bench: Bench) -> None:
-    out = bench.core.datagram(HIT, 0, NOW, braked=False)
+    out = bench.core.datagram(HIT, 0, NOW, reported=False)
     assert motions(out) == [MotionKind.BREAK]
     assert out.hit == 1
 
@@ -324,12 +330,23 @@ def test_only_the_first_jump_of_a_sender_is_an_event(bench: Bench) -> None:
     assert bench.counters["motion_seq_jumps"] == 2
 
 
-def test_a_number_that_is_not_finite_is_dropped_and_logged(bench: Bench) -> None:
+@pytest.mark.parametrize("field", ["linear", "angular"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_not_finite_is_dropped_and_logged(
+    bench: Bench, field: str, value: float
+) -> None:
     bench.arm()
-    out = bench.move(linear=float("nan"))
+    fields: dict[str, Any] = {field: value}
+    out = bench.move(**fields)
     assert (out.sends, out.obeyed) == ([], False)
     assert "not finite" in out.warnings[0]
     assert bench.counters["motion_not_finite"] == 1
+
+
+def test_a_brake_does_not_depend_on_numbers_that_are_not_finite(bench: Bench) -> None:
+    bench.arm()
+    out = bench.move(Command.BRAKE, linear=math.nan)
+    assert (motions(out), out.obeyed) == ([MotionKind.BREAK], True)
 
 
 @pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])

@@ -80,7 +80,7 @@ class Broken:
 def test_a_network_that_fails_is_silence(made: Board) -> None:
     sockets = Sockets(Settings(port=made.address[1], listen_ports=tuple(made.ports)))
     sockets.close()
-    sockets.sockets = [Broken()]  # type: ignore[list-item]
+    sockets.sockets = [Broken(), Broken()]  # type: ignore[list-item]
     assert list(sockets.read(0)) == []
 
 

@@ -38,7 +38,7 @@ def received(sockets: Sockets) -> tuple[bytes, Receipt]:
     came: list[tuple[bytes, Receipt]] = []
 
     def come() -> list[tuple[bytes, Receipt]]:
-        for datagram, ancillary, read_ns in sockets.read(0):
+        for _, datagram, ancillary, read_ns in sockets.read(0):
             came.append((datagram, sockets.receipt(ancillary, read_ns)))
         return came
 

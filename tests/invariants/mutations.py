@@ -20,6 +20,7 @@ from services.bridge.core import Core
 from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
+from services.bridge.reflex import Hit
 from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
@@ -104,8 +105,8 @@ def brakes_go_off_and_on(stack: Stack) -> None:
 HIT = Framing().pack(BumperReport(True))
 
 
-def claims_to_brake(core: Core, datagram: bytes) -> Send | None:
-    return Send(b"", core.port) if HIT in datagram else None
+def claims_to_brake(core: Core, datagram: bytes) -> Hit | None:
+    return Hit(HIT, Send(b"", core.motions.port)) if HIT in datagram else None
 
 
 def still_armed(lease: Lease, ready: bool) -> Lease:

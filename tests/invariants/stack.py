@@ -53,7 +53,7 @@ class Sockets:
         self._process = process
         self._framing = Framing()
 
-    def read(self, port: int) -> Iterator[tuple[bytes, Ancillary, int]]:
+    def read(self, first: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
         """Yield what waits, after the oracle has seen it."""
         inbox = self._stack.vehicle.inbox
         while inbox:
@@ -61,7 +61,7 @@ class Sockets:
             parts = self._framing.read(datagram, FROM_BOARD)
             frames = [part.frame for part in parts if isinstance(part, Received)]
             self._stack.oracle.on_report(self._process, frames)
-            yield datagram, [], self._stack.net.now_ns
+            yield first, datagram, [], self._stack.net.now_ns
 
     def receipt(self, _: Ancillary, read_ns: int) -> Receipt:
         """Return when a datagram was read; nobody has stamped it."""

@@ -36,6 +36,7 @@ MS = NS_PER_S // 1000
 STEP_NS = 10_000  # between two frames, so short that no data becomes stale
 ROBOT = "001"
 C = TypeVar("C", bound=Shared)
+M = TypeVar("M", bound=m.Message)
 
 ANSWERS: list[tuple[Frame, Frame]] = [
     (commands.BumperQuery(), reports.BumperReport(False)),
@@ -75,7 +76,7 @@ class BridgePaths:
         with patch.object(udp, "_bind", Mock(side_effect=self._sockets)):
             self._bridge = Bridge(self._node, Inherited((), heartbeat))
         Session(self._node.bus, self._node.loop)
-        self._session = Session(self._node.drive, self._node.loop)
+        self.session = Session(self._node.drive, self._node.loop)
         self._seq = 0
         self._frames = {
             name: framing.pack(frame)
@@ -101,21 +102,21 @@ class BridgePaths:
 
     def velocity(self) -> None:
         """A measured velocity to the bus."""
-        self._take("velocity")
+        self.take("velocity")
 
     def ultrasonic(self) -> None:
         """Eight ranges to the bus."""
-        self._take("ultrasonic")
+        self.take("ultrasonic")
 
     def hit(self) -> None:
         """The first sample of a hit: the reflex, the message, the event, the log."""
-        self._bridge._core._bumper = BumperFilter()
-        self._take("hit")
+        self.release_bumper()
+        self.take("hit")
 
     def acknowledge(self) -> None:
         """A motion of safety that acknowledges the hit."""
         self._expect(MotionKind.BREAK)
-        self._bridge._core._bumper = BumperFilter()
+        self.release_bumper()
         self._move(Command.RUN, judged=self._bridge._publishers["bumper"].next_seq)
         self._expect(MotionKind.RUN, 300)
 
@@ -124,25 +125,33 @@ class BridgePaths:
         self.clock.now_ns += STEP_NS
         self._move(Command.RUN)
 
+    def release_bumper(self) -> None:
+        """Make the next sample of a hit a new one."""
+        self._bridge._core._bumper = BumperFilter()
+
     def _receive(self, name: str) -> None:
         for sock in self._sockets:  # the board sends to both ports
             sock.inbox.append(self._frames[name])
 
-    def _take(self, name: str) -> None:
+    def take(self, name: str) -> None:
+        """Process this frame, on both ports."""
         self.clock.now_ns += STEP_NS
         self._receive(name)
         self._bridge._read(self.clock.now_ns)
 
     def _move(self, command: Command, judged: int = 0) -> None:
-        self._seq += 1
         now_ns = self.clock.now_ns
-        motion = m.Motion(
+        motion = self.from_authority(m.Motion(
             command=command, linear=0.3 if command is Command.RUN else 0.0, source="teleop",
-            seq=self._seq, boot=BOOT - 1, t_ns=now_ns, mono_ns=now_ns, host=BOOT,
             asked_ns=now_ns, heard_ns=now_ns, judged_ns=now_ns, judged=judged, judged_boot=BOOT,
-        )  # fmt: skip
+        ))  # fmt: skip
         key = keys.MOTION.on(ROBOT)
-        self._session.deliver(key, motion, key)
+        self.session.deliver(key, motion, key)
+
+    def from_authority(self, motion: m.Motion) -> m.Motion:
+        """Return the motion as the next one of the safety service that drives here."""
+        self._seq += 1
+        return msgspec.structs.replace(stamped(motion, self._seq, self.clock.now_ns), boot=BOOT - 1)
 
     def _expect(self, kind: MotionKind, linear_mmps: int = 0) -> None:
         expected = self._framing.pack(commands.MotionCommand(kind, linear_mmps))
@@ -158,8 +167,8 @@ class SafetyPaths:
         self._node = node("safety", SafetyConfig)
         reader = self._node.open_bus()
         SafetyService(self._node, reader)
-        self._session = Session(self._node.bus, self._node.loop)
-        self._link = Session(self._node.drive, self._node.loop)
+        self.session = Session(self._node.bus, self._node.loop)
+        self.link = Session(self._node.drive, self._node.loop)
         Session(reader, self._node.loop)
         self._seq: Counter[str] = Counter()
         for linear in (0.0, 0.3):
@@ -199,7 +208,7 @@ class SafetyPaths:
             self._deliver(keys.DRIVER, m.Driver(faults=(), bits=0), side=side)
 
     def _request(self, linear: float) -> None:
-        state = self._session.sent.get(keys.SAFETY.on(ROBOT))
+        state = self.session.sent.get(keys.SAFETY.on(ROBOT))
         if state is not None:
             echo = msgspec.msgpack.decode(state, type=m.SafetyState).heartbeat
             drive = m.Drive(linear=linear, angular=0.0, echo=echo)
@@ -210,11 +219,11 @@ class SafetyPaths:
         self._seq[key] += 1
         one = stamped(message, self._seq[key], self.clock.now_ns)
         subscription = topic.on(ROBOT, source="*") if topic is keys.DRIVE else key
-        session = self._link if topic.publisher == "bridge" else self._session
+        session = self.link if topic.publisher == "bridge" else self.session
         session.deliver(key, one, subscription)
 
     def _motion(self) -> m.Motion:
-        return msgspec.msgpack.decode(self._session.sent[keys.MOTION.on(ROBOT)], type=m.Motion)
+        return msgspec.msgpack.decode(self.session.sent[keys.MOTION.on(ROBOT)], type=m.Motion)
 
 
 class OdomPaths:
@@ -225,11 +234,11 @@ class OdomPaths:
         clock.install()
         self._node = node("odom", OdomConfig)
         Odometer(self._node)
-        self._session = Session(self._node.bus, self._node.loop)
+        self.session = Session(self._node.bus, self._node.loop)
         self._steps = 0
         for _ in range(100):
             self.step()
-        assert keys.ODOMETRY.on(ROBOT) in self._session.sent, "odometry is silent"
+        assert keys.ODOMETRY.on(ROBOT) in self.session.sent, "odometry is silent"
 
     def step(self) -> None:
         """A velocity and the counters to pose and twist: 20 ms."""
@@ -241,11 +250,11 @@ class OdomPaths:
             (keys.MILEAGE, m.Mileage(distance=distance_m, heading=distance_m / 3, epoch=0)),
         ):
             one = stamped(message, self._steps, self.clock.now_ns)
-            self._session.deliver(topic.on(ROBOT), one, topic.on(ROBOT))
+            self.session.deliver(topic.on(ROBOT), one, topic.on(ROBOT))
         self._node.loop._call_due()
 
 
-def stamped(message: m.Message, seq: int, now_ns: int) -> m.Message:
+def stamped(message: M, seq: int, now_ns: int) -> M:
     """Return the message with a header of a publisher on this host."""
     return msgspec.structs.replace(
         message, seq=seq, boot=BOOT, t_ns=now_ns, mono_ns=now_ns, host=BOOT

@@ -81,8 +81,12 @@ class Session:
 
     def deliver(self, key: str, message: Message, subscription: str) -> None:
         """Deliver a message as Zenoh's thread does, and run the loop once."""
-        payload = zenoh.ZBytes(codec.encode(message))
-        self._queues[subscription](Sample(zenoh.KeyExpr(key), payload, None))
+        self.deliver_encoded(key, codec.encode(message), subscription)
+
+    def deliver_encoded(self, key: str, payload: bytes, subscription: str) -> None:
+        """Deliver an encoded message in the same way."""
+        sample = Sample(zenoh.KeyExpr(key), zenoh.ZBytes(payload), None)
+        self._queues[subscription](sample)
         self._loop._drain(0)
 
 
@@ -91,11 +95,11 @@ class Sink:
 
     def __init__(self, session: Session, key: str) -> None:
         self._session = session
-        self._key = key
+        self.key = key
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Store the newest message."""
-        self._session.sent[self._key] = payload
+        self._session.sent[self.key] = payload
 
 
 class BoardSocket(socket.socket):
