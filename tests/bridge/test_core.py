@@ -1,204 +1,39 @@
 """The bridge's core through its entries: what each input leads to."""
 
 import math
-from collections import Counter
 from typing import Any
 
 import pytest
 
 from common import messages as m
-from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.motion import Command
 from common.wire import commands, reports
-from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.frame import HEADER, Frame, Side
-from common.wire.framing import Framing, Received, crc_function
-from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
-from services.bridge.config import BridgeConfig
-from services.bridge.core import Core
+from common.wire.commands import MotionKind
+from common.wire.frame import Side
+from common.wire.reports import DistanceReport, DriverReport, VelocityReport
 from services.bridge.output import Output
-
-MS = NS_PER_S // 1000
-NOW = 1_000 * NS_PER_S
-BOOT, SAFETY = 7, 1
-
-FRAMING = Framing()
-HIT, CLEAR, STANDS = map(
-    FRAMING.pack, (BumperReport(True), BumperReport(False), VelocityReport(0, 0))
+from tests.bridge.core_fixture import (
+    BOOT,
+    CLEAR,
+    FRAMING,
+    HIT,
+    MS,
+    SAFETY,
+    STANDS,
+    Bench,
+    events,
+    frames,
+    motions,
+    pressed,
+    published,
 )
-
-
-class Bench:
-    """A core and its output so far."""
-
-    def __init__(self, *sets: str) -> None:
-        self.counters: Counter[str] = Counter()
-        config = load(BridgeConfig, Sources(environ={}, sets=list(sets))).config
-        self.core = Core(config, BOOT, self.counters, NOW)
-        self.now_ns = NOW
-        self.seq = 0
-        self.outs: list[Output] = [self.core.start()]
-
-    def receive(self, *datagrams: bytes, port: int = 0) -> Output:
-        """Pass datagrams to the core as the shell does; return the combined output."""
-        made = Output()
-        for datagram in datagrams:
-            hit = self.core.reflex(datagram)
-            outs = []
-            if hit is not None:
-                made.sends.append(hit.brake)
-                outs.append(self.core.hit(hit, self.now_ns))
-            reported = hit is not None
-            outs.append(self.core.datagram(datagram, port, self.now_ns, reported=reported))
-            for out in outs:
-                made.sends += out.sends
-                made.messages += out.messages
-                made.events += out.events
-                made.answers += out.answers
-                made.hit = made.hit or out.hit
-        self.outs.append(made)
-        return made
-
-    def answer(self, *frames: Frame, port: int = 0) -> Output:
-        """Receive these frames, one datagram for each."""
-        return self.receive(*map(FRAMING.pack, frames), port=port)
-
-    def tick(self, after_ns: int = 10 * MS, send_errors: int = 0) -> Output:
-        """Advance the time, and tick."""
-        self.now_ns += after_ns
-        out = self.core.tick(self.now_ns, send_errors)
-        self.outs.append(out)
-        return out
-
-    def move(self, command: Command = Command.RUN, linear: float = 0.0, **fields: Any) -> Output:
-        """Receive a motion from safety."""
-        self.seq += 1
-        values = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
-        out = self.core.motion(m.Motion(command=command, **values), self.now_ns, self.now_ns)
-        self.outs.append(out)
-        return out
-
-    def arm(self) -> None:
-        """Receive all answers and echoes of the board, then a stop from safety."""
-        echoes = reports.UltrasonicBrakeReport(True), reports.BumperBrakeReport(True)
-        self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *echoes)
-        self.receive(CLEAR, CLEAR, CLEAR)
-        self.tick()
-        self.move(Command.STOP)
-        assert self.link().waiting == ""
-
-    def link(self) -> m.Link:
-        """Return the link message of now."""
-        (message,) = published(self.core.link(self.now_ns, 0), "link")
-        assert isinstance(message, m.Link)
-        return message
-
-
-def frames(out: Output) -> list[Frame]:
-    """Return what was sent, read as the board reads it."""
-    parts = [part for send in out.sends for part in FRAMING.read(send.datagram, TO_BOARD)]
-    assert all(isinstance(part, Received) for part in parts)
-    return [part.frame for part in parts if isinstance(part, Received)]
-
-
-def motions(out: Output) -> list[MotionKind]:
-    """Return the motion commands that were sent."""
-    return [frame.kind for frame in frames(out) if isinstance(frame, MotionCommand)]
-
-
-def published(out: Output, stream: str) -> list[Any]:
-    """Return the messages of one stream."""
-    return [message for name, message, _ in out.messages if name == stream]
-
-
-def pressed(out: Output) -> list[bool]:
-    """Return the contents of the bumper messages."""
-    return [message.pressed for message in published(out, "bumper")]
-
-
-def events(out: Output) -> list[str]:
-    """Return the names of the events."""
-    return [event.name for event in out.events]
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
-
 
 # --- the reflex ---------------------------------------------------------------------------------
 
 
 def test_the_first_frame_is_a_stop(bench: Bench) -> None:
     assert motions(bench.outs[0]) == [MotionKind.STOP]
-
-
-@pytest.mark.parametrize("datagram", [HIT, STANDS + HIT, HIT + STANDS, HIT + HIT])
-def test_a_hit_is_braked_for_once_alone_in_its_datagram_or_not(
-    bench: Bench, datagram: bytes
-) -> None:
-    bench.receive(CLEAR, CLEAR, CLEAR)
-    out = bench.receive(datagram, HIT, HIT)
-    assert motions(out) == [MotionKind.BREAK]
-    assert out.hit == 2
-    assert events(out).count("contact") == 1
-    assert bench.core.motions.lease.hit == 2
-
-
-def test_a_hit_that_the_reflex_did_not_see_is_braked_for_all_the_same(bench: Bench) -> None:
-    out = bench.core.datagram(HIT, 0, NOW, reported=False)
-    assert motions(out) == [MotionKind.BREAK]
-    assert out.hit == 1
-
-
-def hit_of(byte: int) -> bytes:
-    """Return a datagram of a pressed bumper with this byte."""
-    payload = bytes((byte,))
-    return HEADER.pack(BumperReport.OPENING, crc_function("crc-16")(payload)) + payload
-
-
-@pytest.mark.parametrize("byte", [1, 2, 0x80, 0xFF])
-@pytest.mark.parametrize("form", ["alone", "behind", "before"])
-def test_a_hit_on_the_other_port_is_braked_for_at_once(bench: Bench, byte: int, form: str) -> None:
-    hit = hit_of(byte)
-    datagram = {"alone": hit, "behind": STANDS + hit, "before": hit + CLEAR}[form]
-    bench.receive(CLEAR, CLEAR, CLEAR)
-    out = bench.receive(datagram, datagram, port=1)
-    assert motions(out) == [MotionKind.BREAK]
-    assert pressed(out)[0]
-    assert bench.core.motions.lease.hit is not None
-    assert pressed(bench.receive(CLEAR, CLEAR, CLEAR, CLEAR)) == [], "the hit's port is active"
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_a_hit_that_comes_to_both_ports_is_published_once(bench: Bench, first: int) -> None:
-    out = bench.receive(HIT, port=first)
-    assert pressed(out) + pressed(bench.receive(HIT, port=1 - first)) == [True]
-
-
-def test_while_one_port_shows_a_hit_clear_samples_of_the_other_do_not_count(bench: Bench) -> None:
-    bench.receive(HIT)
-    for _ in range(5):
-        bench.receive(CLEAR)
-        bench.receive(HIT, port=1)
-    bench.move(Command.BRAKE, judged=99, judged_boot=BOOT)
-    assert pressed(bench.receive(CLEAR)) == [True]
-
-
-def test_a_short_hit_is_reported_until_safety_has_judged_it(bench: Bench) -> None:
-    assert pressed(bench.receive(HIT, *[CLEAR] * 5)) == [True] * 6
-    bench.move(Command.BRAKE, judged=1, judged_boot=BOOT)
-    assert pressed(bench.receive(CLEAR)) == [False]
-
-
-@pytest.mark.parametrize(("command", "is_judged"), [(Command.STOP, False), (Command.BRAKE, True)])
-def test_only_a_brake_is_the_judged_stop(bench: Bench, command: Command, is_judged: bool) -> None:
-    hit = bench.receive(HIT).hit
-    assert hit is not None
-    outs = [bench.move(command, judged=seq, judged_boot=BOOT) for seq in (hit - 1, hit, hit)]
-    assert [out.acked for out in outs] == [False, is_judged, False]
-    assert all(out.obeyed for out in outs)
 
 
 # --- what comes from the board ------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Mutations: remove one protection each, with the objection expected from the oracle."""
+"""Mutations of the bridge: remove one protection each, with the expected objection."""
 
 import dataclasses
 from collections.abc import Callable
@@ -11,7 +11,6 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.motion import Command, Twist
-from common.wire.frame import Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperReport
 from services.bridge import lease as leases
@@ -20,12 +19,6 @@ from services.bridge.core import Core
 from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
-from services.bridge.reflex import Hit
-from services.safety import conditions, latches
-from services.safety.arbiter import Arbiter
-from services.safety.inputs import Inputs
-from services.safety.service import SafetyService
-from services.safety.zones import Zones
 from tests.invariants.net import Disturbance, Envelope
 from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
@@ -55,22 +48,6 @@ def hold(stack: Stack, direction: m.Direction = "backward") -> None:
 
 def safety_dies(stack: Stack) -> None:
     stack.kill("safety", 5000)
-
-
-def estop(stack: Stack) -> None:
-    stack.estop()
-    stack.run(700)
-    stack.sticks["teleop"].requested = (0.0, 0.0)
-    stack.run(700)
-    stack.sticks["teleop"].requested = (0.5, 0.0)
-
-
-def board_freezes(stack: Stack) -> None:
-    stack.vehicle.freeze(400)
-
-
-def wall(stack: Stack) -> None:
-    stack.vehicle.ranges[2] = 250
 
 
 def hit_while_a_run_is_under_way(stack: Stack) -> None:
@@ -120,51 +97,6 @@ def safety_dies_latched(stack: Stack) -> None:
     stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(700)
     stack.sticks["teleop"].requested = (0.5, 0.0)
-
-
-def reset_too_early(stack: Stack) -> None:
-    """Reset a driver's fault after its first good sample; they come twice a second."""
-    stack.sticks["teleop"].requested = (0.0, 0.0)
-    stack.run(1500)
-    stack.vehicle.fault(Side.LEFT, 1)
-    stack.run(20)
-    stack.vehicle.fault(Side.LEFT, 0)
-    stack.run(600)
-    stack.reset()
-    stack.run(300)
-    stack.sticks["teleop"].requested = (0.5, 0.0)
-
-
-def driver_blinks(stack: Stack) -> None:
-    """Report a driver fault and its end at the same time."""
-    for bits in (1, 0):
-        stack.vehicle.fault(Side.LEFT, bits)
-    stack.vehicle.say(stack.vehicle.board.driver(Side.LEFT))
-
-
-def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False) -> Any:
-    return KEEP(ports, field)
-
-
-def velocities_fall_silent(stack: Stack) -> None:
-    stack.vehicle.reports_velocity = False
-
-
-def reset_without_a_velocity(stack: Stack) -> None:
-    """Stop the velocities at standstill, then reset."""
-    stack.sticks["teleop"].requested = (0.0, 0.0)
-    stack.run(1500)
-    stack.estop()
-    stack.vehicle.reports_velocity = False
-    stack.run(1000)
-    stack.reset()
-    stack.vehicle.reports_velocity = True
-    stack.run(1000)
-    stack.sticks["teleop"].requested = (0.5, 0.0)
-
-
-def however_old(inputs: Inputs, *_: object) -> Twist | None:
-    return inputs.measured
 
 
 def successor(
@@ -251,18 +183,12 @@ def authority_is_copied(stack: Stack) -> None:
 
 
 ORDER = leases._order
-EXPIRE, ON_MOTION, KEEP = leases.expire, leases.on_motion, SafetyService._store
+EXPIRE, ON_MOTION = leases.expire, leases.on_motion
 
 
 MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
         leases, "expire", lambda lease, *_: lease, safety_dies, "a RUN is held",
-    ),
-    "latches clear by time": (
-        latches, "_is_over", lambda *_: True, estop, "safety knows of estop",
-    ),
-    "no neutral after a return": (
-        Arbiter, "disarmed", lambda self: self, board_freezes, "was not neutral",
     ),
     "no neutral after a lease": (
         leases, "expire", still_neutral, motions_get_lost, "no neutral motion came",
@@ -281,26 +207,11 @@ MUTATIONS: dict[str, Mutation] = {
     "the bridge remembers no latch": (
         leases, "on_motion", untold, safety_dies_latched, "bridge knows of estop",
     ),
-    "a reset clears what is not gone": (
-        latches, "GOOD_SAMPLES", 0, reset_too_early, "safety knows of driver",
-    ),
-    "no input is too old": (
-        conditions, "_is_old", lambda *_: False, velocities_fall_silent, "old velocity",
-    ),
-    "an old velocity is as good as a new one": (
-        Inputs, "known_velocity", however_old, reset_without_a_velocity, "safety knows of estop",
-    ),
-    "samples are not decided upon one by one": (
-        SafetyService, "_store", at_the_next_tick, driver_blinks, "safety knows of driver",
-    ),
     "a successor's own latch hides the one that is due": (
         leases, "_latched_by", overwritten, successor_hits_something, "safety knows of estop",
     ),
     "a successor need not know of the latch": (
         leases, "_order", whoever, successor_hears_of_no_latch, "bridge knows of estop",
-    ),
-    "the margin is ignored": (
-        Zones, "allowed", lambda *_: 1.0, wall, "toward sonar 2",
     ),
     "a hit needs no judgement": (
         leases, "on_hit", unjudged, hit_while_a_run_is_under_way, "bridge knows of contact",

@@ -1,12 +1,17 @@
-"""Mutations of safety: standstill supervision, source priority and sonar overrides."""
+"""Mutations of safety: latches, inputs, sonars, source priority and standstill supervision."""
 
-from collections.abc import Callable
 from typing import Any
 
 from common.motion import Twist
+from common.wire.frame import Side
+from services.safety import conditions, latches
 from services.safety.arbiter import Arbiter
+from services.safety.inputs import Inputs
+from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
+from services.safety.zones import Zones
+from tests.invariants.mutations import Mutation
 from tests.invariants.stack import Stack
 
 FAULT_MM = 0xFFFF
@@ -43,7 +48,91 @@ def knows_at_once(overrides: SonarOverrides, unseen: Any, _: Any, now_ns: int) -
     return SonarOverrides(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
 
 
-SAFETY_MUTATIONS: dict[str, tuple[object, str, object, Callable[[Stack], None], str]] = {
+def estop(stack: Stack) -> None:
+    stack.estop()
+    stack.run(700)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(700)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def board_freezes(stack: Stack) -> None:
+    stack.vehicle.freeze(400)
+
+
+def wall(stack: Stack) -> None:
+    stack.vehicle.ranges[2] = 250
+
+
+def reset_too_early(stack: Stack) -> None:
+    """Reset a driver's fault after its first good sample; they come twice a second."""
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(1500)
+    stack.vehicle.fault(Side.LEFT, 1)
+    stack.run(20)
+    stack.vehicle.fault(Side.LEFT, 0)
+    stack.run(600)
+    stack.reset()
+    stack.run(300)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def driver_blinks(stack: Stack) -> None:
+    """Report a driver fault and its end at the same time."""
+    for bits in (1, 0):
+        stack.vehicle.fault(Side.LEFT, bits)
+    stack.vehicle.say(stack.vehicle.board.driver(Side.LEFT))
+
+
+def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False) -> Any:
+    return KEEP(ports, field)
+
+
+def velocities_fall_silent(stack: Stack) -> None:
+    stack.vehicle.reports_velocity = False
+
+
+def reset_without_a_velocity(stack: Stack) -> None:
+    """Stop the velocities at standstill, then reset."""
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(1500)
+    stack.estop()
+    stack.vehicle.reports_velocity = False
+    stack.run(1000)
+    stack.reset()
+    stack.vehicle.reports_velocity = True
+    stack.run(1000)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def however_old(inputs: Inputs, *_: object) -> Twist | None:
+    return inputs.measured
+
+
+KEEP = SafetyService._store
+
+SAFETY_MUTATIONS: dict[str, Mutation] = {
+    "latches clear by time": (
+        latches, "_is_over", lambda *_: True, estop, "safety knows of estop",
+    ),
+    "no neutral after a return": (
+        Arbiter, "disarmed", lambda self: self, board_freezes, "was not neutral",
+    ),
+    "a reset clears what is not gone": (
+        latches, "GOOD_SAMPLES", 0, reset_too_early, "safety knows of driver",
+    ),
+    "no input is too old": (
+        conditions, "_is_old", lambda *_: False, velocities_fall_silent, "old velocity",
+    ),
+    "an old velocity is as good as a new one": (
+        Inputs, "known_velocity", however_old, reset_without_a_velocity, "safety knows of estop",
+    ),
+    "samples are not decided upon one by one": (
+        SafetyService, "_store", at_the_next_tick, driver_blinks, "safety knows of driver",
+    ),
+    "the margin is ignored": (
+        Zones, "allowed", lambda *_: 1.0, wall, "toward sonar 2",
+    ),
     "a stop is not supervised": (
         Standstill, "is_late", lambda *_: False, never_stops, "no BRAKE while",
     ),

@@ -22,6 +22,7 @@ from common.messages import (
     Velocity,
 )
 from tests.invariants.operator_book import OperatorBook
+from tests.invariants.sonars import SONARS, approach, shown
 from tests.invariants.standstill_book import StandstillBook
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
@@ -38,14 +39,6 @@ RAMP_S = 2.5  # from the highest speed to standstill, and some
 FAST_MPS, FAST_S = 1.35, 0.4  # measured: no command allows it, so it is a runaway
 STEP_S = 0.03  # decisions are that far apart at most, while nothing stalled
 ROUNDING = 2e-3
-
-FRONT, LEFT = 0.55, 0.35  # m from the middle to the bumpers
-# Name, place and direction of each sonar, clockwise from the left (manual 2.3).
-SONARS = (
-    (0.0, LEFT, 90), (FRONT, LEFT, 45), (FRONT, 0.0, 0), (FRONT, -LEFT, -45),
-    (0.0, -LEFT, -90), (-FRONT, -LEFT, -135), (-FRONT, 0.0, 180), (-FRONT, LEFT, 135),
-)  # fmt: skip
-FLANKS = (0, 4)
 
 
 @dataclass(slots=True)
@@ -279,22 +272,6 @@ class SafetyBook:
         if len(self.ranges) < 3 or now_ns - self.ranges[-1][0] > RANGES_AGE_S * NS_PER_S:
             return 0.0
         return min(shown(message, sonar) for _, message in self.ranges)
-
-
-def shown(message: Ultrasonic, sonar: int) -> float:
-    """Return what one sample shows, 0 where nothing can be trusted."""
-    reading = message.ranges[sonar]
-    if message.status[sonar] == "no_echo":
-        return math.inf
-    return reading if message.status[sonar] == "ok" and reading is not None else 0.0
-
-
-def approach(sonar: int, linear: float, angular: float) -> float:
-    """Return how fast (m/s) a twist closes in on what a sonar sees."""
-    x, y, degrees = SONARS[sonar]
-    yaw = math.radians(degrees)
-    along = (linear - angular * y) * math.cos(yaw) + angular * x * math.sin(yaw)
-    return max(along, abs(angular) * FRONT) if sonar in FLANKS else along
 
 
 def stopping_way(speed: float) -> float:

@@ -35,6 +35,10 @@ NO_ECHO_TEXT = (
     "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat as "
     "`echo`."
 )
+HOLD_TEXT = "The bumper was hit. Hold release to move off, forward or backward."
+CHOOSE_TEXT = "Choose the direction of the release: forward or backward."
+USED_UP_TEXT = "The distance for moving off is used up. Push the vehicle off by hand, then reset."
+DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
 
 

@@ -1,0 +1,146 @@
+"""Sets of causes: what each cause does, and how to raise it in a policy fixture.
+
+The actions are those of the safety case, written here a second time, not taken from the table in
+``causes.py``.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from itertools import combinations
+
+from msgspec.structs import replace
+
+from common.freshness import NS_PER_S
+from common.motion import STILL, Twist
+from services.safety.arbiter import Channel
+from services.safety.latches import FaultBudget
+from services.safety.runaway import Axis
+from services.safety.standstill import Phase, Standstill
+from services.safety.state import State
+from tests.safety.policy_fixture import PolicyFixture
+
+BRAKING = {
+    "contact", "estop", "estop_reader", "predecessor", "runaway", "uncommanded_motion",
+    "not_stopping",
+}  # fmt: skip
+LATCHING = (BRAKING - {"not_stopping"}) | {"driver_left", "driver_right", "flapping"}
+INHIBITING = {
+    "leaving", "starting", "link", "switches", "bumper", "silent", "unarmed", "not_stopping",
+}  # fmt: skip
+# Each one alone, with up to so many others: all sets of all causes would take four times as long.
+STANDSTILL, OTHERS = {"uncommanded_motion", "not_stopping"}, 3
+AHEAD = Twist(0.3, 0.0)
+STEP_NS = NS_PER_S // 50
+
+Change = Callable[[PolicyFixture], None]
+
+
+def sample(name: str, **fields: object) -> Change:
+    """Return what changes fields of the newest sample of a stream."""
+
+    def change(fixture: PolicyFixture) -> None:
+        latest = getattr(fixture.inputs, name)
+        changed = replace(latest, value=replace(latest.value, **fields))
+        fixture.inputs = replace(fixture.inputs, **{name: changed})
+
+    return change
+
+
+def aged(name: str, age_s: float) -> Change:
+    """Return what makes the newest sample of a stream that old."""
+
+    def change(fixture: PolicyFixture) -> None:
+        old = replace(
+            getattr(fixture.inputs, name), received_ns=fixture.now_ns - round(age_s * NS_PER_S)
+        )
+        fixture.inputs = replace(fixture.inputs, **{name: old})
+
+    return change
+
+
+def missing(fixture: PolicyFixture) -> None:
+    fixture.inputs = replace(fixture.inputs, ultrasonic=None)
+
+
+def leaving(fixture: PolicyFixture) -> None:
+    fixture.inputs = replace(fixture.inputs, leaving=True)
+
+
+def spent(fixture: PolicyFixture) -> None:
+    fixture.state = replace(fixture.state, fault_budget=FaultBudget(0.0, fixture.now_ns))
+
+
+def ran_away(fixture: PolicyFixture) -> None:
+    fixture.state = replace(fixture.state, linear=Axis(bad_s=0.3))
+    sample("velocity", linear=2.0)(fixture)
+
+
+def supervised(fixture: PolicyFixture, standstill: Standstill) -> None:
+    verdict = replace(fixture.state.verdict, command="stop", twist=STILL)
+    fixture.state = replace(fixture.state, standstill=standstill, verdict=verdict)
+
+
+def left_its_place(fixture: PolicyFixture) -> None:
+    supervised(fixture, Standstill(Phase.STANDING, counted=Twist(0.06)))
+
+
+def does_not_stop(fixture: PolicyFixture) -> None:
+    sample("velocity", linear=2.0)(fixture)
+    supervised(fixture, Standstill(Phase.STOPPING, due_ns=fixture.now_ns - 1))
+
+
+def nobody_hears(fixture: PolicyFixture) -> None:
+    fixture.estop_session_up = False
+
+
+RAISE: dict[str, Change] = {
+    "contact": sample("bumper", pressed=True),
+    "estop": lambda fixture: None,  # an event, not a sample
+    "estop_reader": nobody_hears,
+    "predecessor": sample("link", latched_by=4711),
+    "runaway": ran_away,
+    "uncommanded_motion": left_its_place,
+    "not_stopping": does_not_stop,
+    "driver_left": sample("left", bits=1),
+    "driver_right": sample("right", bits=1 << 31),
+    "flapping": spent,
+    "leaving": leaving,
+    "starting": missing,
+    "link": sample("link", state="lost"),
+    "switches": sample("switches", bumper_brake=False),
+    "bumper": aged("bumper", 0.16),
+    "silent": aged("left", 2.1),
+    "unarmed": sample("link", armed=False),
+}
+
+
+def report(text: str) -> None:
+    """Show a number to ``pytest -s``."""
+    sys.stdout.write(f"\n{text}\n")
+
+
+def subsets(names: set[str]) -> Iterator[set[str]]:
+    ordered = sorted(names)
+    for size in range(len(ordered) + 1):
+        yield from map(set, combinations(ordered, size))
+
+
+def crossed(names: set[str]) -> Iterator[set[str]]:
+    """Yield all subsets; those with a cause of STANDSTILL only with few others, and with one."""
+    for others in subsets(names - STANDSTILL):
+        yield others
+        if len(others) <= OTHERS:
+            yield from (others | {name} for name in sorted(names & STANDSTILL))
+
+
+def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: bool) -> None:
+    """Give the fixture a memory, all samples good and new, and one request or none."""
+    channels = {}
+    if requested is not None:
+        channels["teleop"] = Channel(99, fixture.driver_seq, requested, fixture.now_ns, None, armed)
+    arbiter = replace(state.arbiter, channels=channels)
+    fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)
+    fixture.estop_session_up = True
+    fixture.inputs = replace(fixture.inputs, leaving=False)
+    fixture.seq = state.verdict.acked[1]  # no bumper sample was lost
+    fixture.feed()

@@ -1,0 +1,192 @@
+"""Sonars through the whole decision: zones, suspect and faulty sonars."""
+
+import math
+
+import pytest
+
+from services.safety.report import state_message
+from tests.safety.policy_fixture import TICK_S, PolicyFixture
+
+# --- zones ----------------------------------------------------------------------------------
+
+
+def test_an_obstacle_slows_and_the_margin_stops() -> None:
+    fixture = PolicyFixture().running(1.0)
+    fixture.sonar(front=1.0)
+    assert fixture.drive(1.0).name == "slow"
+    assert 0 < fixture.verdict.twist.linear < 1.0
+    fixture.linear = 0.0
+    fixture.sonar(front=0.20)
+    assert fixture.drive(1.0).name == "stop"
+    assert "blocked" in fixture.state.latches
+    assert fixture.drive(-0.3).command == "run"  # the way out stays open
+
+
+def test_coming_out_of_the_margin_takes_three_samples_and_5_cm() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=0.20)
+    fixture.drive(0.5)
+    assert fixture.verdict.command == "stop"
+    fixture.sonar(front=0.24)
+    fixture.drive(0.5, seconds=1.0)
+    assert fixture.verdict.command == "stop"
+    fixture.sonar(front=0.26)
+    assert fixture.drive(0.5, seconds=2 * TICK_S).command == "stop"
+    assert fixture.drive(0.5, seconds=2 * TICK_S).command == "run"
+
+
+def test_a_faulty_sonar_closes_its_sector_only() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=None)
+    assert fixture.drive(0.5).command == "stop"
+    assert "faulty" in fixture.state.latches["blocked"].text
+    assert fixture.drive(-0.5).command == "run"
+
+
+def test_old_ranges_close_every_sector() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.muted = {"ultrasonic"}
+    fixture.drive(seconds=0.4)
+    for linear, angular in ((0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)):
+        assert fixture.drive(linear, angular).command == "stop"
+    fixture.muted = set()
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_moving_into_the_margin_against_the_command_stops() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=0.15)
+    fixture.linear = 0.2
+    assert fixture.drive(-0.5).command == "stop"
+    fixture.linear = 0.0
+    assert fixture.drive(-0.5).command == "run"
+
+
+# --- doubt ----------------------------------------------------------------------------------
+
+
+def beside_a_wall() -> PolicyFixture:
+    """Return a fixture with exact readings, the front sonars at their greatest range."""
+    fixture = PolicyFixture().ready()
+    fixture.sonar(
+        left=0.57, front_left=0.8, rear_left=0.8, front=4.5, front_right=4.5, right=1.1,
+        rear=2.0, rear_right=1.3,
+    )  # fmt: skip
+    fixture.drive(seconds=1.5)
+    return fixture
+
+
+def test_exact_readings_beside_a_wall_let_the_vehicle_drive_on() -> None:
+    fixture = beside_a_wall()
+    for _ in range(6):
+        assert fixture.drive(0.5, seconds=5.0).command == "run"
+        assert fixture.verdict.twist.linear == pytest.approx(0.5)
+    for linear, angular in ((-0.1, 0.0), (0.0, 0.1), (0.0, -0.1)):
+        assert fixture.drive(linear, angular, seconds=1.0).command == "run"
+
+
+@pytest.mark.parametrize("frozen_m", [2.0, 1.2])
+def test_a_frozen_front_sonar_creeps_before_the_wall(frozen_m: float) -> None:
+    fixture = PolicyFixture().running(1.0)
+    fixture.sonar(front=frozen_m)
+    wall_m = fixture.distance + frozen_m
+    for _ in range(150):
+        fixture.drive(1.0, seconds=TICK_S)
+        # The vehicle obeys at once here; a real one needs the way to slow down.
+        speed, room_m = fixture.verdict.twist.linear, wall_m - fixture.distance
+        assert speed <= 0.151 or speed * 0.25 + speed**2 / (2 * 0.6) < room_m
+    assert fixture.verdict.twist.linear == pytest.approx(0.15)
+    assert "sonar" in fixture.state.latches
+    assert "front suspect" in fixture.state.latches["sonar"].text
+    assert "Creeping toward the front" in fixture.state.latches["obstacle"].text
+    assert fixture.drive(-0.5, seconds=2.0).twist.linear == pytest.approx(-0.5)
+    fixture.ranges = tuple(1.0 if one else None for one in fixture.ranges)
+    fixture.drive(0.2, seconds=1.0)
+    assert "sonar" not in fixture.state.latches
+
+
+def test_the_limits_tell_of_a_creep() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=2.0)
+    fixture.drive(0.5, seconds=3.0)
+    limits = state_message(fixture.policy, fixture.state, fixture.now_ns).limits
+    assert limits.forward == pytest.approx(0.15)
+    assert limits.backward == 1.0
+    fixture.lost = 3
+    fixture.drive(0.5, seconds=0.1)
+    limits = state_message(fixture.policy, fixture.state, fixture.now_ns).limits
+    assert limits.backward == pytest.approx(0.15)
+    assert limits.angular == pytest.approx(0.15 / math.hypot(0.55, 0.35))
+
+
+def test_an_operator_creeps_past_a_faulty_sonar_after_a_neutral_request() -> None:
+    fixture = PolicyFixture().running()
+    fixture.sonar(front=None)
+    assert fixture.drive(0.5, seconds=3.0).command == "stop"  # held on: nothing moves
+    assert "release the controls" in fixture.state.latches["blocked"].text
+    fixture.drive()
+    assert fixture.drive(0.5, seconds=1.0).name == "slow"
+    assert fixture.verdict.twist.linear == pytest.approx(0.15)
+    assert "sees nothing there" in fixture.state.latches["obstacle"].text
+    assert fixture.drive(-0.5, seconds=1.0).twist.linear < -0.3  # away from it as ever
+    fixture.sonar(front=0.1)
+    assert fixture.drive(0.1, seconds=1.0).command == "stop"
+    fixture.sonar(front=None)
+    assert fixture.drive(0.1, seconds=1.0).command == "stop"  # a new fault
+
+
+def test_no_operator_creeps_while_all_ultrasonic_samples_are_missing() -> None:
+    fixture = PolicyFixture().running()
+    fixture.muted = {"ultrasonic"}
+    fixture.drive(seconds=2.0)
+    assert fixture.drive(0.5, seconds=1.0).command == "stop"
+    text = fixture.state.latches["blocked"].text
+    assert text.startswith("No motion toward the ")
+    assert text.endswith(" is silent.")
+
+
+def test_missing_ultrasonic_samples_end_a_creep_past_a_faulty_sonar() -> None:
+    fixture = PolicyFixture().running()
+    fixture.sonar(front=None)
+    fixture.drive(seconds=2.0)
+    assert fixture.drive(0.5).name == "slow"
+    fixture.muted = {"ultrasonic"}
+    assert fixture.drive(0.5, seconds=0.4).command == "stop"
+    fixture.muted = set()
+    assert fixture.drive(0.5, seconds=2.0).command == "stop"  # its operator must acknowledge again
+    fixture.drive()
+    assert fixture.drive(0.5).name == "slow"
+
+
+def test_a_neutral_request_before_the_fault_was_shown_for_a_second_does_not_count() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=None)
+    fixture.drive(seconds=0.9)
+    assert fixture.drive(0.3, seconds=2.0).command == "stop"
+
+
+def test_a_source_without_an_operator_never_passes_a_faulty_sonar() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.tick(20)
+    fixture.sonar(front=None)
+    fixture.drive(source="nav", seconds=3.0)
+    assert fixture.drive(0.3, source="nav", seconds=1.0).command == "stop"
+    assert "blocked" in fixture.state.latches
+
+
+def test_moving_fast_toward_a_sonar_that_shows_nothing_stops() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(front=None)
+    fixture.drive(seconds=2.0)
+    fixture.linear = 0.34
+    assert fixture.drive(0.15, seconds=0.1).command == "run"
+    fixture.linear = 0.36
+    assert fixture.drive(0.15, seconds=0.04).command == "stop"
+
+
+def test_what_is_too_near_to_measure_is_an_obstacle_for_everybody() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.status = ("no_echo", "no_echo", "too_near", *(("no_echo",) * 5))
+    fixture.drive(seconds=3.0)
+    assert fixture.drive(0.1, seconds=1.0).command == "stop"
+    assert fixture.drive(-0.1, seconds=1.0).command == "run"
