@@ -1,11 +1,4 @@
-"""Exceptions of T2.
-
-RobotError
-├── WireError      a frame that violates the vehicle's protocol
-├── MessageError   a message that violates the bus contract
-├── ConfigError    a setting that is missing, unknown or out of range
-└── LinkError      a socket, session or peer that cannot be reached
-"""
+"""Exceptions of T2; all are a ``RobotError``."""
 
 
 class RobotError(Exception):

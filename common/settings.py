@@ -3,6 +3,7 @@
 The whole configuration of a service is a struct of sections, see ``services/*/config.py``.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from ipaddress import ip_address
@@ -240,6 +241,31 @@ class Vehicle(Section, frozen=True, kw_only=True):
     track: Annotated[float, Meta(ge=0.1, le=3.0)] = 0.56  # m, left wheels to right wheels
     sonar_min: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05  # m, nearer cannot be measured
     sonar_max: Annotated[float, Meta(ge=0.5, le=20.0)] = 5.0  # m, farther gives no echo
+
+
+class Mount(Struct, frozen=True):
+    """Position (m) and direction of a sonar in ``base_link``: x forward, y left."""
+
+    name: str
+    x: float
+    y: float
+    yaw: float  # rad, counter-clockwise from straight ahead
+
+
+def sonar_mounts(vehicle: Vehicle) -> tuple[Mount, ...]:
+    """Return the eight sonars in the manual's order, clockwise from the left (manual 2.3)."""
+    front, left = vehicle.length / 2, vehicle.width / 2
+    degrees = math.radians
+    return (
+        Mount("left", 0.0, left, degrees(90)),
+        Mount("front_left", front, left, degrees(45)),
+        Mount("front", front, 0.0, 0.0),
+        Mount("front_right", front, -left, degrees(-45)),
+        Mount("right", 0.0, -left, degrees(-90)),
+        Mount("rear_right", -front, -left, degrees(-135)),
+        Mount("rear", -front, 0.0, degrees(180)),
+        Mount("rear_left", -front, left, degrees(135)),
+    )
 
 
 class Shared(Struct, frozen=True, kw_only=True):

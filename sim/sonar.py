@@ -8,8 +8,7 @@ to measure, and their maximum range without an echo.
 import random
 
 from common.messages import SONAR_NAMES
-from common.settings import Vehicle
-from common.vehicle import Mount, sonar_mounts
+from common.settings import Mount, Vehicle, sonar_mounts
 from common.wire.reports import SONAR_FAULT_MM
 from sim.geometry import Pose, ray
 from sim.requests import Sonar

@@ -20,7 +20,7 @@ from enum import IntEnum
 from struct import Struct
 from typing import Self
 
-from msgspec.structs import asdict, astuple
+from msgspec.structs import asdict
 
 from common.wire.frame import (
     MAGNITUDE_MAX,
@@ -116,10 +116,6 @@ class DriverQuery(Frame, frozen=True):
 
     side: Side
 
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return self.LAYOUT.pack(self.side)
-
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
         """Decode the side; raise ``WireError`` for an unknown one."""
@@ -149,10 +145,6 @@ class LedSet(Frame, frozen=True):
                 raise refusal(name, value, "0..255")
         if self.on_lightness > 10:
             raise refusal("on_lightness", self.on_lightness, "0..10")
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return self.LAYOUT.pack(*astuple(self))
 
 
 # All frames to the board, by their opening.

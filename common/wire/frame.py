@@ -25,6 +25,7 @@ from struct import Struct
 from typing import ClassVar, NamedTuple, Self
 
 import msgspec
+from msgspec.structs import astuple
 
 from common.errors import WireError
 
@@ -72,7 +73,7 @@ def to_side(value: int) -> Side:
 
 
 class Frame(msgspec.Struct, frozen=True, gc=False):
-    """A frame without payload; subclasses with fields define their layout."""
+    """A frame without payload; subclasses with fields define the layout of these."""
 
     ID: ClassVar[int] = 0  # placeholder; no frame has this id
     LAYOUT: ClassVar[Struct] = Struct("<")
@@ -83,7 +84,7 @@ class Frame(msgspec.Struct, frozen=True, gc=False):
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
-        return b""
+        return self.LAYOUT.pack(*astuple(self))
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
@@ -97,10 +98,6 @@ class Switch(Frame, frozen=True):
     LAYOUT = Struct("<B")
 
     on: bool
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return b"\x01" if self.on else b"\x00"
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:

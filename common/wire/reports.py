@@ -83,10 +83,6 @@ class DistanceReport(Frame, frozen=True):
         if not -HEADING_MAX_DDEG <= self.heading_ddeg <= HEADING_MAX_DDEG:
             raise refusal("heading", self.heading_ddeg, "-1800..1800")
 
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return self.LAYOUT.pack(self.distance_mm, self.heading_ddeg)
-
 
 class UltrasonicReport(Frame, frozen=True):
     """Board to PC: eight ranges, counted clockwise from the left; 0xFFFF is a faulty sensor."""
@@ -155,10 +151,6 @@ class DriverReport(Frame, frozen=True):
     def __post_init__(self) -> None:
         if not 0 <= self.fault_bits < 2**32:
             raise refusal("fault bits", self.fault_bits, "32 bits")
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return self.LAYOUT.pack(self.side, self.fault_bits)
 
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:

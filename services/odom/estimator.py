@@ -31,9 +31,17 @@ from msgspec.structs import replace
 from common import messages as m
 from common.codec import finite
 from common.freshness import NS_PER_S, Latest, fresh
-from services.odom.arc_segments import ArcSegment, fitted, halved, total
 from services.odom.config import Odom
-from services.odom.pose import Covariance, Pose, PoseEstimate, ProcessNoise
+from services.odom.pose import (
+    ArcSegment,
+    Covariance,
+    Pose,
+    PoseEstimate,
+    ProcessNoise,
+    fitted,
+    halved,
+    total,
+)
 from services.odom.slip_detector import (
     COUNTER_STEP_M,
     COUNTER_STEP_RAD,

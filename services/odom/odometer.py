@@ -81,7 +81,9 @@ class Odometer:
         self._published_ns = now_ns
         self._to_odometry.put(odometry)
         self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
-        self._report_input()
+        if self._silent:
+            self._silent = False
+            self._node.event("heard", "info", "counters and velocities are received")
         self._report_slip(odometry)
 
     def _report_silence(self, now_ns: int) -> None:
@@ -91,11 +93,6 @@ class Odometer:
         self._node.event(
             "silent", "warning", "no counters, no velocities: no odometry is published"
         )
-
-    def _report_input(self) -> None:
-        if self._silent:
-            self._silent = False
-            self._node.event("heard", "info", "counters and velocities are received")
 
     def _report_slip(self, odometry: m.Odometry) -> None:
         if odometry.slip == self._slip:

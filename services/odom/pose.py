@@ -1,4 +1,4 @@
-"""Pose, its covariance, their motion along an arc, and the recorded trajectory.
+"""Pose, its covariance, their motion along arcs, and the recorded trajectory.
 
 Between two samples the motion is an arc of length ``distance`` and heading change ``turn``. Its
 chord has the length ``distance * k(turn)`` and is rotated by half the turn from the old heading:
@@ -10,10 +10,14 @@ chord has the length ``distance * k(turn)`` and is rotated by half the turn from
 
 This is exact for a constant curvature, straight on and turning on the spot included. The covariance
 is propagated by the derivatives of these equations.
+
+Between two counter samples, the counters give the length and the turn of the trajectory, the
+velocities give its shape. ``fitted`` combines both.
 """
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import Self
 
 from msgspec import Struct
@@ -113,6 +117,53 @@ class PoseEstimate(Struct, frozen=True):
             .plus(noise.place, 0.0, 1.0, 0.0)
         )
         return PoseEstimate(after, covariance)
+
+
+class ArcSegment(Struct, frozen=True):
+    """One arc; ``seen`` if a velocity was valid, otherwise only its duration is known."""
+
+    distance: float  # m, forward positive
+    turn: float  # rad, counter-clockwise positive
+    time_s: float
+    seen: bool
+
+
+def total(segments: Sequence[ArcSegment]) -> ArcSegment:
+    """Return the sum of segments; it is seen if all of them are."""
+    return ArcSegment(
+        sum(segment.distance for segment in segments),
+        sum(segment.turn for segment in segments),
+        sum(segment.time_s for segment in segments),
+        all(segment.seen for segment in segments),
+    )
+
+
+def fitted(segments: Sequence[ArcSegment], distance: float, turn: float) -> list[ArcSegment]:
+    """Return the segments, corrected to the counters' distance and turn.
+
+    The difference is distributed over the unseen segments by time, or over all if all are seen.
+    """
+    whole = total(segments)
+    if whole.time_s <= 0:
+        return [ArcSegment(distance, turn, 0.0, seen=True)]
+    unseen_s = sum(segment.time_s for segment in segments if not segment.seen)
+    corrected_s = whole.time_s if whole.seen else unseen_s
+    linear, angular = (distance - whole.distance) / corrected_s, (turn - whole.turn) / corrected_s
+    return [
+        segment if segment.seen and not whole.seen else _adjusted(segment, linear, angular)
+        for segment in segments
+    ]  # fmt: skip
+
+
+def halved(segments: Sequence[ArcSegment]) -> list[ArcSegment]:
+    """Return the same trajectory in half as many, coarser segments."""
+    return [total(segments[i : i + 2]) for i in range(0, len(segments), 2)]
+
+
+def _adjusted(segment: ArcSegment, linear: float, angular: float) -> ArcSegment:
+    distance = segment.distance + linear * segment.time_s
+    turn = segment.turn + angular * segment.time_s
+    return ArcSegment(distance, turn, segment.time_s, segment.seen)
 
 
 class Trajectory:

@@ -9,8 +9,8 @@ from collections import deque
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
+from services.odom.pose import ArcSegment
 
 COMPARED_NS = NS_PER_S  # comparison window
 TWIST_NS = NS_PER_S // 5  # window of the twist by counters, whose steps are 1 mm and 0.1 deg

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from common.messages import Mileage
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
+from services.odom.pose import ArcSegment
 from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 
 DISTANCE_WRAP_M = 2**32 / 1000  # the counter is an s32 of millimetres

@@ -11,8 +11,7 @@ from typing import Any
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
-from common.settings import Vehicle
-from common.vehicle import sonar_mounts
+from common.settings import Vehicle, sonar_mounts
 from services.recorder import schema
 from services.recorder.schema import Schema
 

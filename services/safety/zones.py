@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from common.motion import Twist
-from common.settings import Vehicle
-from common.vehicle import Mount, sonar_mounts
+from common.settings import Mount, Vehicle, sonar_mounts
 from services.safety.config import Safety
 
 GRAZING_MPS = 1e-6  # below this is rounding: cos(90 deg) is not exactly 0

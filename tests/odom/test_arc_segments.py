@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.odom.arc_segments import ArcSegment, fitted, halved, total
+from services.odom.pose import ArcSegment, fitted, halved, total
 
 segments = st.builds(
     ArcSegment, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.001, 0.2), st.booleans()

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from common.messages import Mileage, Velocity
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
 from services.odom.estimator import Estimator, Outcome, check_continuity, step
+from services.odom.pose import ArcSegment
 from services.odom.standstill import DISTANCE_WRAP_M
 
 UP = math.inf

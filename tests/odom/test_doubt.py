@@ -6,10 +6,9 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
 from services.odom.estimator import START, Estimator, Outcome
-from services.odom.pose import Covariance, Pose, PoseEstimate, ProcessNoise
+from services.odom.pose import ArcSegment, Covariance, Pose, PoseEstimate, ProcessNoise
 from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 
 ODOM = Odom(

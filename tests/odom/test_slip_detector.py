@@ -3,8 +3,8 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
+from services.odom.pose import ArcSegment
 from services.odom.slip_detector import SlipDetector
 
 TICK_NS = NS_PER_S // 50

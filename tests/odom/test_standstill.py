@@ -7,8 +7,8 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage
-from services.odom.arc_segments import ArcSegment
 from services.odom.config import Odom
+from services.odom.pose import ArcSegment
 from services.odom.slip_detector import COUNTER_STEP_M, COUNTER_STEP_RAD
 from services.odom.standstill import DISTANCE_WRAP_M, Standstill
 from tests.odom.odom_fixture import OdomFixture, started

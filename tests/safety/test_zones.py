@@ -9,8 +9,7 @@ from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
 from common.motion import Twist
-from common.settings import Vehicle
-from common.vehicle import sonar_mounts
+from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
 from services.safety.zones import GRAZING_MPS, Zones, zones
 

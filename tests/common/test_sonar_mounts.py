@@ -5,8 +5,7 @@ import math
 import pytest
 
 from common.messages import SONAR_NAMES
-from common.settings import Vehicle
-from common.vehicle import Mount, sonar_mounts
+from common.settings import Mount, Vehicle, sonar_mounts
 
 
 def test_the_sonars_stand_in_the_manuals_order() -> None:
