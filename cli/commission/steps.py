@@ -24,6 +24,7 @@ from cli.commission.sonar import (
     nearest,
     obstructions,
     resting_ranges,
+    words,
 )
 from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
@@ -84,15 +85,13 @@ def sonars(session: CheckoutSession) -> Verdict:
 
 
 def _find(session: CheckoutSession, rest: Rest, name: str) -> Finding:
-    words = name.replace("_", " ")
     if rest[SONAR_NAMES.index(name)] is None:
-        show(f"The {words} sonar is faulty.")
+        show(f"The {words(name)} sonar is faulty.")
         return Finding(name, ())
-    show(f"NOW the {words} sonar: hold a hand in front of it, within {HAND_S:g} s.")
+    show(f"NOW the {words(name)} sonar: hold a hand in front of it, within {HAND_S:g} s.")
     seen, closest = _wait(session, rest, True, HAND_S)
     if seen:
-        names = ", ".join(one.replace("_", " ") for one in seen)
-        show(f"  detected by: {names}. Take the hand away.")
+        show(f"  detected by: {', '.join(map(words, seen))}. Take the hand away.")
         _wait(session, rest, False, AWAY_S)
     else:
         show("  no sonar has detected it.")
