@@ -7,21 +7,22 @@ operator the loop stands still and so does the vehicle: missing requests are a r
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec import Struct
 
 from cli.commission.latches import Reset
-from cli.commission.message_log import MessageLog
 from cli.commission.motion import too_fast
-from cli.commission.operator import Operator
+from cli.commission.operator import confirm
 from common import keys
-from common.bus.bus import Bus
+from common.bus.bus import Arrival, Bus
+from common.config import Setting
 from common.errors import LinkError
-from common.freshness import NS_PER_S
-from common.keys import Call
+from common.freshness import NS_PER_S, Latest
+from common.keys import Call, Topic
 from common.loop import Loop
+from common.messages import Message
 from common.motion import STILL, Twist, is_standing
 from common.operator import reset_request
 from common.settings import Shared
@@ -35,8 +36,54 @@ REST_S = 3.0  # wait for standstill after the release
 ZEROS_S = 0.15  # three requests
 AFTER_S = 2.0  # wait for safety's state without a latch
 PHRASE = "reset"
+DEPTH = 64  # more than arrives between two rounds of the loop
+PAYLOAD_OFFSET = 8  # of a frame
 
-Settings = dict[str, tuple[Any, str]]  # value and origin by path
+M = TypeVar("M", bound=Message)
+
+
+class MessageLog:
+    """Messages since the last mark, each with its local receive time."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.frames = 0  # received with the board's bytes
+        self.nonzero = 0  # of these, with a payload that is not all zeros
+        self._bus = bus
+        self._marked_ns = 0
+        self._lists: list[list[Any]] = []
+        self.links = self._recorded(keys.LINK)
+        self.safety = self._recorded(keys.SAFETY)
+        self.motions = self._recorded(keys.MOTION)
+        self.velocities = self._recorded(keys.VELOCITY)
+        self.mileages = self._recorded(keys.MILEAGE)
+        self.ultrasonics = self._recorded(keys.ULTRASONIC)
+        self.bumpers = self._recorded(keys.BUMPER)
+        self.switches = self._recorded(keys.SWITCHES)
+        self.health = self._recorded(keys.HEALTH, service="*")
+        self._recorded(keys.DRIVER, side="*")  # the board's frames of the motor drivers count
+
+    def mark(self) -> int:
+        """Discard everything received until now, queued messages too; return the time."""
+        self._marked_ns = time.monotonic_ns()
+        for log in self._lists:
+            log.clear()
+        self.frames = self.nonzero = 0
+        return self._marked_ns
+
+    def _recorded(self, topic: Topic[M], **names: Any) -> list[Latest[M]]:
+        log: list[Latest[M]] = []
+
+        def take(arrival: Arrival[M]) -> None:
+            if arrival.received_ns < self._marked_ns:
+                return
+            log.append(Latest(arrival.message, arrival.received_ns))
+            if arrival.raw:
+                self.frames += 1
+                self.nonzero += any(arrival.raw[PAYLOAD_OFFSET:])
+
+        self._lists.append(log)
+        self._bus.subscribe(topic, take, depth=DEPTH, **names)
+        return log
 
 
 class CheckoutSession:
@@ -91,8 +138,8 @@ class CheckoutSession:
         self.until(lambda: answers, ROUTER_S)
         return answers[0] if answers else (False, "no answer")
 
-    def settings(self, service: str) -> Settings:
-        """Return a service's settings; raise ``LinkError`` without an answer."""
+    def settings(self, service: str) -> dict[str, Setting]:
+        """Return a service's settings by path; raise ``LinkError`` without an answer."""
         answers: list[bytes] = []
         refusals: list[str] = []
         self.bus.look_up(service, "config", answers.append, refusals.append)
@@ -100,8 +147,7 @@ class CheckoutSession:
         if not answers:
             reason = refusals[0] if refusals else "no answer"
             raise LinkError(f"cannot read the settings of {service}: {reason}")
-        decoded = msgspec.json.decode(answers[0], type=dict[str, dict[str, Any]])
-        return {path: (one["value"], str(one["origin"])) for path, one in decoded.items()}
+        return msgspec.json.decode(answers[0], type=dict[str, Setting])
 
     def latched(self) -> tuple[str, ...]:
         """Return the latched causes of safety's newest state."""
@@ -120,14 +166,14 @@ class CheckoutSession:
         self.until(lambda: log.safety and not (granted and self.latched()), AFTER_S)
         return Reset(requested_ns, granted, text, self.latched())
 
-    def unlatch(self, operator: Operator) -> str:
+    def unlatch(self) -> str:
         """Reset earlier latches after confirmation; return the problem, or an empty string."""
         self.log.mark()
         self.until(lambda: self.log.safety, AFTER_S)
         if not self.latched():
             return ""
         fact = f"Safety has latched before: {', '.join(self.latched())}. Reset it first."
-        if not operator.confirm(fact, PHRASE):
+        if not confirm(fact, PHRASE):
             return "The earlier latch of safety was not reset."
         done = self.reset()
         return "" if done.granted and not done.latched else f"The reset was refused: {done.text}"

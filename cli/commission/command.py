@@ -3,30 +3,27 @@
 import argparse
 import signal
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import msgspec
 
-from cli.commission.bus_session import CheckoutSession, Settings
-from cli.commission.operator import Check, Operator, sign, walk
-from cli.commission.report import Checked, Report, Row, render
+from cli.commission.bus_session import CheckoutSession
+from cli.commission.operator import S, Step, prompt, show, sign, walk
+from cli.commission.report import Report, Row, render
 from cli.commission.steps import STEPS
-from cli.commission.watchdog import BoardMaster, watchdog
+from cli.commission.watchdog import WATCHDOG, BoardMaster
 from cli.settings import Everything
 from common import log
 from common.cli_args import VERSION, add_sources, sources
-from common.config import Loaded, load
+from common.config import Loaded, Setting, load
 from common.errors import ConfigError, RobotError
 
 NAMES = [step.name for step in STEPS]
 SECTIONS = ("wire", "board", "vehicle", "bridge")
 SERVICES = ("bridge", "safety", "odom")
 HEALTH_S = 3.0
-WATCHDOG = "The stack must be down, all wheels off the ground, a hand on the vehicle's switch."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,66 +59,54 @@ def run(options: argparse.Namespace) -> int:
 def check_stack(loaded: Loaded[Everything], only: Sequence[str]) -> Report:
     """Run the steps on the running stack."""
     log.configure(msgspec.structs.replace(loaded.config.log, level="error"), "checkout")
-    operator = Operator()
     with CheckoutSession(loaded.config).opened() as session:
         settings = rows(session.settings("bridge"), SECTIONS)
         settings += rows(session.settings("safety"), ("safety",))
-        board = session.log.links[-1].value.board
-        draft = Report(
-            robot=loaded.config.robot.id,
-            date=operator.now(),
-            facts=[("board", board), ("T2 of this tool", VERSION), *versions(session)],
-            settings=settings,
-            left_out=[name for name in NAMES if only and name not in only],
-        )
-        checks = [
-            Check(step.name, step.title, step.what, partial(step.run, session, operator))
-            for step in STEPS
-            if not only or step.name in only
-        ]
-        return guided(draft, checks, operator)
+        report = started(loaded, session.log.links[-1].value.board, settings)
+        report.facts += versions(session)
+        report.left_out = [name for name in NAMES if only and name not in only]
+        guide(report, [step for step in STEPS if step.name not in report.left_out], session)
+    return report
 
 
 def check_board(loaded: Loaded[Everything]) -> Report:
     """Test the board's watchdog, with the stack down."""
-    config, operator = loaded.config, Operator()
-    settings = {path: (one.value, one.origin) for path, one in loaded.settings.items()}
-    board = f"{config.board.address}:{config.board.port}"
-    with closing(BoardMaster(config)) as master:
-        draft = Report(
-            robot=config.robot.id,
-            date=operator.now(),
-            facts=[("board", board), ("T2 of this tool", VERSION)],
-            settings=rows(settings, SECTIONS),
-        )
-        check = partial(watchdog, master, operator)
-        checks = [Check("watchdog", "The board's own watchdog", WATCHDOG, check)]
-        return guided(draft, checks, operator)
+    board = f"{loaded.config.board.address}:{loaded.config.board.port}"
+    report = started(loaded, board, rows(loaded.settings, SECTIONS))
+    with closing(BoardMaster(loaded.config)) as master:
+        guide(report, [WATCHDOG], master)
+    return report
 
 
-def guided(draft: Report, checks: Sequence[Check], operator: Operator) -> Report:
-    """Run the checks with the operator; the report includes what was done before an abort."""
-    operator.show(f"Checkout of robot {draft.robot}, board {dict(draft.facts)['board']}.")
-    name = firmware = signed = aborted = ""
-    checked: list[Checked] = []
+def started(
+    loaded: Loaded[Everything], board: str, settings: Sequence[tuple[str, str, str]]
+) -> Report:
+    """Return the report of a checkout that begins now."""
+    facts = [("board", board), ("T2 of this tool", VERSION)]
+    return Report(robot=loaded.config.robot.id, date=now(), facts=facts, settings=settings)
+
+
+def guide(report: Report, steps: Sequence[Step[S]], subject: S) -> None:
+    """Run the steps with the operator; the report includes what was done before an abort."""
+    show(f"Checkout of robot {report.robot}, board {dict(report.facts)['board']}.")
+    name = firmware = ""
     try:
-        name = operator.prompt("Your name:")
-        firmware = operator.prompt("The firmware version, from the board's label:")
-        walk(checks, operator, checked)
-        signed = sign(operator, name, checked)
+        name = prompt("Your name:")
+        firmware = prompt("The firmware version, from the board's label:")
+        walk(steps, subject, report.steps)
+        report.signed = sign(name, report.steps)
     except KeyboardInterrupt:
-        aborted = "interrupted by the operator"
+        report.aborted = "interrupted by the operator"
     except RobotError as error:
-        aborted = str(error)
-    return replace(
-        draft,
-        operator=name or "unknown",
-        facts=[*draft.facts, ("firmware", firmware or "unknown")],
-        steps=checked,
-        aborted=aborted,
-        signed=signed,
-        ended=operator.now(),
-    )
+        report.aborted = str(error)
+    report.operator = name or "unknown"
+    report.facts.append(("firmware", firmware or "unknown"))
+    report.ended = now()
+
+
+def now() -> str:
+    """Return the local date and time."""
+    return time.strftime("%Y-%m-%d %H:%M:%S %z")
 
 
 def versions(session: CheckoutSession) -> list[Row]:
@@ -136,11 +121,11 @@ def versions(session: CheckoutSession) -> list[Row]:
     return [(f"T2 of {service}", version) for service, version in sorted(found.items())]
 
 
-def rows(settings: Settings, sections: Iterable[str]) -> list[tuple[str, str, str]]:
+def rows(settings: Mapping[str, Setting], sections: Iterable[str]) -> list[tuple[str, str, str]]:
     """Return path, value and origin of the settings in these sections."""
     return [
-        (path, str(value), origin)
-        for path, (value, origin) in settings.items()
+        (path, str(setting.value), setting.origin)
+        for path, setting in settings.items()
         if path.split(".")[0] in sections
     ]
 

@@ -35,7 +35,7 @@ FULL = 0.95  # of the requested speed counts as granted
 NOTHING = 0.15  # of the commanded speed
 RATIO = 0.25  # allowed deviation from 1; that of the nearest other unit is 0.43
 UNIT_MATCH = 0.15  # allowed deviation from a known unit's ratio
-STOP_NS = 2 * NS_PER_S  # limit for standstill after the release
+STOP_S = 2.0  # limit for standstill after the release
 # rad/s per unit of the wire; the first two are values of the setting
 UNITS = {
     "decidegree": math.radians(0.1),
@@ -66,6 +66,11 @@ class Run:
         """Whether it is a turn."""
         return self.requested.angular != 0
 
+    @property
+    def unit_of_rate(self) -> str:
+        """Unit of a velocity on the requested axis."""
+        return "rad/s" if self.turns else "m/s"
+
     def part(self, linear: float, angular: float) -> float:
         """Return the value on the requested axis."""
         return angular if self.turns else linear
@@ -91,13 +96,14 @@ def too_fast(requested: Twist, velocity: Velocity) -> bool:
 
 def judge_motion(run: Run) -> Verdict:
     """Return the verdict on one motion."""
-    measured = measure(run)
-    stood_s = stood_after_s(run)
+    measured, stood_s = measure(run), stood_after_s(run)
     if measured is None:
         return judged([_not_granted(run)], "", [("standstill after", seconds(stood_s))])
-    problems = [*_problems(run, measured), *_standing(stood_s)]
-    unit = _unit(run)
-    text = f"The board counts {measured.counted:.3f} {unit} of {measured.commanded:.3f} commanded."
+    problems = list(_problems(run, measured))
+    if stood_s is None or stood_s > STOP_S:
+        problems.append(f"It did not stand within {STOP_S:g} s after the release.")
+    counted, commanded = f"{measured.counted:.3f}", f"{measured.commanded:.3f}"
+    text = f"The board counts {counted} {run.unit_of_rate} of {commanded} commanded."
     return judged(problems, text, _data(run, measured, stood_s))
 
 
@@ -122,7 +128,7 @@ def measure(run: Run) -> Measured | None:
     # By the bridge's clock, which is independent of network delays.
     span_s = (counts[-1].mono_ns - counts[0].mono_ns) / NS_PER_S
     way = counts[-1].distance - counts[0].distance
-    turn = sum(_wrapped(b.heading - a.heading) for a, b in pairwise(counts))
+    turn = sum(math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(counts))
     return Measured(
         commanded=mean(run.part(m.linear, m.angular) for m in motions),
         velocity=mean(run.part(v.linear, v.angular) for v in velocities),
@@ -156,15 +162,22 @@ def unit_of(ratio: float, setting: str) -> str | None:
 
 def _problems(run: Run, it: Measured) -> Iterator[str]:
     ratio = it.counted / it.commanded
-    turned = abs(ratio) >= NOTHING
-    if not turned:
+    if abs(ratio) < NOTHING:
         yield _nothing_counted(run, it)
-    elif abs(ratio - 1) > RATIO:
-        yield _wrong_ratio(run, ratio)
-    if turned and it.velocity / it.counted < 0:
+        return
+    if ratio < 0:
+        way = "clockwise" if run.turns else "backward"
+        yield f"The sign is wrong: on a positive command it goes {way}."
+    if abs(abs(ratio) - 1) > RATIO:
+        yield f"It goes {abs(ratio):.2f} times as fast as commanded."
+        yield _unit_hint(run, abs(ratio), "command", run.unit)
+    measured = it.velocity / it.counted
+    if measured < 0:
         yield "The measured velocity has the wrong sign: it contradicts the counter."
-    elif turned and abs(it.velocity / it.counted - 1) > RATIO:
-        yield _wrong_velocity(run, abs(it.velocity / it.counted))
+    elif abs(measured - 1) > RATIO:
+        yield f"The measured velocity is {measured:.2f} times the velocity of the counter."
+        # A larger unit of the firmware makes our reading smaller.
+        yield _unit_hint(run, 1 / measured if measured else 0.0, "feedback", run.feedback)
 
 
 def _nothing_counted(run: Run, it: Measured) -> str:
@@ -178,39 +191,14 @@ def _nothing_counted(run: Run, it: Measured) -> str:
     return f"The velocity changes, but the {counter} does not.{hint}"
 
 
-def _wrong_ratio(run: Run, ratio: float) -> str:
-    if ratio < 0:
-        way = "clockwise" if run.turns else "backward"
-        text = f"The sign is wrong: on a positive command it goes {way}."
-        return text if abs(abs(ratio) - 1) <= RATIO else f"{text} {_factor(run, -ratio)}"
-    return _factor(run, ratio)
-
-
-def _factor(run: Run, ratio: float) -> str:
-    text = f"It goes {ratio:.2f} times as fast as commanded."
-    return _with_unit(run, text, unit_of(ratio, run.unit), "command")
-
-
-def _wrong_velocity(run: Run, ratio: float) -> str:
-    text = f"The measured velocity is {ratio:.2f} times the velocity of the counter."
-    # A larger unit of the firmware makes our reading smaller.
-    return _with_unit(run, text, unit_of(1 / ratio, run.feedback) if ratio else None, "feedback")
-
-
-def _with_unit(run: Run, text: str, unit: str | None, direction: str) -> str:
-    if not run.turns:
-        return text
+def _unit_hint(run: Run, ratio: float, direction: str, setting: str) -> str:
+    """Name the firmware's unit if it explains a ratio of turning rates."""
+    unit = unit_of(ratio, setting) if run.turns else None
+    if unit is None:
+        return ""
     if unit in SETTINGS:
-        setting = f"wire.{direction}_angular_unit"
-        return f'{text} The firmware has another unit: set {setting} = "{unit}".'
-    if unit is not None:
-        return f"{text} The firmware's unit seems to be {unit}, which no setting supports."
-    return text
-
-
-def _standing(stood_s: float | None) -> Iterator[str]:
-    if stood_s is None or stood_s * NS_PER_S > STOP_NS:
-        yield f"It did not stand within {STOP_NS / NS_PER_S:g} s after the release."
+        return f'The firmware has another unit: set wire.{direction}_angular_unit = "{unit}".'
+    return f"The firmware's unit seems to be {unit}, which no setting supports."
 
 
 def _not_granted(run: Run) -> str:
@@ -219,12 +207,12 @@ def _not_granted(run: Run) -> str:
     speeds = [run.part(v.value.linear, v.value.angular) for v in run.velocities]
     peak = max(speeds, key=abs, default=0.0)
     requested = run.part(run.requested.linear, run.requested.angular)
-    moved = f" Measured at most {peak:.2f} {_unit(run)} of {requested:.2f} requested."
+    moved = f" Measured at most {peak:.2f} {run.unit_of_rate} of {requested:.2f} requested."
     return f"Safety did not grant the full speed for long enough to measure.{moved}{reason}"
 
 
 def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
-    unit, other = ("rad/s", "m/s") if run.turns else ("m/s", "rad/s")
+    unit, other = run.unit_of_rate, "m/s" if run.turns else "rad/s"
     return [
         ("measured over", f"{it.seconds:.2f} s"),
         (f"commanded, {unit}", f"{it.commanded:.3f}"),
@@ -234,11 +222,3 @@ def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
         (f"counted on the other axis, {other}", f"{it.across:.3f}"),
         ("standstill after", seconds(stood_s)),
     ]
-
-
-def _unit(run: Run) -> str:
-    return "rad/s" if run.turns else "m/s"
-
-
-def _wrapped(angle: float) -> float:
-    return math.remainder(angle, math.tau)

@@ -1,7 +1,7 @@
 """Verdicts of the steps, and the report of a checkout in Markdown. Pure."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Outcome = Literal["passed", "failed", "skipped"]
@@ -30,23 +30,22 @@ def seconds(value: float | None, digits: int = 2) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A step with its verdict."""
+    """The title of a step, and its verdict."""
 
-    name: str
     title: str
     verdict: Verdict
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Report:
-    """Content of the report."""
+    """Content of the report; the checkout fills it in, so that an abort loses nothing."""
 
     robot: str
     date: str
-    facts: Sequence[Row]  # board, firmware, versions
+    facts: list[Row]  # board, versions, firmware
     settings: Sequence[tuple[str, str, str]]  # path, value, origin
     operator: str = ""
-    steps: Sequence[Checked] = ()
+    steps: list[Checked] = field(default_factory=list)
     left_out: Sequence[str] = ()  # steps excluded by --only
     aborted: str = ""  # reason of an early end
     signed: str = ""  # the name typed at the end

@@ -5,7 +5,7 @@ the same sonars have detected it for half a second, because a moving hand passes
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -50,27 +50,33 @@ class Finding:
 
 def resting_ranges(samples: Sequence[Ultrasonic]) -> Rest:
     """Return each sonar's range at rest; None if it is faulty in half of the samples."""
-    columns = zip(*([_distance(one, i) for i in range(8)] for one in samples), strict=True)
-    return tuple(_middle(column) for column in columns)
+    return tuple(map(_middle, zip(*map(_distances, samples), strict=True)))
 
 
 def near(sample: Ultrasonic, rest: Rest) -> frozenset[str]:
     """Return the sonars that detect a hand."""
     return frozenset(
-        name for i, name in enumerate(SONAR_NAMES) if _is_near(_distance(sample, i), rest[i])
+        name
+        for name, distance, resting in zip(SONAR_NAMES, _distances(sample), rest, strict=True)
+        if distance is not None and resting is not None
+        if distance < min(NEAR_M, resting - CLEARLY_M)
     )
 
 
 def nearest(sample: Ultrasonic) -> float | None:
     """Return the nearest reading, m; None if every sonar is faulty."""
-    distances = [_distance(sample, i) for i in range(8)]
-    return min((one for one in distances if one is not None), default=None)
+    return min((one for one in _distances(sample) if one is not None), default=None)
+
+
+def words(name: str) -> str:
+    """Return the name of a sonar as words."""
+    return name.replace("_", " ")
 
 
 def obstructions(rest: Rest) -> str:
     """Return a text that names sonars without free space; empty if all have it."""
     tight = [
-        f"{_words(name)} {distance:.2f} m"
+        f"{words(name)} {distance:.2f} m"
         for name, distance in zip(SONAR_NAMES, rest, strict=True)
         if distance is not None and distance < ROOM_M
     ]
@@ -80,8 +86,10 @@ def obstructions(rest: Rest) -> str:
 def judge_sonars(rest: Rest, findings: Sequence[Finding]) -> Verdict:
     """Return the verdict on the findings of all sonars."""
     of_name = dict(zip(SONAR_NAMES, rest, strict=True))
-    problems = [*_singly(of_name, findings), mixup(_one_for_one(findings))]
-    return judged(problems, "Each sonar is in its place.", _data(of_name, findings))
+    single = {each.name: each.detected_by[0] for each in findings if len(each.detected_by) == 1}
+    problems = [*(_problem(each, of_name[each.name]) for each in findings), mixup(single)]
+    data = [_row(each, of_name[each.name]) for each in findings]
+    return judged(problems, "Each sonar is in its place.", data)
 
 
 def mixup(detected: Mapping[str, str]) -> str:
@@ -90,19 +98,17 @@ def mixup(detected: Mapping[str, str]) -> str:
     if not wrong:
         return ""
     pairs = [(SONAR_NAMES.index(name), SONAR_NAMES.index(to)) for name, to in detected.items()]
-    for words, sign, offset in _ARRANGEMENTS:
+    for arrangement, sign, offset in _ARRANGEMENTS:
         if len(pairs) > 2 and all((sign * i + offset) % 8 == to for i, to in pairs):
-            return f"{words}: the order differs from the manual's."
+            return f"{arrangement}: the order differs from the manual's."
     swaps = {frozenset(pair) for pair in wrong.items() if wrong.get(pair[1]) == pair[0]}
-    named = [" and ".join(sorted(map(_words, swap))) for swap in swaps]
-    single = [
-        f"{_words(name)} is reported as {_words(other)}"
+    exchanged = sorted(" and ".join(sorted(map(words, swap))) for swap in swaps)
+    texts = [f"Exchanged: {each}." for each in exchanged] + [
+        f"{words(name)} is reported as {words(other)}."
         for name, other in wrong.items()
         if frozenset((name, other)) not in swaps
     ]
-    return " ".join(
-        [*(f"Exchanged: {each}." for each in sorted(named)), *(f"{s}." for s in single)]
-    )
+    return " ".join(texts)
 
 
 # A hand in front of sonar i is detected by (sign * i + offset) mod 8. Sonars are numbered clockwise
@@ -115,34 +121,27 @@ _ARRANGEMENTS = (
 )
 
 
-def _singly(rest: Mapping[str, float | None], findings: Sequence[Finding]) -> Iterator[str]:
-    for finding in findings:
-        name = _words(finding.name)
-        if rest[finding.name] is None:
-            yield f"{name} is faulty: the board reports 0xFFFF."
-        elif not finding.detected_by:
-            yield f"{name}: no sonar detected the hand."
-        elif finding.detected_by != (finding.name,):
-            others = " and ".join(map(_words, finding.detected_by))
-            yield f"{name}: the hand was detected by {others}."
+def _problem(finding: Finding, resting: float | None) -> str:
+    name = words(finding.name)
+    if resting is None:
+        return f"{name} is faulty: the board reports 0xFFFF."
+    if not finding.detected_by:
+        return f"{name}: no sonar detected the hand."
+    if finding.detected_by == (finding.name,):
+        return ""
+    return f"{name}: the hand was detected by {' and '.join(map(words, finding.detected_by))}."
 
 
-def _one_for_one(findings: Sequence[Finding]) -> dict[str, str]:
-    return {each.name: each.detected_by[0] for each in findings if len(each.detected_by) == 1}
+def _row(finding: Finding, resting: float | None) -> Row:
+    names = ", ".join(map(words, finding.detected_by)) or "none"
+    ranges = f"at {_metres(finding.nearest)}; at rest {_metres(resting)}"
+    return f"hand in front of {words(finding.name)}", f"detected by {names}, {ranges}"
 
 
-def _data(rest: Mapping[str, float | None], findings: Sequence[Finding]) -> Iterator[Row]:
-    for finding in findings:
-        names = ", ".join(map(_words, finding.detected_by)) or "none"
-        ranges = f"at {_metres(finding.nearest)}; at rest {_metres(rest[finding.name])}"
-        yield f"hand in front of {_words(finding.name)}", f"detected by {names}, {ranges}"
-
-
-def _distance(sample: Ultrasonic, index: int) -> float | None:
-    status = sample.status[index]
-    if status == "ok":
-        return sample.ranges[index]
-    return {"too_near": 0.0, "no_echo": math.inf}.get(status)
+def _distances(sample: Ultrasonic) -> list[float | None]:
+    other: dict[str, float] = {"too_near": 0.0, "no_echo": math.inf}
+    pairs = zip(sample.ranges, sample.status, strict=True)
+    return [known if status == "ok" else other.get(status) for known, status in pairs]
 
 
 def _middle(column: Sequence[float | None]) -> float | None:
@@ -150,17 +149,7 @@ def _middle(column: Sequence[float | None]) -> float | None:
     return median(known) if 2 * len(known) > len(column) else None
 
 
-def _is_near(distance: float | None, rest: float | None) -> bool:
-    if distance is None or rest is None:
-        return False
-    return distance < NEAR_M and distance < rest - CLEARLY_M
-
-
 def _metres(distance: float | None) -> str:
     if distance is None:
         return "no reading"
     return "no echo" if math.isinf(distance) else f"{distance:.2f} m"
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

@@ -1,11 +1,10 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import time
 from functools import partial
 
 from cli.commission.bus_session import CheckoutSession
-from cli.commission.latches import LatchTest, judge_estop
+from cli.commission.latches import LatchTest, judge_bumper, judge_estop
 from cli.commission.link import (
     CRC_FRAMES,
     NONZERO_FRAMES,
@@ -14,38 +13,43 @@ from cli.commission.link import (
     judge_crc,
     judge_link,
 )
-from cli.commission.manual_steps import bumper, sonars
 from cli.commission.motion import Run, judge_motion
-from cli.commission.operator import Operator
+from cli.commission.operator import Step, confirm, show
 from cli.commission.report import Verdict, judged
+from cli.commission.sonar import (
+    Finding,
+    HandDetector,
+    Rest,
+    judge_sonars,
+    nearest,
+    obstructions,
+    resting_ranges,
+    words,
+)
+from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
 
 LINK_S = 5.0
 CRC_S = 30.0
+REST_S = 1.0
+HAND_S = 60.0  # to walk around the vehicle and hold a hand there
+AWAY_S = 20.0
 LATCH_S = 2.0
+CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples of these
 ESTOP_S = 0.25  # between two emergency stops until the latch; the bus may lose one
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
 PHRASE = "wheels off the ground"
 NO_LINK = "No link message from the bridge."
+NOT_PRESSED = LatchTest("contact", None, False, (), (), None)
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One step; ``what`` is the instruction to the operator."""
-
-    name: str
-    title: str
-    what: str
-    run: Callable[[CheckoutSession, Operator], Verdict]
-
-
-def link(session: CheckoutSession, operator: Operator) -> Verdict:
+def link(session: CheckoutSession) -> Verdict:
     """Check the link for some seconds."""
-    settings = {path: value for path, (value, _) in session.settings("bridge").items()}
-    session.log.mark()
-    session.listen(LINK_S)
+    settings = {path: setting.value for path, setting in session.settings("bridge").items()}
     log = session.log
+    log.mark()
+    session.listen(LINK_S)
     if not log.links:
         return judged([NO_LINK], "")
     bridge = (one.value for one in log.health if one.value.service == "bridge")
@@ -58,7 +62,7 @@ def link(session: CheckoutSession, operator: Operator) -> Verdict:
     return judge_link([one.value for one in log.links], switches, expected_rates(settings), ports)
 
 
-def crc(session: CheckoutSession, operator: Operator) -> Verdict:
+def crc(session: CheckoutSession) -> Verdict:
     """Count frames until there are enough, or until the time limit."""
     log = session.log
     log.mark()
@@ -68,9 +72,80 @@ def crc(session: CheckoutSession, operator: Operator) -> Verdict:
     return judge_crc([one.value for one in log.links], log.frames, log.nonzero)
 
 
-def estop(session: CheckoutSession, operator: Operator) -> Verdict:
+def sonars(session: CheckoutSession) -> Verdict:
+    """Check the eight sonars, one hand position each."""
+    session.log.mark()
+    session.listen(REST_S)
+    if not session.log.ultrasonics:
+        return judged(["No ranges are received: see the link."], "")
+    rest = resting_ranges([one.value for one in session.log.ultrasonics])
+    if problem := obstructions(rest):
+        return judged([problem], "")
+    return judge_sonars(rest, [_find(session, rest, name) for name in SONAR_NAMES])
+
+
+def _find(session: CheckoutSession, rest: Rest, name: str) -> Finding:
+    if rest[SONAR_NAMES.index(name)] is None:
+        show(f"The {words(name)} sonar is faulty.")
+        return Finding(name, ())
+    show(f"NOW the {words(name)} sonar: hold a hand in front of it, within {HAND_S:g} s.")
+    seen, closest = _wait(session, rest, True, HAND_S)
+    if seen:
+        show(f"  detected by: {', '.join(map(words, seen))}. Take the hand away.")
+        _wait(session, rest, False, AWAY_S)
+    else:
+        show("  no sonar has detected it.")
+    return Finding(name, seen, closest)
+
+
+def _wait(
+    session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float
+) -> tuple[tuple[str, ...], float | None]:
+    """Wait for a hand, or for none; return the detecting sonars, and the nearest reading."""
+    log = session.log
+    detector = HandDetector(rest, since_ns=log.mark())
+    readings: list[float] = []
+
+    def is_so() -> bool:
+        nonlocal detector
+        for one in log.ultrasonics:
+            detector = detector.take(one.value, one.received_ns)
+            distance = nearest(one.value)
+            readings.extend([] if distance is None else [distance])
+        log.ultrasonics.clear()
+        return bool(detector.seen) == hand and detector.settled(time.monotonic_ns())
+
+    found = session.until(is_so, timeout_s)
+    seen = tuple(sorted(detector.seen, key=SONAR_NAMES.index)) if found else ()
+    return seen, min(readings, default=None)
+
+
+def bumper(session: CheckoutSession) -> Verdict:
+    """Check a press and a release of the strip, and the reset."""
+    if problem := session.unlatch():
+        return judged([problem], "")
+    log = session.log
+    log.mark()
+    session.until(lambda: log.bumpers, LATCH_S)
+    if not log.bumpers:
+        return judged(["No bumper messages are received: see the link."], "")
+    if log.bumpers[-1].value.pressed:
+        return judge_bumper(NOT_PRESSED, True)
+    show(f"NOW press the bumper, within {HAND_S:g} s.")
+    session.until(lambda: log.bumpers[-1].value.pressed, HAND_S)
+    hits = [one.received_ns for one in log.bumpers if one.value.pressed]
+    if not hits:
+        return judge_bumper(NOT_PRESSED, False)
+    session.until(lambda: "contact" in session.latched(), LATCH_S)
+    show("Pressed. NOW release it.")
+    gone = session.until(lambda: not log.bumpers[-1].value.pressed, HAND_S)
+    session.listen(CLEAR_S)
+    return judge_bumper(_latch_test(session, "contact", hits[0], gone), False)
+
+
+def estop(session: CheckoutSession) -> Verdict:
     """Publish an emergency stop, and reset it."""
-    if problem := session.unlatch(operator):
+    if problem := session.unlatch():
         return judged([problem], "")
     log = session.log
     at_ns = log.mark()
@@ -79,23 +154,27 @@ def estop(session: CheckoutSession, operator: Operator) -> Verdict:
         if session.until(lambda: "estop" in session.latched(), ESTOP_S):
             break
     session.until(lambda: any(m.value.command is Command.BRAKE for m in log.motions), ESTOP_S)
-    states, motions = list(log.safety), list(log.motions)
-    return judge_estop(LatchTest("estop", at_ns, True, states, motions, session.reset()))
+    return judge_estop(_latch_test(session, "estop", at_ns, True))
 
 
-def move(requested: Twist, session: CheckoutSession, operator: Operator) -> Verdict:
+def _latch_test(session: CheckoutSession, cause: str, at_ns: int, gone: bool) -> LatchTest:
+    """Reset the latch; the messages are copied before, because the reset discards them."""
+    states, motions = list(session.log.safety), list(session.log.motions)
+    return LatchTest(cause, at_ns, gone, states, motions, session.reset())
+
+
+def move(requested: Twist, session: CheckoutSession) -> Verdict:
     """Drive a motion after the operator's confirmation."""
-    if problem := session.unlatch(operator):
+    if problem := session.unlatch():
         return judged([problem], "")
-    if not operator.confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
+    if not confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
         return judged(["Not confirmed: no motion was requested."], "")
     settings = session.settings("bridge")
-    command, feedback = (
-        str(settings[f"wire.{direction}_angular_unit"][0]) for direction in ("command", "feedback")
-    )
+    command = str(settings["wire.command_angular_unit"].value)
+    feedback = str(settings["wire.feedback_angular_unit"].value)
     log = session.log
     log.mark()
-    operator.show("The wheels turn. Ctrl-C stops them.")
+    show("The wheels turn. Ctrl-C stops them.")
     released_ns = session.drive(requested, DRIVE_S)
     if released_ns is None:
         return judged([_not_granted(session)], "")

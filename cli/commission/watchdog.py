@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from cli.commission.operator import Operator
+from cli.commission.operator import Step, confirm, show
 from cli.commission.report import Verdict, judged
 from cli.commission.watchdog_plan import BRAKE, Sample, WatchdogPlan, judge_watchdog
 from cli.settings import Everything
@@ -37,6 +37,7 @@ GUARD_S = 3.0  # RUN and silence of the test take 2 s
 LAST_BRAKES, LAST_S = 10, 0.05
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PHRASE = "wheels off the ground"
+WHAT = "The stack must be down, all wheels off the ground, a hand on the vehicle's switch."
 
 
 class BoardMaster:
@@ -106,23 +107,23 @@ class BoardMaster:
         return f"The board did not send: {', '.join(missing)}." if missing else ""
 
 
-def watchdog(master: BoardMaster, operator: Operator) -> Verdict:
+def watchdog(master: BoardMaster) -> Verdict:
     """Run the test after the operator's confirmation."""
     fact = "The stack is down. The wheels will turn, for a second of it without any command."
-    if not operator.confirm(fact, PHRASE):
+    if not confirm(fact, PHRASE):
         return judged(["Not confirmed: no motion was commanded."], "")
     if problem := master.wait_for_standstill() or master.switch_brakes_on():
         return judged([problem], "")
-    operator.show("The wheels turn. Ctrl-C stops them.")
+    show("The wheels turn. Ctrl-C stops them.")
     with braking_guard(lambda: master.send(BRAKE)), signalled() as signals:
-        plan = _execute(master, operator, signals)
+        plan = _execute(master, signals)
     verdict = judge_watchdog(plan)
     if plan.phase != "over":
         return judged([verdict.text, "NO STANDSTILL after BRAKE."], "", verdict.data)
     return verdict
 
 
-def _execute(master: BoardMaster, operator: Operator, signals: list[int]) -> WatchdogPlan:
+def _execute(master: BoardMaster, signals: list[int]) -> WatchdogPlan:
     plan = WatchdogPlan(time.monotonic_ns())
     warned = False
     try:
@@ -137,7 +138,7 @@ def _execute(master: BoardMaster, operator: Operator, signals: list[int]) -> Wat
             braked_s = (time.monotonic_ns() - (plan.braked_ns or time.monotonic_ns())) / NS_PER_S
             if braked_s > WARN_S and not warned:
                 warned = True
-                operator.show("NO STANDSTILL: use the vehicle's own switch.")
+                show("NO STANDSTILL: use the vehicle's own switch.")
             if braked_s > GIVE_UP_S:
                 break
         return plan
@@ -188,3 +189,6 @@ def _guard(pipe: int, brake: Callable[[], None]) -> None:
             time.sleep(LAST_S)
     finally:
         os._exit(0)
+
+
+WATCHDOG = Step("watchdog", "The board's own watchdog", WHAT, watchdog)

@@ -6,8 +6,8 @@ import pytest
 
 from cli.commission.report import Checked, Report, Verdict, judged, render, seconds
 
-GOOD = Checked("link", "Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
-SKIPPED = Checked("turn", "Turn", Verdict("skipped", "no blocks | today\nsorry"))
+GOOD = Checked("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
+SKIPPED = Checked("Turn", Verdict("skipped", "no blocks | today\nsorry"))
 REPORT = Report(
     robot="001",
     date="2026-03-01 10:00:00 +0800",
