@@ -3,9 +3,11 @@
 import argparse
 import re
 
-from common import keys
+from common import codec, keys
 from common.bus.probe import valid
-from common.messages import Message
+from common.errors import MessageError
+from common.messages import Health, Message
+from common.sample import Sample
 
 # `**` does not match a chunk that begins with "@" (verbatim in Zenoh): both are needed for all.
 EVERYTHING = ("**", "@cmd/**")
@@ -13,7 +15,6 @@ EVERY_ROBOT = "*"
 # Robots of a site are called SITE-NUMBER. If a site's name could contain a dash, "north" would
 # match the robots of "north-east", too.
 SITE = re.compile(r"[A-Za-z0-9_.]+")
-WRONG_SERVICE = "the message names another service than the key"
 
 
 def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
@@ -75,13 +76,16 @@ def chunks(key: str) -> tuple[str, str]:
     return (parts[2], parts[3]) if len(parts) == 4 and key.startswith(f"{keys.ROOT}/") else ("", "")
 
 
-def service_of(key: str) -> str:
-    """Return the service of a whole key ``tel/{service}/...``.
+def decode(sample: Sample, kind: type[codec.S]) -> codec.S:
+    """Decode a sample; raise ``MessageError`` for an invalid one, or health of another service.
 
-    Access rules protect keys, so only the key proves the sender. The name inside a message is not
-    protected.
+    Access rules protect keys, so only the key ``tel/{service}/health`` proves the sender. The name
+    inside a message is not protected.
     """
-    return chunks(key)[1].split("/")[1]
+    message = codec.decode(sample.payload, kind)
+    if isinstance(message, Health) and message.service != chunks(sample.key)[1].split("/")[1]:
+        raise MessageError("the message names another service than the key")
+    return message
 
 
 def topic_of(key: str) -> keys.Topic[Message] | None:

@@ -6,14 +6,14 @@ know at this moment cannot be listed.
 """
 
 import argparse
-import sys
 import time
 
+from cli.inspect import output
 from cli.inspect.addressing import chunks, is_many
-from cli.inspect.session import add_options, open_session
+from cli.inspect.session import add_options, decoded, open_session
 from common import codec, keys
 from common.bus.probe import Probe
-from common.errors import LinkError, MessageError
+from common.errors import LinkError
 from common.messages import SafetyState
 from common.sample import Sample
 
@@ -77,16 +77,15 @@ def report(confirmed: set[str], expected: set[str]) -> None:
         print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` releases it.")
     missing = sorted(expected - confirmed)
     for each in missing:
-        print(
+        output.warn(
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
-            f"{SWITCH}, then `t2 doctor --robot {each}`.",
-            file=sys.stderr,
+            f"{SWITCH}, then `t2 doctor --robot {each}`."
         )
     if missing and len(expected) > 1:
         count = f"{len(missing)} of {len(expected)} robots"
-        print(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}", file=sys.stderr)
+        output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
     if not confirmed | expected:
-        print("t2 estop: sent, but no robot found", file=sys.stderr)
+        output.warn("t2 estop: sent, but no robot found")
 
 
 def _order(probe: Probe, robot: str) -> None:
@@ -94,7 +93,4 @@ def _order(probe: Probe, robot: str) -> None:
 
 
 def _latched(sample: Sample) -> bool:
-    try:
-        return "estop" in codec.decode(sample.payload, SafetyState).latched
-    except MessageError:
-        return False
+    return any("estop" in state.latched for state in decoded([sample], SafetyState))

@@ -7,7 +7,6 @@ attachments, without the protocol overhead.
 """
 
 import argparse
-import sys
 import time
 from functools import partial
 from typing import Any
@@ -21,11 +20,11 @@ from cli.inspect.session import (
     add_options,
     open_session,
     until_interrupt,
-    wants_json,
     whole,
 )
 from cli.inspect.stream_stats import StreamSample, StreamStats
 from common.bus.publisher import host_id
+from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 
@@ -45,22 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Report once a second; return 0 if any message arrived."""
+    """Report once a second; raise ``RobotError`` if no message arrived."""
     streams: dict[str, StreamStats] = {}
-    name = getattr(options, "subcommand", options.command)  # `t2 topic hz` or `t2 hz`
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
         with until_interrupt():
             session.probe.listen(wanted)
-            follow(session, options, streams, name)
+            follow(session, options, streams)
     if not streams:
-        text = f"t2 {name}: no message on {wanted}; `t2 ls` lists the active keys"
-        print(text, file=sys.stderr)
-    return 0 if streams else 1
+        raise RobotError(f"no message on {wanted}; `t2 ls` lists the active keys")
+    return 0
 
 
 def follow(
-    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats], name: str
+    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats]
 ) -> None:
     """Measure and report until the duration or the count is reached."""
     host = host_id()
@@ -78,21 +75,21 @@ def follow(
         if time.monotonic() - reported_s >= REPORT_S:
             reported_s += REPORT_S
             if silent:
-                print(f"t2 {name}: no new messages", file=sys.stderr)
+                output.warn(f"t2 {options.command}: no new messages")
             else:
-                report(streams, name, as_json=wants_json(options))
+                report(streams, options)
             silent = True
     if not silent:
-        report(streams, name, as_json=wants_json(options))
+        report(streams, options)
 
 
-def report(streams: dict[str, StreamStats], name: str, *, as_json: bool) -> None:
+def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:
     """Print the figures of every key."""
-    measure = MEASURES[name]
+    measure = MEASURES[options.command]
     rows = [{"key": key, **measure(stats)} for key, stats in sorted(streams.items())]
     head = [column.replace("_", " ") for column in rows[0]]
-    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), as_json=as_json)
-    if not as_json:
+    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), options.output)
+    if options.output != "json":
         print(flush=True)
 
 

@@ -18,20 +18,21 @@ def line(thing: object) -> None:
     sys.stdout.flush()
 
 
-def value(thing: Any, *, as_json: bool) -> None:
-    """Print a value as one JSON line, or as lines ``name: value``."""
-    line(thing) if as_json else print(fields(thing), flush=True)
+def warn(text: str) -> None:
+    """Print a line to standard error."""
+    print(text, file=sys.stderr)
+
+
+def value(thing: Any, form: str) -> None:
+    """Print a value as one JSON line, or as lines ``name: value``; ``form`` is that of ``-o``."""
+    line(thing) if form == "json" else print(fields(thing), flush=True)
 
 
 def rows(
-    things: Iterable[Row],
-    head: Sequence[str],
-    cells: Callable[[Row], Sequence[str]],
-    *,
-    as_json: bool,
+    things: Iterable[Row], head: Sequence[str], cells: Callable[[Row], Sequence[str]], form: str
 ) -> None:
     """Print one JSON line per row, or a table whose cells ``cells`` returns."""
-    if as_json:
+    if form == "json":
         for each in things:
             line(each)
     else:

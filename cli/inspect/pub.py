@@ -8,7 +8,6 @@ board, and a simulated board is on the bridge's own host.
 import argparse
 import ipaddress
 import json
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -70,10 +69,10 @@ def run(options: argparse.Namespace) -> int:
         try:
             check_message(key, options.message)
         except MessageError as error:
-            print(f"t2 pub: {error}; see `t2 schema {options.key}`", file=sys.stderr)
+            output.warn(f"t2 pub: {error}; see `t2 schema {options.key}`")
             return 2
         if not session.probe.has_reader(key):
-            print(f"t2 pub: no reader on {short(key, session.robot)} yet", file=sys.stderr)
+            output.warn(f"t2 pub: no reader on {short(key, session.robot)} yet")
         with until_interrupt():
             publish(session, key, options)
     return 0

@@ -2,14 +2,17 @@
 
 import argparse
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from cli.inspect.addressing import EVERY_ROBOT, is_many, parse_site
-from common.bus.probe import Probe, probe
+from common import codec
+from common.bus.probe import Answer, Probe, probe
 from common.cli_args import add_sources, sources
 from common.config import load
+from common.errors import MessageError
+from common.sample import Sample
 from common.settings import Shared
 
 
@@ -108,6 +111,13 @@ def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     many = options.robot and is_many(options.robot)
     with probe(config.bus) as opened:
         yield BusSession(opened, options.robot if many else config.robot.id)
+
+
+def decoded(received: Iterable[Sample | Answer], kind: type[codec.S]) -> Iterator[codec.S]:
+    """Yield the valid messages; any program may publish an invalid one."""
+    for each in received:
+        with suppress(MessageError):
+            yield codec.decode(each.payload, kind)
 
 
 @contextmanager
