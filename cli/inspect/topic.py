@@ -81,6 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the subcommand, which then has the name of its command."""
-    options.command = options.subcommand
+    """Run the subcommand, under the name of its own command if it has one."""
+    if options.subcommand != "info":
+        options.command = options.subcommand
     return SUBCOMMANDS[options.subcommand][1](options)
