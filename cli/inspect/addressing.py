@@ -48,11 +48,6 @@ def parse_site(site: str) -> str:
     return f"{site}-$*"
 
 
-def is_many(robot: str) -> bool:
-    """Return whether a robot's chunk of a key matches several robots."""
-    return "*" in robot
-
-
 def expression(word: str, robot: str) -> str:
     """Return the whole key or key expression for a typed key.
 
@@ -113,12 +108,8 @@ def _ending(row: list[str], typed: list[str]) -> str:
         return ""
     if not all(map(_matches, end, typed)):
         return ""
-    return "/".join([*("*" if _is_placeholder(part) else part for part in rest), *typed])
+    return "/".join([*("*" if part.startswith("{") else part for part in rest), *typed])
 
 
 def _matches(part: str, typed: str) -> bool:
-    return part == typed or _is_placeholder(part)
-
-
-def _is_placeholder(part: str) -> bool:
-    return part.startswith("{")
+    return part == typed or part.startswith("{")

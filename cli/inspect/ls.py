@@ -78,7 +78,9 @@ def add_publishers(streams: dict[str, Stream], found: list[Member], wanted: list
     """Add the publishers, and the declared keys on which no message arrived."""
     boots = by_boot(found)
     for key, names in publishers(found).items():
-        if any(intersects(key, each) for each in wanted) and is_stream(key):
+        # Calls and tokens are no streams.
+        is_stream = not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
+        if is_stream and any(intersects(key, each) for each in wanted):
             streams.setdefault(key, Stream()).publishers.update(names)
     for key, stream in streams.items():
         stream.publishers |= {title(boots[boot], found) for boot in stream.boots if boot in boots}
@@ -109,8 +111,3 @@ def as_cells(row: output.Row) -> list[str]:
         "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
         ", ".join(row["publishers"]) or "?",
     ]
-
-
-def is_stream(key: str) -> bool:
-    """Return whether messages are published on a key, as opposed to calls and tokens."""
-    return not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key

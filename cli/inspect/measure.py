@@ -8,8 +8,6 @@ attachments, without the protocol overhead.
 
 import argparse
 import time
-from functools import partial
-from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
@@ -107,18 +105,11 @@ def stream_sample(sample: Sample, host: int) -> StreamSample:
     header = read(sample.payload, sample.encoding).value
     if not isinstance(header, dict):
         return StreamSample(sample.received_ns, sample.size)
-    number = partial(integer, header)
+    numbers = {name: value for name, value in header.items() if isinstance(value, int)}
     delay_s, clock = None, ""
-    if number("mono_ns") and host and header.get("host") == host:
-        delay_s, clock = (sample.received_ns - header["mono_ns"]) / NS_PER_S, "host"
-    elif number("t_ns"):
-        delay_s, clock = (sample.wall_ns - header["t_ns"]) / NS_PER_S, "wall"
-    return StreamSample(
-        sample.received_ns, sample.size, number("seq"), number("boot"), delay_s, clock
-    )
-
-
-def integer(header: dict[str, Any], name: str) -> int | None:
-    """Return an integer of the header; None if it is absent or of another type."""
-    value = header.get(name)
-    return value if isinstance(value, int) else None
+    if numbers.get("mono_ns") and host and numbers.get("host") == host:
+        delay_s, clock = (sample.received_ns - numbers["mono_ns"]) / NS_PER_S, "host"
+    elif numbers.get("t_ns"):
+        delay_s, clock = (sample.wall_ns - numbers["t_ns"]) / NS_PER_S, "wall"
+    seq, boot = numbers.get("seq"), numbers.get("boot")
+    return StreamSample(sample.received_ns, sample.size, seq, boot, delay_s, clock)

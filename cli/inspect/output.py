@@ -71,7 +71,10 @@ def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     body = [[printable(cell) for cell in row] for row in body]
     columns = list(zip(head, *body, strict=True))
     widths = [max(map(len, column)) for column in columns]
-    right = [bool(body) and all(map(_is_number, column[1:])) for column in columns]
+    right = [
+        bool(body) and not any(cell.strip("-+.,0123456789e") for cell in column[1:])
+        for column in columns
+    ]
     return "\n".join(
         "  ".join(
             cell.rjust(width) if to_right else cell.ljust(width)
@@ -107,7 +110,3 @@ def _field(name: str, thing: Any, indent: str) -> str:
     if isinstance(thing, dict | list) and thing:
         return f"{name}\n{fields(thing, indent + '  ')}"
     return f"{name} {scalar(thing)}"
-
-
-def _is_number(cell: str) -> bool:
-    return not cell.strip("-+.,0123456789e")

@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     """Publish until the end; return 2 for an invalid message."""
     robot, path = chunks(expression(options.key, settings(options).robot.id))
     if path == keys.ESTOP_PATH:
-        return estop.stop_with_retry(options, robot)
+        return estop.run(options, robot)
     with open_session(options) as session:
         key = expression(options.key, session.robot)
         check_permission(key, options.simulator, session.probe)

@@ -5,7 +5,6 @@ Liveliness tokens list the robots; safety's newest state gives the verdict.
 
 import argparse
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,15 +70,11 @@ def discover(probe: Probe, robot: str) -> dict[str, Robot]:
         probe.listen(topic.on(robot))
     for name, path in map(chunks, probe.alive(keys.live_key(robot, "*", "*"))):
         found[name].services.add(path.split("/")[1])
-    for key, sample in newest(probe, expected_keys(found)).items():
+    wanted = {keys.SAFETY.on(name) for name, each in found.items() if "safety" in each.services}
+    wanted |= {keys.VELOCITY.on(name) for name, each in found.items() if "bridge" in each.services}
+    for key, sample in newest(probe, wanted).items():
         update(found[chunks(key)[0]], sample)
     return found
-
-
-def expected_keys(found: Mapping[str, Robot]) -> set[str]:
-    """Return the keys on which the present services publish."""
-    safe = {keys.SAFETY.on(name) for name, each in found.items() if "safety" in each.services}
-    return safe | {keys.VELOCITY.on(name) for name in found if "bridge" in found[name].services}
 
 
 def newest(probe: Probe, wanted: set[str]) -> dict[str, Sample]:
