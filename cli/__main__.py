@@ -1,6 +1,6 @@
-"""The ``t2`` command: each subcommand is a module of its name, or the one that ``PLACES`` names.
+"""The ``t2`` command: its subcommands with their modules, by group.
 
-Such a module has ``add_arguments(parser)`` and ``run(options) -> int``. Only the module of the
+A command's module has ``add_arguments(parser)`` and ``run(options) -> int``. Only the module of the
 given command is imported, so that ``t2`` starts fast.
 """
 
@@ -18,78 +18,64 @@ from common.errors import ConfigError, LinkError, RobotError
 
 GROUPS = {
     "Run": {
-        "up": "the whole stack with a simulated vehicle, until Ctrl-C",
-        "demo": "a simulated T2 drives a lap through the real services",
-        "drive": "drive from this terminal, by keys or gamepad",
-        "dashboard": "show, drive and stop the robot in a browser",
-        "estop": "emergency stop: a robot, a site or all, until a reset",
-        "router": "the embedded Zenoh router alone",
-        "sim": "the simulated vehicle alone",
+        "up": ("run.up", "the whole stack with a simulated vehicle, until Ctrl-C"),
+        "demo": ("demo.command", "a simulated T2 drives a lap through the real services"),
+        "drive": ("run.services:drive", "drive from this terminal, by keys or gamepad"),
+        "dashboard": ("run.services:dashboard", "show, drive and stop the robot in a browser"),
+        "estop": ("inspect.estop", "emergency stop: a robot, a site or all, until a reset"),
+        "router": ("run.router", "the embedded Zenoh router alone"),
+        "sim": ("run.services:sim", "the simulated vehicle alone"),
     },
     "Inspect": {
-        "doctor": "diagnose the path from this laptop to the wheels",
-        "robots": "the robots on the bus: verdict, speed, driver",
-        "services": "the services on the bus, with publishers and readers of each key",
-        "health": "service health",
-        "ls": "the active keys: type, rate, publisher",
-        "list": "the same as ls",
-        "echo": "print messages received on a key",
-        "hz": "rate, gaps and losses of a key",
-        "delay": "transport delay of the messages on a key",
-        "bw": "bandwidth of a key",
-        "pub": "publish on a key of your own",
-        "call": "call a service, such as safety/reset",
-        "latency": "reaction times of the bridge, hop by hop",
-        "topic": "as ros2 topic: list, echo, hz, delay, bw, info, pub",
-        "schema": "the fields of a message type",
+        "doctor": ("inspect.doctor", "diagnose the path from this laptop to the wheels"),
+        "robots": ("inspect.robots", "the robots on the bus: verdict, speed, driver"),
+        "services": (
+            "inspect.services",
+            "the services on the bus, with publishers and readers of each key",
+        ),
+        "health": ("inspect.health", "service health"),
+        "ls": ("inspect.ls", "the active keys: type, rate, publisher"),
+        "list": ("inspect.ls", "the same as ls"),
+        "echo": ("inspect.echo", "print messages received on a key"),
+        "hz": ("inspect.measure", "rate, gaps and losses of a key"),
+        "delay": ("inspect.measure", "transport delay of the messages on a key"),
+        "bw": ("inspect.measure", "bandwidth of a key"),
+        "pub": ("inspect.pub", "publish on a key of your own"),
+        "call": ("inspect.call", "call a service, such as safety/reset"),
+        "latency": ("latency", "reaction times of the bridge, hop by hop"),
+        "topic": ("inspect.topic", "as ros2 topic: list, echo, hz, delay, bw, info, pub"),
+        "schema": ("inspect.schema", "the fields of a message type"),
     },
     "Record": {
-        "record": "record everything on the bus to files, until Ctrl-C",
-        "info": "show the content of a recording",
-        "replay": "play a recording onto the bus, or its raw frames to a bridge",
-        "report": "HTML report of a recording: path, speeds, stops, streams",
-        "foxglove": "stream the bus live to Foxglove or Lichtblick",
-        "metrics": "export health, link, safety and odometry to Prometheus",
+        "record": ("run.services:record", "record everything on the bus to files, until Ctrl-C"),
+        "info": ("recordings.info", "show the content of a recording"),
+        "replay": (
+            "recordings.replay.command",
+            "play a recording onto the bus, or its raw frames to a bridge",
+        ),
+        "report": (
+            "recordings.report.command",
+            "HTML report of a recording: path, speeds, stops, streams",
+        ),
+        "foxglove": ("recordings.foxglove", "stream the bus live to Foxglove or Lichtblick"),
+        "metrics": (
+            "run.services:metrics",
+            "export health, link, safety and odometry to Prometheus",
+        ),
     },
     "Commission": {
-        "checkout": "check the real vehicle before its first drive",
-        "wire": "decode captured frames",
+        "checkout": ("commission.command", "check the real vehicle before its first drive"),
+        "wire": ("wire.command", "decode captured frames"),
     },
     "Administer": {
-        "config": "show the effective configuration and the source of each value",
-        "install": "install the services as systemd units on this computer",
-        "keys": "create, renew, revoke and list certificates",
-        "completion": "print the shell completion for bash, zsh or fish",
+        "config": ("settings", "show the effective configuration and the source of each value"),
+        "install": ("run.install", "install the services as systemd units on this computer"),
+        "keys": ("keys.command", "create, renew, revoke and list certificates"),
+        "completion": ("inspect.completion", "print the shell completion for bash, zsh or fish"),
     },
 }
-COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
-INSPECT = (
-    "doctor", "ls", "echo", "pub", "call", "estop", "robots", "services", "health", "schema",
-    "topic", "completion",
-)  # fmt: skip
-PLACES = {
-    "bw": "inspect.measure",
-    "checkout": "commission.command",
-    "config": "settings",
-    "dashboard": "run.services:dashboard",
-    "delay": "inspect.measure",
-    "demo": "demo.command",
-    "drive": "run.services:drive",
-    "foxglove": "recordings.foxglove",
-    "hz": "inspect.measure",
-    "info": "recordings.info",
-    "install": "run.install",
-    "keys": "keys.command",
-    "list": "inspect.ls",
-    "metrics": "run.services:metrics",
-    "record": "run.services:record",
-    "replay": "recordings.replay.command",
-    "report": "recordings.report.command",
-    "router": "run.router",
-    "sim": "run.services:sim",
-    "up": "run.up",
-    "wire": "wire.command",
-} | {name: f"inspect.{name}" for name in INSPECT}
+COMMANDS = {name: text for group in GROUPS.values() for name, (_, text) in group.items()}
+PLACES = {name: place for group in GROUPS.values() for name, (place, _) in group.items()}
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 
@@ -177,13 +163,13 @@ def overview() -> str:
     width = max(map(len, COMMANDS)) + 2
     lines: list[str] = []
     for title, commands in GROUPS.items():
-        lines += [f"{title}:", *(f"  {name:{width}}{text}" for name, text in commands.items()), ""]
+        lines += [f"{title}:", *(f"  {name:{width}}{COMMANDS[name]}" for name in commands), ""]
     return "\n".join([*lines, '"t2 COMMAND --help" shows the options of a command.'])
 
 
 def module(name: str) -> Any:
     """Import the module of a command, or return the ``ServiceCommand`` that stands for it."""
-    path, _, function = PLACES.get(name, name).partition(":")
+    path, _, function = PLACES[name].partition(":")
     found = import_module(f"cli.{path}")
     return getattr(found, function)() if function else found
 

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
-from cli.inspect.session import add_output, wants_json
-from cli.interrupt import interruptible
+from cli.inspect.session import add_output, interruptible, wants_json
 from common import keys, log
 from common.bus.bus import Arrival, Bus
 from common.cli_args import add_sources, sources
@@ -169,7 +168,8 @@ def table(newest: Health | None, silent: bool) -> "Table":
     for name, each in shown_figures["durations"].items():
         whole, _, hop = name.partition(".")
         text = f"  {NAMES.get(hop, hop)}" if hop else NAMES.get(whole, whole)
-        times = (milliseconds(each[key]) for key in ("p50", "p99", "worst"))
+        values = (each[key] for key in ("p50", "p99", "worst"))
+        times = ("" if value is None else f"{value * 1000:.3f}" for value in values)
         made.add_row(text, str(each["count"]), *times, style="" if hop else "bold")
     if not silent:
         left_out = ", ".join(
@@ -179,8 +179,3 @@ def table(newest: Health | None, silent: bool) -> "Table":
             f"up for {shown_figures['uptime']:.0f} s; not counted: {left_out or 'nothing'}"
         )
     return made
-
-
-def milliseconds(seconds: float | None) -> str:
-    """Format a duration in milliseconds."""
-    return "" if seconds is None else f"{seconds * 1000:.3f}"

@@ -3,6 +3,7 @@
 import argparse
 import json
 
+from cli.inspect import output
 from common import settings
 from common.cli_args import add_sources, sources
 from common.config import Loaded, load
@@ -56,11 +57,8 @@ def as_json(loaded: Loaded[Everything]) -> str:
 
 def as_table(loaded: Loaded[Everything]) -> str:
     """Return one line per setting: path, value, source."""
-    rows = [
+    first, *others = (
         (path, json.dumps(setting.value, ensure_ascii=False), setting.origin)
         for path, setting in loaded.settings.items()
-    ]
-    widths = max(len(path) for path, _, _ in rows), max(len(value) for _, value, _ in rows)
-    return "\n".join(
-        f"{path:{widths[0]}}  {value:{widths[1]}}  {origin}" for path, value, origin in rows
     )
+    return output.table(first, others)

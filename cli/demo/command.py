@@ -14,7 +14,7 @@ from cli.demo import host_stalls
 from cli.demo.driver import PERIOD_S, Driver
 from cli.demo.score import good, read, results
 from cli.demo.script import PATIENT, QUICK, Lap, lap
-from cli.interrupt import interruptible
+from cli.inspect.session import interruptible
 from cli.run.supervisor import Supervisor
 from cli.run.up import commands
 from cli.settings import Everything

@@ -3,9 +3,11 @@
 import argparse
 import re
 
-from common import keys
+from common import codec, keys
 from common.bus.probe import valid
-from common.messages import Message
+from common.errors import MessageError
+from common.messages import Health, Message
+from common.sample import Sample
 
 # `**` does not match a chunk that begins with "@" (verbatim in Zenoh): both are needed for all.
 EVERYTHING = ("**", "@cmd/**")
@@ -13,7 +15,6 @@ EVERY_ROBOT = "*"
 # Robots of a site are called SITE-NUMBER. If a site's name could contain a dash, "north" would
 # match the robots of "north-east", too.
 SITE = re.compile(r"[A-Za-z0-9_.]+")
-WRONG_SERVICE = "the message names another service than the key"
 
 
 def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
@@ -47,11 +48,6 @@ def parse_site(site: str) -> str:
     return f"{site}-$*"
 
 
-def is_many(robot: str) -> bool:
-    """Return whether a robot's chunk of a key matches several robots."""
-    return "*" in robot
-
-
 def expression(word: str, robot: str) -> str:
     """Return the whole key or key expression for a typed key.
 
@@ -75,13 +71,16 @@ def chunks(key: str) -> tuple[str, str]:
     return (parts[2], parts[3]) if len(parts) == 4 and key.startswith(f"{keys.ROOT}/") else ("", "")
 
 
-def service_of(key: str) -> str:
-    """Return the service of a whole key ``tel/{service}/...``.
+def decode(sample: Sample, kind: type[codec.S]) -> codec.S:
+    """Decode a sample; raise ``MessageError`` for an invalid one, or health of another service.
 
-    Access rules protect keys, so only the key proves the sender. The name inside a message is not
-    protected.
+    Access rules protect keys, so only the key ``tel/{service}/health`` proves the sender. The name
+    inside a message is not protected.
     """
-    return chunks(key)[1].split("/")[1]
+    message = codec.decode(sample.payload, kind)
+    if isinstance(message, Health) and message.service != chunks(sample.key)[1].split("/")[1]:
+        raise MessageError("the message names another service than the key")
+    return message
 
 
 def topic_of(key: str) -> keys.Topic[Message] | None:
@@ -109,12 +108,8 @@ def _ending(row: list[str], typed: list[str]) -> str:
         return ""
     if not all(map(_matches, end, typed)):
         return ""
-    return "/".join([*("*" if _is_placeholder(part) else part for part in rest), *typed])
+    return "/".join([*("*" if part.startswith("{") else part for part in rest), *typed])
 
 
 def _matches(part: str, typed: str) -> bool:
-    return part == typed or _is_placeholder(part)
-
-
-def _is_placeholder(part: str) -> bool:
-    return part.startswith("{")
+    return part == typed or part.startswith("{")

@@ -5,8 +5,6 @@ fills it in, and the causes of a reset. A reset succeeds when safety's state con
 """
 
 import argparse
-import sys
-from collections.abc import Iterator
 from typing import Any
 
 import msgspec
@@ -15,7 +13,7 @@ from cli.inspect import output
 from cli.inspect.addressing import chunks, expression, parse_one_key
 from cli.inspect.payload import read
 from cli.inspect.pub import json_object
-from cli.inspect.session import BusSession, add_options, open_session, positive, wants_json
+from cli.inspect.session import BusSession, add_options, decoded, open_session, positive
 from common import codec, keys
 from common.bus.probe import Answer, Probe
 from common.errors import MessageError, RobotError
@@ -55,13 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Call and show the reply; return 1 if it failed or is unconfirmed, 2 if invalid."""
+    """Call and show the reply; return 2 if the request is invalid."""
     if not options.key:
         rows = [
             (each.path, each.request.__name__, each.reply.__name__, each.what) for each in CALLS
         ]
         things = [dict(zip(HEAD, row, strict=True)) for row in rows]
-        output.rows(things, HEAD, lambda row: list(row.values()), as_json=wants_json(options))
+        output.rows(things, HEAD, lambda row: list(row.values()), options.output)
         return 0
     robot, below = chunks(options.key.strip("/"))
     path = below or options.key.strip("/")
@@ -70,50 +68,42 @@ def run(options: argparse.Namespace) -> int:
     try:
         packed(call, options.request)
     except MessageError as error:
-        print(f"t2 call: {error}; see `t2 schema {path}`", file=sys.stderr)
+        output.warn(f"t2 call: {error}; see `t2 schema {path}`")
         return 2
     with open_session(options) as session:
-        problem = make(session, call, path, options)
-    if problem:
-        print(f"t2 call: {problem}", file=sys.stderr)
-    return 1 if problem else 0
+        make(session, call, path, options)
+    return 0
 
 
 def make(
     session: BusSession, call: Call[Any, Any] | None, path: str, options: argparse.Namespace
-) -> str:
-    """Call and show the replies; return the problem, or an empty string."""
+) -> None:
+    """Call and show the replies; raise ``RobotError`` if it failed or is unconfirmed."""
     request, seen = options.request, None
     if call and needs_state(call, request):
         session.probe.listen(keys.SAFETY.on(session.robot))
-        seen = next(states(session.probe, STATE_S), None)
+        seen = next(decoded(session.probe.samples(STATE_S), SafetyState), None)
         if seen is None:
-            return NO_STATE
+            raise RobotError(NO_STATE)
         request = filled(call, request, seen)
     key = call.on(session.robot) if call else expression(path, session.robot)
     answers = session.probe.query(key, packed(call, request), options.timeout)
+    if not answers and call:
+        raise RobotError(f"{call.server} does not answer on {key}; run `t2 doctor`")
     if not answers:
-        return no_answer(key, call)
-    if refusals := show(answers, as_json=wants_json(options)):
-        return f"refused: {' '.join(refusals)}"
+        raise RobotError(f"no service answers on {key}; `t2 call` lists the calls")
+    show(answers, options.output)
     if seen and call is keys.RESET and not is_confirmed(session.probe, seen, answers):
-        return "not confirmed: safety's state does not show this reset; run `t2 doctor`"
-    return ""
+        raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
 
 
-def show(answers: list[Answer], *, as_json: bool) -> list[str]:
-    """Print the replies; return the refusals."""
+def show(answers: list[Answer], form: str) -> None:
+    """Print the replies; raise ``RobotError`` with the refusals."""
     for answer in answers:
         if not answer.refusal:
-            output.value(read(answer.payload, answer.encoding).value, as_json=as_json)
-    return [answer.refusal for answer in answers if answer.refusal]
-
-
-def no_answer(key: str, call: Call[Any, Any] | None) -> str:
-    """Return the error text for a call without an answer."""
-    if call:
-        return f"{call.server} does not answer on {key}; run `t2 doctor`"
-    return f"no service answers on {key}; `t2 call` lists the calls"
+            output.value(read(answer.payload, answer.encoding).value, form)
+    if refusals := [answer.refusal for answer in answers if answer.refusal]:
+        raise RobotError(f"refused: {' '.join(refusals)}")
 
 
 def known(path: str) -> Call[Any, Any] | None:
@@ -151,31 +141,12 @@ def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request
         given["causes"] = list(reset_request(seen).causes)
         for cause in seen.causes:
             if cause.id in given["causes"]:
-                print(f"t2 call: clears {cause.name}: {cause.text}", file=sys.stderr)
+                output.warn(f"t2 call: clears {cause.name}: {cause.text}")
     return {"echo": seen.heartbeat, **given}
 
 
 def is_confirmed(probe: Probe, seen: SafetyState, answers: list[Answer]) -> bool:
     """Return whether safety's state soon shows the reset that one of the answers claims."""
-    done = list(resets(answers))
-    return bool(done) and any(
-        confirms(seen, claim, state) for state in states(probe, CONFIRM_S) for claim in done
-    )
-
-
-def states(probe: Probe, seconds: float) -> Iterator[SafetyState]:
-    """Yield the valid states of safety."""
-    for sample in probe.samples(seconds):
-        try:
-            yield codec.decode(sample.payload, SafetyState)
-        except MessageError:
-            continue  # from another publisher
-
-
-def resets(answers: list[Answer]) -> Iterator[ResetDone]:
-    """Yield the answers that claim a reset."""
-    for answer in answers:
-        try:
-            yield codec.decode(answer.payload, ResetDone)
-        except MessageError:
-            continue
+    done = list(decoded(answers, ResetDone))
+    states = decoded(probe.samples(CONFIRM_S), SafetyState)
+    return bool(done) and any(confirms(seen, claim, state) for state in states for claim in done)

@@ -6,7 +6,6 @@ from the parser of the command that is being typed. See docs/adr/0028-shell-comp
 
 import argparse
 import os
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -63,7 +62,7 @@ def add_completers(command: str, parser: argparse.ArgumentParser) -> None:
         elif action.type is Path or "FILE" in str(action.metavar):
             setattr(action, "completer", FilesCompleter())  # noqa: B010 (no attribute of Action)
         elif words := candidates(command, action.metavar):
-            setattr(action, "completer", partial(_completer, words))  # noqa: B010
+            setattr(action, "completer", lambda words=words, **_: words)  # noqa: B010
 
 
 def candidates(command: str, metavar: object) -> dict[str, str]:
@@ -79,7 +78,3 @@ def filled(path: str) -> list[str]:
     """Return the paths of a topic with the usual values of its placeholders."""
     parts = [PLACEHOLDERS.get(part, (part,)) for part in path.split("/")]
     return ["/".join(chosen) for chosen in product(*parts)]
-
-
-def _completer(words: dict[str, str], **_: object) -> dict[str, str]:
-    return words

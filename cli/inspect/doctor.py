@@ -5,36 +5,34 @@ board, switches, sensors, drivers, safety. It only listens and queries; it chang
 """
 
 import argparse
+import socket
+import ssl
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
 from importlib.metadata import version
+from pathlib import Path
 
 from cli.inspect import output, remedies
-from cli.inspect.addressing import (
-    EVERYTHING,
-    WRONG_SERVICE,
-    chunks,
-    expression,
-    service_of,
-    topic_of,
-)
-from cli.inspect.connect_probe import connect
-from cli.inspect.diagnosis import Finding, Observation, diagnose_bus, network
+from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
+from cli.inspect.diagnosis import Attempt, Finding, Observation, diagnose_bus, network
 from cli.inspect.services import discover, routers
 from cli.inspect.session import add_duration, add_options, settings, until_interrupt, wants_json
 from cli.inspect.vehicle import diagnose_vehicle
-from common import codec, keys
-from common import messages as m
+from common import keys
 from common.bus.probe import Probe, probe
 from common.bus.publisher import host_id
 from common.cli_args import VERSION
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.sample import Sample
-from common.settings import Shared
+from common.settings import BusSettings, Shared
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
+CONNECT_S = 2.0
+ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
+STREAMS = ("tcp", "tls", "ws")
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
 
 
@@ -74,6 +72,62 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     yield from diagnose_vehicle(seen)
 
 
+def connect(endpoint: str, bus: BusSettings) -> Attempt:
+    """Connect to one endpoint with a plain socket, to find problems below Zenoh."""
+    protocol, _, rest = endpoint.partition("/")
+    address = rest.partition("?")[0].partition("#")[0]
+    if protocol == "unixsock-stream":
+        exists = Path(address).exists()
+        return Attempt(endpoint, "" if exists else "the socket file is missing", remedies.NO_SOCKET)
+    if protocol not in STREAMS:
+        return Attempt(endpoint, tried=False)
+    name, _, port = address.rpartition(":")
+    host = name.strip("[]")
+    begin_s, took_s = time.monotonic(), 0.0
+    try:
+        with socket.create_connection((host, int(port)), CONNECT_S) as plain:
+            took_s = time.monotonic() - begin_s
+            trouble = handshake(plain, host, bus) if protocol == "tls" else ""
+            todo = remedies.KEYS
+    except OSError as error:
+        trouble, todo = explain(error, host)
+    return Attempt(endpoint, trouble, todo, took_s)
+
+
+def explain(error: OSError, host: str) -> tuple[str, str]:
+    """Return problem and remedy of a failed connection."""
+    match error:
+        case socket.gaierror():
+            return f"unknown host name {host}", remedies.NO_NAME
+        case ConnectionRefusedError():
+            return "connection refused: the host is up, but nothing listens", remedies.REFUSED
+        case TimeoutError():
+            return "no answer", remedies.NO_ROUTE
+    return (error.strerror or str(error)).lower(), remedies.NO_ROUTE
+
+
+def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
+    """Do a TLS handshake; return the problem, empty if both certificates are valid."""
+    try:
+        context = ssl.create_default_context(cafile=bus.ca)
+        context.load_cert_chain(bus.certificate, bus.private_key)
+    except OSError as error:  # the base class of SSLError
+        reason = error.strerror or getattr(error, "reason", "") or str(error)
+        return f"bus.ca, bus.certificate or bus.private_key is invalid: {reason}"
+    try:
+        with context.wrap_socket(plain, server_hostname=host) as sock:
+            sock.settimeout(ALERT_S)
+            sock.recv(1)  # in TLS 1.3 the server checks our certificate after our handshake ends
+    except ssl.SSLCertVerificationError as error:
+        return f"the router's certificate is not trusted: {error.verify_message}"
+    except ssl.SSLError as error:
+        reason = (error.reason or str(error)).lower().replace("_", " ")
+        return f"the router refuses this certificate: {reason}"
+    except TimeoutError:
+        return ""  # the router has accepted us and waits for the first message of a session
+    return "the router closes the connection on this certificate"
+
+
 def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     """Return the observation of one robot."""
     seen = Observation(zenoh=version("eclipse-zenoh"), t2=VERSION)
@@ -108,12 +162,9 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
     if topic is None:
         return
     try:
-        message = codec.decode(sample.payload, topic.message)
+        message = decode(sample, topic.message)
     except MessageError as error:
         seen.undecodable[path] = str(error)
-        return
-    if isinstance(message, m.Health) and message.service != service_of(sample.key):
-        seen.undecodable[path] = WRONG_SERVICE
         return
     if path.startswith("tel/"):
         seen.delays_s.append((sample.wall_ns - message.t_ns) / NS_PER_S)

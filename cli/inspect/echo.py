@@ -1,7 +1,6 @@
 """``t2 echo``: print messages received on a key, valid or not."""
 
 import argparse
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -9,15 +8,8 @@ from typing import Any
 from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
-from cli.inspect.session import (
-    BusSession,
-    add_end,
-    add_options,
-    open_session,
-    until_interrupt,
-    wants_json,
-)
-from common.errors import MessageError
+from cli.inspect.session import BusSession, add_end, add_options, open_session, until_interrupt
+from common.errors import MessageError, RobotError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 
@@ -41,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print messages; return 0 if any arrived."""
+    """Print messages; raise ``RobotError`` if none arrived."""
     shown = 0
     most = 1 if options.once else options.count
     duration_s = options.duration or (ONCE_S if options.once else None)
@@ -57,12 +49,11 @@ def run(options: argparse.Namespace) -> int:
                     break
         left_out = session.probe.left_out
     if left_out:
-        print(f"t2 echo: {left_out} messages dropped: output too slow", file=sys.stderr)
+        output.warn(f"t2 echo: {left_out} messages dropped: output too slow")
     if not shown:
         within = f" within {duration_s:g} s" if duration_s else ""
-        text = f"t2 echo: no message on {wanted}{within}; `t2 ls` lists the active keys"
-        print(text, file=sys.stderr)
-    return 0 if shown else 1
+        raise RobotError(f"no message on {wanted}{within}; `t2 ls` lists the active keys")
+    return 0
 
 
 def samples(session: BusSession, wanted: str, duration_s: float | None) -> Iterator[Sample]:
@@ -72,7 +63,7 @@ def samples(session: BusSession, wanted: str, duration_s: float | None) -> Itera
     if first is not None:
         yield first
     elif duration_s is None or duration_s > FIRST_S:
-        print(f"t2 echo: no message on {wanted} yet; waiting", file=sys.stderr)
+        output.warn(f"t2 echo: no message on {wanted} yet; waiting")
     left_s = None if duration_s is None else duration_s - (time.monotonic() - begun_s)
     yield from session.probe.samples(left_s)
 
@@ -81,8 +72,8 @@ def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
     """Print one sample in the format of the options."""
     reading = read(sample.payload, sample.encoding)
     if options.field:
-        output.value(field(reading, sample, options.field), as_json=wants_json(options))
-    elif wants_json(options):
+        output.value(field(reading, sample, options.field), options.output)
+    elif options.output == "json":
         output.line(as_json(sample, reading, robot))
     else:
         form = as_line if options.output == "table" else as_text

@@ -6,16 +6,15 @@ know at this moment cannot be listed.
 """
 
 import argparse
-import sys
 import time
 
-from cli.inspect.addressing import chunks, is_many
-from cli.inspect.session import add_options, open_session
+from cli.inspect import output
+from cli.inspect.addressing import chunks
+from cli.inspect.session import add_options, decoded, open_session
 from common import codec, keys
 from common.bus.probe import Probe
-from common.errors import LinkError, MessageError
+from common.errors import LinkError
 from common.messages import SafetyState
-from common.sample import Sample
 
 TIMEOUT_S = 3.0
 REPEAT_S = 0.1
@@ -28,12 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Stop; return 1 if a robot does not confirm."""
-    return stop_with_retry(options)
-
-
-def stop_with_retry(options: argparse.Namespace, robot: str | None = None) -> int:
+def run(options: argparse.Namespace, robot: str | None = None) -> int:
     """Stop the robot of the options, or another one; retry while no router is reachable."""
     end_s = time.monotonic() + TIMEOUT_S
     while True:
@@ -57,7 +51,7 @@ def stop(probe: Probe, robot: str) -> int:
         for each in (robot, *sorted(expected - confirmed - {robot})):
             _order(probe, each)
         for sample in probe.samples(REPEAT_S):
-            if chunks(sample.key)[0] not in confirmed and _latched(sample):
+            if any("estop" in state.latched for state in decoded([sample], SafetyState)):
                 confirmed.add(chunks(sample.key)[0])
     report(confirmed, expected)
     return 0 if confirmed and confirmed >= expected else 1
@@ -65,7 +59,7 @@ def stop(probe: Probe, robot: str) -> int:
 
 def expected_robots(probe: Probe, robot: str) -> set[str]:
     """Return the robots that must confirm: the named one, or all present ones."""
-    if not is_many(robot):
+    if "*" not in robot:
         return {robot}
     tokens = map(chunks, probe.alive(keys.live_key(robot, "*", "*")))
     return {name for name, path in tokens if path.split("/")[1] in MOVES}
@@ -77,24 +71,16 @@ def report(confirmed: set[str], expected: set[str]) -> None:
         print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` releases it.")
     missing = sorted(expected - confirmed)
     for each in missing:
-        print(
+        output.warn(
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
-            f"{SWITCH}, then `t2 doctor --robot {each}`.",
-            file=sys.stderr,
+            f"{SWITCH}, then `t2 doctor --robot {each}`."
         )
     if missing and len(expected) > 1:
         count = f"{len(missing)} of {len(expected)} robots"
-        print(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}", file=sys.stderr)
+        output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
     if not confirmed | expected:
-        print("t2 estop: sent, but no robot found", file=sys.stderr)
+        output.warn("t2 estop: sent, but no robot found")
 
 
 def _order(probe: Probe, robot: str) -> None:
     probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
-
-
-def _latched(sample: Sample) -> bool:
-    try:
-        return "estop" in codec.decode(sample.payload, SafetyState).latched
-    except MessageError:
-        return False

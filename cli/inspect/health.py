@@ -5,22 +5,15 @@ answer, so a container's health check can run it often.
 """
 
 import argparse
-import sys
 from typing import Any, NamedTuple
 
 import msgspec
 
 from cli.inspect import output
-from cli.inspect.addressing import WRONG_SERVICE, chunks, service_of
+from cli.inspect.addressing import chunks, decode
 from cli.inspect.services import discover
-from cli.inspect.session import (
-    BusSession,
-    add_options,
-    open_session,
-    until_interrupt,
-    wants_json,
-)
-from common import codec, keys
+from cli.inspect.session import BusSession, add_options, open_session, until_interrupt, wants_json
+from common import keys
 from common.bus.probe import Answer, Probe
 from common.errors import MessageError
 from common.messages import Health
@@ -67,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         print(output.table(HEAD, list(map(as_cells, found))))
     unhealthy = [row for row in found if row.state != "ok"]
     for row in unhealthy:
-        print(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}", file=sys.stderr)
+        output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
     return 1 if unhealthy else 0
 
 
@@ -113,14 +106,10 @@ def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
     with until_interrupt():
         for sample in probe.samples(LISTEN_S):
             try:
-                health, name = codec.decode(sample.payload, Health), service_of(sample.key)
+                health = decode(sample, Health)
+                newest[chunks(sample.key)[0], health.service] = health
             except MessageError as error:
-                print(f"t2 health: {sample.key}: {error}", file=sys.stderr)
-                continue
-            if health.service == name:
-                newest[chunks(sample.key)[0], name] = health
-            else:
-                print(f"t2 health: {sample.key}: {WRONG_SERVICE}", file=sys.stderr)
+                output.warn(f"t2 health: {sample.key}: {error}")
     return newest
 
 

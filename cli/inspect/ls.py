@@ -4,7 +4,6 @@ A key is active if a message arrives on it while the command listens, or if a pu
 """
 
 import argparse
-import sys
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,17 +12,11 @@ from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, shor
 from cli.inspect.graph import Member, by_boot, publishers, title
 from cli.inspect.measure import WINDOW, stream_sample
 from cli.inspect.services import discover
-from cli.inspect.session import (
-    BusSession,
-    add_duration,
-    add_options,
-    open_session,
-    until_interrupt,
-    wants_json,
-)
+from cli.inspect.session import BusSession, add_duration, add_options, open_session, until_interrupt
 from cli.inspect.stream_stats import StreamStats
 from common import codec
 from common.bus.probe import intersects
+from common.errors import RobotError
 from common.sample import Sample
 
 LISTEN_S = 2.0  # two periods of the slowest streams
@@ -57,17 +50,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List the active keys; return 1 without any."""
+    """List the active keys; raise ``RobotError`` without any."""
     with open_session(options) as session:
         words = [options.key] if options.key else EVERYTHING
         wanted = [expression(word, session.robot) for word in words]
         streams = listen(session, wanted, options.duration)
         add_publishers(streams, discover(session.probe, session.robot), wanted)
     if not streams:
-        print(f"t2 ls: no active key on {', '.join(wanted)}; try `t2 doctor`", file=sys.stderr)
-        return 1
+        raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
     rows = [as_json(key, streams[key], session.robot) for key in sorted(streams)]
-    output.rows(rows, HEAD, as_cells, as_json=wants_json(options))
+    output.rows(rows, HEAD, as_cells, options.output)
     return 0
 
 
@@ -86,7 +78,9 @@ def add_publishers(streams: dict[str, Stream], found: list[Member], wanted: list
     """Add the publishers, and the declared keys on which no message arrived."""
     boots = by_boot(found)
     for key, names in publishers(found).items():
-        if any(intersects(key, each) for each in wanted) and is_stream(key):
+        # Calls and tokens are no streams.
+        is_stream = not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
+        if is_stream and any(intersects(key, each) for each in wanted):
             streams.setdefault(key, Stream()).publishers.update(names)
     for key, stream in streams.items():
         stream.publishers |= {title(boots[boot], found) for boot in stream.boots if boot in boots}
@@ -117,8 +111,3 @@ def as_cells(row: output.Row) -> list[str]:
         "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
         ", ".join(row["publishers"]) or "?",
     ]
-
-
-def is_stream(key: str) -> bool:
-    """Return whether messages are published on a key, as opposed to calls and tokens."""
-    return not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key

@@ -7,10 +7,7 @@ attachments, without the protocol overhead.
 """
 
 import argparse
-import sys
 import time
-from functools import partial
-from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
@@ -21,11 +18,11 @@ from cli.inspect.session import (
     add_options,
     open_session,
     until_interrupt,
-    wants_json,
     whole,
 )
 from cli.inspect.stream_stats import StreamSample, StreamStats
 from common.bus.publisher import host_id
+from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 
@@ -45,22 +42,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Report once a second; return 0 if any message arrived."""
+    """Report once a second; raise ``RobotError`` if no message arrived."""
     streams: dict[str, StreamStats] = {}
-    name = getattr(options, "subcommand", options.command)  # `t2 topic hz` or `t2 hz`
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
         with until_interrupt():
             session.probe.listen(wanted)
-            follow(session, options, streams, name)
+            follow(session, options, streams)
     if not streams:
-        text = f"t2 {name}: no message on {wanted}; `t2 ls` lists the active keys"
-        print(text, file=sys.stderr)
-    return 0 if streams else 1
+        raise RobotError(f"no message on {wanted}; `t2 ls` lists the active keys")
+    return 0
 
 
 def follow(
-    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats], name: str
+    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats]
 ) -> None:
     """Measure and report until the duration or the count is reached."""
     host = host_id()
@@ -78,21 +73,21 @@ def follow(
         if time.monotonic() - reported_s >= REPORT_S:
             reported_s += REPORT_S
             if silent:
-                print(f"t2 {name}: no new messages", file=sys.stderr)
+                output.warn(f"t2 {options.command}: no new messages")
             else:
-                report(streams, name, as_json=wants_json(options))
+                report(streams, options)
             silent = True
     if not silent:
-        report(streams, name, as_json=wants_json(options))
+        report(streams, options)
 
 
-def report(streams: dict[str, StreamStats], name: str, *, as_json: bool) -> None:
+def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:
     """Print the figures of every key."""
-    measure = MEASURES[name]
+    measure = MEASURES[options.command]
     rows = [{"key": key, **measure(stats)} for key, stats in sorted(streams.items())]
     head = [column.replace("_", " ") for column in rows[0]]
-    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), as_json=as_json)
-    if not as_json:
+    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), options.output)
+    if options.output != "json":
         print(flush=True)
 
 
@@ -110,18 +105,11 @@ def stream_sample(sample: Sample, host: int) -> StreamSample:
     header = read(sample.payload, sample.encoding).value
     if not isinstance(header, dict):
         return StreamSample(sample.received_ns, sample.size)
-    number = partial(integer, header)
+    numbers = {name: value for name, value in header.items() if isinstance(value, int)}
     delay_s, clock = None, ""
-    if number("mono_ns") and host and header.get("host") == host:
-        delay_s, clock = (sample.received_ns - header["mono_ns"]) / NS_PER_S, "host"
-    elif number("t_ns"):
-        delay_s, clock = (sample.wall_ns - header["t_ns"]) / NS_PER_S, "wall"
-    return StreamSample(
-        sample.received_ns, sample.size, number("seq"), number("boot"), delay_s, clock
-    )
-
-
-def integer(header: dict[str, Any], name: str) -> int | None:
-    """Return an integer of the header; None if it is absent or of another type."""
-    value = header.get(name)
-    return value if isinstance(value, int) else None
+    if numbers.get("mono_ns") and host and numbers.get("host") == host:
+        delay_s, clock = (sample.received_ns - numbers["mono_ns"]) / NS_PER_S, "host"
+    elif numbers.get("t_ns"):
+        delay_s, clock = (sample.wall_ns - numbers["t_ns"]) / NS_PER_S, "wall"
+    seq, boot = numbers.get("seq"), numbers.get("boot")
+    return StreamSample(sample.received_ns, sample.size, seq, boot, delay_s, clock)

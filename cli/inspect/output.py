@@ -18,20 +18,21 @@ def line(thing: object) -> None:
     sys.stdout.flush()
 
 
-def value(thing: Any, *, as_json: bool) -> None:
-    """Print a value as one JSON line, or as lines ``name: value``."""
-    line(thing) if as_json else print(fields(thing), flush=True)
+def warn(text: str) -> None:
+    """Print a line to standard error."""
+    print(text, file=sys.stderr)
+
+
+def value(thing: Any, form: str) -> None:
+    """Print a value as one JSON line, or as lines ``name: value``; ``form`` is that of ``-o``."""
+    line(thing) if form == "json" else print(fields(thing), flush=True)
 
 
 def rows(
-    things: Iterable[Row],
-    head: Sequence[str],
-    cells: Callable[[Row], Sequence[str]],
-    *,
-    as_json: bool,
+    things: Iterable[Row], head: Sequence[str], cells: Callable[[Row], Sequence[str]], form: str
 ) -> None:
     """Print one JSON line per row, or a table whose cells ``cells`` returns."""
-    if as_json:
+    if form == "json":
         for each in things:
             line(each)
     else:
@@ -70,7 +71,10 @@ def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     body = [[printable(cell) for cell in row] for row in body]
     columns = list(zip(head, *body, strict=True))
     widths = [max(map(len, column)) for column in columns]
-    right = [bool(body) and all(map(_is_number, column[1:])) for column in columns]
+    right = [
+        bool(body) and not any(cell.strip("-+.,0123456789e") for cell in column[1:])
+        for column in columns
+    ]
     return "\n".join(
         "  ".join(
             cell.rjust(width) if to_right else cell.ljust(width)
@@ -106,7 +110,3 @@ def _field(name: str, thing: Any, indent: str) -> str:
     if isinstance(thing, dict | list) and thing:
         return f"{name}\n{fields(thing, indent + '  ')}"
     return f"{name} {scalar(thing)}"
-
-
-def _is_number(cell: str) -> bool:
-    return not cell.strip("-+.,0123456789e")

@@ -8,7 +8,6 @@ board, and a simulated board is on the bridge's own host.
 import argparse
 import ipaddress
 import json
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -63,17 +62,17 @@ def run(options: argparse.Namespace) -> int:
     """Publish until the end; return 2 for an invalid message."""
     robot, path = chunks(expression(options.key, settings(options).robot.id))
     if path == keys.ESTOP_PATH:
-        return estop.stop_with_retry(options, robot)
+        return estop.run(options, robot)
     with open_session(options) as session:
         key = expression(options.key, session.robot)
         check_permission(key, options.simulator, session.probe)
         try:
             check_message(key, options.message)
         except MessageError as error:
-            print(f"t2 pub: {error}; see `t2 schema {options.key}`", file=sys.stderr)
+            output.warn(f"t2 pub: {error}; see `t2 schema {options.key}`")
             return 2
         if not session.probe.has_reader(key):
-            print(f"t2 pub: no reader on {short(key, session.robot)} yet", file=sys.stderr)
+            output.warn(f"t2 pub: no reader on {short(key, session.robot)} yet")
         with until_interrupt():
             publish(session, key, options)
     return 0

@@ -4,19 +4,17 @@ Liveliness tokens list the robots; safety's newest state gives the verdict.
 """
 
 import argparse
-import sys
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT, chunks
 from cli.inspect.estop import MOVES
-from cli.inspect.session import add_options, open_session, until_interrupt, wants_json
+from cli.inspect.session import add_options, open_session, until_interrupt
 from common import codec, keys
 from common.bus.probe import Probe
-from common.errors import MessageError
+from common.errors import MessageError, RobotError
 from common.messages import SafetyState, Velocity
 from common.sample import Sample
 
@@ -54,15 +52,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List the robots; return 1 without any, or if one that moves has no safety state."""
+    """List the robots; return 1 if one that moves has no safety state."""
     options.robot = options.robot or EVERY_ROBOT
     with open_session(options) as session:
         found = discover(session.probe, session.robot)
     if not found:
-        print("t2 robots: no robot found; try `t2 doctor`", file=sys.stderr)
-        return 1
+        raise RobotError("no robot found; try `t2 doctor`")
     rows = [as_json(name, found[name]) for name in sorted(found)]
-    output.rows(rows, HEAD, as_cells, as_json=wants_json(options))
+    output.rows(rows, HEAD, as_cells, options.output)
     return 0 if all(each.state for each in found.values() if each.moves) else 1
 
 
@@ -73,15 +70,11 @@ def discover(probe: Probe, robot: str) -> dict[str, Robot]:
         probe.listen(topic.on(robot))
     for name, path in map(chunks, probe.alive(keys.live_key(robot, "*", "*"))):
         found[name].services.add(path.split("/")[1])
-    for key, sample in newest(probe, expected_keys(found)).items():
+    wanted = {keys.SAFETY.on(name) for name, each in found.items() if "safety" in each.services}
+    wanted |= {keys.VELOCITY.on(name) for name, each in found.items() if "bridge" in each.services}
+    for key, sample in newest(probe, wanted).items():
         update(found[chunks(key)[0]], sample)
     return found
-
-
-def expected_keys(found: Mapping[str, Robot]) -> set[str]:
-    """Return the keys on which the present services publish."""
-    safe = {keys.SAFETY.on(name) for name, each in found.items() if "safety" in each.services}
-    return safe | {keys.VELOCITY.on(name) for name in found if "bridge" in found[name].services}
 
 
 def newest(probe: Probe, wanted: set[str]) -> dict[str, Sample]:
@@ -103,7 +96,7 @@ def update(robot: Robot, sample: Sample) -> None:
         else:
             robot.velocity = codec.decode(sample.payload, Velocity)
     except MessageError as error:
-        print(f"t2 robots: {sample.key}: {error}", file=sys.stderr)
+        output.warn(f"t2 robots: {sample.key}: {error}")
 
 
 def as_json(name: str, robot: Robot) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from msgspec import Struct
 from cli.inspect import output
 from cli.inspect.addressing import expression, topic_of
 from cli.inspect.payload import kinds
-from cli.inspect.session import add_options, settings, wants_json
+from cli.inspect.session import add_options, settings
 from common import messages
 from common.errors import RobotError
 from common.keys import CALLS, TOPICS
@@ -37,13 +37,12 @@ def run(options: argparse.Namespace) -> int:
     if not options.type:
         rows = [{"type": name, "keys": paths} for name, paths in keys_by_type().items()]
         output.rows(
-            rows, ("type", "on"), lambda row: [row["type"], ", ".join(row["keys"])],
-            as_json=wants_json(options),
-        )  # fmt: skip
+            rows, ("type", "on"), lambda row: [row["type"], ", ".join(row["keys"])], options.output
+        )
         return 0
     name = find_type(options.type, settings(options).robot.id)
     kind = kinds()[name]
-    if wants_json(options):
+    if options.output == "json":
         output.line(msgspec.json.schema(kind))
         return 0
     print(f"{name}: {(kind.__doc__ or '').splitlines()[0]}\n")

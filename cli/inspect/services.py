@@ -10,7 +10,6 @@ listening.
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from cli.inspect.payload import read
 from cli.inspect.session import add_options, open_session, wants_json
 from common import keys
 from common.bus.probe import Probe, intersects
+from common.errors import RobotError
 
 # The router of a robot that connects to a site's router is a peer there.
 ADMIN = "@/*/*/*/t2/v1/{robot}/**"
@@ -39,15 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the services; return 1 without any."""
+    """Show the services; raise ``RobotError`` without any."""
     with open_session(options) as session:
         found = discover(session.probe, session.robot)
         commands = listen_to_commands(session.probe, session.robot, found)
     if not found:
-        print("t2 services: no service found; try `t2 doctor`", file=sys.stderr)
-        return 1
+        raise RobotError("no service found; try `t2 doctor`")
     if not any(each.reads or each.publishes for each in found):
-        print(f"t2 services: {CLOSED}", file=sys.stderr)
+        output.warn(f"t2 services: {CLOSED}")
     links = edges(found, intersects) + commands
     if options.dot:
         print(dot(found, links, session.robot))

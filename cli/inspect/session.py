@@ -1,15 +1,19 @@
-"""Options and bus session that the inspection commands share."""
+"""Options, bus session and handling of Ctrl-C that the commands share."""
 
 import argparse
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from cli.inspect.addressing import EVERY_ROBOT, is_many, parse_site
-from common.bus.probe import Probe, probe
+from cli.inspect.addressing import EVERY_ROBOT, parse_site
+from common import codec
+from common.bus.probe import Answer, Probe, probe
 from common.cli_args import add_sources, sources
 from common.config import load
+from common.errors import MessageError
+from common.loop import Loop
+from common.sample import Sample
 from common.settings import Shared
 
 
@@ -52,7 +56,7 @@ def add_output(parser: argparse.ArgumentParser) -> None:
 
 def one_robot(text: str) -> str:
     """Check the name of one robot, for commands that work on one robot at a time."""
-    if is_many(text):
+    if "*" in text:
         raise argparse.ArgumentTypeError("this command works on one robot at a time; name it")
     return text
 
@@ -96,7 +100,7 @@ def wants_json(options: argparse.Namespace) -> bool:
 
 def settings(options: argparse.Namespace) -> Shared:
     """Return the effective shared settings; ``--robot`` with one name sets ``robot.id``."""
-    if options.robot and not is_many(options.robot):
+    if options.robot and "*" not in options.robot:
         options.sets = [*options.sets, f"robot.id={options.robot}"]
     return load(Shared, sources(options)).config
 
@@ -105,9 +109,33 @@ def settings(options: argparse.Namespace) -> Shared:
 def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     """Open a bus session for the context; raise ``LinkError`` without a router."""
     config = settings(options)
-    many = options.robot and is_many(options.robot)
+    several = options.robot and "*" in options.robot
     with probe(config.bus) as opened:
-        yield BusSession(opened, options.robot if many else config.robot.id)
+        yield BusSession(opened, options.robot if several else config.robot.id)
+
+
+def decoded(received: Iterable[Sample | Answer], kind: type[codec.S]) -> Iterator[codec.S]:
+    """Yield the valid messages; any program may publish an invalid one."""
+    for each in received:
+        with suppress(MessageError):
+            yield codec.decode(each.payload, kind)
+
+
+@contextmanager
+def interruptible(loop: Loop) -> Iterator[list[int]]:
+    """Stop the loop on SIGINT or SIGTERM while the context lasts; yield the signals received."""
+    received: list[int] = []
+
+    def stop(number: int, _: object) -> None:
+        received.append(number)
+        loop.stop()
+
+    before = {name: signal.signal(name, stop) for name in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for name, handler in before.items():
+            signal.signal(name, handler)
 
 
 @contextmanager

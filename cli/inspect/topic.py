@@ -1,7 +1,6 @@
 """``t2 topic``: the subcommands of ``ros2 topic``, and ``t2 topic info``."""
 
 import argparse
-import sys
 from collections.abc import Callable
 
 from cli.inspect import echo, ls, measure, output, pub
@@ -9,7 +8,7 @@ from cli.inspect.addressing import expression, parse_one_key, short, topic_of
 from cli.inspect.graph import by_boot, title
 from cli.inspect.payload import read
 from cli.inspect.services import discover
-from cli.inspect.session import BusSession, add_options, open_session, wants_json
+from cli.inspect.session import BusSession, add_options, open_session
 from common import codec
 from common.bus.probe import intersects
 
@@ -26,9 +25,9 @@ def run_info(options: argparse.Namespace) -> int:
     """Show a key; return 1 if it has neither publisher nor reader."""
     with open_session(options) as session:
         found = info(session, expression(options.key, session.robot))
-    output.value(found, as_json=wants_json(options))
+    output.value(found, options.output)
     if not found["publishers"] and not found["readers"]:
-        print("t2 topic info: the key has no publisher and no reader", file=sys.stderr)
+        output.warn("t2 topic info: the key has no publisher and no reader")
         return 1
     return 0
 
@@ -63,10 +62,7 @@ def info(session: BusSession, key: str) -> dict[str, object]:
     }
 
 
-Subcommand = tuple[
-    Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int], str
-]
-SUBCOMMANDS: dict[str, Subcommand] = {
+SUBCOMMANDS: dict[str, tuple[Callable[..., None], Callable[..., int], str]] = {
     "list": (ls.add_arguments, ls.run, "list the active keys; also `t2 ls`"),
     "info": (add_info_arguments, run_info, "type, publishers and readers of a key"),
     "echo": (echo.add_arguments, echo.run, "print messages; also `t2 echo`"),
@@ -85,5 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the subcommand."""
+    """Run the subcommand, under the name of its own command if it has one."""
+    if options.subcommand != "info":
+        options.command = options.subcommand
     return SUBCOMMANDS[options.subcommand][1](options)

@@ -7,7 +7,6 @@ first interface.
 
 import io
 import re
-import socket
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -83,7 +82,7 @@ def _hex(text: str) -> bytes | None:
 
 def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
     try:
-        from dpkt import dpkt, ip, ip6, pcap, udp  # type: ignore[import-untyped]
+        from dpkt import dpkt, ip, ip6, pcap, udp, utils  # type: ignore[import-untyped]
     except ImportError:
         raise RobotError(
             "reading a capture needs dpkt; `make` installs it, or pip install -e '.[inspect]'"
@@ -98,8 +97,9 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
                 network = network.data
             if not isinstance(network, bytes) and isinstance(network.data, udp.UDP):
                 segment = network.data
-                ends = _ends(network.src, segment.sport, network.dst, segment.dport)
-                yield Datagram(f"packet {number} {ends}", bytes(segment.data))
+                source = f"{utils.inet_to_str(network.src)}:{segment.sport}"
+                target = f"{utils.inet_to_str(network.dst)}:{segment.dport}"
+                yield Datagram(f"packet {number} {source} > {target}", bytes(segment.data))
     except (dpkt.Error, ValueError, KeyError) as error:
         raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
 
@@ -121,10 +121,3 @@ def _link(name: str, kind: int) -> Callable[[bytes], Any]:
     if kind not in links:
         raise RobotError(f"{name}: unsupported link type {kind}; capture on Ethernet")
     return links[kind]
-
-
-def _ends(source: bytes, source_port: int, target: bytes, target_port: int) -> str:
-    family = socket.AF_INET if len(source) == 4 else socket.AF_INET6
-    addresses = (socket.inet_ntop(family, address) for address in (source, target))
-    ends = zip(addresses, (source_port, target_port), strict=True)
-    return " > ".join(f"{address}:{port}" for address, port in ends)

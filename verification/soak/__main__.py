@@ -22,7 +22,7 @@ from cli.demo.command import (
     traced,
 )
 from cli.demo.script import PATIENT, QUICK
-from cli.interrupt import interruptible
+from cli.inspect.session import interruptible
 from cli.run.supervisor import Supervisor
 from cli.run.up import passed_on
 from cli.settings import Everything

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from cli.inspect import remedies
-from cli.inspect.connect_probe import connect
+from cli.inspect.doctor import connect
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop

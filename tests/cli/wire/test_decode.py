@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cli.wire.decode import Bad, Good, as_json, as_text, parts
+from cli.wire.command import Bad, Good, as_json, as_text, parts
 from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
