@@ -4,10 +4,10 @@ Names follow Prometheus' conventions: base units, ``_total`` for counters. Stale
 sample; ``t2_robot_up``, ``t2_service_up`` and the ages report them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from prometheus_client.core import (
     CounterMetricFamily,
@@ -16,10 +16,10 @@ from prometheus_client.core import (
     Metric,
 )
 
-from common.freshness import Latest, fresh
+from common.freshness import fresh
 from common.keys import ROOT
 from common.members import Members
-from common.messages import Health, Link, Odometry, SafetyState, Timing, Verdict
+from common.messages import Health, Link, Message, Odometry, SafetyState, Timing, Verdict
 from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
 
 Kind = Literal["gauge", "counter", "histogram"]
@@ -113,13 +113,13 @@ class Scrape:
         self,
         name: str,
         bounds: Sequence[float],
-        counts: Iterable[int],
+        cumulative: Iterable[int],
         total: float | None,
         *labels: str,
     ) -> None:
-        """Add a histogram; ``counts`` holds one count per bucket, the last one unbounded."""
+        """Add a histogram by the counts up to each bound and the count of all."""
         ends = [*(f"{bound:.3g}" for bound in bounds), "+Inf"]
-        buckets = list(zip(ends, accumulate(counts), strict=True))
+        buckets = list(zip(ends, cumulative, strict=True))
         self.families[name].add_metric(labels, buckets, total)  # type: ignore[attr-defined]
 
 
@@ -147,20 +147,11 @@ def metric_families(
 
 def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
     scrape.add("t2_robot_up", robot.is_up(now_ns), name)
-    streams: dict[str, Latest[SafetyState] | Latest[Link] | Latest[Odometry] | None] = {
-        "safety": robot.safety,
-        "link": robot.link,
-        "odometry": robot.odometry,
-    }
-    for stream, latest in streams.items():
-        if latest is not None:
-            scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
-    if robot.safety and fresh(robot.safety, now_ns, FRESH_S):
-        _safety(scrape, name, robot.safety.value)
-    if robot.link and fresh(robot.link, now_ns, FRESH_S):
-        _link(scrape, name, robot.link.value)
-    if robot.odometry and fresh(robot.odometry, now_ns, FRESH_S):
-        _odometry(scrape, name, robot.odometry.value)
+    for message, latest in robot.streams.items():
+        stream, add_samples = OF_STREAM[message]
+        scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
+        if fresh(latest, now_ns, FRESH_S):
+            add_samples(scrape, name, latest.value)
     recorder = robot.services.get("recorder")
     if recorder and recorder.is_healthy(now_ns):
         scrape.add("t2_recorder_disk_full", robot.disk_full(), name)
@@ -176,9 +167,9 @@ def _service(scrape: Scrape, labels: tuple[str, str], service: ServiceState, now
     scrape.add("t2_service_health_age_seconds", service.health.age_s(now_ns), *labels)
     if fresh(service.health, now_ns, FRESH_S):
         _health(scrape, labels, service.health.value)
-        lateness = service.lateness
+        late, counts = service.lateness, accumulate(service.lateness.counts)
         scrape.add_histogram(
-            "t2_service_loop_lateness_seconds", LATENESS_S, lateness.counts, lateness.total, *labels
+            "t2_service_loop_lateness_seconds", LATENESS_S, counts, late.total, *labels
         )
 
 
@@ -204,9 +195,8 @@ def _timing(scrape: Scrape, labels: tuple[str, str], timing: Timing) -> None:
             continue
         cumulative = list(accumulate(durations.counts))
         kept = [*cumulative[:-1:BUCKET_STEP], cumulative[-1]]
-        counts = [after - before for before, after in zip([0, *kept], kept, strict=False)]
         scrape.add_histogram(
-            "t2_reaction_seconds", timing.bounds[::BUCKET_STEP], counts, None, *labels, name
+            "t2_reaction_seconds", timing.bounds[::BUCKET_STEP], kept, None, *labels, name
         )
 
 
@@ -238,6 +228,11 @@ def _odometry(scrape: Scrape, robot: str, odometry: Odometry) -> None:
     scrape.add("t2_odometry_slip", odometry.slip, robot)
     if odometry.residual is not None:
         scrape.add("t2_odometry_residual_meters", odometry.residual, robot)
+
+
+OF_STREAM: dict[type[Message], tuple[str, Callable[[Scrape, str, Any], None]]] = {
+    SafetyState: ("safety", _safety), Link: ("link", _link), Odometry: ("odometry", _odometry),
+}  # fmt: skip
 
 
 def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:
