@@ -24,7 +24,7 @@ from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import Push
 from services.dashboard.robot import Robot
-from services.dashboard.snapshot import event_lines, fast_snapshot, slow_snapshot
+from services.dashboard.snapshot import fast_snapshot, slow_snapshot
 
 PERIOD_S = 0.05
 SLOW_TICKS = 10  # between two slow snapshots
@@ -136,8 +136,8 @@ class Fleet:
             vehicle=self._vehicle,
             protection=robot.protection,
         )
-        robot.driver_lock.sent(self._number, now_ns)
-        robot.snapshots.sent(self._number, robot.telemetry.newest(keys.SAFETY, now_ns), now_ns)
+        state = robot.telemetry.newest(keys.SAFETY, now_ns)
+        robot.driver_lock.sent(self._number, now_ns, state)
         robot.used_ns = now_ns
         self._send(here, fast, replaces=True)
         if self._number % SLOW_TICKS == 0:
@@ -156,7 +156,7 @@ class Fleet:
         count = robot.telemetry.event_count
         late = [key for key, viewer in here.items() if viewer.events_sent != count]
         if late:
-            self._send(late, {"k": "events", "lines": event_lines(robot.telemetry)})
+            self._send(late, {"k": "events", "lines": list(robot.telemetry.events)})
             for key in late:
                 here[key].events_sent = count
 
@@ -238,7 +238,7 @@ class Fleet:
     def _seen(self, viewer: str, robot: Robot, number: int) -> SafetyState | None:
         """Return the state of safety that the viewer saw; refuse a late command with a notice."""
         limit_s = self._settings.call_round_trip
-        seen = robot.snapshots.seen(number, time.monotonic_ns(), limit_s)
+        seen = robot.driver_lock.seen(number, time.monotonic_ns(), limit_s)
         if seen is None:
             self._notify(viewer, "warning", "too_late")
         return seen
