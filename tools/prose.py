@@ -30,7 +30,7 @@ EXCLUDED = {
 }  # fmt: skip
 COMMENTED = {".toml", ".yaml", ".yml", ".sh", ".nft", ".service", ".conf", ".env"}
 COMMENTED_NAMES = {"Makefile", "Dockerfile"}
-CATALOGUES = {"texts.toml"}  # their strings are prose, too
+CATALOGUES = {"texts.toml", "families.toml"}  # their strings are prose, too
 HASH_COMMENT = re.compile(r"(?:^|(?<=\s))#+(?=\s)[^\n]*", re.MULTILINE)
 # Code, and blocks that are generated from code; `events` is written by hand.
 MARKDOWN_CODE = re.compile(

@@ -11,7 +11,7 @@ import html
 from collections.abc import Callable
 from urllib.parse import parse_qs
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -62,26 +62,21 @@ class AuthMiddleware:
         connection = self._find(scope["client"])
         send = _with_headers(connection, send)
         is_socket = scope["type"] == "websocket"
-        if _is_reserved(connection) and not scope["path"].startswith(ESTOP):
+        is_reserved = connection is not None and connection.place is Place.RESERVE
+        if is_reserved and not scope["path"].startswith(ESTOP):
             await _refuse(is_socket, "too many connections; only E-STOP is served")(
                 scope, receive, send
             )
             return
-        headers = {
-            name.decode("latin1"): value.decode("latin1") for name, value in scope["headers"]
-        }
+        headers, credentials = Headers(scope=scope), self._credentials
         acts = is_socket or scope["method"] not in SAFE_METHODS
-        if self._is_allowed(headers, acts=acts):
+        if credentials.may_act(headers) if acts else credentials.may_view(headers):
             await self.app(scope, receive, send)
         elif is_socket:
             await _refuse(is_socket, "")(scope, receive, send)
         else:
             answer = await self._authenticate(Request(scope, receive))
             await answer(scope, receive, send)
-
-    def _is_allowed(self, headers: dict[str, str], *, acts: bool) -> bool:
-        credentials = self._credentials
-        return credentials.may_act(headers) if acts else credentials.may_view(headers)
 
     async def _authenticate(self, request: Request) -> Response:
         if not self._credentials.token:
@@ -111,10 +106,6 @@ class AuthMiddleware:
             if len(body) > BODY_MAX:
                 return ""
         return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
-
-
-def _is_reserved(connection: Connection | None) -> bool:
-    return connection is not None and connection.place is Place.RESERVE
 
 
 def _with_headers(connection: Connection | None, send: Send) -> Send:

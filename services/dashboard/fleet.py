@@ -244,11 +244,14 @@ class Fleet:
         return seen
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
-        self._send([viewer], notice(level, text, about))
+        """Send a text or its key in ``i18n``, and the key of the result that it explains."""
+        notice = {"k": "notice", "level": level, "text": text, "about": about}
+        self._send([viewer], notice)
 
     def _broadcast(self, robot: str, level: Level, text: str, about: str = "") -> None:
-        here = [key for key, viewer in self._viewers.items() if viewer.robot == robot]
-        self._send(here, notice(level, text, about))
+        for key, viewer in self._viewers.items():
+            if viewer.robot == robot:
+                self._notify(key, level, text, about)
 
     def _send_trail(self, viewers: Collection[str], robot: Robot) -> None:
         self._send(viewers, {"k": "path", "points": list(robot.trail.points)})
@@ -285,8 +288,3 @@ class Fleet:
             return  # no viewer could select it
         tokens = self._alive.setdefault(robot, set())
         (tokens.add if alive else tokens.discard)(key)
-
-
-def notice(level: Level, text: str, about: str) -> dict[str, str]:
-    """Return a notice: a text or its key in ``i18n``, and the key of the result it explains."""
-    return {"k": "notice", "level": level, "text": text, "about": about}

@@ -1,14 +1,15 @@
-"""Prometheus samples of the robots: the table of metric families, and their values. Pure.
+"""Prometheus samples of the robots, by the table of metric families ``families.toml``.
 
 Names follow Prometheus' conventions: base units, ``_total`` for counters. Stale values have no
 sample; ``t2_robot_up``, ``t2_service_up`` and the ages report them.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import accumulate
+from pathlib import Path
 from typing import Any, Literal, get_args
 
+import msgspec
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -22,13 +23,13 @@ from common.members import Members
 from common.messages import Health, Link, Message, Odometry, SafetyState, Timing, Verdict
 from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
 
+FILE = Path(__file__).with_name("families.toml")
 Kind = Literal["gauge", "counter", "histogram"]
 KINDS = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
 BUCKET_STEP = 4  # every fourth bound of a reaction: two per decade
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
+class Family(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A metric; its samples differ in their labels."""
 
     name: str
@@ -37,63 +38,7 @@ class Family:
     help: str
 
 
-ONE = ("robot",)
-EACH = ("robot", "service")
-FAMILIES = (
-    Family("t2_bus_connected", "gauge", (), "Whether the exporter is connected to a router"),
-    Family(
-        "t2_certificate_expiry_timestamp_seconds", "gauge", ("role", "name"),
-        "Expiry of a member's certificate",
-    ),
-    Family("t2_robot_up", "gauge", ONE, "Whether the robot is alive"),
-    Family(
-        "t2_stream_age_seconds", "gauge", (*ONE, "stream"), "Time since a stream's latest message"
-    ),
-    Family("t2_service_up", "gauge", EACH, "Whether the service is present and healthy"),
-    Family("t2_service_instances", "gauge", EACH, "Processes of the service on the bus"),
-    Family("t2_service_health_age_seconds", "gauge", EACH, "Time since the latest health message"),
-    Family("t2_service_info", "gauge", (*EACH, "version"), "Always 1; the version is the label"),
-    Family("t2_service_uptime_seconds", "gauge", EACH, "Time since the start of the service"),
-    Family("t2_service_resident_memory_bytes", "gauge", EACH, "Resident memory"),
-    Family("t2_service_realtime_priority", "gauge", EACH, "SCHED_FIFO priority; 0 if ordinary"),
-    Family(
-        "t2_service_message_rate_hertz", "gauge", (*EACH, "key"), "Messages in the last second"
-    ),
-    Family("t2_service_counts_total", "counter", (*EACH, "counter"), "The service's counters"),
-    Family(
-        "t2_service_loop_lateness_seconds", "histogram", EACH,
-        "Maximum lateness of the event loop in each second",
-    ),
-    Family("t2_reaction_seconds", "histogram", (*EACH, "reaction"), "Reaction times"),
-    Family("t2_safety_verdict", "gauge", (*ONE, "verdict"), "1 for the current verdict"),
-    Family("t2_safety_latched", "gauge", ONE, "Latched causes that need a reset"),
-    Family(
-        "t2_safety_cause_active", "gauge", (*ONE, "cause", "action"),
-        "1 for each cause that limits or stops the motion",
-    ),
-    Family("t2_safety_drives", "gauge", (*ONE, "source"), "1 for the source that drives"),
-    Family("t2_link_up", "gauge", ONE, "Whether the board's reports arrive"),
-    Family("t2_link_armed", "gauge", ONE, "Whether the bridge accepts a RUN"),
-    Family("t2_link_round_trip_seconds", "gauge", ONE, "Round trip of a board query, median"),
-    Family("t2_link_frame_rate_hertz", "gauge", (*ONE, "frame"), "Frames in the last second"),
-    Family("t2_link_rejected_total", "counter", (*ONE, "reason"), "Rejected frames and datagrams"),
-    Family("t2_link_board_restarts_total", "counter", ONE, "Restarts of the board"),
-    Family("t2_odometry_linear_velocity_meters_per_second", "gauge", ONE, "Forward positive"),
-    Family(
-        "t2_odometry_angular_velocity_radians_per_second", "gauge", ONE,
-        "Counter-clockwise positive",
-    ),
-    Family(
-        "t2_odometry_residual_meters", "gauge", ONE,
-        "Distance by counters minus distance by velocities, over a second",
-    ),
-    Family("t2_odometry_slip", "gauge", ONE, "Whether counters and velocities disagree"),
-    Family("t2_recorder_disk_full", "gauge", ONE, "Whether the recorder stopped: the disk is full"),
-    Family(
-        "t2_events_total", "counter", (*EACH, "event", "level"),
-        "Events received, including replayed ones",
-    ),
-)  # fmt: skip
+FAMILIES = msgspec.toml.decode(FILE.read_bytes(), type=dict[str, tuple[Family, ...]])["family"]
 
 
 class Scrape:
