@@ -9,6 +9,8 @@ import base64
 import hashlib
 import html
 from collections.abc import Callable
+from pathlib import Path
+from string import Template
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -25,10 +27,8 @@ WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
 ESTOP = "/estop/"
-STYLE = """body{font:18px system-ui,sans-serif;background:#0d1117;color:#f0f6fc;display:grid;
-place-content:center;min-height:90vh;gap:12px;text-align:center}input,button{font:inherit;
-padding:12px;border-radius:8px;border:1px solid #57606a;width:100%;box-sizing:border-box}
-button{background:#1f6feb;color:#fff;margin-top:12px}"""  # of the token page
+TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
+STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
@@ -131,9 +131,4 @@ def _refuse(is_socket: bool, reason: str) -> ASGIApp:
 def token_page(wrong: bool) -> str:
     """Return the HTML of the token page."""
     lines = [html.escape(text) for text in TEXTS["token_wrong" if wrong else "token_ask"]]
-    return f"""<!doctype html><meta charset=utf-8><title>T2</title>
-<meta name=viewport content="width=device-width, initial-scale=1">
-<style>{STYLE}</style>
-<form method=post action="/"><h1>T2</h1><p>{"<br>".join(lines)}</p>
-<input name=token type=password autofocus autocomplete=current-password><button>OK</button></form>
-"""
+    return Template(TOKEN_PAGE).substitute(text="<br>".join(lines))
