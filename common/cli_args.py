@@ -1,10 +1,14 @@
 """Command-line options, exit codes and version that all programs of T2 share."""
 
 import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
 from common.config import DEFAULT_FILE, Sources
+from common.errors import ConfigError, LinkError, RobotError
 
 # As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
 VERSION = "0.1.0"
@@ -12,6 +16,7 @@ VERSION = "0.1.0"
 EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
 EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
 NO_RESTART = (EXIT_CONFIG, EXIT_LINK)
+EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}  # of other errors: 1
 WIDTH = 100  # characters, of a service's help
 
 
@@ -39,3 +44,38 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 def sources(options: argparse.Namespace) -> Sources:
     """Return the sources of settings named by the options."""
     return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)
+
+
+def add_setting(parser: argparse.ArgumentParser, option: str, path: str, text: str) -> None:
+    """Add an option for one setting; it has the effect of ``--set PATH=VALUE``."""
+    parser.add_argument(
+        option, action="append", dest="sets", metavar=option[2:].upper(), default=[],
+        type=lambda value: f"{path}={value}", help=text,
+    )  # fmt: skip
+
+
+def run_program(
+    name: str,
+    add_arguments: Callable[[argparse.ArgumentParser], None],
+    run: Callable[[argparse.Namespace], int],
+    argv: Sequence[str] | None,
+) -> int:
+    """Run a program with its options and return its exit code, as for every service."""
+    parser = argparse.ArgumentParser(prog=name)
+    add_arguments(parser)
+    try:
+        return run(parser.parse_args(argv))
+    except RobotError as error:
+        print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - logs may not be set up yet
+        return EXIT_CODES.get(type(error), 1)
+
+
+@contextmanager
+def needs_extra(extra: str, what: str) -> Iterator[None]:
+    """Raise ``RobotError`` that names the extra if an import in the block finds no library."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise RobotError(
+            f"{what} needs {error.name}: install the extra `{extra}` (pip install -e '.[{extra}]')"
+        ) from None

@@ -4,9 +4,12 @@ from collections.abc import Callable
 
 from common import codec, keys
 from common.bus.bus import Arrival, Bus
-from common.messages import Drive, SafetyState
+from common.messages import Direction, Drive, SafetyState
+from common.operator import ReleaseCalls
 
 DENIED_AFTER = 10  # requests; a router needs a moment to announce its subscribers
+RELEASE_TIMEOUT_S = 0.3
+HELD = "held"  # the first answer of a release, with any distance left
 
 
 class DriveSource:
@@ -43,3 +46,32 @@ class DriveSource:
 
     def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
         self._echo = arrival.message.heartbeat
+
+
+def call_release(
+    bus: Bus,
+    calls: ReleaseCalls,
+    direction: Direction | None,
+    seen: SafetyState | None,
+    newest: SafetyState | None,
+    *,
+    report: Callable[[bool, str], None],
+) -> None:
+    """Make the calls of one tick of a release, see ``ReleaseCalls.tick``.
+
+    ``report`` receives whether the release is held, and the text: once, and for each new refusal.
+    """
+
+    def answered(is_held: bool, text: str) -> None:
+        calls.answered()
+        if calls.is_new(HELD if is_held else text):
+            report(is_held, text)
+
+    for request in calls.tick(direction, seen, newest):
+        bus.call(
+            keys.RELEASE,
+            request,
+            (lambda done: answered(True, done.text)) if request.held else lambda _: None,
+            (lambda reason: answered(False, reason)) if request.held else lambda _: None,
+            timeout_s=RELEASE_TIMEOUT_S,
+        )

@@ -30,6 +30,7 @@ EXCLUDED = {
 }  # fmt: skip
 COMMENTED = {".toml", ".yaml", ".yml", ".sh", ".nft", ".service", ".conf", ".env"}
 COMMENTED_NAMES = {"Makefile", "Dockerfile"}
+CATALOGUES = {"texts.toml", "families.toml"}  # their strings are prose, too
 HASH_COMMENT = re.compile(r"(?:^|(?<=\s))#+(?=\s)[^\n]*", re.MULTILINE)
 # Code, and blocks that are generated from code; `events` is written by hand.
 MARKDOWN_CODE = re.compile(
@@ -211,6 +212,8 @@ def prose(path: Path, text: str) -> str:
     """Return the text with everything masked that is not prose, line breaks kept."""
     if path.suffix == ".py":
         return _python(text)
+    if path.name in CATALOGUES:
+        return text
     if path.suffix == ".md":
         return MARKDOWN_CODE.sub(lambda match: _masked(match[0]), text)
     return _kept(text, [match.span() for match in HASH_COMMENT.finditer(text)])

@@ -9,9 +9,11 @@ import base64
 import hashlib
 import html
 from collections.abc import Callable
+from pathlib import Path
+from string import Template
 from urllib.parse import parse_qs
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -25,10 +27,8 @@ WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
 ESTOP = "/estop/"
-STYLE = """body{font:18px system-ui,sans-serif;background:#0d1117;color:#f0f6fc;display:grid;
-place-content:center;min-height:90vh;gap:12px;text-align:center}input,button{font:inherit;
-padding:12px;border-radius:8px;border:1px solid #57606a;width:100%;box-sizing:border-box}
-button{background:#1f6feb;color:#fff;margin-top:12px}"""  # of the token page
+TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
+STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
@@ -62,26 +62,21 @@ class AuthMiddleware:
         connection = self._find(scope["client"])
         send = _with_headers(connection, send)
         is_socket = scope["type"] == "websocket"
-        if _is_reserved(connection) and not scope["path"].startswith(ESTOP):
+        is_reserved = connection is not None and connection.place is Place.RESERVE
+        if is_reserved and not scope["path"].startswith(ESTOP):
             await _refuse(is_socket, "too many connections; only E-STOP is served")(
                 scope, receive, send
             )
             return
-        headers = {
-            name.decode("latin1"): value.decode("latin1") for name, value in scope["headers"]
-        }
+        headers, credentials = Headers(scope=scope), self._credentials
         acts = is_socket or scope["method"] not in SAFE_METHODS
-        if self._is_allowed(headers, acts=acts):
+        if credentials.may_act(headers) if acts else credentials.may_view(headers):
             await self.app(scope, receive, send)
         elif is_socket:
             await _refuse(is_socket, "")(scope, receive, send)
         else:
             answer = await self._authenticate(Request(scope, receive))
             await answer(scope, receive, send)
-
-    def _is_allowed(self, headers: dict[str, str], *, acts: bool) -> bool:
-        credentials = self._credentials
-        return credentials.may_act(headers) if acts else credentials.may_view(headers)
 
     async def _authenticate(self, request: Request) -> Response:
         if not self._credentials.token:
@@ -113,10 +108,6 @@ class AuthMiddleware:
         return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
 
 
-def _is_reserved(connection: Connection | None) -> bool:
-    return connection is not None and connection.place is Place.RESERVE
-
-
 def _with_headers(connection: Connection | None, send: Send) -> Send:
     """Return ``send`` with the response headers; an accepted WebSocket has no deadline."""
 
@@ -140,9 +131,4 @@ def _refuse(is_socket: bool, reason: str) -> ASGIApp:
 def token_page(wrong: bool) -> str:
     """Return the HTML of the token page."""
     lines = [html.escape(text) for text in TEXTS["token_wrong" if wrong else "token_ask"]]
-    return f"""<!doctype html><meta charset=utf-8><title>T2</title>
-<meta name=viewport content="width=device-width, initial-scale=1">
-<style>{STYLE}</style>
-<form method=post action="/"><h1>T2</h1><p>{"<br>".join(lines)}</p>
-<input name=token type=password autofocus autocomplete=current-password><button>OK</button></form>
-"""
+    return Template(TOKEN_PAGE).substitute(text="<br>".join(lines))

@@ -1,7 +1,7 @@
 """Messages from the browser, as tagged JSON; any other message is refused.
 
-``n`` is the number of the snapshot that a message answers: see ``driver_lock.py`` for a hold and
-``snapshot.SentSnapshots`` for a reset or a switch.
+``n`` is the number of the snapshot that a message answers: see ``driver_lock.py`` for a hold, a
+reset or a switch.
 """
 
 from typing import Annotated

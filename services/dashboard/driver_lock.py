@@ -25,7 +25,7 @@ from enum import Enum
 
 from common.codec import finite
 from common.freshness import NS_PER_S
-from common.messages import Direction
+from common.messages import Direction, SafetyState
 from common.motion import clamp
 
 SNAPSHOTS_KEPT = 64  # 3 s; an older one is too old for any setting
@@ -58,7 +58,9 @@ class DriverLock:
     push: Push = field(default_factory=Push)
     gear: int = 1
     answered: int = 0  # the newest snapshot that a hold answered
-    _sent: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT))
+    _sent: deque[tuple[int, int, SafetyState | None]] = field(
+        default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT)
+    )
     _answered_ns: int = 0  # when the newest answered snapshot was sent
 
     def take(self, viewer: str, force: bool) -> bool:
@@ -76,13 +78,23 @@ class DriverLock:
             self.let_go(viewer)
             self.driver = None
 
-    def sent(self, number: int, now_ns: int) -> None:
-        """Note that a snapshot is sent to the viewers now."""
-        self._sent.append((number, now_ns))
+    def sent(self, number: int, now_ns: int, state: SafetyState | None = None) -> None:
+        """Note that a snapshot with this state of safety is sent to the viewers now."""
+        self._sent.append((number, now_ns, state))
+
+    def seen(self, number: int, now_ns: int, limit_s: float) -> SafetyState | None:
+        """Return safety's state in a snapshot; None if it is unknown, too old or had none.
+
+        A reset, a switch and a release answer a snapshot by its number. The call carries the echo
+        and the causes of that snapshot, so that a delayed click has no effect on anything newer.
+        """
+        known = (sent for sent in self._sent if sent[0] == number)
+        _, sent_ns, state = next(known, (number, 0, None))
+        return state if now_ns - sent_ns <= limit_s * NS_PER_S else None
 
     def hold(self, viewer: str, snapshot: int, push: Push, now_ns: int) -> bool:
         """Handle a browser's hold in answer to a snapshot; return whether it is valid."""
-        sent_ns = next((at_ns for number, at_ns in self._sent if number == snapshot), None)
+        sent_ns = next((at_ns for number, at_ns, _ in self._sent if number == snapshot), None)
         if viewer != self.driver or not finite(push.linear, push.angular) or sent_ns is None:
             return False
         if self.state is HoldState.LAPSED or now_ns - sent_ns > self.round_trip_s * NS_PER_S:

@@ -24,7 +24,7 @@ from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import Push
 from services.dashboard.robot import Robot
-from services.dashboard.snapshot import event_lines, fast_snapshot, slow_snapshot
+from services.dashboard.snapshot import fast_snapshot, slow_snapshot
 
 PERIOD_S = 0.05
 SLOW_TICKS = 10  # between two slow snapshots
@@ -136,8 +136,8 @@ class Fleet:
             vehicle=self._vehicle,
             protection=robot.protection,
         )
-        robot.driver_lock.sent(self._number, now_ns)
-        robot.snapshots.sent(self._number, robot.telemetry.newest(keys.SAFETY, now_ns), now_ns)
+        state = robot.telemetry.newest(keys.SAFETY, now_ns)
+        robot.driver_lock.sent(self._number, now_ns, state)
         robot.used_ns = now_ns
         self._send(here, fast, replaces=True)
         if self._number % SLOW_TICKS == 0:
@@ -156,7 +156,7 @@ class Fleet:
         count = robot.telemetry.event_count
         late = [key for key, viewer in here.items() if viewer.events_sent != count]
         if late:
-            self._send(late, {"k": "events", "lines": event_lines(robot.telemetry)})
+            self._send(late, {"k": "events", "lines": list(robot.telemetry.events)})
             for key in late:
                 here[key].events_sent = count
 
@@ -238,17 +238,20 @@ class Fleet:
     def _seen(self, viewer: str, robot: Robot, number: int) -> SafetyState | None:
         """Return the state of safety that the viewer saw; refuse a late command with a notice."""
         limit_s = self._settings.call_round_trip
-        seen = robot.snapshots.seen(number, time.monotonic_ns(), limit_s)
+        seen = robot.driver_lock.seen(number, time.monotonic_ns(), limit_s)
         if seen is None:
             self._notify(viewer, "warning", "too_late")
         return seen
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
-        self._send([viewer], notice(level, text, about))
+        """Send a text or its key in ``i18n``, and the key of the result that it explains."""
+        notice = {"k": "notice", "level": level, "text": text, "about": about}
+        self._send([viewer], notice)
 
     def _broadcast(self, robot: str, level: Level, text: str, about: str = "") -> None:
-        here = [key for key, viewer in self._viewers.items() if viewer.robot == robot]
-        self._send(here, notice(level, text, about))
+        for key, viewer in self._viewers.items():
+            if viewer.robot == robot:
+                self._notify(key, level, text, about)
 
     def _send_trail(self, viewers: Collection[str], robot: Robot) -> None:
         self._send(viewers, {"k": "path", "points": list(robot.trail.points)})
@@ -285,8 +288,3 @@ class Fleet:
             return  # no viewer could select it
         tokens = self._alive.setdefault(robot, set())
         (tokens.add if alive else tokens.discard)(key)
-
-
-def notice(level: Level, text: str, about: str) -> dict[str, str]:
-    """Return a notice: a text or its key in ``i18n``, and the key of the result it explains."""
-    return {"k": "notice", "level": level, "text": text, "about": about}

@@ -24,11 +24,10 @@ from common.operator import (
     ResetCheck,
     reset_request,
 )
-from common.source import DriveSource
+from common.source import DriveSource, call_release
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock
 from services.dashboard.sectors import Protection
-from services.dashboard.snapshot import SentSnapshots
 from services.dashboard.telemetry_cache import TelemetryCache, Trail, path_of
 
 R = TypeVar("R", bound=msgspec.Struct)
@@ -40,7 +39,6 @@ FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
-RELEASE_TIMEOUT_S = 0.3
 PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
 
 
@@ -59,7 +57,6 @@ class Robot:
         self.trail = Trail()
         self.protection = Protection()
         self.driver_lock = DriverLock(settings.round_trip)
-        self.snapshots = SentSnapshots()
         self.used_ns = 0  # the last time that a viewer selected or stopped it
         self.trail_sent = False  # whether the viewers have the current trail
         self._settings = settings
@@ -179,30 +176,17 @@ class Robot:
     ) -> None:
         """Make the calls of a release that is held in a direction, or has ended."""
         limit_s = self._settings.round_trip
-        seen = self.snapshots.seen(self.driver_lock.answered, now_ns, limit_s)
-        for request in self._release.tick(direction, seen, newest):
-            self.bus.call(
-                keys.RELEASE,
-                request,
-                self._release_held if request.held else lambda _: None,
-                self._release_refused if request.held else lambda _: None,
-                timeout_s=RELEASE_TIMEOUT_S,
-            )
+        seen = self.driver_lock.seen(self.driver_lock.answered, now_ns, limit_s)
+        call_release(self.bus, self._release, direction, seen, newest, report=self._on_release)
 
-    def _release_held(self, done: m.Done) -> None:
-        """Report the first answer of a release; the page shows the distance that is left."""
-        self._release.answered()
-        self._report_release("info", done.text, "release_held")
-
-    def _release_refused(self, reason: str) -> None:
-        self._release.answered()
-        self._report_release("warning", reason, "release_refused")
-
-    def _report_release(self, level: m.Level, text: str, key: str) -> None:
-        driver = self.driver_lock.driver
-        result = key if level == "info" else text
-        if driver is not None and self._release.is_new(result):
-            self._notify(driver, level, text, key)
+    def _on_release(self, is_held: bool, text: str) -> None:
+        """Report a release to its driver; the page shows the distance that is left."""
+        if (driver := self.driver_lock.driver) is None:
+            return
+        if is_held:
+            self._notify(driver, "info", text, "release_held")
+        else:
+            self._notify(driver, "warning", text, "release_refused")
 
     # --- telemetry ----------------------------------------------------------------------------
 

@@ -5,18 +5,15 @@ Two snapshots are sent to the browsers as JSON, each encoded once for all viewer
 there is no fresh message, or no finite number. Distances are metres, angles radians, times seconds.
 """
 
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
-from msgspec import Struct
+from msgspec import Struct, convert
 
 from common import keys
 from common.codec import finite
-from common.freshness import NS_PER_S
-from common.messages import Cause, Driver, Limits, Link, Release, SafetyState, Switches
+from common.messages import Cause, Driver, Limits, Link, Release, Switches
 from common.settings import Vehicle
-from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState
+from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
 from services.dashboard.telemetry_cache import TelemetryCache
 
@@ -79,16 +76,6 @@ class Stream(Struct, frozen=True):
     key: str
     rate: float
     age: float
-
-
-class EventLine(Struct, frozen=True):
-    """An event."""
-
-    t: float  # s, the sender's wall clock
-    service: str
-    name: str
-    level: str
-    text: str
 
 
 class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
@@ -171,44 +158,6 @@ def slow_snapshot(
     )
 
 
-def event_lines(telemetry: TelemetryCache) -> list[EventLine]:
-    """Return the events, the newest last."""
-    return [
-        EventLine(
-            line.event.t_ns / 1e9,
-            line.service,
-            line.event.name,
-            line.event.level,
-            line.event.text,
-        )
-        for line in telemetry.events
-    ]
-
-
-@dataclass
-class SentSnapshots:
-    """The last fast snapshots of one robot, with safety's state in each.
-
-    A reset, a switch and a release answer a snapshot by its number. The call carries the echo and
-    the causes of that snapshot, so that a delayed click has no effect on anything newer.
-    """
-
-    _sent: deque[tuple[int, int, SafetyState | None]] = field(
-        default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT)
-    )
-
-    def sent(self, number: int, state: SafetyState | None, now_ns: int) -> None:
-        """Note that a snapshot is sent now."""
-        self._sent.append((number, now_ns, state))
-
-    def seen(self, number: int, now_ns: int, limit_s: float) -> SafetyState | None:
-        """Return safety's state in a snapshot; None if it is unknown, too old or had none."""
-        for known, sent_ns, state in reversed(self._sent):
-            if known == number:
-                return state if now_ns - sent_ns <= limit_s * NS_PER_S else None
-        return None
-
-
 def _driver(lock: DriverLock, names: Mapping[str, str]) -> DriverState:
     return DriverState(lock.driver, names.get(lock.driver or "", ""), lock.state, lock.gear)
 
@@ -223,17 +172,7 @@ def _number(value: float | None) -> float | None:
 
 def _state(telemetry: TelemetryCache, now_ns: int) -> State | None:
     safety = telemetry.newest(keys.SAFETY, now_ns)
-    if safety is None:
-        return None
-    return State(
-        safety.verdict,
-        safety.text,
-        safety.source,
-        safety.latched,
-        safety.causes,
-        safety.limits,
-        safety.release,
-    )
+    return convert(safety, State, from_attributes=True) if safety else None
 
 
 def _service(telemetry: TelemetryCache, name: str, now_ns: int) -> Service:

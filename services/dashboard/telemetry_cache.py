@@ -8,6 +8,8 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from msgspec import Struct
+
 from common import keys
 from common.freshness import NS_PER_S, Latest, fresh
 from common.keys import Topic
@@ -27,12 +29,14 @@ SPACING_M = 0.05  # between two points of the trail
 POINTS = 4000
 
 
-@dataclass(frozen=True, slots=True)
-class ServiceEvent:
-    """An event and the service that published it."""
+class EventLine(Struct, frozen=True):
+    """An event as the browsers show it."""
 
+    t: float  # s, the sender's wall clock
     service: str
-    event: Event
+    name: str
+    level: str
+    text: str
 
 
 def max_age_s(topic: Topic[M]) -> float:
@@ -45,7 +49,7 @@ class TelemetryCache:
     """The newest message of each stream, the events and the live services."""
 
     alive: dict[str, set[str]] = field(default_factory=dict)  # instances by service
-    events: deque[ServiceEvent] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
+    events: deque[EventLine] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
     event_count: int = 0  # events so far
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path, over RATE_WINDOW_S
     _unknown: int = 0  # entries that are not in ``FIXED``
@@ -84,8 +88,8 @@ class TelemetryCache:
 
     def add_event(self, service: str, event: Event) -> None:
         """Store an event, sorted by the sender's time."""
-        self.events.append(ServiceEvent(service, event))
-        ordered = sorted(self.events, key=lambda line: line.event.t_ns)
+        line = EventLine(event.t_ns / 1e9, service, event.name, event.level, event.text)
+        ordered = sorted([*self.events, line], key=lambda line: line.t)
         self.events.clear()
         self.events.extend(ordered)
         self.event_count += 1

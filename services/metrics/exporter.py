@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from wsgiref.simple_server import WSGIServer
 
 from prometheus_client import CollectorRegistry, start_http_server
@@ -54,21 +54,15 @@ class Exporter(Collector):
 
     def _subscribe(self) -> None:
         bus = self._bus
-        bus.subscribe(keys.SAFETY, self._on_safety, depth=DEPTH)
-        bus.subscribe(keys.LINK, self._on_link, depth=DEPTH)
-        bus.subscribe(keys.ODOMETRY, self._on_odometry, depth=DEPTH)
+        for topic in (keys.SAFETY, keys.LINK, keys.ODOMETRY):
+            bus.subscribe(topic, self._on_stream, depth=DEPTH)
         bus.subscribe(keys.HEALTH, self._on_health, depth=DEPTH, service="*")
         bus.subscribe(keys.EVENTS, self._on_event, depth=DEPTH, service="*")
         bus.watch_live(keys.live_key(bus.robot, "*", "*"), self._on_live)
 
-    def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
-        self._robot(arrival.key).safety = Latest(arrival.message, arrival.received_ns)
-
-    def _on_link(self, arrival: Arrival[m.Link]) -> None:
-        self._robot(arrival.key).link = Latest(arrival.message, arrival.received_ns)
-
-    def _on_odometry(self, arrival: Arrival[m.Odometry]) -> None:
-        self._robot(arrival.key).odometry = Latest(arrival.message, arrival.received_ns)
+    def _on_stream(self, arrival: Arrival[Any]) -> None:
+        latest = Latest(arrival.message, arrival.received_ns)
+        self._robot(arrival.key).streams[type(arrival.message)] = latest
 
     def _on_health(self, arrival: Arrival[m.Health]) -> None:
         service = arrival.key.split("/")[-2]

@@ -8,9 +8,10 @@ from bisect import bisect_left
 from collections import Counter
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import Any
 
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Event, Health, Link, Odometry, SafetyState
+from common.messages import Event, Health, Message
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
 EXPIRY_S = 24 * 3600.0  # until an absent robot or service is removed: fleets change
@@ -55,9 +56,7 @@ class RobotState:
     services: dict[str, ServiceState] = field(
         default_factory=lambda: {name: ServiceState() for name in EXPECTED}
     )
-    safety: Latest[SafetyState] | None = None
-    link: Latest[Link] | None = None
-    odometry: Latest[Odometry] | None = None
+    streams: dict[type[Message], Latest[Any]] = field(default_factory=dict)  # by message
     events: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     disk: Event | None = None  # the recorder's latest disk event
 
@@ -85,13 +84,11 @@ class RobotState:
     @property
     def is_robot(self) -> bool:
         """Return whether a service of a robot was ever seen, not only a laptop with its id."""
-        streams = self.safety, self.link, self.odometry
-        return any(streams) or any(self.services[name].seen_ns for name in EXPECTED)
+        return bool(self.streams) or any(self.services[name].seen_ns for name in EXPECTED)
 
     def is_up(self, now_ns: int) -> bool:
         """Return whether the robot itself is alive; a laptop with its id does not count."""
-        received = [each.received_ns for each in (self.safety, self.link, self.odometry) if each]
-        is_fresh = any(now_ns - each_ns <= FRESH_S * NS_PER_S for each_ns in received)
+        is_fresh = any(fresh(latest, now_ns, FRESH_S) for latest in self.streams.values())
         return is_fresh or any(self.services[name].is_healthy(now_ns) for name in EXPECTED)
 
     def disk_full(self) -> bool:
@@ -108,8 +105,8 @@ class RobotState:
             gone = not service.instances and now_ns - service.seen_ns > EXPIRY_S * NS_PER_S
             if gone and name not in EXPECTED:
                 del self.services[name]
-        streams = [each.received_ns for each in (self.safety, self.link, self.odometry) if each]
-        seen_ns = max([*streams, *(each.seen_ns for each in self.services.values())])
+        received = [latest.received_ns for latest in self.streams.values()]
+        seen_ns = max([*received, *(each.seen_ns for each in self.services.values())])
         present = any(each.instances for each in self.services.values())
         return not present and now_ns - seen_ns > EXPIRY_S * NS_PER_S
 

@@ -1,14 +1,15 @@
-"""Prometheus samples of the robots: the table of metric families, and their values. Pure.
+"""Prometheus samples of the robots, by the table of metric families ``families.toml``.
 
 Names follow Prometheus' conventions: base units, ``_total`` for counters. Stale values have no
 sample; ``t2_robot_up``, ``t2_service_up`` and the ages report them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import accumulate
-from typing import Literal, get_args
+from pathlib import Path
+from typing import Any, Literal, get_args
 
+import msgspec
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -16,19 +17,19 @@ from prometheus_client.core import (
     Metric,
 )
 
-from common.freshness import Latest, fresh
+from common.freshness import fresh
 from common.keys import ROOT
 from common.members import Members
-from common.messages import Health, Link, Odometry, SafetyState, Timing, Verdict
+from common.messages import Health, Link, Message, Odometry, SafetyState, Timing, Verdict
 from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
 
+FILE = Path(__file__).with_name("families.toml")
 Kind = Literal["gauge", "counter", "histogram"]
 KINDS = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
 BUCKET_STEP = 4  # every fourth bound of a reaction: two per decade
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
+class Family(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A metric; its samples differ in their labels."""
 
     name: str
@@ -37,63 +38,7 @@ class Family:
     help: str
 
 
-ONE = ("robot",)
-EACH = ("robot", "service")
-FAMILIES = (
-    Family("t2_bus_connected", "gauge", (), "Whether the exporter is connected to a router"),
-    Family(
-        "t2_certificate_expiry_timestamp_seconds", "gauge", ("role", "name"),
-        "Expiry of a member's certificate",
-    ),
-    Family("t2_robot_up", "gauge", ONE, "Whether the robot is alive"),
-    Family(
-        "t2_stream_age_seconds", "gauge", (*ONE, "stream"), "Time since a stream's latest message"
-    ),
-    Family("t2_service_up", "gauge", EACH, "Whether the service is present and healthy"),
-    Family("t2_service_instances", "gauge", EACH, "Processes of the service on the bus"),
-    Family("t2_service_health_age_seconds", "gauge", EACH, "Time since the latest health message"),
-    Family("t2_service_info", "gauge", (*EACH, "version"), "Always 1; the version is the label"),
-    Family("t2_service_uptime_seconds", "gauge", EACH, "Time since the start of the service"),
-    Family("t2_service_resident_memory_bytes", "gauge", EACH, "Resident memory"),
-    Family("t2_service_realtime_priority", "gauge", EACH, "SCHED_FIFO priority; 0 if ordinary"),
-    Family(
-        "t2_service_message_rate_hertz", "gauge", (*EACH, "key"), "Messages in the last second"
-    ),
-    Family("t2_service_counts_total", "counter", (*EACH, "counter"), "The service's counters"),
-    Family(
-        "t2_service_loop_lateness_seconds", "histogram", EACH,
-        "Maximum lateness of the event loop in each second",
-    ),
-    Family("t2_reaction_seconds", "histogram", (*EACH, "reaction"), "Reaction times"),
-    Family("t2_safety_verdict", "gauge", (*ONE, "verdict"), "1 for the current verdict"),
-    Family("t2_safety_latched", "gauge", ONE, "Latched causes that need a reset"),
-    Family(
-        "t2_safety_cause_active", "gauge", (*ONE, "cause", "action"),
-        "1 for each cause that limits or stops the motion",
-    ),
-    Family("t2_safety_drives", "gauge", (*ONE, "source"), "1 for the source that drives"),
-    Family("t2_link_up", "gauge", ONE, "Whether the board's reports arrive"),
-    Family("t2_link_armed", "gauge", ONE, "Whether the bridge accepts a RUN"),
-    Family("t2_link_round_trip_seconds", "gauge", ONE, "Round trip of a board query, median"),
-    Family("t2_link_frame_rate_hertz", "gauge", (*ONE, "frame"), "Frames in the last second"),
-    Family("t2_link_rejected_total", "counter", (*ONE, "reason"), "Rejected frames and datagrams"),
-    Family("t2_link_board_restarts_total", "counter", ONE, "Restarts of the board"),
-    Family("t2_odometry_linear_velocity_meters_per_second", "gauge", ONE, "Forward positive"),
-    Family(
-        "t2_odometry_angular_velocity_radians_per_second", "gauge", ONE,
-        "Counter-clockwise positive",
-    ),
-    Family(
-        "t2_odometry_residual_meters", "gauge", ONE,
-        "Distance by counters minus distance by velocities, over a second",
-    ),
-    Family("t2_odometry_slip", "gauge", ONE, "Whether counters and velocities disagree"),
-    Family("t2_recorder_disk_full", "gauge", ONE, "Whether the recorder stopped: the disk is full"),
-    Family(
-        "t2_events_total", "counter", (*EACH, "event", "level"),
-        "Events received, including replayed ones",
-    ),
-)  # fmt: skip
+FAMILIES = msgspec.toml.decode(FILE.read_bytes(), type=dict[str, tuple[Family, ...]])["family"]
 
 
 class Scrape:
@@ -113,13 +58,13 @@ class Scrape:
         self,
         name: str,
         bounds: Sequence[float],
-        counts: Iterable[int],
+        cumulative: Iterable[int],
         total: float | None,
         *labels: str,
     ) -> None:
-        """Add a histogram; ``counts`` holds one count per bucket, the last one unbounded."""
+        """Add a histogram by the counts up to each bound and the count of all."""
         ends = [*(f"{bound:.3g}" for bound in bounds), "+Inf"]
-        buckets = list(zip(ends, accumulate(counts), strict=True))
+        buckets = list(zip(ends, cumulative, strict=True))
         self.families[name].add_metric(labels, buckets, total)  # type: ignore[attr-defined]
 
 
@@ -147,20 +92,11 @@ def metric_families(
 
 def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
     scrape.add("t2_robot_up", robot.is_up(now_ns), name)
-    streams: dict[str, Latest[SafetyState] | Latest[Link] | Latest[Odometry] | None] = {
-        "safety": robot.safety,
-        "link": robot.link,
-        "odometry": robot.odometry,
-    }
-    for stream, latest in streams.items():
-        if latest is not None:
-            scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
-    if robot.safety and fresh(robot.safety, now_ns, FRESH_S):
-        _safety(scrape, name, robot.safety.value)
-    if robot.link and fresh(robot.link, now_ns, FRESH_S):
-        _link(scrape, name, robot.link.value)
-    if robot.odometry and fresh(robot.odometry, now_ns, FRESH_S):
-        _odometry(scrape, name, robot.odometry.value)
+    for message, latest in robot.streams.items():
+        stream, add_samples = OF_STREAM[message]
+        scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
+        if fresh(latest, now_ns, FRESH_S):
+            add_samples(scrape, name, latest.value)
     recorder = robot.services.get("recorder")
     if recorder and recorder.is_healthy(now_ns):
         scrape.add("t2_recorder_disk_full", robot.disk_full(), name)
@@ -176,9 +112,9 @@ def _service(scrape: Scrape, labels: tuple[str, str], service: ServiceState, now
     scrape.add("t2_service_health_age_seconds", service.health.age_s(now_ns), *labels)
     if fresh(service.health, now_ns, FRESH_S):
         _health(scrape, labels, service.health.value)
-        lateness = service.lateness
+        late, counts = service.lateness, accumulate(service.lateness.counts)
         scrape.add_histogram(
-            "t2_service_loop_lateness_seconds", LATENESS_S, lateness.counts, lateness.total, *labels
+            "t2_service_loop_lateness_seconds", LATENESS_S, counts, late.total, *labels
         )
 
 
@@ -204,9 +140,8 @@ def _timing(scrape: Scrape, labels: tuple[str, str], timing: Timing) -> None:
             continue
         cumulative = list(accumulate(durations.counts))
         kept = [*cumulative[:-1:BUCKET_STEP], cumulative[-1]]
-        counts = [after - before for before, after in zip([0, *kept], kept, strict=False)]
         scrape.add_histogram(
-            "t2_reaction_seconds", timing.bounds[::BUCKET_STEP], counts, None, *labels, name
+            "t2_reaction_seconds", timing.bounds[::BUCKET_STEP], kept, None, *labels, name
         )
 
 
@@ -238,6 +173,11 @@ def _odometry(scrape: Scrape, robot: str, odometry: Odometry) -> None:
     scrape.add("t2_odometry_slip", odometry.slip, robot)
     if odometry.residual is not None:
         scrape.add("t2_odometry_residual_meters", odometry.residual, robot)
+
+
+OF_STREAM: dict[type[Message], tuple[str, Callable[[Scrape, str, Any], None]]] = {
+    SafetyState: ("safety", _safety), Link: ("link", _link), Odometry: ("odometry", _odometry),
+}  # fmt: skip
 
 
 def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:

@@ -15,12 +15,11 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
 from common import log
-from common.cli_args import EXIT_CONFIG, add_sources, sources
+from common.cli_args import add_setting, add_sources, needs_extra, run_program, sources
 from common.config import Loaded, load
-from common.errors import ConfigError, RobotError
+from common.errors import RobotError
 from common.service import STOP_TIMEOUT_S, Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
@@ -28,29 +27,24 @@ from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
 from services.teleop.round_trip import multiplexer
 
-if TYPE_CHECKING:
-    from services.teleop.app import TeleopApp
-
 EXIT_HANGUP = 128 + signal.SIGHUP
 TERMINAL_POLL_S = 0.2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command line options; each sets a setting."""
-    parser.add_argument("--source", help="name of the drive source, which has its own priority")
-    parser.add_argument("--robot", help="robot to drive, such as 001")
-    parser.add_argument("--no-gamepad", action="store_true", help="use keys only")
+    text = "name of the drive source, which has its own priority"
+    add_setting(parser, "--source", "teleop.source", text)
+    add_setting(parser, "--robot", "robot.id", "robot to drive, such as 001")
+    parser.add_argument(
+        "--no-gamepad", action="append_const", dest="sets", const="teleop.gamepad=false",
+        help="use keys only",
+    )  # fmt: skip
     add_sources(parser)
 
 
 def drive(options: argparse.Namespace) -> int:
     """Drive until the operator quits; raise ``RobotError`` if teleop cannot start."""
-    if options.source:
-        options.sets = [*options.sets, f"teleop.source={options.source}"]
-    if options.robot:
-        options.sets = [*options.sets, f"robot.id={options.robot}"]
-    if options.no_gamepad:
-        options.sets = [*options.sets, "teleop.gamepad=false"]
     loaded = load(TeleopConfig, sources(options))
     if not terminal_is_there():
         raise RobotError("driving needs a terminal on standard input and output")
@@ -61,7 +55,9 @@ class TeleopProcess:
     """Teleop's process: the node's loop, the controller and the screen."""
 
     def __init__(self, loaded: Loaded[TeleopConfig]) -> None:
-        self._screen = _screen_class()
+        with needs_extra("teleop", "the screen"):
+            from services.teleop.app import TeleopApp
+        self._screen = TeleopApp
         event_log = EventLog()
         event_log.capture_logs(loaded.config.log)
         self._settings = loaded.config
@@ -136,26 +132,7 @@ def ancestors() -> list[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Drive from this terminal; return the exit code, as for every service."""
-    parser = argparse.ArgumentParser(prog="teleop")
-    add_arguments(parser)
-    try:
-        return drive(parser.parse_args(argv))
-    except RobotError as error:
-        print(f"teleop: {error}", file=sys.stderr)  # noqa: T201 - there is no screen
-        return EXIT_CONFIG if isinstance(error, ConfigError) else 1
-
-
-def _screen_class() -> "type[TeleopApp]":
-    try:
-        from services.teleop.app import TeleopApp
-    except ModuleNotFoundError as error:
-        if error.name and error.name.split(".")[0] in {"textual", "rich"}:
-            raise RobotError(
-                f"the screen needs {error.name}: install the extra `teleop` "
-                "(pip install -e '.[teleop]')"
-            ) from None
-        raise
-    return TeleopApp
+    return run_program("teleop", add_arguments, drive, argv)
 
 
 def _on_signal(call: Callable[[], None], *numbers: signal.Signals) -> None:

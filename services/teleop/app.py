@@ -5,6 +5,7 @@ The screen decides nothing. It exits when the controller has sent its final zero
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
@@ -43,24 +44,7 @@ class Panel(Static):
 class TeleopApp(App[None]):
     """The operator's screen: posts keys to the controller and draws its view."""
 
-    CSS = """
-    Screen { layout: vertical; overflow: hidden; }
-    #header { height: 1; padding: 0 1; background: $panel; }
-    #safety { height: 4; border: round $primary; padding: 0 1; }
-    #middle { height: 13; }
-    Panel { text-wrap: nowrap; text-overflow: ellipsis; }
-    #around { width: 1fr; height: 100%; border: round $primary; content-align: center middle; }
-    #motion { width: 44; height: 100%; border: round $primary; padding: 0 1; }
-    #events { height: 1fr; min-height: 3; border: round $primary; padding: 0 1; }
-    #hints { height: 2; padding: 0 1; }
-    .contact #safety { height: 6; }
-    .contact #middle { height: 12; }
-    .contact #hints { height: 1; }
-    Screen.tall #safety { height: 7; }
-    Screen.tall #middle { height: 15; }
-    .contact Screen.tall #safety { height: 9; }
-    .contact Screen.tall #hints { height: 2; }
-    """
+    CSS_PATH = Path(__file__).with_name("app.tcss")
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("q,Q,ctrl+c,ctrl+q", "leave", "quit", priority=True)

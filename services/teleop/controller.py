@@ -15,11 +15,10 @@ from common.operator import EstopRepetition, EstopStep
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.controls import RELEASE, STOP, Controls
+from services.teleop.controls import DIRECTIONS, RELEASE, STOP, Controls, Deflection, Stick, twist
 from services.teleop.event_log import EventLog
 from services.teleop.gamepad import Gamepad, NoGamepad
 from services.teleop.hold import Press
-from services.teleop.mapping import DIRECTIONS, Deflection, Stick, twist
 from services.teleop.operator_calls import OperatorCalls
 from services.teleop.round_trip import ADVICE, RoundTrip
 from services.teleop.view import LatestTopic, View

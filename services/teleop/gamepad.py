@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from services.teleop.config import Teleop
-from services.teleop.mapping import Deflection, Stick
+from services.teleop.controls import Deflection, Stick
 
 ENVIRON = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would overwrite the screen

@@ -3,15 +3,14 @@
 from msgspec.structs import replace
 
 from common import keys
-from common.messages import Direction, Done, Level, ResetDone, SafetyState
+from common.messages import Direction, Level, ResetDone, SafetyState
 from common.operator import ReleaseCalls, ResetCheck, reset_request
 from common.service import Node
+from common.source import call_release
 from services.teleop.config import TeleopConfig
 from services.teleop.event_log import EventLog
 
 RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
-RELEASE_TIMEOUT_S = 0.3
-RELEASED = "released"  # the first answer of a release, with any distance left
 NO_STATE = "no fresh state of safety"
 NOT_CONFIRMED = (
     "RESET NOT CONFIRMED: safety's state does not show the effect of the reset; "
@@ -71,30 +70,16 @@ class OperatorCalls:
 
     def release(self, direction: Direction | None, newest: SafetyState | None) -> None:
         """Make the calls of a release that is held in a direction, or has ended."""
-        for request in self._release.tick(direction, newest, newest):
-            self._bus.call(
-                keys.RELEASE,
-                request,
-                self._release_held if request.held else lambda _: None,
-                self._release_refused if request.held else lambda _: None,
-                timeout_s=RELEASE_TIMEOUT_S,
-            )
-        if newest is None:
-            self._report("warning", f"release not sent: {NO_STATE}")
+        call_release(self._bus, self._release, direction, newest, newest, report=self._on_release)
+        if newest is None and self._release.is_new(NO_STATE):
+            self._add("warning", f"release not sent: {NO_STATE}")
 
-    def _release_held(self, done: Done) -> None:
-        """Log the first answer of a release; the screen shows the distance that is left."""
-        self._release.answered()
-        self._report("info", f"release: {done.text}", RELEASED)
-
-    def _release_refused(self, reason: str) -> None:
-        self._release.answered()
-        self._report("warning", f"release refused: {reason}")
-
-    def _report(self, level: Level, text: str, result: str = "") -> None:
-        """Log a result of the current release, unless it repeats the last one."""
-        if self._release.is_new(result or text):
-            self._add(level, text)
+    def _on_release(self, is_held: bool, text: str) -> None:
+        """Log the result of a release; the screen shows the distance that is left."""
+        if is_held:
+            self._add("info", f"release: {text}")
+        else:
+            self._add("warning", f"release refused: {text}")
 
     def _add(self, level: Level, text: str) -> None:
         self._event_log.add("safety", level, text)

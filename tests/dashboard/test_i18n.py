@@ -10,8 +10,7 @@ from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
 from services.dashboard.auth import token_page
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import LANGUAGES, PAGE, TEXTS, table
-from services.dashboard.i18n_events import EVENTS
+from services.dashboard.i18n import LANGUAGES, TEXTS, table
 from services.safety.causes import RULES
 from tools.docs import DOCS
 
@@ -86,10 +85,6 @@ def test_every_result_of_a_call_has_its_text() -> None:
         name for name in found if name
     }
     assert {f"event.{name}" for name in found} <= set(TEXTS)
-
-
-def test_the_parts_of_the_catalogue_do_not_overlap() -> None:
-    assert not PAGE.keys() & EVENTS.keys()
 
 
 @pytest.mark.parametrize("direction", get_args(Direction))

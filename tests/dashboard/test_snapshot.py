@@ -31,8 +31,7 @@ from common.settings import Vehicle
 from services.dashboard import snapshot
 from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState
 from services.dashboard.sectors import Protection
-from services.dashboard.snapshot import SentSnapshots
-from services.dashboard.telemetry_cache import TelemetryCache
+from services.dashboard.telemetry_cache import EventLine, TelemetryCache
 from tests.factories import safety_state
 
 AT = 100 * NS_PER_S
@@ -165,9 +164,7 @@ def test_the_events() -> None:
     telemetry.add_event(
         "safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * NS_PER_S)
     )
-    assert snapshot.event_lines(telemetry) == [
-        snapshot.EventLine(2.0, "safety", "stop", "warning", "Stopped.")
-    ]
+    assert list(telemetry.events) == [EventLine(2.0, "safety", "stop", "warning", "Stopped.")]
 
 
 def test_the_fast_snapshot_is_small() -> None:
@@ -183,10 +180,10 @@ LIMIT_S = 1.0
 
 
 @pytest.fixture
-def snapshots() -> SentSnapshots:
-    snapshots = SentSnapshots()
-    snapshots.sent(1, STATE, 10 * NS_PER_S)
-    snapshots.sent(2, None, 10 * NS_PER_S)
+def snapshots() -> DriverLock:
+    snapshots = DriverLock(0.3)
+    snapshots.sent(1, 10 * NS_PER_S, STATE)
+    snapshots.sent(2, 10 * NS_PER_S, None)
     return snapshots
 
 
@@ -203,13 +200,13 @@ def snapshots() -> SentSnapshots:
     ],
 )
 def test_the_state_in_a_sent_snapshot(
-    snapshots: SentSnapshots, number: int, now_ns: int, seen: object
+    snapshots: DriverLock, number: int, now_ns: int, seen: object
 ) -> None:
     assert snapshots.seen(number, now_ns, LIMIT_S) == seen
 
 
-def test_only_the_newest_sent_snapshots_are_kept(snapshots: SentSnapshots) -> None:
+def test_only_the_newest_sent_snapshots_are_kept(snapshots: DriverLock) -> None:
     for number in range(3, 3 + SNAPSHOTS_KEPT):
-        snapshots.sent(number, STATE, 10 * NS_PER_S)
+        snapshots.sent(number, 10 * NS_PER_S, STATE)
     assert snapshots.seen(1, 10 * NS_PER_S, LIMIT_S) is None
     assert snapshots.seen(3, 10 * NS_PER_S, LIMIT_S) == STATE

@@ -93,11 +93,11 @@ def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
     telemetry = TelemetryCache()
     for number in (2, 1, 3):
         telemetry.add_event("safety", event(number))
-    assert [line.event.text for line in telemetry.events] == ["1", "2", "3"]
+    assert [line.text for line in telemetry.events] == ["1", "2", "3"]
     for number in range(4, 4 + EVENTS_MAX):
         telemetry.add_event("bridge", event(number))
     assert len(telemetry.events) == EVENTS_MAX
-    assert telemetry.events[0].event.text == "4"
+    assert telemetry.events[0].text == "4"
     assert telemetry.event_count == EVENTS_MAX + 3
 
 

@@ -48,7 +48,7 @@ def whole(at_ns: int = NOW_NS) -> RobotState:
     for name in ("bridge", "safety", "odom", "recorder"):
         robot.on_live(name, "a", True, at_ns)
         robot.on_health(name, health(name), at_ns)
-    robot.safety = Latest(safety(), at_ns)
-    robot.link = Latest(link(), at_ns)
-    robot.odometry = Latest(odometry(), at_ns)
+    robot.streams[m.SafetyState] = Latest(safety(), at_ns)
+    robot.streams[m.Link] = Latest(link(), at_ns)
+    robot.streams[m.Odometry] = Latest(odometry(), at_ns)
     return robot

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from common import messages as m
 from common.freshness import NS_PER_S, Latest
 from services.metrics.robot import (
     EVENT_NAMES_MAX,
@@ -31,7 +32,7 @@ def test_a_robot_is_up_while_any_stream_is_fresh() -> None:
     robot = whole()
     assert robot.is_up(NOW_NS)
     assert not robot.is_up(LATE_NS)
-    robot.link = Latest(link(), LATE_NS)
+    robot.streams[m.Link] = Latest(link(), LATE_NS)
     assert robot.is_up(LATE_NS)
 
 
@@ -114,7 +115,7 @@ def test_is_robot_needs_a_service_of_the_robot() -> None:
     robot = RobotState()
     robot.on_health("dashboard", health("dashboard"), NOW_NS)
     assert not robot.is_robot
-    assert RobotState(link=Latest(link(), NOW_NS)).is_robot
+    assert RobotState(streams={m.Link: Latest(link(), NOW_NS)}).is_robot
 
 
 def test_absent_services_expire_except_expected_ones() -> None:
@@ -142,7 +143,7 @@ def test_a_robot_expires_when_all_its_services_are_gone(name: str) -> None:
 
 def test_fresh_streams_keep_a_robot() -> None:
     robot = RobotState()
-    robot.link = Latest(link(), NOW_NS)
+    robot.streams[m.Link] = Latest(link(), NOW_NS)
     assert not robot.expire(LONG_NS - 1)
     assert robot.expire(LONG_NS)
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 
+from common import messages as m
 from common.freshness import NS_PER_S, Latest
 from common.members import Member, Members, Role
 from common.messages import Durations, Timing
@@ -58,7 +59,7 @@ def test_samples_of_a_healthy_robot() -> None:
 
 def test_the_current_verdict_is_one_and_the_others_are_zero() -> None:
     robot = whole()
-    robot.safety = Latest(safety("contact", "estop"), NOW_NS)
+    robot.streams[m.SafetyState] = Latest(safety("contact", "estop"), NOW_NS)
     found = values(robot)
     verdicts = {
         dict(labels)["verdict"]: count
@@ -95,9 +96,9 @@ def test_an_unseen_robot_is_exported_as_down() -> None:
 
 def test_unknown_values_have_no_sample() -> None:
     robot = whole()
-    robot.link = Latest(link(round_trip=None), NOW_NS)
-    robot.odometry = Latest(odometry(residual=None), NOW_NS)
-    robot.safety = Latest(safety(source=None), NOW_NS)
+    robot.streams[m.Link] = Latest(link(round_trip=None), NOW_NS)
+    robot.streams[m.Odometry] = Latest(odometry(residual=None), NOW_NS)
+    robot.streams[m.SafetyState] = Latest(safety(source=None), NOW_NS)
     found = names(values(robot))
     assert "t2_link_up" in found
     for name in ("t2_link_round_trip_seconds", "t2_odometry_residual_meters", "t2_safety_drives"):

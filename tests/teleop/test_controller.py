@@ -25,8 +25,8 @@ from common.messages import (
 from common.motion import Twist
 from common.operator import ESTOP_TICKS
 from services.teleop.controller import Controller
+from services.teleop.controls import Deflection, Stick
 from services.teleop.hold import Press
-from services.teleop.mapping import Deflection, Stick
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.support import FakeNode, answer
 

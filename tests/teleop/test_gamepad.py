@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from services.teleop.config import Teleop
-from services.teleop.controls import Controls
+from services.teleop.controls import Controls, Deflection, Stick
 from services.teleop.gamepad import NoGamepad, SdlGamepad, find
-from services.teleop.mapping import Deflection, Stick
 
 MAPS = Path("/proc/self/maps")
 REMOVED = 1542

@@ -67,6 +67,12 @@ def test_generated_blocks_are_checked_in_the_code_that_makes_them(root: Path) ->
     assert found(root, "a.md", text.format("events"), STALL) == ["a.md:2: hold up -> stall"]
 
 
+def test_the_texts_of_a_catalogue(root: Path) -> None:
+    assert found(root, "texts.toml", 'a = ["hold up"]\n', STALL) == [
+        "texts.toml:1: hold up -> stall"
+    ]
+
+
 def test_comments_of_other_files(root: Path) -> None:
     text = "hold up = 1 # they hold up\n"
     assert found(root, "a.toml", text, STALL) == ["a.toml:1: hold up -> stall"]
