@@ -19,6 +19,7 @@ from services.bridge.core import Core
 from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
+from services.bridge.reflex import Hit
 from tests.invariants.net import Disturbance, Envelope
 from tests.invariants.process import ROBOT, DriveEnd
 from tests.invariants.stack import Stack
