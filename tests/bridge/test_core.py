@@ -29,8 +29,6 @@ from tests.bridge.core_fixture import (
     published,
 )
 
-# --- the reflex ---------------------------------------------------------------------------------
-
 
 def test_the_first_frame_is_a_stop(bench: Bench) -> None:
     assert motions(bench.outs[0]) == [MotionKind.STOP]

@@ -1,7 +1,8 @@
 """Buses of one robot on a real router, with a loop in a thread for their handlers."""
 
 import contextlib
-from collections.abc import Callable, Iterable
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from itertools import count
 from types import TracebackType
 from typing import Self
@@ -52,6 +53,22 @@ class BusFixture:
         self._stack.callback(bus.close)
         wait_until(lambda: bus.connected, "a session with the router")
         return bus
+
+    @contextlib.contextmanager
+    def stalled(self) -> Iterator[None]:
+        """Stall the loop while the context lasts."""
+        held, go_on = threading.Event(), threading.Event()
+
+        def hold() -> None:
+            held.set()
+            go_on.wait(20)
+
+        self.loop.post(hold)
+        assert held.wait(20)
+        try:
+            yield
+        finally:
+            go_on.set()
 
     def session(self) -> zenoh.Session:
         """Open a bare session, as a stranger would."""

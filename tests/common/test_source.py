@@ -11,14 +11,14 @@ from common.loop import Loop
 from common.messages import Drive
 from common.source import DENIED_AFTER, DriveSource
 from tests.factories import safety_state
-from tests.teleop.support import FakeBus
-from verification.harness.bus import at, bus_on, running
+from tests.fake_bus import FakeBus
+from verification.harness.bus import bus_on, running
 from verification.harness.waiting import wait_until
 
 
 @pytest.fixture
 def bus() -> FakeBus:
-    return FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+    return FakeBus()
 
 
 def test_the_echo_is_zero_before_the_first_state_of_safety(bus: FakeBus) -> None:

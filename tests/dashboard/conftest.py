@@ -1,13 +1,16 @@
-"""A router, its simulated safety and a dashboard, for the tests of one module."""
+"""A router, its simulated safety, a dashboard and a browser for a module, and call servers."""
 
 from collections.abc import Iterator
 
 import pytest
+from playwright.sync_api import Browser, sync_playwright
 
 from common.loop import Loop
 from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.servers import CallServers, serving
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.dashboard import Server, dashboard
+from verification.harness.dashboard_page import CHROMIUM
 from verification.harness.ports import free_port
 
 
@@ -30,3 +33,17 @@ def peer(endpoint: str) -> Iterator[Peer]:
 def server(endpoint: str, peer: Peer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     with dashboard(endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=0.5") as it:
         yield it
+
+
+@pytest.fixture
+def calls(endpoint: str, peer: Peer) -> Iterator[CallServers]:
+    with serving(endpoint, peer) as it:
+        yield it
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from sim.requests import Driver
 from verification.harness.dashboard import Server, dashboard
@@ -41,14 +41,6 @@ def server(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Ite
         stack.endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=1.0"
     ) as it:
         yield it
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

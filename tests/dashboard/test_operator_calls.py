@@ -6,18 +6,11 @@ from collections.abc import Iterator
 import pytest
 
 from common.messages import Cause
-from tests.dashboard.bus_fixture import Peer
-from tests.dashboard.servers import CONTACT, NEWER, CallServers, serving
+from tests.dashboard.servers import CONTACT, NEWER, CallServers
 from verification.harness.dashboard import Client, Server, connected
 from verification.harness.waiting import wait_until
 
 PROXY_S = 5.0  # that a proxy delays a message
-
-
-@pytest.fixture
-def calls(endpoint: str, peer: Peer) -> Iterator[CallServers]:
-    with serving(endpoint, peer) as it:
-        yield it
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from tests.dashboard.bus_fixture import Peer
-from tests.dashboard.servers import FREE, NEWER, CallServers, serving
+from tests.dashboard.servers import FREE, NEWER, CallServers
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_page import CHROMIUM, center_of, take_control, wait_for_text
 from verification.harness.waiting import wait_until
@@ -20,14 +20,6 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
 def patient(
     endpoint: str, peer: Peer, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Server]:
@@ -35,12 +27,6 @@ def patient(
     sets = ("dashboard.round_trip=1.0", "dashboard.call_round_trip=2.0")
     with dashboard(endpoint, folder, *sets) as server:
         yield server
-
-
-@pytest.fixture
-def calls(endpoint: str, peer: Peer) -> Iterator[CallServers]:
-    with serving(endpoint, peer) as it:
-        yield it
 
 
 @pytest.fixture

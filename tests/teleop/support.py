@@ -1,66 +1,21 @@
-"""A node without a network: records what it publishes and calls, and injects messages."""
+"""Teleop without a network or a terminal: node, gamepad, and an operator at the controller."""
 
-import time
-from collections.abc import Callable
 from typing import Any
 
-from msgspec import Struct
-
 from common import keys
-from common.bus.bus import Arrival, Bus
 from common.config import Loaded
 from common.freshness import NS_PER_S
-from common.keys import Call, Topic
-from common.messages import Drive, Message
+from common.messages import Drive, SafetyState
 from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
+from services.teleop.controls import Stick
 from services.teleop.event_log import EventLog
+from services.teleop.hold import Press
 from services.teleop.view import View
-from verification.harness.bus import at
-
-
-class FakeBus(Bus):
-    """A bus that never opens."""
-
-    def __init__(self, *args: Any) -> None:
-        self.handlers: dict[str, list[Callable[[Arrival[Any]], None]]] = {}
-        self.asked: list[tuple[str, Any]] = []
-        self.answers: list[tuple[Callable[[Any], None], Callable[[str], None]]] = []
-        self.estops = 0
-        super().__init__(*args)
-
-    def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
-        """Store the handler for ``deliver``; the depth is ignored."""
-        names.pop("depth", None)
-        self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
-
-    def call(
-        self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
-        timeout_s: float = 2.0,
-    ) -> None:  # fmt: skip
-        """Store the request and the handlers of its answer."""
-        self.asked.append((call.path, request))
-        self.answers.append((on_reply, on_refusal))
-
-    def estop(self) -> None:
-        """Count the stop."""
-        self.estops += 1
-
-    def deliver(
-        self,
-        topic: Topic[Any],
-        message: Message,
-        received_ns: int | None = None,
-        declared: str = "",
-        **names: str,
-    ) -> None:
-        """Inject a message, by default now; ``declared`` is the handler's key if it has a *."""
-        key = topic.on(self.robot, **names)
-        now_ns = time.monotonic_ns() if received_ns is None else received_ns
-        for handler in self.handlers[declared or key]:
-            handler(Arrival(message, key, now_ns, None))
+from tests.factories import contact_state, safety_state
+from tests.fake_bus import FakeBus
 
 
 class FakeNode(Node[TeleopConfig]):
@@ -74,7 +29,7 @@ class FakeNode(Node[TeleopConfig]):
 
     def open_bus(self) -> FakeBus:
         """Return the fake."""
-        self.fake = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+        self.fake = FakeBus()
         return self.fake
 
     @property
@@ -101,3 +56,65 @@ def answer(controller: Controller, now_ns: int) -> None:
     """Simulate a terminal that answers at once."""
     controller.terminal.sent(0, now_ns - NS_PER_S // 1000)
     controller.terminal.answered(0, now_ns)
+
+
+PERIOD_NS = NS_PER_S // 20
+
+
+class FakeGamepad:
+    """A gamepad with a configured state."""
+
+    status = "Fake Pad"
+    stick: Stick | None = None
+
+    def read(self) -> Stick | None:
+        return self.stick
+
+
+class Operator:
+    """A controller with a simulated clock that advances by ticks."""
+
+    def __init__(self) -> None:
+        self.node = FakeNode()
+        self.controller = Controller(self.node, self.node.event_log)
+        self.now_ns = 100 * NS_PER_S
+        self.near = True  # the terminal answers at once
+        self.shown: SafetyState | None = None
+        answer(self.controller, self.now_ns)
+
+    def press(self, key: str, waited_s: float = 0.0) -> None:
+        at_ns = self.now_ns - round(waited_s * NS_PER_S)
+        self.controller.press(Press(key, at_ns, self.shown), self.now_ns)
+
+    def wait(self, seconds: float) -> None:
+        """Advance the clock without ticks; then the terminal answers at once."""
+        self.now_ns += round(seconds * NS_PER_S)
+        answer(self.controller, self.now_ns)
+
+    def tell_safety(self, **fields: Any) -> None:
+        self.node.fake.deliver(keys.SAFETY, safety_state(**fields), self.now_ns)
+
+    def tell_contact(self, **fields: Any) -> None:
+        """Simulate a pressed bumper in safety's state and on the screen."""
+        self.shown = contact_state(**{"boot": 5} | fields)
+        self.node.fake.deliver(keys.SAFETY, self.shown, self.now_ns)
+
+    def ticks(self, count: int) -> list[Drive | None]:
+        sent = []
+        for _ in range(count):
+            before, _ = self.node.requests
+            self.controller.tick(self.now_ns)
+            after, last = self.node.requests
+            assert after - before <= 1
+            sent.append(last if after > before else None)
+            self.now_ns += PERIOD_NS
+            if self.near:
+                answer(self.controller, self.now_ns)
+        return sent
+
+    def speeds(self, count: int) -> list[float | None]:
+        return [drive.linear if drive else None for drive in self.ticks(count)]
+
+    @property
+    def lines(self) -> list[str]:
+        return [line.text for line in self.node.event_log.last(99)]

@@ -4,12 +4,11 @@ from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Bumper
 from services.teleop.view import LatestTopic
-from tests.teleop.support import FakeBus
-from verification.harness.bus import at
+from tests.fake_bus import FakeBus
 
 
 def test_a_value_is_shown_until_it_is_too_old() -> None:
-    bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+    bus = FakeBus()
     topic = LatestTopic(bus, keys.BUMPER, 0.5)
     assert topic.at(0) is None
     bus.deliver(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
@@ -18,7 +17,7 @@ def test_a_value_is_shown_until_it_is_too_old() -> None:
 
 
 def test_each_side_has_its_own_topic() -> None:
-    bus = FakeBus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+    bus = FakeBus()
     LatestTopic(bus, keys.DRIVER, 2.0, side="left")
     LatestTopic(bus, keys.DRIVER, 2.0, side="right")
     assert sorted(bus.handlers) == [

@@ -17,6 +17,7 @@ from cli.commission.link import (
 from cli.commission.report import Verdict
 from common.freshness import NS_PER_S
 from common.messages import Link, Switches
+from tests import factories
 
 SETTINGS = {
     "bridge.bumper_rate": 50.0,
@@ -30,17 +31,7 @@ BOTH = Ports((4002, 4001), 200)
 
 
 def link(**fields: Any) -> Link:
-    known: dict[str, Any] = {
-        "state": "up",
-        "board": "10.7.5.224:4002",
-        "epoch": 0,
-        "armed": True,
-        "waiting": "",
-        "rates": dict(EXPECTED),
-        "rejected": {},
-        "round_trip": 0.002,
-    }
-    return Link(**(known | fields))
+    return factories.link(**({"rates": dict(EXPECTED), "round_trip": 0.002} | fields))
 
 
 @dataclass

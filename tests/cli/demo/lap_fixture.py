@@ -8,6 +8,7 @@ from common import motion
 from common.freshness import NS_PER_S
 from common.messages import Cause, Limits, Odometry, SafetyState
 from sim import trace as t
+from tests import factories
 
 RUN, STOP, BRAKE = motion.Command
 
@@ -16,15 +17,8 @@ TICK_NS = NS_PER_S // 20  # the simulator records the truth at 20 Hz
 
 def odometry(**fields: Any) -> Odometry:
     """Return a standing pose at the start, with the given differences."""
-    known: dict[str, Any] = dict.fromkeys(("x", "y", "heading", "linear", "angular"), 0.0)
-    known |= {
-        "pose_covariance": (0.0,) * 9,
-        "twist_covariance": (0.0,) * 4,
-        "epoch": 0,
-        "residual": 0.0,
-        "slip": False,
-    }
-    return Odometry(**(known | fields))
+    standing = dict.fromkeys(("x", "y", "heading", "linear", "residual"), 0.0)
+    return factories.odometry(**(standing | fields))
 
 
 def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> SafetyState:

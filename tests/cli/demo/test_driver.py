@@ -1,37 +1,15 @@
 """The driver of the lap: drive requests, calls, and their answers."""
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 
 from cli.demo.driver import PRESS_NS, Driver
 from cli.demo.script import Lap, Step, View, lap, still
 from common import keys
 from common import messages as m
-from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
 from tests.cli.demo.lap_fixture import odometry, safety
-from verification.harness.bus import at
-
-
-class FakeBus(Bus):
-    """A bus without a router; the test answers its calls."""
-
-    def __init__(self) -> None:
-        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-        self.calls: list[tuple[str, Callable[[Any], None], Callable[[str], None]]] = []
-
-    def call(
-        self,
-        call: keys.Call[Any, Any],
-        request: Any,
-        on_reply: Callable[[Any], None],
-        on_refusal: Callable[[str], None],
-        timeout_s: float = 2.0,
-    ) -> None:
-        self.calls.append((call.path, on_reply, on_refusal))
+from tests.fake_bus import FakeBus
 
 
 @pytest.fixture
@@ -81,7 +59,7 @@ def test_a_request_per_beat_and_one_start_per_step(bus: FakeBus) -> None:
     assert (request.linear, request.angular, request.seq) == (0.5, 0.1, 3)
     assert driver.requested == Twist(0.5, 0.1)
     assert started == ["drive"]
-    assert bus.calls == []
+    assert bus.asked == []
 
 
 def test_zero_is_requested_after_the_end(bus: FakeBus) -> None:
@@ -95,14 +73,15 @@ def test_a_call_is_repeated_in_time_for_a_held_release(bus: FakeBus) -> None:
     driver, _ = driver_of(bus, RELEASE)
     for now_ns in (NS_PER_S, NS_PER_S + PRESS_NS - 1, NS_PER_S + PRESS_NS):
         driver.on_beat(now_ns)
-    assert [path for path, _, _ in bus.calls] == [keys.RELEASE.path] * 2
+    assert [path for path, _ in bus.asked] == [keys.RELEASE.path] * 2
     assert PRESS_NS < 0.3 * NS_PER_S
 
 
 def test_a_refusal_ends_the_step_that_waits_for_it(bus: FakeBus) -> None:
     driver, started = driver_of(bus, RESET, DRIVE)
     driver.on_beat(NS_PER_S)
-    ((path, _, refuse),) = bus.calls
+    ((path, _),) = bus.asked
+    ((_, refuse),) = bus.answers
     assert path == keys.RESET.path
     refuse("still pressed")
     driver.on_beat(2 * NS_PER_S)
@@ -113,7 +92,7 @@ def test_a_refusal_ends_the_step_that_waits_for_it(bus: FakeBus) -> None:
 def test_a_late_answer_is_kept_and_ends_no_step(bus: FakeBus) -> None:
     driver, started = driver_of(bus, RESET, RESET, DRIVE)
     driver.on_beat(NS_PER_S)
-    refuse = bus.calls[0][2]
+    refuse = bus.answers[0][1]
     refuse("still pressed")
     driver.on_beat(2 * NS_PER_S)
     refuse("late")
@@ -126,5 +105,5 @@ def test_the_same_answer_again_is_started_once(bus: FakeBus) -> None:
     driver, _ = driver_of(bus, RELEASE)
     driver.on_beat(NS_PER_S)
     for _ in range(2):
-        bus.calls[0][1](m.Done(text="creeping"))
+        bus.answers[0][0](m.Done(text="creeping"))
     assert driver.answers == [("release", "release", True, "creeping")]

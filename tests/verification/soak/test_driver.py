@@ -1,7 +1,6 @@
 """The driver of a soak: recovery before driving, and restarted laps."""
 
 import math
-from collections.abc import Callable
 from typing import Any, cast
 
 import pytest
@@ -9,38 +8,16 @@ import pytest
 from cli.demo.script import QUICK, lap
 from common import keys
 from common import messages as m
-from common.bus.bus import Bus
 from common.errors import LinkError
 from common.freshness import NS_PER_S
 from sim.control import Control
 from sim.requests import Asked, Place
 from sim.trace import Truth
 from tests.cli.demo.lap_fixture import odometry, safety, truth
-from verification.harness.bus import at
+from tests.fake_bus import FakeBus
 from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
 
 BEAT_NS = NS_PER_S // 20
-
-
-class FakeBus(Bus):
-    """A bus without a router, whose calls are answered by hand."""
-
-    def __init__(self) -> None:
-        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-        self.asked: list[Any] = []
-        self.reply: Callable[[Any], None] = lambda _: None
-        self.refuse: Callable[[str], None] = lambda _: None
-
-    def call(
-        self,
-        call: keys.Call[Any, Any],
-        request: Any,
-        on_reply: Callable[[Any], None],
-        on_refusal: Callable[[str], None],
-        timeout_s: float = 2.0,
-    ) -> None:
-        self.asked.append(request)
-        self.reply, self.refuse = on_reply, on_refusal
 
 
 class Vehicle:
@@ -87,11 +64,16 @@ class DriverFixture:
         self.beat()
         return source.last is not before
 
+    @property
+    def asked(self) -> list[Any]:
+        """The requests of the calls."""
+        return [request for _, request in self.bus.asked]
+
     def ready(self) -> None:
         """Run the setup steps of the operator, and confirm the pose."""
         self.now_ns += TRY_NS
         self.beat()
-        self.bus.reply(m.Done(text="the pose is set"))
+        self.bus.answers[-1][0](m.Done(text="the pose is set"))
 
 
 @pytest.fixture
@@ -102,7 +84,7 @@ def fixture() -> DriverFixture:
 def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: DriverFixture) -> None:
     assert not fixture.drives()
     assert fixture.vehicle.done == [Place(x=0.0, y=0.0)]
-    assert fixture.bus.asked == [m.PoseRequest(echo=1)]
+    assert fixture.asked == [m.PoseRequest(echo=1)]
     assert not fixture.drives()
     fixture.ready()
     assert fixture.drives()
@@ -111,12 +93,12 @@ def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: Driv
 def test_what_cannot_be_set_right_is_tried_again(fixture: DriverFixture) -> None:
     fixture.vehicle.there = False
     fixture.beat(2.0)
-    assert fixture.bus.asked == []
+    assert fixture.asked == []
     fixture.vehicle.there = True
     fixture.beat(1.0)
-    fixture.bus.refuse("there is no router")
+    fixture.bus.answers[-1][1]("there is no router")
     fixture.beat(2 * TRY_NS / NS_PER_S)
-    assert len(fixture.bus.asked) >= 3
+    assert len(fixture.asked) >= 3
     assert not fixture.drives()
 
 
@@ -126,13 +108,13 @@ def test_a_new_odometry_gets_the_true_pose_once_the_vehicle_stands(fixture: Driv
     fixture.bus.asked.clear()
     fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
     fixture.beat(2.0, boot=6)
-    assert fixture.bus.asked == []
+    assert fixture.asked == []
     fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
     fixture.beat(1.0, boot=6)
-    pose = fixture.bus.asked[0]
+    pose = fixture.asked[0]
     assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, 7.0 - math.tau))
     index = fixture.driver.lap.index
-    fixture.bus.reply(m.Done(text="the pose is set"))
+    fixture.bus.answers[-1][0](m.Done(text="the pose is set"))
     fixture.beat(boot=6)
     assert fixture.driver.lap.index >= index, "the lap goes on"
 

@@ -1,0 +1,81 @@
+"""Late joiners and presence over a real router: what is replayed, and who is there."""
+
+from collections.abc import Callable
+
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.messages import Bumper, Drive, Event
+from tests.common.bus_fixture import BusFixture, until_received
+from verification.harness.bus import at
+from verification.harness.waiting import wait_until
+
+
+def events(bus: Bus) -> Callable[[str], object]:
+    """Return how to publish an event by its name."""
+    publisher = bus.publisher(keys.EVENTS, service="bridge")
+    return lambda name: publisher.put(Event(name=name, level="info", text=name))
+
+
+def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
+    names = [f"event_{number}" for number in range(20)]
+    bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
+    emit = events(bus)
+    for name in names[:10]:
+        emit(name)  # before there is a session
+    buses.opened(bus)
+    for name in names[10:]:
+        emit(name)
+    received: list[str] = []
+
+    def hear(arrival: Arrival[Event]) -> None:
+        received.append(arrival.message.name)
+
+    buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
+    wait_until(lambda: len(received) >= 20, "the events that were")
+    emit("one more")
+    wait_until(lambda: "one more" in received, "the next one")
+    assert received == [*names, "one more"]
+
+
+def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
+    """Messages that move the robot are never replayed."""
+    sender = buses.bus()
+    drive, bump = sender.publisher(keys.DRIVE, source="web"), sender.publisher(keys.BUMPER)
+    for _ in range(20):
+        drive.put(Drive(linear=1.0, angular=0.0, echo=0))
+    driven: list[Arrival[Drive]] = []
+    bumped: list[Arrival[Bumper]] = []
+
+    def declare(bus: Bus) -> None:
+        bus.subscribe(keys.DRIVE, driven.append, depth=50, source="*")
+        bus.subscribe(keys.BUMPER, bumped.append)
+
+    buses.bus(declare)
+    until_received(lambda: bump.put(Bumper(pressed=False)), lambda: bumped, "something live")
+    assert driven == []
+
+
+def test_presence_appears_and_goes(buses: BusFixture) -> None:
+    seen: list[tuple[str, bool]] = []
+    key = keys.live_key(buses.robot, "bridge", "1a")
+    buses.bus(
+        lambda bus: bus.watch_live(
+            keys.live_key(buses.robot, "*", "*"), lambda key, alive: seen.append((key, alive))
+        )
+    )
+    bus = buses.bus(lambda bus: bus.live(key))
+    wait_until(lambda: (key, True) in seen, "the token")
+    bus.close()
+    wait_until(lambda: (key, False) in seen, "its end")
+
+
+def test_who_watches_late_sees_who_is_there(buses: BusFixture) -> None:
+    key = keys.live_key(buses.robot, "bridge", "1a")
+    buses.bus(lambda bus: bus.live(key))
+    seen: list[str] = []
+    buses.bus(
+        lambda bus: bus.watch_live(
+            keys.live_key(buses.robot, "*", "*"), lambda key, _: seen.append(key)
+        )
+    )
+    wait_until(lambda: key in seen, "the token")

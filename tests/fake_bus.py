@@ -1,0 +1,54 @@
+"""A bus without a router: records what is published and called, and injects messages."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from msgspec import Struct
+
+from common.bus.bus import Arrival, Bus
+from common.keys import Call, Topic
+from common.messages import Message
+from verification.harness.bus import at
+
+
+class FakeBus(Bus):
+    """A bus that never opens."""
+
+    def __init__(self) -> None:
+        self.handlers: dict[str, list[Callable[[Arrival[Any]], None]]] = {}
+        self.asked: list[tuple[str, Any]] = []
+        self.answers: list[tuple[Callable[[Any], None], Callable[[str], None]]] = []
+        self.estops = 0
+        super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
+
+    def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
+        """Store the handler for ``deliver``; the depth is ignored."""
+        names.pop("depth", None)
+        self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
+
+    def call(
+        self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
+        timeout_s: float = 2.0,
+    ) -> None:  # fmt: skip
+        """Store the request and the handlers of its answer."""
+        self.asked.append((call.path, request))
+        self.answers.append((on_reply, on_refusal))
+
+    def estop(self) -> None:
+        """Count the stop."""
+        self.estops += 1
+
+    def deliver(
+        self,
+        topic: Topic[Any],
+        message: Message,
+        received_ns: int | None = None,
+        declared: str = "",
+        **names: str,
+    ) -> None:
+        """Inject a message, by default now; ``declared`` is the handler's key if it has a *."""
+        key = topic.on(self.robot, **names)
+        now_ns = time.monotonic_ns() if received_ns is None else received_ns
+        for handler in self.handlers[declared or key]:
+            handler(Arrival(message, key, now_ns, None))
