@@ -83,9 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand and return its exit code."""
     if "_ARGCOMPLETE" in os.environ:  # the shell asks for completions
         complete()
-    words = list(sys.argv[1:] if argv is None else argv)
-    if not words:
-        words = ["--help"]
+    words = list(sys.argv[1:] if argv is None else argv) or ["--help"]
     options = parsed(words)
     try:
         code: int = module(options.command).run(options)

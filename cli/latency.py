@@ -6,13 +6,12 @@ differ by a third.
 """
 
 import argparse
-import json
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from cli.inspect import output
 from cli.inspect.session import add_output, interruptible, wants_json
 from common import keys, log
 from common.bus.bus import Arrival, Bus
@@ -128,9 +127,9 @@ def shown(once: bool, as_json: bool) -> Iterator[Show]:
 def print_line(newest: Health | None, silent: bool) -> None:
     """Print a JSON line; report silence on standard error."""
     if silent:
-        print(f"t2 latency: {SILENCE}", file=sys.stderr)
+        output.warn(f"t2 latency: {SILENCE}")
     elif newest:
-        print(json.dumps(figures(newest)), flush=True)
+        output.line(figures(newest))
 
 
 def figures(health: Health) -> dict[str, Any]:

@@ -22,10 +22,6 @@ from common.messages import ReleaseRequest, ResetDone, SafetyState
 from common.operator import CONFIRM_S, confirms, reset_request
 
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
-NO_STATE = (
-    "no state of safety within 1 s, and the call needs its heartbeat: is safety running? "
-    "run `t2 doctor`"
-)
 HEAD = ("key", "request", "reply", "does")
 
 Request = dict[str, Any]
@@ -43,12 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         call takes `echo` and `causes` from safety's newest state if they are omitted""",
     )  # fmt: skip
     parser.add_argument(
-        "--timeout",
-        type=positive,
-        default=2.0,
-        metavar="S",
+        "--timeout", type=positive, default=2.0, metavar="S",
         help="wait for S seconds, 2 by default",
-    )
+    )  # fmt: skip
     add_options(parser, every=False)
 
 
@@ -84,7 +77,10 @@ def make(
         session.probe.listen(keys.SAFETY.on(session.robot))
         seen = next(decoded(session.probe.samples(STATE_S), SafetyState), None)
         if seen is None:
-            raise RobotError(NO_STATE)
+            raise RobotError(
+                "no state of safety within 1 s, and the call needs its heartbeat: "
+                "is safety running? run `t2 doctor`"
+            )
         request = filled(call, request, seen)
     key = call.on(session.robot) if call else expression(path, session.robot)
     answers = session.probe.query(key, packed(call, request), options.timeout)

@@ -134,9 +134,8 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     texts = (str(each.get("version", "")) for each in routers(opened))
     seen.routers = [text.removeprefix("v").partition("-")[0] for text in texts]
     listen(opened, robot, seconds, seen)
-    for member in discover(opened, robot):
-        if member.instance:
-            seen.instances[member.name] = seen.instances.get(member.name, 0) + 1
+    members = discover(opened, robot)
+    seen.instances = Counter(member.name for member in members if member.instance)
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))

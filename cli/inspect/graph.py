@@ -97,15 +97,6 @@ def dot(found: Sequence[Member], links: Iterable[Edge], robot: str) -> str:
     return "\n".join([*lines, "}"])
 
 
-def publishers(found: Sequence[Member]) -> dict[str, list[str]]:
-    """Return the declared publishers by key."""
-    names: dict[str, list[str]] = {}
-    for member in found:
-        for key in member.publishes:
-            names.setdefault(key, []).append(title(member, found))
-    return names
-
-
 def by_boot(found: Iterable[Member]) -> dict[int | None, Member]:
     """Return the services by the ``boot`` of their messages, which is part of their tokens."""
     boots: dict[int | None, Member] = {}

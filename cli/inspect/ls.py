@@ -9,7 +9,7 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short, topic_of
-from cli.inspect.graph import Member, by_boot, publishers, title
+from cli.inspect.graph import Member, by_boot, title
 from cli.inspect.measure import WINDOW, stream_sample
 from cli.inspect.services import discover
 from cli.inspect.session import BusSession, add_duration, add_options, open_session, until_interrupt
@@ -20,7 +20,7 @@ from common.errors import RobotError
 from common.sample import Sample
 
 LISTEN_S = 2.0  # two periods of the slowest streams
-NO_STREAMS = ("live/", "info/", "srv/")
+NO_STREAMS = ("live/", "info/", "srv/")  # tokens and calls
 HEAD = ("key", "type", "Hz", "of", "publisher")
 
 
@@ -77,11 +77,11 @@ def listen(session: BusSession, wanted: list[str], seconds: float) -> dict[str, 
 def add_publishers(streams: dict[str, Stream], found: list[Member], wanted: list[str]) -> None:
     """Add the publishers, and the declared keys on which no message arrived."""
     boots = by_boot(found)
-    for key, names in publishers(found).items():
-        # Calls and tokens are no streams.
-        is_stream = not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
-        if is_stream and any(intersects(key, each) for each in wanted):
-            streams.setdefault(key, Stream()).publishers.update(names)
+    for member in found:
+        for key in member.publishes:
+            is_stream = not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
+            if is_stream and any(intersects(key, each) for each in wanted):
+                streams.setdefault(key, Stream()).publishers.add(title(member, found))
     for key, stream in streams.items():
         stream.publishers |= {title(boots[boot], found) for boot in stream.boots if boot in boots}
         topic = topic_of(key)

@@ -19,7 +19,6 @@ from common.messages import SafetyState, Velocity
 from common.sample import Sample
 
 LISTEN_S = 1.5  # at most; over a thin uplink a stream may have 1 Hz
-SILENT = "silent"  # safety is present and publishes no state
 HEAD = ("robot", "services", "verdict", "m/s", "driver", "")
 
 
@@ -37,7 +36,7 @@ class Robot:
         if self.state:
             return self.state.verdict
         if "safety" in self.services:
-            return SILENT
+            return "silent"
         return "no safety" if self.moves else "-"
 
     @property

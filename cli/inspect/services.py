@@ -48,11 +48,10 @@ def run(options: argparse.Namespace) -> int:
     if not any(each.reads or each.publishes for each in found):
         output.warn(f"t2 services: {CLOSED}")
     links = edges(found, intersects) + commands
+    rows = [as_json(each, found, links, session.robot) for each in found]
     if options.dot:
         print(dot(found, links, session.robot))
-        return 0
-    rows = [as_json(each, found, links, session.robot) for each in found]
-    if wants_json(options):
+    elif wants_json(options):
         for row in rows:
             output.line(row)
     else:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cli.inspect.graph import Edge, Member, by_boot, dot, edges, members, publishers, title
+from cli.inspect.graph import Edge, Member, by_boot, dot, edges, members, title
 
 TOKENS = ["t2/v1/7/live/bridge/1a", "t2/v1/7/live/safety/2b", "t2/v1/7/live/odd"]
 
@@ -71,8 +71,7 @@ def test_dot() -> None:
     assert shown.count("{") == shown.count("}") == 1
 
 
-def test_publishers_by_key_and_by_boot() -> None:
-    assert publishers(found())["t2/v1/7/tel/bridge/bumper"] == ["bridge"]
+def test_services_by_boot() -> None:
     strange = Member("x", instance="no number")
     assert {boot: member.name for boot, member in by_boot([*found(), strange]).items()} == {
         0x1A: "bridge",
