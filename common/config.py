@@ -31,6 +31,9 @@ FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 # Replaced settings and their replacements.
 REPLACED = {
     "wire.angular_unit": "wire.command_angular_unit and wire.feedback_angular_unit",
+} | {
+    f"{section}.i_accept": f"{section}.unsafe_overrides"
+    for section in ("safety", "bridge", "board", "bus", "teleop", "metrics")
 }
 
 # Sections allowed in a file; a service reads its own and the shared ones.

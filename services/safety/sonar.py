@@ -92,10 +92,13 @@ def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
 
 
 def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
-    if distance <= sonar.distance:
-        return replace(sonar, distance=distance, farther=())
-    if distance < sonar.distance + hysteresis:
-        return replace(sonar, farther=())
+    # A faulty sonar has no distance to compare with: any good readings end the fault. A near one
+    # that did not would leave the obstacle unseen, and an operator may creep toward that.
+    if not sonar.fault:
+        if distance <= sonar.distance:
+            return replace(sonar, distance=distance, farther=())
+        if distance < sonar.distance + hysteresis:
+            return replace(sonar, farther=())
     farther = (*sonar.farther, distance)
     if len(farther) < FARTHER_SAMPLES:
         return replace(sonar, farther=farther)

@@ -73,6 +73,18 @@ def test_a_bad_sample_begins_the_count_anew() -> None:
     assert feed(again, 1.0, 1.0).fault == "faulty"
 
 
+@pytest.mark.parametrize("fault", ["silent", "faulty", "too near to measure"])
+@pytest.mark.parametrize("reading", [0.0, 0.01, 0.06, 0.28])
+def test_a_fault_ends_with_near_readings_too(fault: str, reading: float) -> None:
+    # Within the hysteresis of distance zero: the obstacle must not stay unseen.
+    rules = Rules(hysteresis=0.3, stuck_travel=0.5)
+    sonar = Sonar(fault=fault)
+    for expected in (fault, fault, ""):
+        sonar = read(sonar, reading, "ok", STILL, rules)
+        assert sonar.fault == expected
+    assert (sonar.distance, sonar.is_unseen) == (reading, False)
+
+
 def test_no_echo_is_free_space() -> None:
     sonar = GOOD
     for _ in range(3):
