@@ -73,8 +73,12 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
     given |= _from_environ(root, sources.environ)
     given |= _from_sets(root, sources.sets)
     names = {part.name for part in msgspec.structs.fields(root)}
+    known = names | set(SECTIONS)
     for path, setting in given.items():
-        _check_section(path.split(".")[0], path, setting, names)
+        section = path.split(".")[0]
+        if section not in known:
+            unknown = f"no section {section!r}{_suggestion(section, known)}"
+            raise ConfigError(f"{setting.origin}: {path}: {unknown}")
     ours = {path: setting for path, setting in given.items() if path.split(".")[0] in names}
     tree = _nest(ours)
     try:
@@ -95,15 +99,20 @@ def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
         yield from flatten(part, f"{path}.{key}" if path else str(key))
 
 
+def read_toml(file: Path, shown: str) -> dict[str, Any]:
+    """Read a file; raise ``ConfigError`` that calls it ``shown``."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{shown}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
+        raise ConfigError(f"{shown}: is no TOML: {error}") from None
+
+
 def _from_file(file: Path) -> dict[str, Setting]:
     origin = _shown_path(file)
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{origin}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
-        raise ConfigError(f"{origin}: is no TOML: {error}") from None
-    return {at: _resolved(file, at, leaf) for at, leaf in _leaves("", table, origin).items()}
+    leaves = _leaves("", read_toml(file, origin), origin)
+    return {at: _resolved(file, at, leaf) for at, leaf in leaves.items()}
 
 
 def _resolved(file: Path, at: str, leaf: Setting) -> Setting:
@@ -196,14 +205,6 @@ def _nest(settings: Mapping[str, Setting]) -> dict[str, Any]:
         if setting.value != {} or not isinstance(branch.get(leaf), dict):
             branch[leaf] = setting.value
     return tree
-
-
-def _check_section(section: str, path: str, setting: Setting, names: set[str]) -> None:
-    known = names | set(SECTIONS)
-    if section not in known:
-        raise ConfigError(
-            f"{setting.origin}: {path}: no section {section!r}{_suggestion(section, known)}"
-        )
 
 
 def _suggestion(word: str, known: Iterable[str]) -> str:

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         except LinkError as error:
             log.Logger().error(str(error))
             return EXIT_LINK
-        with process:
+        with closing(process):
             for name in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(name, lambda *_: process.loop.stop())
             log.Logger().info(

@@ -24,7 +24,6 @@ from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from sim.config import Sim
-from sim.geometry import wrapped
 from sim.sonar import Ranges
 
 # rad/s of one unit on the wire; the unit of each direction is a setting.
@@ -129,7 +128,7 @@ class Board:
         distance = round(self._distance * 1000)
         return r.DistanceReport(
             (distance + S32_SPAN // 2) % S32_SPAN - S32_SPAN // 2,
-            round(math.degrees(wrapped(self._turn)) * 10),
+            round(math.degrees(math.remainder(self._turn, math.tau)) * 10),
         )
 
     def _ways(self) -> set[int]:

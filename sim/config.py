@@ -1,12 +1,12 @@
 """Settings, world files and fault scripts of the simulated vehicle."""
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
 from msgspec import Meta, Struct
 
+from common.config import read_toml
 from common.errors import ConfigError
 from common.settings import Board, Section, Shared, Vehicle, Wire
 from sim.geometry import Rectangle
@@ -80,10 +80,6 @@ def load_script(file: Path) -> Script:
 
 def _load(file: Path, kind: type[F]) -> F:
     try:
-        return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), kind)
-    except OSError as error:
-        raise ConfigError(f"{file}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file}: is no TOML: {error}") from None
+        return msgspec.convert(read_toml(file, str(file)), kind)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{file}: {error}") from None

@@ -113,8 +113,3 @@ def ray(x: float, y: float, angle: float, segment: Segment) -> float:
     rx, ry = segment.ax - x, segment.ay - y
     along, where = (rx * dy - ry * dx) / cross, (rx * sin - ry * cos) / cross
     return along if along >= 0 and 0 <= where <= 1 else math.inf
-
-
-def wrapped(angle: float) -> float:
-    """Return the angle in -pi..pi."""
-    return math.remainder(angle, math.tau)

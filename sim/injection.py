@@ -69,6 +69,10 @@ class Injection:
                 return self._remove(request.name)
             case q.Wire():
                 self._wire(request)
+            case q.Mute():
+                self._simulation.muted = _kinds(request.reports)
+            case q.Lose():
+                self._simulation.lose(_kinds(request.reports), request.every)
             case _:
                 self._inject_board(request, now_ns)
         return ""
@@ -89,16 +93,6 @@ class Injection:
                 simulation.power_cycle(request.seconds, now_ns)
             case q.Flood():
                 simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
-            case _:
-                self._inject_firmware(request)
-
-    def _inject_firmware(self, request: q.Asked) -> None:
-        simulation = self._simulation
-        match request:
-            case q.Mute():
-                simulation.muted = frozenset(REPORTS[name] for name in request.reports)
-            case q.Lose():
-                simulation.lose(frozenset(REPORTS[name] for name in request.reports), request.every)
             case q.Firmware():  # pragma: no branch - there is no other
                 simulation.firmware = request
 
@@ -129,3 +123,7 @@ class Injection:
         if name not in names:
             return f"no box is called {name!r}; there are: {', '.join(names) or 'none'}"
         return self._rebuild(self._simulation.world.without(name))
+
+
+def _kinds(names: tuple[q.ReportName, ...]) -> frozenset[type[Frame]]:
+    return frozenset(REPORTS[name] for name in names)

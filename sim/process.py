@@ -3,7 +3,6 @@
 import time
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Self
 
 import msgspec
 
@@ -13,11 +12,10 @@ from common.log import Logger
 from common.loop import Loop
 from sim import trace as t
 from sim.config import Config
-from sim.control import ControlSocket
 from sim.injection import Injection
 from sim.requests import Script
 from sim.simulation import STEP_NS, Simulation
-from sim.udp import BoardSocket
+from sim.sockets import BoardSocket, ControlSocket
 from sim.world import Plan
 
 
@@ -70,12 +68,6 @@ class Process:
     def close(self) -> None:
         """Close ports and descriptors."""
         self._opened.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _step(self, now_ns: int) -> None:
         self._injection.advance(now_ns)

@@ -13,15 +13,10 @@ from collections.abc import Sequence
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Command
+from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
-from common.wire.reports import (
-    FROM_BOARD,
-    BumperBrakeReport,
-    BumperReport,
-    UltrasonicBrakeReport,
-)
 from sim import trace as t
 from sim.board import Board
 from sim.config import Config
@@ -29,7 +24,7 @@ from sim.faults import Cable, Datagram
 from sim.geometry import Rectangle
 from sim.requests import Firmware, Where
 from sim.sonar import Sonars
-from sim.vehicle import move, next_twist, wheels
+from sim.vehicle import move, next_twist, wheel_angles
 from sim.world import Plan, World
 
 STEP_NS = NS_PER_S // 100
@@ -39,7 +34,7 @@ TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
 GARBAGE = b"GS" + bytes(20)  # starts with a frame's magic
 
-ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
+ECHOES = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
 COMMANDS = {
     MotionKind.STOP: Command.STOP,
     MotionKind.RUN: Command.RUN,
@@ -159,7 +154,7 @@ class Simulation:
             clearance=clearance if math.isfinite(clearance) else None,
             contact=self._contact,
             pressed=self._pressed(),
-            wheels=tuple(wheel.angle for wheel in wheels(self.twist, self._config.vehicle)),
+            wheels=wheel_angles(self.twist, self._config.vehicle),
             command=self._command,
             braking=self.board.braking(),
             ultrasonic_brake=self.board.ultrasonic_brake,
@@ -233,7 +228,7 @@ class Simulation:
         if isinstance(frame, ECHOES) and not self.firmware.echoes:
             return
         where = self.firmware.answers
-        if isinstance(frame, BumperReport) and frame.on and self.firmware.hits is not None:
+        if isinstance(frame, r.BumperReport) and frame.on and self.firmware.hits is not None:
             where = self.firmware.hits
         for port in self._ports(where, asked):
             self._send(frame, port, now_ns)
@@ -276,8 +271,8 @@ class Simulation:
     def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
         if datagram.foreign:
             return
-        for part in self._framing.read(datagram.payload, FROM_BOARD):
-            if not isinstance(part, Received) or not isinstance(part.frame, BumperReport):
+        for part in self._framing.read(datagram.payload, r.FROM_BOARD):
+            if not isinstance(part, Received) or not isinstance(part.frame, r.BumperReport):
                 continue
             if part.frame.on != self._reported_pressed:
                 self._reported_pressed = part.frame.on

@@ -17,7 +17,7 @@ from sim.world import World
 RAYS = 7
 TOO_NEAR_MM = 0
 
-Ranges = tuple[int, int, int, int, int, int, int, int]
+Ranges = tuple[int, ...]  # mm, of the eight in the manual's order
 
 
 class Sonars:
@@ -40,9 +40,8 @@ class Sonars:
         self._injected[sonar.name] = sonar
 
     def measure(self, world: World, pose: Pose) -> Ranges:
-        """Return the reported ranges from this pose, in mm."""
-        a, b, c, d, e, f, g, h = (self._report(mount, world, pose) for mount in self._mounts)
-        return a, b, c, d, e, f, g, h
+        """Return the reported ranges from this pose."""
+        return tuple(self._report(mount, world, pose) for mount in self._mounts)
 
     def _report(self, mount: Mount, world: World, pose: Pose) -> int:
         noise = self._random.gauss(0.0, self._noise)  # always drawn: independent of faults

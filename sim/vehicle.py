@@ -18,14 +18,6 @@ BISECTIONS = 12  # of one step, 15 mm at 1.5 m/s: contact is found to a few micr
 
 
 @dataclass(frozen=True, slots=True)
-class Wheel:
-    """A wheel's steering angle, rad within a quarter turn, and its speed, m/s."""
-
-    angle: float
-    speed: float
-
-
-@dataclass(frozen=True, slots=True)
 class Movement:
     """Result of one step: the new pose, and the actual distance and turn."""
 
@@ -75,24 +67,21 @@ def move(pose: Pose, twist: Twist, dt: float, blocked: Callable[[Pose], bool]) -
     return Movement(end, twist.linear * free, twist.angular * free, held=True)
 
 
-def wheels(twist: Twist, vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
-    """Return the front left, front right, rear left and rear right wheels."""
+def wheel_angles(twist: Twist, vehicle: Vehicle) -> tuple[float, ...]:
+    """Return the steering angles of the wheels, rad within a quarter turn.
+
+    Front left, front right, rear left, rear right.
+    """
     x, y = vehicle.wheelbase / 2, vehicle.track / 2
-    return (
-        _wheel(twist, x, y),
-        _wheel(twist, x, -y),
-        _wheel(twist, -x, y),
-        _wheel(twist, -x, -y),
-    )
+    return tuple(_wheel_angle(twist, *at) for at in ((x, y), (x, -y), (-x, y), (-x, -y)))
 
 
-def _wheel(twist: Twist, x: float, y: float) -> Wheel:
+def _wheel_angle(twist: Twist, x: float, y: float) -> float:
     # Adding 0.0 turns -0.0 into 0.0, which atan2 would take for backward.
     forward, left = twist.linear - twist.angular * y + 0.0, twist.angular * x + 0.0
-    speed = math.hypot(forward, left)
     if forward < 0:  # a wheel rolls backward instead of turning around
-        return Wheel(math.atan2(-left, -forward), -speed)
-    return Wheel(math.atan2(left, forward), speed)
+        return math.atan2(-left, -forward)
+    return math.atan2(left, forward)
 
 
 def _toward(value: float, target: float, most: float) -> float:

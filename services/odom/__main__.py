@@ -6,11 +6,5 @@ from common.service import run
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 
-
-def main() -> int:
-    """Run odometry until a signal."""
-    return run("odom", OdomConfig, Odometer)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run("odom", OdomConfig, Odometer))

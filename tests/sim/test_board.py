@@ -27,7 +27,7 @@ def board(unit: str = "decidegree", feedback: str = "", **settings: Any) -> Boar
 
 
 def near(*sonars: int, millimetres: int = 100) -> Ranges:
-    return tuple(millimetres if k in sonars else 5000 for k in range(8))  # type: ignore[return-value]
+    return tuple(millimetres if k in sonars else 5000 for k in range(8))
 
 
 def hit(way: float = 0.5, **settings: Any) -> Board:

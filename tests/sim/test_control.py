@@ -7,9 +7,9 @@ import msgspec
 import pytest
 
 from common.errors import LinkError, MessageError
-from sim.control import HOST, Control, ControlSocket
 from sim.injection import Reply
 from sim.requests import Bumper, RemoveBox
+from sim.sockets import HOST, Control, ControlSocket
 from tests.sim.sim_fixture import SimFixture
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry import Pose, Rectangle, Segment, point_gap, ray, wrapped
+from sim.geometry import Pose, Rectangle, Segment, point_gap, ray
 
 BODY = Rectangle(1.0, 0.5)
 ORIGIN = Pose(0.0, 0.0, 0.0)
@@ -96,10 +96,3 @@ def test_a_segment_may_be_a_point() -> None:
 )
 def test_rays(angle: float, distance: float) -> None:
     assert ray(0.0, 0.0, angle, Segment(2.0, -3.0, 2.0, 3.0)) == pytest.approx(distance)
-
-
-@given(st.floats(-1000.0, 1000.0))
-def test_wrapped_angles_point_the_same_way(angle: float) -> None:
-    value = wrapped(angle)
-    assert -math.pi <= value <= math.pi
-    assert math.cos(value - angle) == pytest.approx(1.0)

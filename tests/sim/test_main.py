@@ -21,8 +21,8 @@ from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
-from sim.control import Control
 from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
+from sim.sockets import Control
 from sim.trace import read
 from sim.world import Box
 from tests.common.rights import needs_right

@@ -15,8 +15,8 @@ from cli.settings import Everything
 from common import settings
 from common.config import Sources, load
 from common.freshness import NS_PER_S
-from sim.control import Control
 from sim.requests import Place
+from sim.sockets import Control
 from verification.containers.driver import LaptopDriver, driving
 from verification.containers.engine import Container, Project, docker
 from verification.harness.certificates import Site

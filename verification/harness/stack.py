@@ -17,7 +17,7 @@ from cli.demo.score import Trace, read
 from cli.run.up import commands
 from cli.settings import Everything
 from common.config import Sources, load
-from sim.control import Control
+from sim.sockets import Control
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 

@@ -32,7 +32,7 @@ from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import LinkError, RobotError
 from common.loop import Loop
-from sim.control import Control
+from sim.sockets import Control
 from verification.harness.process_stats import PROC
 from verification.soak.driver import STEP_S
 from verification.soak.record import Record, encoded

@@ -25,8 +25,8 @@ from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Done, PoseRequest
-from sim.control import Control
 from sim.requests import Place
+from sim.sockets import Control
 
 OLD_NS = NS_PER_S // 2  # an older pose is not used
 TRY_NS = NS_PER_S // 2  # between two attempts to recover

@@ -16,8 +16,8 @@ from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.messages import Health
 from sim import trace as t
-from sim.control import Control
 from sim.requests import Asked
+from sim.sockets import Control
 from verification.harness.process_stats import GONE, PROC, stat, tree
 from verification.harness.trace import Tail, moves
 from verification.soak.faults import Fault, Faults

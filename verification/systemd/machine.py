@@ -101,7 +101,7 @@ class Machine:
     def truth(self) -> dict[str, float | str]:
         """Return the true speed of the simulated vehicle, and the command that its board holds."""
         code = (
-            "import json; from sim.control import Control; t = Control(4009, 1.0).truth(); "
+            "import json; from sim.sockets import Control; t = Control(4009, 1.0).truth(); "
             "print(json.dumps({'linear': t.linear, 'holds': t.command.kind}))"
         )
         state: dict[str, float | str] = json.loads(self.python("-c", code))

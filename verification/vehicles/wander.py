@@ -5,6 +5,7 @@ and for sonars that saturate at a shorter range. A contact is counted, and the v
 to its pose one second before.
 """
 
+import math
 import random
 import statistics
 import sys
@@ -35,7 +36,7 @@ from services.safety.config import Safety
 from services.safety.inputs import DriveRequest, Event, Inputs
 from services.safety.policy import Policy
 from sim.config import Drive as Motors
-from sim.geometry import Rectangle, wrapped
+from sim.geometry import Rectangle
 from sim.sonar import Sonars
 from sim.vehicle import move, next_twist
 from sim.world import Plan, World
@@ -151,7 +152,7 @@ class Walk:
 
     def _report(self) -> None:
         self._put("velocity", Velocity(linear=self.twist.linear, angular=self.twist.angular))
-        heading = wrapped(self.turn)
+        heading = math.remainder(self.turn, math.tau)
         self._put("mileage", Mileage(distance=self.distance, heading=heading, epoch=0))
         self._put("bumper", Bumper(pressed=False))
         for side in ("left", "right"):

@@ -15,8 +15,8 @@ from cli.demo.score import read
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.wire.commands import MotionKind
 from common.wire.frame import Frame
-from sim.control import Control
 from sim.requests import Freeze
+from sim.sockets import Control
 from sim.trace import Command
 from tests.cli.commission.operator_process import PATIENCE_S, OperatorProcess, checkout
 from tests.cli.processes import ran, sets

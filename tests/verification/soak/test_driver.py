@@ -10,8 +10,8 @@ from common import keys
 from common import messages as m
 from common.errors import LinkError
 from common.freshness import NS_PER_S
-from sim.control import Control
 from sim.requests import Asked, Place
+from sim.sockets import Control
 from sim.trace import Truth
 from tests.cli.demo.lap_fixture import odometry, safety, truth
 from tests.fake_bus import FakeBus

@@ -16,8 +16,8 @@ from common.errors import LinkError
 from common.freshness import NS_PER_S
 from common.motion import Command
 from sim import trace as t
-from sim.control import Control
 from sim.requests import Asked, Driver
+from sim.sockets import Control
 from tests.cli.processes import alive, wait_gone
 from verification.harness.process_stats import tree
 from verification.harness.waiting import wait_until

@@ -7,7 +7,7 @@ import pytest
 from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
-from sim.udp import BURST, BoardSocket, bound, drain
+from sim.sockets import BURST, BoardSocket, bound, drain
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 

@@ -1,0 +1,147 @@
+"""The simulator's UDP sockets: the board's, and the control socket with its client.
+
+On the control socket, one JSON request in a datagram gets one JSON reply in another. It is for
+tests and demonstrations on this host, and off unless ``sim.control_port`` is set. Requests are
+those of ``sim.requests``: ``{"do": "bumper", "pressed": true}``.
+"""
+
+import contextlib
+import socket
+from collections.abc import Iterator
+
+import msgspec
+
+from common.errors import LinkError, MessageError
+from common.settings import Board
+from sim.faults import Datagram
+from sim.injection import Injection, Reply
+from sim.requests import Asked, GetTruth
+from sim.trace import Truth
+
+HOST = "127.0.0.1"  # of the control socket
+LARGEST = 65536
+BURST = 256  # datagrams per round, so that a flood does not stall the simulation
+
+_requests = msgspec.json.Decoder(Asked)
+_replies = msgspec.json.Decoder(Reply)
+
+
+class BoardSocket:
+    """The board's socket, and a second one that plays a foreign sender."""
+
+    def __init__(self, board: Board) -> None:
+        self._ports = board.listen_ports
+        self._pc = board.listen_address
+        self.sock = bound(board.address, board.port, "board.port")
+        self._foreign = _foreign_socket(board.address)
+        self.unsent = 0
+
+    def receive(self) -> Iterator[tuple[bytes, int | None]]:
+        """Yield received datagrams with the PC's port, or None for other senders."""
+        for payload, (address, port, *_) in drain(self.sock):
+            ours = address == self._pc and port in self._ports
+            yield payload, port if ours else None
+
+    def send(self, datagram: Datagram) -> None:
+        """Send to a port of the PC; count errors."""
+        sock = self._foreign if datagram.foreign else self.sock
+        try:
+            sock.sendto(datagram.payload, (self._pc, datagram.port))
+        except OSError:
+            self.unsent += 1
+
+    def close(self) -> None:
+        """Close the sockets."""
+        self.sock.close()
+        self._foreign.close()
+
+
+class ControlSocket:
+    """The simulator's end of the control socket."""
+
+    def __init__(self, port: int, injection: Injection) -> None:
+        self.sock = bound(HOST, port, "sim.control_port")
+        self._injection = injection
+
+    def serve(self, now_ns: int) -> None:
+        """Answer the waiting requests."""
+        for payload, sender in drain(self.sock):
+            reply = self._answer(payload, now_ns)
+            with contextlib.suppress(OSError):  # the client may be gone
+                self.sock.sendto(msgspec.json.encode(reply), sender)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self.sock.close()
+
+    def _answer(self, payload: bytes, now_ns: int) -> Reply:
+        try:
+            request = _requests.decode(payload)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            return Reply(ok=False, error=str(error))
+        return self._injection.handle(request, now_ns)
+
+
+class Control:
+    """A client of the control socket."""
+
+    def __init__(self, port: int, timeout_s: float = 5.0) -> None:
+        self._port = port
+        self._timeout_s = timeout_s
+
+    def do(self, request: Asked) -> Reply:
+        """Send a request; ``MessageError`` when it is refused, ``LinkError`` when none answers."""
+        try:
+            reply = _replies.decode(self._exchange(msgspec.json.encode(request)))
+        except OSError as error:  # includes timeouts
+            raise LinkError(f"the simulator's control socket: {error}") from None
+        if not reply.ok:
+            raise MessageError(reply.error)
+        return reply
+
+    def truth(self) -> Truth:
+        """Return the true state; errors as in ``do``."""
+        truth = self.do(GetTruth()).truth
+        assert truth is not None
+        return truth
+
+    def _exchange(self, payload: bytes) -> bytes:
+        # A socket for each request: a late reply to an earlier one must not be taken for its own.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.settimeout(self._timeout_s)
+            sock.connect((HOST, self._port))
+            sock.send(payload)
+            return sock.recv(LARGEST)
+
+
+def bound(address: str, port: int, setting: str) -> socket.socket:
+    """Return a bound, non-blocking UDP socket; raise ``LinkError`` on failure."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sock.bind((address, port))
+    except OSError as error:
+        sock.close()
+        raise LinkError(
+            f"{setting}: cannot listen on UDP port {port} of {address}: {error.strerror}; "
+            f"is another simulator running? --set {setting}=PORT takes another port"
+        ) from None
+    sock.setblocking(False)
+    return sock
+
+
+def drain(sock: socket.socket) -> Iterator[tuple[bytes, tuple[str, int]]]:
+    """Yield waiting datagrams, a burst at most."""
+    # ConnectionRefusedError belongs to an earlier datagram; the rest is read next time.
+    with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+        for _ in range(BURST):
+            payload, address = sock.recvfrom(LARGEST)
+            yield payload, address
+
+
+def _foreign_socket(address: str) -> socket.socket:
+    """Return a socket with another loopback address, or another port on other networks."""
+    if address.startswith("127."):
+        other = "127.0.0.2" if address != "127.0.0.2" else "127.0.0.3"
+        with contextlib.suppress(LinkError):  # not every system has the whole of 127.0.0.0/8
+            return bound(other, 0, "board.address")
+    return bound(address, 0, "board.address")
