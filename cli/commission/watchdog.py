@@ -21,7 +21,8 @@ from cli.commission.report import Verdict, judged
 from cli.commission.watchdog_plan import BRAKE, Sample, WatchdogPlan, judge_watchdog
 from cli.settings import Everything
 from common.errors import WireError
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
+from common.motion import Twist
 from common.wire import commands, reports
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
@@ -79,7 +80,8 @@ class BoardMaster:
                     velocity = self._translator.velocity(frame)
                 except WireError:
                     continue  # implausible: the header has no CRC
-                yield Sample(velocity.linear, velocity.angular, time.monotonic_ns())
+                twist = Twist(velocity.linear, velocity.angular)
+                yield Latest(twist, time.monotonic_ns())
 
     def wait_for_standstill(self) -> str:
         """Brake until the board reports standstill; return the problem, or an empty string."""
@@ -87,7 +89,7 @@ class BoardMaster:
         while time.monotonic() < end_s:
             self.send(BRAKE)
             for sample in self.velocities(REPEAT_S):
-                if sample.stands:
+                if sample.value.is_standing:
                     return ""
         bad = f"; {self.rejected} invalid frames" if self.rejected else ""
         return f"The board does not report standstill within {STANDSTILL_S:g} s{bad}."

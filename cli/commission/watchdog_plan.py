@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from cli.commission.report import Verdict
-from common.freshness import NS_PER_S
-from common.motion import is_standing
+from common.freshness import NS_PER_S, Latest
+from common.motion import STILL, Twist
 from common.wire.commands import MotionCommand, MotionKind
 
 LINEAR_MPS = 0.05
@@ -30,20 +30,7 @@ RUN = MotionCommand(MotionKind.RUN, round(LINEAR_MPS * 1000))
 BRAKE = MotionCommand(MotionKind.BREAK)
 
 Phase = Literal["run", "silence", "brake", "over"]
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """A velocity of the board with its local receive time; m/s and rad/s."""
-
-    linear: float
-    angular: float
-    received_ns: int
-
-    @property
-    def stands(self) -> bool:
-        """Whether the velocity counts as standstill."""
-        return is_standing(self.linear, self.angular)
+Sample = Latest[Twist]  # a velocity of the board, with its local receive time
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +48,7 @@ class WatchdogPlan:
 
     def add(self, sample: Sample) -> "WatchdogPlan":
         """Return the plan after one velocity of the board."""
-        stood_ns = (self.stood_ns or sample.received_ns) if sample.stands else None
+        stood_ns = (self.stood_ns or sample.received_ns) if sample.value.is_standing else None
         return replace(self, samples=(*self.samples, sample), stood_ns=stood_ns)
 
     def end(self, reason: str, now_ns: int) -> "WatchdogPlan":
@@ -94,11 +81,11 @@ class WatchdogPlan:
         return self
 
     def _danger(self, now_ns: int) -> str:
-        newest_ns = self.samples[-1].received_ns if self.samples else self.begun_ns
-        if now_ns - newest_ns > SILENT_NS:
+        newest = self.samples[-1] if self.samples else Latest(STILL, self.begun_ns)
+        if now_ns - newest.received_ns > SILENT_NS:
             return f"The board was silent for {SILENT_NS / NS_PER_S:g} s."
-        if self.samples and abs(self.samples[-1].linear) > TOO_FAST_MPS:
-            return f"It moved at {self.samples[-1].linear:.2f} m/s, requested were {LINEAR_MPS:g}."
+        if abs(newest.value.linear) > TOO_FAST_MPS:
+            return f"It moved at {newest.value.linear:.2f} m/s, requested were {LINEAR_MPS:g}."
         return ""
 
     def _silence_over(self, now_ns: int) -> bool:
@@ -119,8 +106,14 @@ def judge_watchdog(plan: WatchdogPlan) -> Verdict:
     ran, silent = _split(plan)
     data = [
         ("commanded", f"{LINEAR_MPS:g} m/s for {RUN_NS / NS_PER_S:g} s, then nothing"),
-        ("velocity at the end of RUN", f"{ran[-1].linear:.3f} m/s" if ran else "not received"),
-        ("velocity at the end of the silence", f"{silent[-1].linear:.3f} m/s" if silent else "-"),
+        (
+            "velocity at the end of RUN",
+            f"{ran[-1].value.linear:.3f} m/s" if ran else "not received",
+        ),
+        (
+            "velocity at the end of the silence",
+            f"{silent[-1].value.linear:.3f} m/s" if silent else "-",
+        ),
         ("velocities in the silence", str(len(silent))),
     ]
     if problem := _inconclusive(plan, ran, silent):
@@ -139,20 +132,20 @@ def _split(plan: WatchdogPlan) -> tuple[Sequence[Sample], Sequence[Sample]]:
 def _inconclusive(plan: WatchdogPlan, ran: Sequence[Sample], silent: Sequence[Sample]) -> str:
     if plan.abort:
         return f"Ended early: {plan.abort}"
-    if not ran or abs(ran[-1].linear) < MOVING_MPS:
+    if not ran or abs(ran[-1].value.linear) < MOVING_MPS:
         return "The wheels did not turn at the end of RUN: the result is inconclusive."
     if not silent:
         return "No velocity was received in the silence: the result is inconclusive."
-    if not silent[-1].stands and not _steady(ran[-1], silent[-1]):
+    if not silent[-1].value.is_standing and not _steady(ran[-1], silent[-1]):
         return "It slowed down but did not stand within the silence: the result is inconclusive."
     return ""
 
 
 def _finding(plan: WatchdogPlan, ran: Sequence[Sample], silent: Sequence[Sample]) -> str:
-    if not silent[-1].stands:
+    if not silent[-1].value.is_standing:
         return f"Drives on for {SILENCE_NS / NS_PER_S:g} s without a command: no watchdog."
     last_run_ns = plan.last_run_ns or plan.begun_ns
-    moving = [s.received_ns for s in silent if not s.stands]
+    moving = [s.received_ns for s in silent if not s.value.is_standing]
     slowing = [s.received_ns for s in silent if not _steady(ran[-1], s)]
     stood_ns = next(s.received_ns for s in silent if not moving or s.received_ns > moving[-1])
     return (
@@ -163,4 +156,4 @@ def _finding(plan: WatchdogPlan, ran: Sequence[Sample], silent: Sequence[Sample]
 
 def _steady(before: Sample, after: Sample) -> bool:
     """Return whether the speed is about that of RUN."""
-    return abs(after.linear) >= 0.7 * abs(before.linear)
+    return abs(after.value.linear) >= 0.7 * abs(before.value.linear)

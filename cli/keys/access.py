@@ -5,10 +5,8 @@ Zenoh messages in each direction. The router drops all other messages without no
 ``docs/security.md``.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
-
-from msgspec import Struct
 
 from common import keys
 from common.members import Member
@@ -51,58 +49,43 @@ QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 # them: a recorder on a laptop must not hide that the one on board is dead.
 LAPTOP_SERVICES = ("dashboard", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
-SUBSCRIBER_INFO: Rights = {"know": (EVERY_KEY, KEPT), "recall": RECALLED}
-
-
-class Rule(Struct, frozen=True):
-    """A Zenoh rule: the allowed messages, and their keys."""
-
-    id: str
-    flow: Literal["ingress", "egress"]
-    messages: Sequence[str]
-    key_exprs: Sequence[str]
-
-    def as_config(self) -> dict[str, object]:
-        """Return the rule as Zenoh configuration."""
-        return {
-            "id": self.id,
-            "permission": "allow",
-            "flows": [self.flow],
-            "messages": list(self.messages),
-            "key_exprs": list(self.key_exprs),
-        }
 
 
 def access_control(members: Iterable[Member], trusted: Sequence[str]) -> dict[str, object]:
     """Return Zenoh's ``access_control``; on-board clients use the ``trusted`` link protocols."""
-    subjects: list[dict[str, object]] = [{"id": "onboard", "link_protocols": list(trusted)}]
-    granted: dict[str, Rights] = {"onboard": ONBOARD}
+    subjects: list[dict[str, object]] = []
+    rules: dict[str, list[dict[str, object]]] = {}
+    if trusted:  # Zenoh rejects an empty list, and a missing one means every protocol
+        subjects.append({"id": "onboard", "link_protocols": list(trusted)})
+        rules["onboard"] = list(_rules("onboard", ONBOARD))
     for member in members:
         name = member.common_name
-        granted[name] = rights(member)
         subjects.append({"id": name, "cert_common_names": [name]})
-    if not trusted:  # Zenoh rejects an empty list, and a missing one means every protocol
-        subjects, granted = subjects[1:], {k: v for k, v in granted.items() if k != "onboard"}
-    rules = {name: list(rules_of(name, given)) for name, given in granted.items()}
+        rules[name] = list(_rules(name, rights(member)))
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule.as_config() for own in rules.values() for rule in own],
+        "rules": [rule for own in rules.values() for rule in own],
         "subjects": subjects,
         "policies": [
-            {"rules": [rule.id for rule in own], "subjects": [name]} for name, own in rules.items()
+            {"rules": [rule["id"] for rule in own], "subjects": [name]}
+            for name, own in rules.items()
         ],
     }
 
 
-def rules_of(name: str, given: Rights) -> Iterable[Rule]:
-    """Yield the rules for the rights of a member."""
+def _rules(name: str, given: Rights) -> Iterator[dict[str, object]]:
+    """Yield Zenoh's rules for the rights of a member."""
     for verb, expressions in given.items():
-        incoming, outgoing = VERBS[verb]
-        if incoming:
-            yield Rule(f"{name} {verb} in", "ingress", incoming, expressions)
-        if outgoing:
-            yield Rule(f"{name} {verb} out", "egress", outgoing, expressions)
+        for flow, messages in zip(("ingress", "egress"), VERBS[verb], strict=True):
+            if messages:
+                yield {
+                    "id": f"{name} {verb} {flow}",
+                    "permission": "allow",
+                    "flows": [flow],
+                    "messages": list(messages),
+                    "key_exprs": list(expressions),
+                }
 
 
 def rights(member: Member) -> Rights:
@@ -116,29 +99,27 @@ def rights(member: Member) -> Rights:
     return fleet() if member.role == "fleet" else viewer()
 
 
-def viewer() -> Rights:
+def viewer(services: Sequence[str] = LAPTOP_SERVICES) -> Rights:
     """Return the rights to see everything and command nothing."""
     return {
         "read": EVERYTHING,
-        **SUBSCRIBER_INFO,
+        "know": (EVERY_KEY, KEPT),
+        "recall": RECALLED,
         "ask": QUERYABLE,
-        **publishing(LAPTOP_SERVICES),
+        **publishing(services),
     }
 
 
 def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
     """Return the rights to see everything, and to drive, stop and call the given robots."""
     own_robots = tuple(robots)
-    own = publishing(DRIVER_SERVICES)
+    viewing = viewer(DRIVER_SERVICES)
+    calls = (call.on(each) for each in own_robots for call in keys.CALLS)
+    actuation = (key for each in own_robots for key in actuation_keys(each, sources))
     return {
-        "read": EVERYTHING,
-        **SUBSCRIBER_INFO,
-        "ask": (*QUERYABLE, *(call.on(each) for each in own_robots for call in keys.CALLS)),
-        **own,
-        "write": (
-            *own["write"],
-            *(key for each in own_robots for key in actuation_keys(each, sources)),
-        ),
+        **viewing,
+        "ask": (*viewing["ask"], *calls),
+        "write": (*viewing["write"], *actuation),
     }
 
 
@@ -179,17 +160,16 @@ def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ..
     return (*driven, keys.estop_key(robot))
 
 
-def publishing(services: Iterable[str]) -> dict[Verb, Sequence[str]]:
+def publishing(services: Sequence[str]) -> dict[Verb, Sequence[str]]:
     """Return the rights to publish as these services: health, events, presence, replies."""
-    names = tuple(services)
-    health = tuple(keys.HEALTH.on(ANY, service=name) for name in names)
-    events = tuple(keys.EVENTS.on(ANY, service=name) for name in names)
+    health = tuple(keys.HEALTH.on(ANY, service=name) for name in services)
+    events = tuple(keys.EVENTS.on(ANY, service=name) for name in services)
     kept = tuple(f"{event}/{KEPT_KEY}" for event in events)
     return {
         "write": (*health, *events, *kept),
         "keep": events,
-        "serve": (*(keys.info_key(ANY, name, ANY) for name in names), *kept),
-        "live": (*(keys.live_key(ANY, name, ANY) for name in names), *kept),
+        "serve": (*(keys.info_key(ANY, name, ANY) for name in services), *kept),
+        "live": (*(keys.live_key(ANY, name, ANY) for name in services), *kept),
     }
 
 

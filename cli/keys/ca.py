@@ -4,7 +4,7 @@ Keys use the curve P-256 and signatures ECDSA with SHA-256. Every TLS library su
 rustls, which Zenoh uses.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from ipaddress import ip_address
@@ -24,8 +24,6 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from cli.keys.profile import Profile, Span, is_ip
 from common.errors import RobotError
 from common.members import Member
-
-Extensions = Sequence[tuple[x509.ExtensionType, bool]]  # each with its critical flag
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +47,10 @@ class CertificateAuthority:
         """Create the authority of a site."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = _name(f"T2 CA of {site}")
-        extensions: Extensions = [
-            (x509.BasicConstraints(ca=True, path_length=0), True),
-            (_key_usage(signs_certificates=True), True),
-            (x509.SubjectKeyIdentifier.from_public_key(key.public_key()), False),
-        ]
-        serial = x509.random_serial_number()
-        signed = _signed(name, key.public_key(), serial, span, extensions, issuer=name, by=key)
-        return cls(signed, key)
+        identifier = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
+        unsigned = _unsigned(name, name, key, span, [identifier], is_ca=True)
+        numbered = unsigned.serial_number(x509.random_serial_number())
+        return cls(numbered.sign(key, hashes.SHA256()), key)
 
     @classmethod
     def load(
@@ -68,7 +62,7 @@ class CertificateAuthority:
         """
         loaded = certificate_from(certificate)
         try:
-            private = load_pem_private_key(key, passphrase() if _is_encrypted(key) else None)
+            private = load_pem_private_key(key, passphrase() if b"ENCRYPTED" in key else None)
         except ValueError:
             raise RobotError("cannot read the CA's key: wrong passphrase, or not a key") from None
         if not isinstance(private, ec.EllipticCurvePrivateKey):
@@ -83,17 +77,16 @@ class CertificateAuthority:
         serial = x509.random_serial_number()
         name = profile.common_name(serial)
         authority = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
-        extensions: Extensions = [
-            (x509.BasicConstraints(ca=False, path_length=None), True),
-            (_key_usage(signs_certificates=False), True),
-            (x509.ExtendedKeyUsage(_usages(profile)), False),
-            (x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(authority), False),
-            *((names, False) for names in _alternative_names(profile)),
+        server = [ExtendedKeyUsageOID.SERVER_AUTH] if profile.listens else []
+        extensions = [
+            x509.ExtendedKeyUsage([*server, ExtendedKeyUsageOID.CLIENT_AUTH]),
+            x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(authority),
+            *_alternative_names(profile),
         ]
-        signed = _signed(
-            _name(name), key.public_key(), serial, span, extensions,
-            issuer=self.certificate.subject, by=self.key,
-        )  # fmt: skip
+        unsigned = _unsigned(
+            self.certificate.subject, _name(name), key, span, extensions, is_ca=False
+        )
+        signed = unsigned.serial_number(serial).sign(self.key, hashes.SHA256())
         member = Member(
             common_name=name, role=profile.role, name=profile.name, robots=profile.robots,
             sources=profile.sources, addresses=profile.addresses,
@@ -121,39 +114,34 @@ def key_pem(key: ec.EllipticCurvePrivateKey, passphrase: bytes = b"") -> bytes:
     return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, protection)
 
 
-def _signed(
-    name: x509.Name,
-    public_key: ec.EllipticCurvePublicKey,
-    serial: int,
-    span: Span,
-    extensions: Extensions,
-    *,
+def _unsigned(
     issuer: x509.Name,
-    by: ec.EllipticCurvePrivateKey,
-) -> x509.Certificate:
-    builder = x509.CertificateBuilder(issuer, name, public_key, serial)
+    name: x509.Name,
+    key: ec.EllipticCurvePrivateKey,
+    span: Span,
+    extensions: Iterable[x509.ExtensionType],
+    *,
+    is_ca: bool,
+) -> x509.CertificateBuilder:
+    """Return a certificate without serial number; only what limits its use is critical."""
+    usage = x509.KeyUsage(
+        digital_signature=not is_ca, key_cert_sign=is_ca, crl_sign=is_ca,
+        content_commitment=False, key_encipherment=False, data_encipherment=False,
+        key_agreement=False, encipher_only=False, decipher_only=False,
+    )  # fmt: skip
+    builder = x509.CertificateBuilder(issuer, name, key.public_key())
     builder = builder.not_valid_before(datetime.fromtimestamp(span.begins_s, UTC))
     builder = builder.not_valid_after(datetime.fromtimestamp(span.ends_s, UTC))
-    for extension, critical in extensions:
-        builder = builder.add_extension(extension, critical)
-    return builder.sign(by, hashes.SHA256())
+    constraints = x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None)
+    builder = builder.add_extension(constraints, critical=True)
+    builder = builder.add_extension(usage, critical=True)
+    for extension in extensions:
+        builder = builder.add_extension(extension, critical=False)
+    return builder
 
 
 def _name(common_name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
-
-
-def _key_usage(*, signs_certificates: bool) -> x509.KeyUsage:
-    return x509.KeyUsage(
-        digital_signature=not signs_certificates, key_cert_sign=signs_certificates,
-        crl_sign=signs_certificates, content_commitment=False, key_encipherment=False,
-        data_encipherment=False, key_agreement=False, encipher_only=False, decipher_only=False,
-    )  # fmt: skip
-
-
-def _usages(profile: Profile) -> list[x509.ObjectIdentifier]:
-    client = [ExtendedKeyUsageOID.CLIENT_AUTH]
-    return [ExtendedKeyUsageOID.SERVER_AUTH, *client] if profile.listens else client
 
 
 def _alternative_names(profile: Profile) -> list[x509.SubjectAlternativeName]:
@@ -162,7 +150,3 @@ def _alternative_names(profile: Profile) -> list[x509.SubjectAlternativeName]:
         for each in profile.addresses
     ]
     return [x509.SubjectAlternativeName(names)] if names else []
-
-
-def _is_encrypted(key: bytes) -> bool:
-    return b"ENCRYPTED" in key

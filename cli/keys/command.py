@@ -17,11 +17,31 @@ FOLDER = Path("keys")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the five subcommands."""
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    _add_init(_verb(verbs, "init", "create the CA of a site"))
-    _add_issue(_verb(verbs, "issue", "create a certificate, and the folder for its machine"))
-    _add_renew(_verb(verbs, "renew", "create the next certificate; the previous one stays valid"))
-    _add_revoke(_verb(verbs, "revoke", "revoke the certificates of a member"))
+    init = _verb(verbs, "init", "create the CA of a site")
+    issue = _verb(verbs, "issue", "create a certificate, and the folder for its machine")
+    renew = _verb(verbs, "renew", "create the next certificate; the previous one stays valid")
+    revoke = _verb(verbs, "revoke", "revoke the certificates of a member")
     shown = _verb(verbs, "list", "list every certificate, and what expires soon")
+    init.add_argument("--site", default="t2", metavar="NAME", help="t2 by default")
+    init.add_argument(
+        "--passphrase", action="store_true", help="ask for a passphrase, to encrypt the CA's key"
+    )
+    for verb in (issue, renew, revoke):
+        verb.add_argument("role", choices=ROLES, metavar="ROLE", help=", ".join(ROLES))
+        verb.add_argument(
+            "name", metavar="NAME", help="a robot's id, or the name of a person or site"
+        )
+    _add_rights(issue)
+    _add_signing(issue)
+    _add_signing(renew)
+    for verb in (init, issue, renew):
+        verb.add_argument(
+            "--passphrase-file", type=Path, metavar="FILE",
+            help="file with the passphrase of the CA's key",
+        )  # fmt: skip
+    revoke.add_argument(
+        "--serial", type=_serial, help="only the certificate whose name ends with this serial"
+    )
     shown.add_argument("--json", action="store_true", help="one JSON object")
 
 
@@ -46,16 +66,7 @@ def _verb(
     return parser
 
 
-def _add_init(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--site", default="t2", metavar="NAME", help="t2 by default")
-    parser.add_argument(
-        "--passphrase", action="store_true", help="ask for a passphrase, to encrypt the CA's key"
-    )
-    _add_passphrase_file(parser)
-
-
-def _add_issue(parser: argparse.ArgumentParser) -> None:
-    _add_member(parser)
+def _add_rights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", action="append", default=[], metavar="ID",
         help="for a driver: allow this robot; may be repeated",
@@ -66,34 +77,6 @@ def _add_issue(parser: argparse.ArgumentParser) -> None:
         help="for a driver: allow only this source name, as in safety.sources; may be repeated; "
         f" {', '.join(OPERATORS_SOURCES)} by default",
     )  # fmt: skip
-    _add_signing(parser)
-
-
-def _add_renew(parser: argparse.ArgumentParser) -> None:
-    _add_member(parser)
-    _add_signing(parser)
-
-
-def _add_revoke(parser: argparse.ArgumentParser) -> None:
-    _add_member(parser)
-    parser.add_argument(
-        "--serial", type=_serial, help="only the certificate whose name ends with this serial"
-    )
-
-
-def _serial(text: str) -> str:
-    if not text:  # an unset shell variable must not revoke all
-        raise argparse.ArgumentTypeError(
-            "is empty; `t2 keys list` shows serials, and without --serial all are revoked"
-        )
-    return text
-
-
-def _add_member(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("role", choices=ROLES, metavar="ROLE", help=", ".join(ROLES))
-    parser.add_argument(
-        "name", metavar="NAME", help="a robot's id, or the name of a person or site"
-    )
 
 
 def _add_signing(parser: argparse.ArgumentParser) -> None:
@@ -108,13 +91,11 @@ def _add_signing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ca-key", type=Path, metavar="FILE", help="the CA's key, if it is stored elsewhere"
     )
-    _add_passphrase_file(parser)
 
 
-def _add_passphrase_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--passphrase-file",
-        type=Path,
-        metavar="FILE",
-        help="file with the passphrase of the CA's key",
-    )
+def _serial(text: str) -> str:
+    if not text:  # an unset shell variable must not revoke all
+        raise argparse.ArgumentTypeError(
+            "is empty; `t2 keys list` shows serials, and without --serial all are revoked"
+        )
+    return text

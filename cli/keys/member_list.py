@@ -1,12 +1,19 @@
-"""Changes of the member list: lookup, addition, revocation. Pure."""
+"""The member list: lookup, addition, revocation, and the output of ``t2 keys list``. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
 
 from msgspec.structs import replace
 
-from cli.keys.profile import LISTENERS, Profile
+from cli.inspect import output
+from cli.keys.profile import DAY_S, DAYS, EVERY_ROBOT, LISTENERS, Profile
 from common.errors import RobotError
 from common.members import Member, Members, Role
+
+SOON_DAYS = 30
+HEAD = ("role", "name", "robots", "until", "state", "certificate")
+
+State = Literal["valid", "expires soon", "expired", "revoked"]
 
 
 def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:
@@ -16,13 +23,18 @@ def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:
 
 def newest(members: Members, role: Role, name: str) -> Member:
     """Return the latest certificate of a member; raise ``RobotError`` without one."""
-    found = of(members, role, name)
-    if not found:
+    found = newest_of_each(members).get((role, name))
+    if found is None:
         raise RobotError(
             f"{role} {name} has no certificate, or a revoked one; "
             f"`t2 keys issue {role} {name}` makes one"
         )
-    return found[-1]
+    return found
+
+
+def newest_of_each(members: Members) -> Mapping[tuple[Role, str], Member]:
+    """Return the latest certificate of each admitted member, by role and name."""
+    return {(member.role, member.name): member for member in members.welcome}
 
 
 def addresses_of(member: Member) -> tuple[str, ...]:
@@ -38,8 +50,8 @@ def addresses_of(member: Member) -> tuple[str, ...]:
 
 def routers(members: Members) -> list[Profile]:
     """Return the admitted routers, each with the addresses of its latest certificate."""
-    last = {(each.role, each.name): each for each in members.welcome if each.role in LISTENERS}
-    return [Profile(*who, addresses=last[who].addresses) for who in sorted(last)]
+    newest = sorted(newest_of_each(members).items())
+    return [Profile(*who, addresses=it.addresses) for who, it in newest if who[0] in LISTENERS]
 
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
@@ -70,3 +82,76 @@ def revoked(
         replace(each, revoked=True) if each in matching else each for each in members.members
     )
     return replace(members, members=left), matching
+
+
+def state(member: Member, now_s: float) -> State:
+    """Return the state of a certificate."""
+    if member.revoked:
+        return "revoked"
+    left_s = member.expires.timestamp() - now_s
+    if left_s <= 0:
+        return "expired"
+    return "expires soon" if left_s < SOON_DAYS * DAY_S else "valid"
+
+
+def as_table(members: Members, now_s: float) -> str:
+    """Return a table with a row for each certificate."""
+    rows = [
+        (
+            member.role,
+            member.name,
+            robots(member),
+            f"{member.expires:%Y-%m-%d}",
+            state(member, now_s),
+            member.common_name,
+        )
+        for member in members.members
+    ]
+    return output.table(HEAD, rows)
+
+
+def as_json(members: Members, ca_ends_s: float, now_s: float) -> dict[str, object]:
+    """Return the list as JSON fields."""
+    return {
+        "site": members.site,
+        "authority": {"days": days(ca_ends_s, now_s)},
+        "certificates": [
+            {
+                "common_name": member.common_name,
+                "role": member.role,
+                "name": member.name,
+                "robots": list(member.robots),
+                "sources": list(member.sources),
+                "expires": f"{member.expires:%Y-%m-%dT%H:%M:%SZ}",
+                "days": days(member.expires.timestamp(), now_s),
+                "state": state(member, now_s),
+            }
+            for member in members.members
+        ],
+    }
+
+
+def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
+    """Yield what expires, with the command to renew it; skip renewed certificates."""
+    left = days(ca_ends_s, now_s)
+    if left < DAYS:
+        yield f"the CA {_expiry(left)}: create another with `t2 keys init --folder NEW`"
+    for member in newest_of_each(members).values():
+        if state(member, now_s) in ("expires soon", "expired"):
+            name = f"{member.role} {member.name}"
+            left = days(member.expires.timestamp(), now_s)
+            yield f"{name} {_expiry(left)}: `t2 keys renew {name}`"
+
+
+def robots(member: Member) -> str:
+    """Return the robots of a member as text."""
+    return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
+
+
+def days(ends_s: float, now_s: float) -> int:
+    """Return the number of whole days left; negative after the expiry."""
+    return int((ends_s - now_s) // DAY_S)
+
+
+def _expiry(left: int) -> str:
+    return f"expires in {left} days" if left >= 0 else "has expired"

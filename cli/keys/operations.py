@@ -9,7 +9,7 @@ from getpass import getpass
 from pathlib import Path
 
 from cli.inspect import output
-from cli.keys import instructions, member_list, report
+from cli.keys import instructions, member_list
 from cli.keys.ca import CertificateAuthority, certificate_from
 from cli.keys.profile import (
     CA_DAYS,
@@ -81,12 +81,12 @@ def show(options: argparse.Namespace) -> int:
     members, now_s = folder.read(), time.time()
     ends_s = certificate_from(folder.certificate()).not_valid_after_utc.timestamp()
     if options.json:
-        output.line(report.as_json(members, ends_s, now_s))
+        output.line(member_list.as_json(members, ends_s, now_s))
         return 0
     until = f"{datetime.fromtimestamp(ends_s, UTC):%Y-%m-%d}"
     print(f"site {members.site}, CA until {until}\n")
-    print(report.as_table(members, now_s))
-    for line in report.advice(members, ends_s, now_s):
+    print(member_list.as_table(members, now_s))
+    for line in member_list.advice(members, ends_s, now_s):
         print(f"\n{line}")
     return 0
 

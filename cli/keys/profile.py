@@ -27,6 +27,11 @@ VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (
 EVERY_ROBOT = "*"
 OPERATORS_SOURCES = ("teleop", "web", "checkout")  # the sources of the operator's screens
 LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role and serial too
+NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
+SOURCE_NAMES = (
+    "a lowercase letter, then up to 31 lowercase letters, digits, hyphens and underscores, as in "
+    "safety.sources"
+)
 
 LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
 HOST = re.compile(rf"(?=.{{1,253}}\Z)(?!(.*\.)?\d+\Z)({LABEL}\.)*{LABEL}\Z")  # no 300.1.1.1
@@ -74,7 +79,7 @@ def profile(
 ) -> Profile:
     """Return the profile for the given options; raise ``ConfigError`` if they are invalid."""
     for each in (name, *(robot for robot in robots if robot != EVERY_ROBOT)):
-        _check_name(each)
+        _check(each, Annotated[Name, Meta(max_length=LONGEST)], f"{each!r} is not a name: {NAMES}")
     for address in addresses:
         _check_address(address)
     _check_driver(role, robots, sources)
@@ -115,35 +120,23 @@ def is_ip(address: str) -> bool:
     return True
 
 
-def _check_name(name: str) -> None:
+def _check(text: str, kind: object, problem: str) -> None:
     try:
-        msgspec.convert(name, Annotated[Name, Meta(max_length=LONGEST)])
+        msgspec.convert(text, kind)
     except msgspec.ValidationError:
-        raise ConfigError(
-            f"{name!r} is not a name: 1 to {LONGEST} letters, digits, dots, hyphens and underscores"
-        ) from None
+        raise ConfigError(problem) from None
 
 
 def _check_driver(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
     """Reject driver options for other roles, and a driver without robots."""
     for source in sources:
-        _check_source(source)
+        _check(source, SourceName, f"--source {source!r} is not a source name: {SOURCE_NAMES}")
     if role == "driver" and not robots:
         raise ConfigError("a driver needs --robot ID for each of its robots, or --every")
     if role != "driver" and robots:
         raise ConfigError(f"--robot and --every are for drivers, not for a {role}")
     if role != "driver" and sources:
         raise ConfigError(f"--source is for drivers; a {role} does not request motion")
-
-
-def _check_source(source: str) -> None:
-    try:
-        msgspec.convert(source, SourceName)
-    except msgspec.ValidationError:
-        raise ConfigError(
-            f"--source {source!r} is not a source name: a lowercase letter, then up to 31 "
-            "lowercase letters, digits, hyphens and underscores, as in safety.sources"
-        ) from None
 
 
 def _check_address(address: str) -> None:

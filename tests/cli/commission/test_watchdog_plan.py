@@ -12,11 +12,11 @@ from cli.commission.watchdog_plan import (
     PERIOD_NS,
     RUN,
     SILENT_NS,
-    Sample,
     WatchdogPlan,
     judge_watchdog,
 )
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
+from common.motion import Twist
 from common.wire.commands import MotionCommand, MotionKind
 
 START_NS = 50 * NS_PER_S
@@ -51,7 +51,7 @@ def played(board: Board, limit_s: float = 5.0) -> tuple[WatchdogPlan, Sent]:
             sent.append((now_ns, command))
         speed = board(now_ns, sent)
         if speed is not None:
-            plan = plan.add(Sample(speed, 0.0, now_ns))
+            plan = plan.add(Latest(Twist(speed), now_ns))
         now_ns += STEP_NS
     return plan, sent
 
@@ -155,14 +155,14 @@ def test_an_abort_brakes_with_the_next_tick(phase: str) -> None:
 
 def test_a_silence_without_a_sample_is_inconclusive() -> None:
     plan = WatchdogPlan(START_NS, "over", last_run_ns=START_NS, braked_ns=START_NS + NS_PER_S)
-    silent = plan.add(Sample(LINEAR_MPS, 0.0, START_NS))
+    silent = plan.add(Latest(Twist(LINEAR_MPS), START_NS))
     assert "No velocity was received in the silence" in judge_watchdog(silent).text
 
 
 def test_standstill_from_the_first_sample() -> None:
     plan = WatchdogPlan(START_NS, "over", last_run_ns=START_NS, braked_ns=START_NS + NS_PER_S)
     for speed, after_ns in ((LINEAR_MPS, 0), (0.0, NS_PER_S // 10), (0.0, NS_PER_S // 2)):
-        plan = plan.add(Sample(speed, 0.0, START_NS + after_ns))
+        plan = plan.add(Latest(Twist(speed), START_NS + after_ns))
     assert judge_watchdog(plan).text == (
         "Stops by itself after 0.10 s, slowing down from 0.10 s on."
     )
