@@ -27,6 +27,7 @@ WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
 ESTOP = "/estop/"
+FULL = "too many connections; only E-STOP is served\n"
 TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
 STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
@@ -60,23 +61,22 @@ class AuthMiddleware:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or WebSocket."""
         connection = self._find(scope["client"])
-        send = _with_headers(connection, send)
+        answer = await self._answer(connection, scope, receive)
+        await answer(scope, receive, _with_headers(connection, send))
+
+    async def _answer(
+        self, connection: Connection | None, scope: Scope, receive: Receive
+    ) -> ASGIApp:
+        """Return the application for a request with valid credentials, else the refusal."""
         is_socket = scope["type"] == "websocket"
         is_reserved = connection is not None and connection.place is Place.RESERVE
         if is_reserved and not scope["path"].startswith(ESTOP):
-            await _refuse(is_socket, "too many connections; only E-STOP is served")(
-                scope, receive, send
-            )
-            return
+            return _close if is_socket else PlainTextResponse(FULL, 503, {"retry-after": "1"})
         headers, credentials = Headers(scope=scope), self._credentials
         acts = is_socket or scope["method"] not in SAFE_METHODS
         if credentials.may_act(headers) if acts else credentials.may_view(headers):
-            await self.app(scope, receive, send)
-        elif is_socket:
-            await _refuse(is_socket, "")(scope, receive, send)
-        else:
-            answer = await self._authenticate(Request(scope, receive))
-            await answer(scope, receive, send)
+            return self.app
+        return _close if is_socket else await self._authenticate(Request(scope, receive))
 
     async def _authenticate(self, request: Request) -> Response:
         if not self._credentials.token:
@@ -121,11 +121,8 @@ def _with_headers(connection: Connection | None, send: Send) -> Send:
     return send_with_headers
 
 
-def _refuse(is_socket: bool, reason: str) -> ASGIApp:
-    async def close(_: Scope, __: Receive, send: Send) -> None:
-        await send({"type": "websocket.close", "code": 1008})
-
-    return close if is_socket else PlainTextResponse(f"{reason}\n", 503, {"retry-after": "1"})
+async def _close(_: Scope, __: Receive, send: Send) -> None:
+    await send({"type": "websocket.close", "code": 1008})
 
 
 def token_page(wrong: bool) -> str:

@@ -83,20 +83,15 @@ class SdlGamepad:
 
     def _stick(self) -> Stick:
         joystick, settings = self._joystick, self._settings
-        push = Deflection(
-            -self._part(joystick.get_axis, settings.linear_axis, joystick.get_numaxes()),
-            -self._part(joystick.get_axis, settings.angular_axis, joystick.get_numaxes()),
+        linear, angular = (  # a missing axis or button is at rest
+            joystick.get_axis(index) if index < joystick.get_numaxes() else 0.0
+            for index in (settings.linear_axis, settings.angular_axis)
         )
         deadman, turbo = (
-            bool(self._part(joystick.get_button, index, joystick.get_numbuttons()))
+            index < joystick.get_numbuttons() and bool(joystick.get_button(index))
             for index in (settings.deadman_button, settings.turbo_button)
         )
-        return Stick(push, deadman, turbo, self._events)
-
-    @staticmethod
-    def _part(read: Any, index: int, count: int) -> float:
-        """Read an axis or button; a missing one is at rest."""
-        return float(read(index)) if index < count else 0.0
+        return Stick(Deflection(-linear, -angular), deadman, turbo, self._events)
 
 
 def find(settings: Teleop) -> Gamepad:

@@ -27,9 +27,11 @@ FAULT = "bold magenta"
 UNKNOWN = "-"
 
 HIT = "bold white on red"
-CORNERS = (
-    ("front_left", -1, -1), ("front_right", -1, 1), ("rear_left", 1, -1), ("rear_right", 1, 1),
-)  # fmt: skip
+# -1 is ahead, 1 behind; -1 is left, 1 right.
+SONARS = {
+    "front": (-1, 0), "rear": (1, 0), "left": (0, -1), "right": (0, 1),
+    "front_left": (-1, -1), "front_right": (-1, 1), "rear_left": (1, -1), "rear_right": (1, 1),
+}  # fmt: skip
 
 BODY = (
     "█╭───────╮█",
@@ -52,7 +54,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Positions on the canvas; ``ahead`` is -1 for the front, ``side`` is -1 for the left."""
+    """Positions on the canvas; ``ahead`` and ``side`` as in ``SONARS``."""
 
     middle: int  # column of the vehicle's centre
     top: int  # row of its front
@@ -62,10 +64,22 @@ class Plan:
         """Return the row at ``band`` rows from the front or the rear."""
         return self.top - 1 - band if ahead < 0 else self.top + BODY_HEIGHT + band
 
-    def outside(self, side: int, label: str) -> int:
-        """Return the first column of a label beside the outermost arc."""
+    def arc(self, ahead: int, side: int, band: int) -> list[tuple[int, int, str]]:
+        """Return row, column and text of each part of a sonar's arc."""
+        row, column = self.row(ahead, band), self.middle + side * (7 + 2 * band)
+        if not side:
+            return [(row, self.middle - 3 - band, "━" * (7 + 2 * band))]
+        if ahead:
+            return [(row, column, "╱" if ahead == side else "╲")]
+        return [(self.top + each, column, "┃") for each in range(1, BODY_HEIGHT - 1)]
+
+    def label(self, ahead: int, side: int, label: str) -> tuple[int, int]:
+        """Return row and column of a label beside a sonar's outermost arc."""
+        if not side:
+            return self.row(ahead, self.bands), self.middle - len(label) // 2
+        row = self.row(ahead, self.bands - 1) if ahead else self.top + 2
         gap = 7 + 2 * self.bands
-        return self.middle + gap if side > 0 else self.middle - gap - len(label) + 1
+        return row, self.middle + gap if side > 0 else self.middle - gap - len(label) + 1
 
 
 class Canvas:
@@ -123,12 +137,8 @@ def around(
     canvas = Canvas(width, height)
     seen = readings(ultrasonic)
     _body(canvas, plan, bumper)
-    for name, side in (("front", -1), ("rear", 1)):
-        _end(canvas, plan, side, seen[name])
-    for name, side in (("left", -1), ("right", 1)):
-        _side(canvas, plan, side, seen[name])
-    for name, ahead, side in CORNERS:
-        _corner(canvas, plan, (ahead, side), seen[name])
+    for name, at in SONARS.items():
+        _sonar(canvas, plan, at, seen[name])
     return canvas.text()
 
 
@@ -142,32 +152,11 @@ def _body(canvas: Canvas, plan: Plan, bumper: Bumper | None) -> None:
     canvas.put(plan.top + 2, left + (BODY_WIDTH - len(label)) // 2, label, style)
 
 
-def _end(canvas: Canvas, plan: Plan, ahead: int, sonar: Reading) -> None:
-    for band in range(plan.bands):
-        half = 3 + band
-        canvas.put(
-            plan.row(ahead, band), plan.middle - half, "━" * (2 * half + 1), _arc(sonar, band)
-        )
-    column = plan.middle - len(sonar.label) // 2
-    canvas.put(plan.row(ahead, plan.bands), column, sonar.label, sonar.style)
-
-
-def _side(canvas: Canvas, plan: Plan, side: int, sonar: Reading) -> None:
-    for band in range(plan.bands):
-        for row in range(1, BODY_HEIGHT - 1):
-            column = plan.middle + side * (7 + 2 * band)
-            canvas.put(plan.top + row, column, "┃", _arc(sonar, band))
-    canvas.put(plan.top + 2, plan.outside(side, sonar.label), sonar.label, sonar.style)
-
-
-def _corner(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> None:
+def _sonar(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> None:
     ahead, side = at
     for band in range(plan.bands):
-        column = plan.middle + side * (7 + 2 * band)
-        canvas.put(plan.row(ahead, band), column, "╱" if ahead == side else "╲", _arc(sonar, band))
-    row = plan.row(ahead, plan.bands - 1)
-    canvas.put(row, plan.outside(side, sonar.label), sonar.label, sonar.style)
-
-
-def _arc(sonar: Reading, band: int) -> str:
-    return sonar.style if band in sonar.lit else DIM
+        style = sonar.style if band in sonar.lit else DIM
+        for row, column, text in plan.arc(ahead, side, band):
+            canvas.put(row, column, text, style)
+    row, column = plan.label(ahead, side, sonar.label)
+    canvas.put(row, column, sonar.label, sonar.style)
