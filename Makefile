@@ -42,8 +42,9 @@ demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap
 up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C
 	$(BIN)/t2 up
 
-# Most tests wait for other processes most of the time. Tests that measure run alone.
-TOGETHER = -n 4 --dist worksteal -m "not alone and not campaign"
+# Most tests wait for other processes most of the time. Of the tests that measure times two run at once.
+MANY = -n 6 --dist worksteal
+FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
@@ -53,8 +54,8 @@ WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 TESTS = $(BIN)/python -m tools.run_tests
 
 test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
-	$(TESTS) $(WITHOUT_SEARCH) $(TOGETHER)
-	$(TESTS) $(WITHOUT_SEARCH) -m alone
+	$(TESTS) $(WITHOUT_SEARCH) $(MANY) -m "not timed and not campaign"
+	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m "timed and not campaign"
 
 fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
@@ -101,8 +102,8 @@ search: $(STAMP) ## search for violations of the invariants
 
 cover: $(STAMP) ## all tests except the search, with coverage
 	$(BIN)/coverage erase
-	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(TOGETHER)
-	$(TESTS) $(WITHOUT_SEARCH) -m "alone or campaign"
+	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(MANY) -m "not timed"
+	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m timed
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
 

@@ -22,7 +22,7 @@ from verification.harness.bus import at, bus_on, running
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 ROGUE_MPS = 0.9
 AHEAD = 1000  # so far the copied number is ahead of the real one

@@ -18,7 +18,7 @@ from verification.harness.waiting import wait_until
 
 __all__ = ["source", "stack"]  # fixtures
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 WAYS = {
     "contact_to_break": ["board_to_bridge", "bridge_to_break"],

@@ -61,6 +61,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.campaign
 def test_the_document_is_printed_again_from_stored_samples(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -75,6 +76,7 @@ def test_the_document_is_printed_again_from_stored_samples(
     assert text in capsys.readouterr().out
 
 
+@pytest.mark.campaign
 def test_a_benchmark_is_measured_stored_and_printed(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

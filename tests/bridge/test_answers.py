@@ -47,7 +47,7 @@ def test_what_is_not_answered_is_told_with_what_is_waited_for(bridge: BridgeFixt
     bridge.drive()
 
 
-@pytest.mark.alone
+@pytest.mark.timed
 def test_short_presses_are_seen_although_every_third_answer_is_lost(bridge: BridgeFixture) -> None:
     """Presses of 60 ms at any time; 6 of 18 were missed when each query waited for its answer."""
     bridge.drive()

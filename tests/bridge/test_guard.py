@@ -70,7 +70,7 @@ def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
         made.wait_for(MotionKind.STOP)
 
 
-@pytest.mark.alone  # more delay than its own, and the bridge is killed
+@pytest.mark.timed  # more delay than its own, and the bridge is killed
 def test_a_bridge_that_was_only_held_up_lives_on() -> None:
     with guarded_rig(0.2) as (made, process):
         first = bridge_pid(process)

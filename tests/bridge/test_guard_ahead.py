@@ -36,7 +36,7 @@ sys.exit(Guard(config, Sockets(config.board), [sys.executable, "-c", {SPIN!r}]).
 
 
 @needs_right
-@pytest.mark.alone  # it takes a whole core
+@pytest.mark.timed  # it takes a whole core
 def test_a_bridge_that_runs_away_is_braked_for_and_killed() -> None:
     with board() as made:
         sets = [f"board.port={made.address[1]}", f"board.listen_ports={made.ports}"]

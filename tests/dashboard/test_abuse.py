@@ -67,6 +67,7 @@ def said(server: Server) -> None:
         it.send("estop")
 
 
+@pytest.mark.timed
 @pytest.mark.campaign
 @pytest.mark.parametrize("message", FLOODS.values(), ids=FLOODS)
 def test_a_flood_of_messages_does_not_delay_an_emergency_stop(

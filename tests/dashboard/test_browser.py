@@ -23,7 +23,7 @@ from verification.harness.stack import RunningStack, running_stack
 
 # Alone: a browser on a busy host answers so late that the hold lapses.
 pytestmark = [
-    pytest.mark.alone,
+    pytest.mark.timed,
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
 ]
 

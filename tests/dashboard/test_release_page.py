@@ -14,7 +14,7 @@ from verification.harness.dashboard_page import CHROMIUM, center_of, take_contro
 from verification.harness.waiting import wait_until
 
 pytestmark = [
-    pytest.mark.alone,
+    pytest.mark.timed,
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
 ]
 

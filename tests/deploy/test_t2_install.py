@@ -49,6 +49,7 @@ def link(home: Path, name: str) -> str:
     return str((home / name).readlink()).partition("-")[0]
 
 
+@pytest.mark.campaign
 def test_install_again_upgrade_and_roll_back(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
@@ -78,6 +79,7 @@ def test_install_again_upgrade_and_roll_back(
     assert "t2 2.0 install" in forth.stdout
 
 
+@pytest.mark.campaign
 def test_another_build_of_a_version_has_its_own_folder(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
@@ -90,6 +92,7 @@ def test_another_build_of_a_version_has_its_own_folder(
     assert len(list(home.glob("1.0-*"))) == 2
 
 
+@pytest.mark.campaign
 def test_a_version_that_rejects_the_settings_is_not_activated(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
@@ -121,6 +124,7 @@ def test_the_dry_run_uses_the_same_arguments(
     assert not (home / "current").exists()
 
 
+@pytest.mark.campaign
 def test_an_interrupted_build_is_repeated(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:

@@ -128,7 +128,3 @@ def test_a_finding_fails_the_run(root: Path, capsys: pytest.CaptureFixture[str])
     (root / "a.md").write_text("It stalls.\n", encoding="utf-8")
     assert prose.main(["a.md"]) == 0
     assert capsys.readouterr().out == ""
-
-
-def test_the_tree_passes() -> None:
-    assert prose.main([]) == 0

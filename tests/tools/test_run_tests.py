@@ -1,6 +1,7 @@
 """The second run of failed tests, with a small suite."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -29,7 +30,16 @@ def run(folder: Path, tests: str, *words: str) -> "subprocess.CompletedProcess[s
     (folder / "test_it.py").write_text(tests, encoding="utf-8")
     (folder / "pytest.ini").write_text("[pytest]\naddopts = -q -rs\n", encoding="utf-8")
     command = [sys.executable, str(ROOT / "tools/run_tests.py"), *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # Other plugins take longer to load than these tests to run.
+    only_xdist = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_PLUGINS": "xdist.plugin"}
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | only_xdist,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 @pytest.mark.parametrize("words", [(), ("-n", "2")])

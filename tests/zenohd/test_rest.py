@@ -24,7 +24,7 @@ from verification.harness.ports import free_port
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 ODOMETRY = keys.ODOMETRY.on("001")
 

@@ -15,7 +15,7 @@ from verification.harness.bus import bus_on, running
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 
 def t2(stack: RunningStack, *words: str) -> tuple[int, str]:

@@ -89,9 +89,15 @@ WAYS: dict[str, Callable[[int], None]] = {
 }
 
 
-@pytest.mark.alone
+@pytest.mark.timed
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way",
+    [
+        "the supervisor",
+        *(pytest.param(way, marks=pytest.mark.campaign) for way in list(WAYS)[1:]),
+    ],
+)
 def test_no_run_after_a_kill_of(way: str, tmp_path: Path) -> None:
     with driven(tmp_path) as (pid, frames):
         frames.forget()

@@ -12,7 +12,18 @@ NOTHING = "recvmsg(22, {msg_namelen=16}, 0) = -1 EAGAIN (Resource temporarily un
 WAKING = 'write(15, "\\1\\0\\0\\0\\0\\0\\0\\0", 8) = 8\nfutex(0x7f, FUTEX_WAKE_PRIVATE, 1) = 1\n'
 
 
-@pytest.mark.parametrize("method", METHODS, ids=[method.kinds[0] for method in METHODS])
+# Callgrind takes half a minute of a core.
+EACH = [
+    pytest.param(
+        method,
+        marks=[pytest.mark.campaign] if "instructions" in method.kinds else [],
+        id=method.kinds[0],
+    )
+    for method in METHODS
+]
+
+
+@pytest.mark.parametrize("method", EACH)
 def test_each_path_has_its_expected_cost(method: Method) -> None:
     tolerance, sections = read(FILE.read_text(encoding="utf-8"))
     what = " and ".join(method.kinds)

@@ -8,7 +8,7 @@ import pytest
 
 from verification.faults.catalogue import FAULTS
 
-pytestmark = pytest.mark.campaign
+pytestmark = [pytest.mark.timed, pytest.mark.campaign]
 
 NAMES = (
     "driver's network cut for 0.8 s, then the burst", "robot's clock stepped by +1 h",

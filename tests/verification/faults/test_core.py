@@ -17,7 +17,7 @@ from verification.faults.table import Row
 from verification.faults.trial import run_trial
 from verification.harness.host import StallRecorder
 
-pytestmark = pytest.mark.campaign
+pytestmark = [pytest.mark.timed, pytest.mark.campaign]
 
 CORE = (
     "contact in one sample", "estop", "bridge SIGKILL", "bridge SIGSTOP", "guard SIGKILL",

@@ -23,7 +23,7 @@ from verification.harness.waiting import wait_until
 
 __all__ = ["source", "stack"]  # fixtures
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 # In addition to the bridge's lease, 0.2 s as shipped: 0.5 s from the death of a process to the last
 # command that moves the vehicle.

@@ -40,6 +40,7 @@ def test_the_heading_wraps_at_half_a_turn(turned: float, heading: int) -> None:
     assert int.from_bytes(wire.distance(0.0, turned)[12:], "little", signed=True) == heading
 
 
+@pytest.mark.timed
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     "scenario",

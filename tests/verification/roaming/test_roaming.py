@@ -9,7 +9,7 @@ import pytest
 
 from verification.roaming.__main__ import UNAVAILABLE
 
-pytestmark = pytest.mark.campaign
+pytestmark = [pytest.mark.timed, pytest.mark.campaign]
 
 NAMES = ("1 % lost", "down for 1 s")
 

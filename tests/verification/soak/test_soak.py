@@ -21,6 +21,7 @@ def soak_command(*words: str) -> list[str]:
     return [sys.executable, "-m", "verification.soak", *words]
 
 
+@pytest.mark.timed
 @pytest.mark.campaign
 @pytest.mark.timeout(PATIENCE_S + 20)
 def test_a_short_soak(tmp_path: Path) -> None:
