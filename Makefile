@@ -10,6 +10,9 @@ PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
 CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
   "T2 needs Python 3.11 or newer: make PYTHON=/path/to/python3.11")
 
+# The tests start hundreds of processes. Without cached bytecode each of them compiles T2 anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
@@ -54,8 +57,8 @@ WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 TESTS = $(BIN)/python -m tools.run_tests
 
 test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
-	$(TESTS) $(WITHOUT_SEARCH) $(MANY) -m "not timed and not campaign"
 	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m "timed and not campaign"
+	$(TESTS) $(WITHOUT_SEARCH) $(MANY) -m "not timed and not campaign"
 
 fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
