@@ -1,0 +1,48 @@
+"""Figures of a report: gaps, ids, and drawings of almost nothing."""
+
+import math
+import re
+from xml.etree import ElementTree as ET
+
+from cli.recordings.report import figures
+from cli.recordings.report.timeline import Timeline
+from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
+
+
+def timeline_of_the_drive() -> Timeline:
+    timeline = Timeline()
+    for arrival in drive():
+        timeline.add(*arrival)
+    return timeline
+
+
+def lines_of(svg: str, color: str) -> list[str]:
+    """Return the points of each line of this colour, without those of the legend."""
+    paths = ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}path")
+    return [path.attrib["d"] for path in paths if path.get("stroke") == color]
+
+
+def test_a_gap_breaks_the_line() -> None:
+    timeline = timeline_of_the_drive()
+    whole = lines_of(figures.speeds(timeline), figures.MEASURED)
+    timeline.linear.measured.values[50] = math.nan
+    broken = lines_of(figures.speeds(timeline), figures.MEASURED)
+    assert len(broken) == len(whole) + 1
+    assert not any("nan" in points for points in broken)
+
+
+def test_the_path_has_equal_scales() -> None:
+    timeline = timeline_of_the_drive()
+    segment = timeline.path[0]
+    segment.times[:], segment.xs[:], segment.ys[:] = [0.0, 9.0], [0.0, 2.0], [0.0, 1.0]
+    (points,) = lines_of(figures.path(timeline), figures.MEASURED)
+    (x1, y1), (x2, y2) = (map(float, at) for at in re.findall(r"([\d.]+),([\d.]+)", points))
+    assert abs((x2 - x1) - 2 * (y1 - y2)) < 0.5
+
+
+def test_a_recording_of_one_unknown_message() -> None:
+    timeline = Timeline()
+    timeline.add("t2/v1/001/tel/<mine>", None, BEGIN_NS)
+    assert "linear, m/s" in figures.speeds(timeline)
+    drawn = figures.arrivals(timeline, list(timeline.streams.values()), ["<mine>"])
+    assert "&lt;mine&gt;" in drawn
