@@ -1,7 +1,7 @@
 """Timeline of a recording: time series, path, phases and events for the plots. Pure.
 
 Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
-NaN in a gap, so that no line is drawn through it.
+NaN in a gap and for a non-finite value, so that no line is drawn through it.
 """
 
 import math
@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from cli.recordings.report.stops import Phases, Stop, stops
 from cli.recordings.report.timing import Stream
+from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
     SONAR_NAMES,
@@ -43,7 +44,7 @@ class Series:
             self.times.append(self.times[-1])
             self.values.append(NAN)
         self.times.append(at_s)
-        self.values.append(NAN if value is None else value)
+        self.values.append(value if value is not None and math.isfinite(value) else NAN)
 
 
 @dataclass(slots=True)
@@ -138,7 +139,7 @@ class Timeline:
             case Velocity():
                 self.linear.measured.add(at_s, message.linear)
                 self.angular.measured.add(at_s, message.angular)
-            case Odometry():
+            case Odometry() if finite(message.x, message.y):
                 self._add_pose(message, at_s)
             case SafetyState():
                 self._add_state(message, at_s)

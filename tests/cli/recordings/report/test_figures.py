@@ -4,8 +4,14 @@ import math
 import re
 from xml.etree import ElementTree as ET
 
+import msgspec
+import pytest
+
 from cli.recordings.report import figures
 from cli.recordings.report.timeline import Timeline
+from cli.recordings.report.timing import Stream
+from common.messages import Drive, Limits, SafetyState
+from tests.cli.recordings.report import drive_fixture
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
 
 
@@ -38,6 +44,35 @@ def test_the_path_has_equal_scales() -> None:
     (points,) = lines_of(figures.path(timeline), figures.MEASURED)
     (x1, y1), (x2, y2) = (map(float, at) for at in re.findall(r"([\d.]+),([\d.]+)", points))
     assert abs((x2 - x1) - 2 * (y1 - y2)) < 0.5
+
+
+def test_gaps_of_a_stream_are_red() -> None:
+    stream = Stream("t2/v1/001/tel/bridge/velocity")
+    for at_s in (0.0, 0.02, 0.5, 0.52):
+        stream.add(at_s, None)
+    drawn = figures.arrivals(Timeline(lasted_s=1.0), [stream], ["tel/bridge/velocity"])
+    assert len(lines_of(drawn, figures.STOPPED)) == 1
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_non_finite_values_are_left_out(value: float) -> None:
+    timeline = Timeline()
+    pose = drive_fixture.odometry(1)
+    for number, message in enumerate(
+        (
+            msgspec.structs.replace(pose, x=value),
+            Drive(seq=1, boot=1, linear=value, angular=value, echo=1),
+            SafetyState(
+                verdict="run", latched=(), causes=(), source=None, heartbeat=1, text="",
+                limits=Limits(forward=value, backward=value, angular=value),
+            ),
+        )
+    ):  # fmt: skip
+        timeline.add(*drive_fixture.at("@cmd/drive/teleop", message, number / 10))
+    assert timeline.path == []
+    assert "requested by teleop" in figures.speeds(timeline)
+    timeline.add(*drive_fixture.at("tel/odom/odometry", pose, 1.0))
+    assert "start" in figures.path(timeline)
 
 
 def test_a_recording_of_one_unknown_message() -> None:
