@@ -5,13 +5,12 @@ import re
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any
 
 import ziaplot as zp
 from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
-from cli.recordings.report.stops import Phase, Stop
+from cli.recordings.report.stops import Period
 from cli.recordings.report.timeline import Series, Timeline, VelocitySeries, downsampled
 from cli.recordings.report.timing import Stream
 
@@ -216,7 +215,7 @@ def _line(
     graph.add(line.name(label).color(color).strokewidth(width).stroke(dash))
 
 
-def _span(graph: zp.Graph, period: Phase[Any] | Stop, color: str) -> None:
+def _span(graph: zp.Graph, period: Period, color: str) -> None:
     """Shade a period over the graph's full height."""
     span = zp.Rectangle(period.begins_s, -BEYOND, period.lasts_s, 2 * BEYOND)
     graph.add(span.fill(color).color("none"))
