@@ -16,6 +16,7 @@ ON_BOARD = (
 HEAVY = {
     "asyncio", "dataclasses", "email", "hashlib", "importlib.metadata", "shutil",
     "jinja2", "matplotlib", "mcap", "rich", "starlette", "structlog", "textual", "uvicorn",
+    "ziaplot",
 }  # fmt: skip
 
 

@@ -15,6 +15,10 @@ SAMPLES_S = 0.005
 AGES = (
     "bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age", "estop_path_age",
 )  # fmt: skip
+LEASES = (
+    "runaway_time", "release_lease", "sources.demo.lease", "sources.teleop.lease",
+    "sources.checkout.lease",
+)  # fmt: skip
 SLOWER = ("switches_age", "driver_age")
 
 
@@ -35,8 +39,6 @@ def settings(stall_s: float) -> list[str]:
         return []
     longer = min(3.0, max(1.0, 3.0 * stall_s))
     react = min(1.5, max(0.5, 2.0 * stall_s))
-    accepted = [*AGES, *SLOWER, "runaway_time", "release_lease", "sources.demo.lease",
-                "sources.teleop.lease", "sources.checkout.lease"]  # fmt: skip
     return [
         "bus.unsafe_overrides=lease",
         "bus.lease=10",
@@ -46,14 +48,9 @@ def settings(stall_s: float) -> list[str]:
         f"bridge.silence={longer}",
         f"bridge.heartbeat={longer}",
         f"bridge.echo_timeout={min(2.0, longer)}",
-        f"safety.unsafe_overrides={','.join(accepted)}",
-        *(f"safety.{name}={longer}" for name in AGES),
+        f"safety.unsafe_overrides={','.join((*AGES, *LEASES, *SLOWER))}",
+        *(f"safety.{name}={longer}" for name in (*AGES, *LEASES)),
         *(f"safety.{name}=10" for name in SLOWER),
-        f"safety.runaway_time={longer}",
-        f"safety.release_lease={longer}",
-        f"safety.sources.demo.lease={longer}",
-        f"safety.sources.teleop.lease={longer}",
-        f"safety.sources.checkout.lease={longer}",
         f"safety.react={react}",
     ]
 

@@ -17,6 +17,7 @@ from common.motion import STILL, Twist, clamp, is_standing
 UNDER_WAY = 0.5  # m; a shorter way means blocked at the start, before the first sonar message
 
 Press = Literal["reset", "release"]
+HeadingError = Callable[[Odometry], float]  # rad to turn, counter-clockwise
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +123,12 @@ class Lap:
 
 def lap(fast: bool, pace: Pace = QUICK) -> tuple[Step, ...]:
     """Return the steps; the fast lap ends before the drive home."""
-    north = math.pi / 2
+    to_north, to_east = heading_error(math.pi / 2), heading_error(0.0)
     first = (
         Step("wait for safety", still, lambda v, _: v.safety.verdict in ("run", "slow")),
         Step("drive off to the wall", ahead(pace, pace.cruise), blocked),
         Step("back off", ahead(pace, -pace.careful), moved_by(0.45)),
-        Step("turn left", turn(pace, north), faces(pace, north)),
+        Step("turn left", turn(pace, to_north), faces(pace, to_north)),
         Step("drive on", ahead(pace, pace.cruise), lambda v, _: "contact" in v.safety.latched),
         Step("reset, refused", still, lambda v, _: v.refusal is not None, "reset", latched=True),
         Step("release", still, released, "release", latched=True),
@@ -138,9 +139,9 @@ def lap(fast: bool, pace: Pace = QUICK) -> tuple[Step, ...]:
         return first
     return (
         *first,
-        Step("turn home", toward(pace, 0.0), faces_home(pace)),
-        Step("drive home", toward(pace, pace.cruise), is_home),
-        Step("turn as at the start", turn(pace, 0.0), faces(pace, 0.0)),
+        Step("turn home", turn(pace, bearing), faces(pace, bearing)),
+        Step("drive home", toward_start(pace), is_home),
+        Step("turn as at the start", turn(pace, to_east), faces(pace, to_east)),
     )
 
 
@@ -159,23 +160,18 @@ def ahead(pace: Pace, linear: float) -> Callable[[View, Odometry], Twist]:
     return drive
 
 
-def turn(pace: Pace, heading: float) -> Callable[[View, Odometry], Twist]:
-    """Request a turn on the spot to a heading (rad)."""
-
-    def drive(view: View, _: Odometry) -> Twist:
-        error = wrap(heading - view.odometry.heading)
-        return Twist(0.0, clamp(pace.gain * error, pace.spin))
-
-    return drive
+def turn(pace: Pace, error: HeadingError) -> Callable[[View, Odometry], Twist]:
+    """Request a turn on the spot until the error is 0."""
+    return lambda view, _: Twist(0.0, clamp(pace.gain * error(view.odometry), pace.spin))
 
 
-def toward(pace: Pace, linear: float) -> Callable[[View, Odometry], Twist]:
+def toward_start(pace: Pace) -> Callable[[View, Odometry], Twist]:
     """Request motion to the start, slower when close."""
 
     def drive(view: View, _: Odometry) -> Twist:
         error = bearing(view.odometry)
         slower = 0.4 * pace.gain * distance(view.odometry, 0.0, 0.0)
-        speed = min(linear, slower) if abs(error) < 0.5 else 0.0
+        speed = min(pace.cruise, slower) if abs(error) < 0.5 else 0.0
         return Twist(speed, clamp(pace.gain * error, pace.spin))
 
     return drive
@@ -192,18 +188,9 @@ def moved_by(metres: float) -> Callable[[View, Odometry], bool]:
     return lambda view, began: distance(view.odometry, began.x, began.y) >= metres
 
 
-def faces(pace: Pace, heading: float) -> Callable[[View, Odometry], bool]:
-    """Return a condition: standstill in a heading (rad)."""
-
-    def done(view: View, _: Odometry) -> bool:
-        return abs(wrap(heading - view.odometry.heading)) < pace.facing and view.standing
-
-    return done
-
-
-def faces_home(pace: Pace) -> Callable[[View, Odometry], bool]:
-    """Return a condition: standstill in the direction of the start."""
-    return lambda view, _: abs(bearing(view.odometry)) < pace.facing and view.standing
+def faces(pace: Pace, error: HeadingError) -> Callable[[View, Odometry], bool]:
+    """Return a condition: standstill with a small error."""
+    return lambda view, _: abs(error(view.odometry)) < pace.facing and view.standing
 
 
 def is_home(view: View, _: Odometry) -> bool:
@@ -220,6 +207,11 @@ def released(view: View, began: Odometry) -> bool:
 def distance(pose: Odometry, x: float, y: float) -> float:
     """Return the distance to a point, m."""
     return math.hypot(x - pose.x, y - pose.y)
+
+
+def heading_error(heading: float) -> HeadingError:
+    """Return the function that measures the turn to a heading (rad)."""
+    return lambda pose: wrap(heading - pose.heading)
 
 
 def bearing(pose: Odometry) -> float:

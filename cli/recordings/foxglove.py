@@ -1,6 +1,7 @@
 """``t2 foxglove``: a live WebSocket server for Foxglove or Lichtblick."""
 
 import argparse
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import EVERYTHING, expression
@@ -9,7 +10,7 @@ from common.cli_args import sources
 from common.config import load
 from common.errors import LinkError, RobotError
 from services.recorder.config import RecorderConfig
-from services.recorder.mcap_codec import Channel, Encoder, Entry
+from services.recorder.mcap_codec import Channel, Encoder
 
 if TYPE_CHECKING:
     from foxglove import Channel as FoxgloveChannel
@@ -48,12 +49,12 @@ def run(options: argparse.Namespace) -> int:
         print(f"connect Foxglove or Lichtblick to ws://{options.host}:{server.port}", flush=True)
         for word in EVERYTHING:
             session.probe.listen(expression(word, session.robot))
-        sent, channels = 0, Channels(context)
+        sent, channel_of = 0, cache(partial(create_channel, context))
         try:
             with until_interrupt():
                 for sample in session.probe.samples(options.duration):
                     for entry in encoder.entries(sample, sample.wall_ns):
-                        channels.send(entry)
+                        channel_of(entry.channel).log(entry.data, log_time=entry.log_ns)
                     sent += 1
                     if sent == options.count:
                         break
@@ -62,27 +63,12 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-class Channels:
-    """The channels of the server, each created on first use."""
+def create_channel(context: "Context", channel: Channel) -> "FoxgloveChannel":
+    """Create a channel of the server."""
+    import foxglove
 
-    def __init__(self, context: "Context") -> None:
-        self._context = context
-        self._channels: dict[Channel, FoxgloveChannel] = {}
-
-    def send(self, entry: Entry) -> None:
-        """Send a message to the subscribers of its topic."""
-        channel = self._channels.get(entry.channel)
-        if channel is None:
-            channel = self._channels[entry.channel] = self._create(entry.channel)
-        channel.log(entry.data, log_time=entry.log_ns)
-
-    def _create(self, channel: Channel) -> "FoxgloveChannel":
-        import foxglove
-
-        schema = None
-        if channel.schema:
-            name, data = channel.schema.name, channel.schema.data
-            schema = foxglove.Schema(name=name, encoding="jsonschema", data=data)
-        return foxglove.Channel(
-            channel.topic, schema=schema, message_encoding="json", context=self._context
-        )
+    schema = None
+    if channel.schema:
+        name, data = channel.schema.name, channel.schema.data
+        schema = foxglove.Schema(name=name, encoding="jsonschema", data=data)
+    return foxglove.Channel(channel.topic, schema=schema, message_encoding="json", context=context)

@@ -98,7 +98,12 @@ def as_text(reader: "Reader", summary: Summary) -> str:
         versions = (f"{name} {version}" for name, version in sorted(summary.versions.items()))
         lines.append(f"versions: {', '.join(versions)}")
     rows = [
-        [_short(key), one.kind, str(one.count), "-" if one.hz is None else f"{one.hz:.1f}"]
+        [
+            key.removeprefix(f"{ROOT}/"),
+            one.kind,
+            str(one.count),
+            "-" if one.hz is None else f"{one.hz:.1f}",
+        ]
         for key, one in sorted(summary.streams.items())
     ]
     lines += ["", output.table(["key", "type", "messages", "Hz"], rows)]
@@ -106,10 +111,6 @@ def as_text(reader: "Reader", summary: Summary) -> str:
         if notes:
             lines += ["", f"{title}:", *(_as_text(note) for note in notes)]
     return "\n".join(lines)
-
-
-def _short(key: str) -> str:
-    return key.removeprefix(f"{ROOT}/")
 
 
 def _as_json(note: Note) -> dict[str, Any]:

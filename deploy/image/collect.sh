@@ -19,11 +19,9 @@ find "$library" \( -name test -o -name tests -o -name idlelib -o -name tkinter -
     -o -name '_tkinter*' -o -name '_test*' -o -name '_ctypes_test*' -o -name 'xxlimited*' \
     -o -name 'nis.*' -o -name '_dbm.*' -o -name '_gdbm.*' \) -prune \
   -o ! -type d -print >/opt/files
-# Excluded: tests, manuals, examples and stubs of packages; PDF fonts; AVIF, which T2 does not use.
+# Excluded: tests, manuals, examples and stubs of packages.
 find /opt/venv \( -name __pycache__ -o -name tests -o -name '*.pyi' -o -path '*/zstandard/_cffi*' \
-    -o -path '*/pygame/docs' -o -path '*/pygame/examples' -o -path '*/mpl-data/sample_data' \
-    -o -path '*/mpl-data/fonts/afm' -o -path '*/mpl-data/fonts/pdfcorefonts' \
-    -o -name 'libavif*' -o -name '_avif.*' \) -prune -o ! -type d -print >>/opt/files
+    -o -path '*/pygame/docs' -o -path '*/pygame/examples' \) -prune -o ! -type d -print >>/opt/files
 # Remove debug symbols, if the base has binutils. strip breaks libraries that auditwheel has patched,
 # so strip only extensions without bundled libraries.
 if command -v strip >/dev/null; then

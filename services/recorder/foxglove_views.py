@@ -1,23 +1,109 @@
-"""Views for Foxglove's 3D and log panels, derived from our messages. Pure.
+"""Views for Foxglove's 3D and log panels, derived from our messages, and JSON schemas. Pure.
 
 Each sonar is a scan of its own in ``base_link``: a single LaserScan cannot represent ranges from
 eight mounting positions. Frames and units follow REP-103 and REP-105: metres, radians.
+
+Foxglove rejects a schema with ``$ref``, ``anyOf`` or ``null``, and recognises the messages of its
+panels by the schema's name. An optional field has the type of its non-null value.
 """
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
+
+import msgspec
 
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
 from common.settings import Vehicle, sonar_mounts
-from services.recorder import schema
-from services.recorder.schema import Schema
 
 CONE = 0.5  # rad, for display only: the manual does not specify the sensors' opening angle
 POINTS = 5  # of the displayed arc
 LEVELS = {"info": 2, "warning": 3, "error": 4}
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """A named JSON schema."""
+
+    name: str
+    data: bytes
+
+
+@cache
+def schema_of(kind: type[Message]) -> Schema:
+    """Return the simplified schema of a message type, ``t2.v1.Odometry``."""
+    whole = msgspec.json.schema(kind)
+    made = simplified(whole, whole.get("$defs", {}))
+    return Schema(f"t2.v1.{kind.__name__}", msgspec.json.encode(made))
+
+
+def simplified(schema: dict[str, Any], named: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema without references and alternatives; ``named`` holds the definitions."""
+    if "$ref" in schema:
+        return simplified(named[schema["$ref"].rpartition("/")[2]], named)
+    if "anyOf" in schema:
+        return simplified(next(s for s in schema["anyOf"] if s.get("type") != "null"), named)
+    if "enum" in schema:  # all enums of ours are strings
+        return {"type": "string"}
+    made: dict[str, Any] = {"type": schema["type"]}
+    if schema["type"] == "array":
+        made["items"] = simplified(schema["items"], named)
+    if schema["type"] == "object":
+        parts = schema.get("properties", {})
+        made["properties"] = {name: simplified(part, named) for name, part in parts.items()}
+    if "description" in schema:
+        made["description"] = schema["description"]
+    return made
+
+
+def _table(**properties: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "properties": properties}
+
+
+def _foxglove(title: str, /, **properties: dict[str, Any]) -> Schema:
+    whole = {"title": f"foxglove.{title}", **_table(timestamp=_TIME, **properties)}
+    return Schema(f"foxglove.{title}", msgspec.json.encode(whole))
+
+
+_NUMBER, _INTEGER, _TEXT = ({"type": kind} for kind in ("number", "integer", "string"))
+_NUMBERS = {"type": "array", "items": _NUMBER}
+_TIME = {"title": "time", **_table(sec=_INTEGER, nsec=_INTEGER)}
+_VECTOR = _table(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_QUATERNION = _table(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _table(position=_VECTOR, orientation=_QUATERNION)
+
+POSE = _foxglove("PoseInFrame", frame_id=_TEXT, pose=_POSE)
+ODOMETRY = _foxglove(
+    "Odometry",
+    frame_id=_TEXT,
+    child_frame_id=_TEXT,
+    pose=_POSE,
+    linear_velocity=_VECTOR,
+    angular_velocity=_VECTOR,
+    pose_covariance=_NUMBERS,
+    velocity_covariance=_NUMBERS,
+)
+TRANSFORM = _foxglove(
+    "FrameTransform",
+    parent_frame_id=_TEXT,
+    child_frame_id=_TEXT,
+    translation=_VECTOR,
+    rotation=_QUATERNION,
+)
+SCAN = _foxglove(
+    "LaserScan",
+    frame_id=_TEXT,
+    pose=_POSE,
+    start_angle=_NUMBER,
+    end_angle=_NUMBER,
+    ranges=_NUMBERS,
+    intensities=_NUMBERS,
+)
+LOG = _foxglove("Log", level=_INTEGER, message=_TEXT, name=_TEXT, file=_TEXT, line=_INTEGER)
 
 View = tuple[str, Schema, dict[str, Any]]  # topic, schema, message
 
@@ -53,20 +139,20 @@ class FoxgloveViews:
                 "ranges": [] if distance is None else [distance] * POINTS,
                 "intensities": [],
             }
-            yield f"sonar/{name}", schema.SCAN, fields
+            yield f"sonar/{name}", SCAN, fields
 
 
 def _odometry(message: Odometry) -> Iterator[View]:
     pose = _pose(message.x, message.y, message.heading)
     parent, child = message.frame_id, message.child_frame_id
-    yield "pose", schema.POSE, {"frame_id": parent, "pose": pose}
+    yield "pose", POSE, {"frame_id": parent, "pose": pose}
     transform = {
         "parent_frame_id": parent,
         "child_frame_id": child,
         "translation": pose["position"],
         "rotation": pose["orientation"],
     }
-    yield "tf", schema.TRANSFORM, transform
+    yield "tf", TRANSFORM, transform
     fields = {
         "frame_id": parent,
         "child_frame_id": child,
@@ -76,13 +162,13 @@ def _odometry(message: Odometry) -> Iterator[View]:
         "pose_covariance": _expanded(message.pose_covariance, (0, 1, 5)),
         "velocity_covariance": _expanded(message.twist_covariance, (0, 5)),
     }
-    yield "odometry", schema.ODOMETRY, fields
+    yield "odometry", ODOMETRY, fields
 
 
 def _log(message: Event, service: str) -> View:
     text = f"{message.name}: {message.text}"
     fields = {"level": LEVELS[message.level], "message": text, "name": service}
-    return "log", schema.LOG, {**fields, "file": "", "line": 0}
+    return "log", LOG, {**fields, "file": "", "line": 0}
 
 
 def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> dict[str, float]:

@@ -21,9 +21,7 @@ from common.errors import MessageError
 from common.messages import Message
 from common.sample import Sample
 from common.settings import Vehicle
-from services.recorder import schema
-from services.recorder.foxglove_views import FoxgloveViews
-from services.recorder.schema import Schema
+from services.recorder.foxglove_views import FoxgloveViews, Schema, schema_of
 
 RAW, PAYLOAD, DELETED = RESERVED = ("_raw", "_payload", "_deleted")
 JSON = "application/json"
@@ -53,6 +51,31 @@ class Entry:
     publish_ns: int
     sequence: int = 0
 
+    @property
+    def key(self) -> str:
+        """Return the full key, ``t2/v1/001/tel/odom/odometry``."""
+        return self.channel.topic
+
+    @property
+    def kind(self) -> str:
+        """Return the name of its type, ``Odometry``; empty for a type unknown to T2."""
+        name = codec.kind_of(self.channel.encoding)
+        return name if name in MESSAGE_TYPES else ""
+
+    @property
+    def message(self) -> Message | None:
+        """Return the decoded message; None if its type is unknown or it is invalid."""
+        kind = MESSAGE_TYPES.get(self.kind)
+        try:
+            return codec.decode(self.sample.payload, kind) if kind else None
+        except MessageError:
+            return None
+
+    @property
+    def sample(self) -> Sample:
+        """Return the original bytes of the bus; raise ``MessageError`` for a foreign entry."""
+        return decode_sample(self)
+
 
 class Encoder:
     """Encodes samples, with views for one vehicle."""
@@ -64,7 +87,7 @@ class Encoder:
         """Yield the message, then the views derived from it."""
         fields = decode_fields(sample)
         kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
-        channel = Channel(sample.key, schema.of_message(kind) if kind else None, sample.encoding)
+        channel = Channel(sample.key, schema_of(kind) if kind else None, sample.encoding)
         sent_ns, number = _header(fields, "t_ns") or log_ns, _header(fields, "seq") & 0xFFFFFFFF
         yield Entry(channel, encode_json(sample, fields), log_ns, sent_ns, number)
         message = _message(sample, kind)

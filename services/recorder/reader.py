@@ -10,9 +10,7 @@ sets ``cut``. It skips a damaged chunk and counts it.
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from mcap import records
@@ -20,55 +18,13 @@ from mcap.exceptions import McapError
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
-from common import codec
-from common.errors import MessageError, RobotError
-from common.messages import Message
-from common.sample import Sample
-from services.recorder import mcap_codec
+from common.errors import RobotError
+from services.recorder.mcap_codec import Channel, Entry
 from services.recorder.writer import ABOUT
 
 # Raised by the MCAP library for missing or wrong bytes.
 DAMAGE = (McapError, struct.error, ValueError, RuntimeError, EOFError, OverflowError, MemoryError)
 RECORD_MAX = 1 << 28  # bytes; a larger record is damage
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedMessage:
-    """A message of the bus in a recording."""
-
-    entry: mcap_codec.Entry
-
-    @property
-    def key(self) -> str:
-        """Return the full key, ``t2/v1/001/tel/odom/odometry``."""
-        return self.entry.channel.topic
-
-    @property
-    def kind(self) -> str:
-        """Return the name of its type, ``Odometry``; empty for a type unknown to T2."""
-        name = codec.kind_of(self.entry.channel.encoding)
-        return name if name in mcap_codec.MESSAGE_TYPES else ""
-
-    @property
-    def log_ns(self) -> int:
-        """Return the time of reception on the recorder's wall clock."""
-        return self.entry.log_ns
-
-    @property
-    def message(self) -> Message | None:
-        """Return the decoded message; None if its type is unknown or it is invalid."""
-        kind = mcap_codec.MESSAGE_TYPES.get(self.kind)
-        if kind is None:
-            return None
-        try:
-            return codec.decode(self.sample.payload, kind)
-        except MessageError:
-            return None
-
-    @property
-    def sample(self) -> Sample:
-        """Return the original bytes of the bus."""
-        return mcap_codec.decode_sample(self.entry)
 
 
 class Reader:
@@ -86,20 +42,15 @@ class Reader:
         self.cut = False  # truncated: the writer was killed, or is still writing
         self.damaged = 0  # chunks that were skipped
         self.readable = 0  # bytes, up to the end of the last complete record
-        self._channels: dict[int, mcap_codec.Channel | None] = {}
+        self._channels: dict[int, Channel | None] = {}
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    def __iter__(self) -> Iterator[RecordedMessage]:
+    def __iter__(self) -> Iterator[Entry]:
         """Yield all messages; raise ``RobotError`` if the file is not an MCAP file."""
         for record in self._records():
             if isinstance(record, records.Metadata) and record.name == ABOUT:
@@ -109,7 +60,9 @@ class Reader:
             elif isinstance(record, records.Message):
                 channel = self._channels.get(record.channel_id)
                 if channel is not None:
-                    yield RecordedMessage(_entry(channel, record))
+                    yield Entry(
+                        channel, record.data, record.log_time, record.publish_time, record.sequence
+                    )
 
     def _records(self) -> Iterator[records.McapRecord]:
         """Yield the records of the file and of its chunks, up to the truncation."""
@@ -139,14 +92,8 @@ class Reader:
             return []
 
 
-def _channel(record: records.Channel) -> mcap_codec.Channel | None:
+def _channel(record: records.Channel) -> Channel | None:
     """Return a channel of the bus; None for a view."""
     if "drawn" in record.metadata:
         return None
-    return mcap_codec.Channel(record.topic, None, record.metadata.get("encoding", ""))
-
-
-def _entry(channel: mcap_codec.Channel, record: records.Message) -> mcap_codec.Entry:
-    return mcap_codec.Entry(
-        channel, record.data, record.log_time, record.publish_time, record.sequence
-    )
+    return Channel(record.topic, None, record.metadata.get("encoding", ""))

@@ -1,19 +1,31 @@
-"""Views for Foxglove's 3D and log panels."""
+"""Views for Foxglove's 3D and log panels, and schemas that Foxglove supports."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import msgspec
 import pytest
 
-from common.messages import SONAR_NAMES, Event, Message
+from common.messages import SONAR_NAMES, Event, Health, Link, Message, SafetyState
 from common.settings import Vehicle
-from services.recorder.foxglove_views import FoxgloveViews
-from services.recorder.schema import Schema
+from services.recorder.foxglove_views import (
+    LOG,
+    ODOMETRY,
+    POSE,
+    SCAN,
+    TRANSFORM,
+    FoxgloveViews,
+    Schema,
+    schema_of,
+)
+from services.recorder.mcap_codec import MESSAGE_TYPES
 from tests.recorder import samples
 
 VEHICLE = Vehicle(length=1.0, width=0.6)
 AT_NS = 1_700_000_000_250_000_000
+VIEWS = (POSE, ODOMETRY, TRANSFORM, SCAN, LOG)
+ALL = [schema_of(kind) for kind in MESSAGE_TYPES.values()] + list(VIEWS)
 
 
 def views_of(message: Message, service: str = "") -> dict[str, tuple[Schema, dict[str, Any]]]:
@@ -78,3 +90,42 @@ def test_an_event_is_a_log_entry() -> None:
 
 def test_other_messages_have_no_view() -> None:
     assert views_of(samples.velocity()) == {}
+
+
+def parts(table: dict[str, Any], inside: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield every schema within a schema, depth first."""
+    yield inside, table
+    for name, part in table.get("properties", {}).items():
+        yield from parts(part, f"{inside}.{name}")
+    if "items" in table:
+        yield from parts(table["items"], f"{inside}[]")
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
+def test_schemas_use_only_what_foxglove_supports(one: Schema) -> None:
+    whole = msgspec.json.decode(one.data)
+    assert whole["type"] == "object"
+    for where, part in parts(whole):
+        assert part["type"] in ("object", "array", "string", "number", "integer", "boolean"), where
+        assert not {"$ref", "anyOf", "oneOf", "enum", "$defs"} & part.keys(), where
+        if part["type"] == "array":
+            assert part["items"]["type"] != "array", where
+
+
+@pytest.mark.parametrize("kind", [SafetyState, Link, Health, Event])
+def test_schemas_contain_every_field(kind: type[Message]) -> None:
+    whole = msgspec.json.decode(schema_of(kind).data)
+    assert list(whole["properties"]) == [field.name for field in msgspec.structs.fields(kind)]
+
+
+def test_optional_fields_have_their_non_null_type() -> None:
+    whole = msgspec.json.decode(schema_of(Link).data)
+    assert whole["properties"]["round_trip"] == {"type": "number"}
+    assert whole["properties"]["state"] == {"type": "string"}
+
+
+def test_views_have_foxglove_schema_names() -> None:
+    assert {one.name for one in VIEWS} == {
+        "foxglove.PoseInFrame", "foxglove.Odometry", "foxglove.FrameTransform",
+        "foxglove.LaserScan", "foxglove.Log",
+    }  # fmt: skip

@@ -9,8 +9,8 @@ from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.messages import Odometry, Velocity
 from common.settings import Vehicle
-from services.recorder.mcap_codec import Encoder
-from services.recorder.reader import Reader, RecordedMessage
+from services.recorder.mcap_codec import Encoder, Entry
+from services.recorder.reader import Reader
 from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
@@ -33,7 +33,7 @@ def path(tmp_path: Path) -> Path:
     return made.path
 
 
-def read(path: Path) -> tuple[list[RecordedMessage], Reader]:
+def read(path: Path) -> tuple[list[Entry], Reader]:
     with Reader(path) as reader:
         return list(reader), reader
 

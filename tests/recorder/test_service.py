@@ -21,7 +21,8 @@ from common.freshness import NS_PER_S
 from common.messages import Event
 from common.service import Node
 from services.recorder.config import MB, RecorderConfig
-from services.recorder.reader import Reader, RecordedMessage
+from services.recorder.mcap_codec import Entry
+from services.recorder.reader import Reader
 from services.recorder.recorder import Recorder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
@@ -66,9 +67,9 @@ def recorder_events(buses: BusFixture) -> list[Event]:
     return found
 
 
-def read(folder: Path) -> list[RecordedMessage]:
+def read(folder: Path) -> list[Entry]:
     """Return the messages of all files, in order."""
-    found: list[RecordedMessage] = []
+    found: list[Entry] = []
     for path in sorted(folder.glob("*.mcap")):
         if not path.stat().st_size:
             continue  # just created
@@ -83,7 +84,7 @@ def is_whole(path: Path) -> bool:
     return bool(found) and not reader.cut
 
 
-def paths(found: list[RecordedMessage]) -> set[str]:
+def paths(found: list[Entry]) -> set[str]:
     return {each.key.split("/", 3)[3] for each in found}
 
 

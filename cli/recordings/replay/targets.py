@@ -4,7 +4,6 @@ import ipaddress
 import secrets
 import socket
 import time
-from types import TracebackType
 from typing import Protocol, Self
 
 from msgspec.structs import replace
@@ -124,12 +123,7 @@ class BoardTarget:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._socket.close()
 
     def check(self) -> None:

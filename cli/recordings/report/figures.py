@@ -1,21 +1,21 @@
-"""Figures of a report, as inline SVG."""
+"""Figures of a report, as inline SVG without scripts."""
 
 import math
+import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
-from io import StringIO
+from collections.abc import Sequence
+from itertools import groupby
 
-import matplotlib as mpl
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+import ziaplot as zp
+from ziaplot.canvas import Borders, Canvas, ViewBox
+from ziaplot.style import DashTypes, MarkerTypes
 
-from cli.recordings.report.stops import Stop
+from cli.recordings.report.stops import Period
 from cli.recordings.report.timeline import Series, Timeline, VelocitySeries, downsampled
 from cli.recordings.report.timing import Stream
 
-WIDTH = 11.0  # inches
-REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#e6eaee"
+WIDTH = 1100  # pixels
+REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#c5ccd3"
 STOPPED, TEXT, MUTED = "#cf1f26", "#0a0e13", "#8a939c"
 VERDICTS = {
     "run": "#1a7f37", "slow": "#f0b429", "stop": "#8a939c", "brake": "#cf1f26",
@@ -23,88 +23,108 @@ VERDICTS = {
 }  # fmt: skip
 LEVELS = {"info": MUTED, "warning": "#b35900", "error": STOPPED}
 FRONT = ("front_left", "front", "front_right")
+SONARS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd")
+DASHES: tuple[DashTypes, ...] = ("-", "--", ":", "-.")
+PATH_ASPECT = 2.0  # width by height
+BEYOND = 1000.0  # outside each axis; figures are clipped
+
+zp.config.text = "text"  # searchable, and a `$` in a name is not a formula
+zp.config.precision = 1  # of a pixel
+zp.css("""
+    Graph { color: none; edge_width: 1; }
+    Graph.GridX { color: #e3e7eb; stroke: solid; }
+    Graph.GridY { color: #e3e7eb; stroke: solid; }
+    Graph.TickX { font_size: 12; height: 4; stroke_width: 1; pad: 0; }
+    Graph.TickY { font_size: 12; height: 4; stroke_width: 1; pad: 0.1; }
+    Graph.XName { font_size: 12; }
+    Graph.YName { font_size: 12; }
+    Graph.Legend { stroke: none; edge_color: none; edge_width: 12; font_size: 12; radius: 24; }
+    Graph.LegendText { font_size: 12; }
+    Point { edge_width: 0; }
+    Point.Text { font_size: 12; margin: 8; }
+    Text { font_size: 12; }
+""")
+
+
+class BrokenLine(zp.PolyLine):
+    """A series with a gap at each NaN, and 0 on both axes; ziaplot's own line has no gaps.
+
+    A line for each part would take seconds: ziaplot resolves the style of each element.
+    """
+
+    def __init__(self, series: Series) -> None:
+        points = zip(*downsampled(series.times, series.values), strict=True)
+        parts = groupby(points, lambda point: not math.isnan(point[1]))
+        self._parts = [tuple(zip(*part, strict=True)) for known, part in parts if known]
+        times, values = ([n for part in self._parts for n in part[axis]] for axis in (0, 1))
+        super().__init__([0.0, *times], [0.0, *values])
+
+    def _xml(
+        self, canvas: Canvas, databox: ViewBox | None = None, borders: Borders | None = None
+    ) -> None:
+        style = self._build_style()
+        for times, values in self._parts:
+            canvas.path(
+                times, values, color=style.get_color(), width=style.stroke_width,
+                stroke=style.stroke, dataview=databox, zorder=self._zorder,
+            )  # fmt: skip
 
 
 def path(timeline: Timeline) -> str:
     """Draw the path by odometry, with the numbered stops."""
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        for number, segment in enumerate(timeline.path):
-            xs, ys = downsampled(segment.xs, segment.ys)
-            axes.plot(xs, ys, color=MEASURED, linewidth=1.6)
-            _mark(axes, (xs[0], ys[0]), "o", "start" if number == 0 else "odometry restart")
-            if number == len(timeline.path) - 1:
-                _mark(axes, (xs[-1], ys[-1]), "s", "end")
-        for number, stop in enumerate(timeline.stops, 1):
-            place = place_at(timeline, stop.begins_s)
-            if place:
-                axes.plot(*place, "x", color=STOPPED, markersize=8)
-                axes.annotate(f" {number}", place, color=STOPPED, weight="bold")
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.set_xlabel("x in odom, m")
-        axes.set_ylabel("y in odom, m")
-
-    return svg(draw, 6.0, "path")
+    graph = zp.Graph()
+    graph.axesnames("x in odom, m", "y in odom, m")
+    for number, segment in enumerate(timeline.path):
+        xs, ys = downsampled(segment.xs, segment.ys)
+        graph.add(zp.PolyLine(xs, ys).color(MEASURED).strokewidth(1.6))
+        _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else "odometry restart")
+        if number == len(timeline.path) - 1:
+            _mark(graph, (xs[-1], ys[-1]), "square", "end")
+    for number, stop in enumerate(timeline.stops, 1):
+        place = place_at(timeline, stop.begins_s)
+        if place:
+            graph.add(zp.Point(place).marker("x", 5).color(STOPPED))
+            graph.add(zp.Text(*place, f"\u2002{number}", valign="top").color(STOPPED))
+    _fit(graph, timeline)
+    return svg(graph, 560, "path")
 
 
 def speeds(timeline: Timeline) -> str:
     """Draw linear and angular velocity over time, with verdicts and events."""
-
-    def draw(figure: Figure) -> None:
-        linear, angular, verdicts, events = figure.subplots(
-            4, 1, sharex=True, height_ratios=[5, 5, 1, 1.4]
-        )
-        _draw_velocity(linear, timeline.linear, "linear, m/s")
-        _draw_velocity(angular, timeline.angular, "angular, rad/s")
-        linear.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-        for axes in (linear, angular):
-            _shade(axes, timeline.stops)
-        _draw_verdicts(verdicts, timeline)
-        _draw_events(events, timeline)
-        _set_time(events, timeline)
-
-    return svg(draw, 7.0, "speeds")
+    rows = (
+        _velocity(timeline, timeline.linear, "linear, m/s"),
+        _velocity(timeline, timeline.angular, "angular, rad/s"),
+        _verdicts(timeline),
+        _events(timeline),
+    )
+    return svg(zp.LayoutV(*rows, row_gap=4, row_heights="5fr 5fr 1fr 2fr"), 700, "speeds")
 
 
 def ranges(timeline: Timeline) -> str:
     """Draw the eight sonar ranges over time, and when the bumper was pressed."""
-
-    def draw(figure: Figure) -> None:
-        front, rest = figure.subplots(2, 1, sharex=True)
-        for name, series in timeline.ranges.items():
-            axes = front if name in FRONT else rest
-            _plot(axes, series, label=name.replace("_", " "), linewidth=1.0)
-        for axes in (front, rest):
-            for phase in timeline.pressed.done:
-                if phase.state:
-                    axes.axvspan(phase.begins_s, phase.ends_s, color=STOPPED, alpha=0.5)
-            axes.set_ylabel("range, m")
-            axes.set_ylim(bottom=0)
-            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-        _set_time(rest, timeline)
-
-    return svg(draw, 5.0, "ranges")
+    front, rest = _over_time(timeline, "range, m"), _over_time(timeline, "range, m", "time, s")
+    for graph, names in ((front, FRONT), (rest, [n for n in timeline.ranges if n not in FRONT])):
+        for name, color in zip(names, SONARS, strict=False):
+            _line(graph, timeline.ranges[name], color, name.replace("_", " "))
+        for phase in timeline.pressed.done:
+            if phase.state:
+                _span(graph, phase, f"{STOPPED} 50%")
+    return svg(zp.LayoutV(front, rest, row_gap=4), 500, "ranges")
 
 
 def arrivals(timeline: Timeline, streams: Sequence[Stream], names: Sequence[str]) -> str:
     """Draw the arrivals of each stream, one row each, with gaps in red."""
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        for row, stream in enumerate(streams):
-            if not stream.expected_hz:  # event-driven
-                axes.plot(stream.times, [row] * len(stream.times), "|", color=MEASURED)
-                continue
-            axes.hlines(row, stream.times[0], stream.times[-1], color=MEASURED, linewidth=4)
-            for begins_s, ends_s in stream.gaps:
-                axes.hlines(row, begins_s, ends_s, color="white", linewidth=4)
-                axes.hlines(row, begins_s, ends_s, color=STOPPED, linewidth=2)
-        axes.set_yticks(range(len(streams)), names)
-        axes.invert_yaxis()
-        _set_time(axes, timeline)
-
-    return svg(draw, 1.2 + 0.24 * len(streams), "arrivals")
+    graph = _rows(timeline, names, "time, s")
+    for row, stream in enumerate(streams):
+        if not stream.expected_hz:  # event-driven
+            ticks = zp.Scatter(stream.times, [-row] * len(stream.times))
+            graph.add(ticks.marker("|", 5).color(MEASURED))
+            continue
+        _bar(graph, (stream.times[0], stream.times[-1]), row, MEASURED, 5)
+        for gap in stream.gaps:
+            _bar(graph, gap, row, "white", 5)
+            _bar(graph, gap, row, STOPPED, 2)
+    return svg(graph, 90 + 24 * len(streams), "arrivals")
 
 
 def place_at(timeline: Timeline, at_s: float) -> tuple[float, float] | None:
@@ -116,84 +136,110 @@ def place_at(timeline: Timeline, at_s: float) -> tuple[float, float] | None:
     return None
 
 
-def svg(draw: Callable[[Figure], None], height: float, name: str) -> str:
-    """Return a figure as an SVG element, ``height`` in inches; its ids begin with the name."""
-    # Text stays text: it is searchable and accessible. A `$` in a name is not a formula.
-    with mpl.rc_context(
-        {"svg.fonttype": "none", "svg.hashsalt": name, "text.parse_math": False, "font.size": 9}
-    ):
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
-        FigureCanvasSVG(figure)
-        draw(figure)
-        for axes in figure.axes:
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
-        text = StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    document = text.getvalue()
-    return document[document.index("<svg") :]
+def svg(drawing: zp.Graph | zp.LayoutV, height: float, name: str) -> str:
+    """Return a drawing as an SVG element, ``height`` in pixels; its ids begin with the name."""
+    drawing.size(WIDTH, height)
+    # The page contains several figures, and ids are unique in a page.
+    return re.sub(r'( id="|"url\(#)', rf"\1{name}-", drawing.tosvg())
 
 
-def _draw_velocity(axes: Axes, series: VelocitySeries, label: str) -> None:
-    times, upper = downsampled(series.upper.times, series.upper.values)
-    lower_times, lower = downsampled(series.lower.times, series.lower.values)
-    axes.plot(times, upper, color=LIMIT, linewidth=2, label="safety's limits")
-    axes.plot(lower_times, lower, color=LIMIT, linewidth=2)
-    styles = ("-", "--", ":", "-.")
+def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None) -> zp.Graph:
+    graph = zp.Graph()
+    graph.axesnames(x_name, y_name)
+    graph.legend("right")
+    graph.xrange(0.0, timeline.lasted_s or 1.0)
+    if not x_name:  # the graph below it has the same axis
+        graph.noxticks()
+    return graph
+
+
+def _rows(timeline: Timeline, names: Sequence[str], x_name: str | None = None) -> zp.Graph:
+    """Return a graph with a row for each name, the first one on top."""
+    graph = _over_time(timeline, None, x_name)
+    graph.css("Graph.GridY { color: none; }")
+    graph.yrange(0.5 - max(len(names), 1), 0.5)
+    if names:
+        graph.yticks([-row for row in range(len(names))], names)
+    else:
+        graph.noyticks()
+    return graph
+
+
+def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Graph:
+    graph = _over_time(timeline, label)
+    _line(graph, series.upper, LIMIT, "safety's limits", width=2)
+    _line(graph, series.lower, LIMIT, "", width=2)
     for number, (source, request) in enumerate(series.requested.items()):
-        _plot(
-            axes,
-            request,
-            color=REQUESTED,
-            linestyle=styles[number % 4],
-            label=f"requested by {source}",
-        )
-    _plot(axes, series.allowed, color=ALLOWED, label="allowed by safety")
-    _plot(axes, series.measured, color=MEASURED, label="measured")
-    axes.set_ylabel(label)
+        _line(graph, request, REQUESTED, f"requested by {source}", dash=DASHES[number % 4])
+    _line(graph, series.allowed, ALLOWED, "allowed by safety")
+    _line(graph, series.measured, MEASURED, "measured")
+    top = graph.datarange().ymax
+    for number, stop in enumerate(timeline.stops, 1):
+        _span(graph, stop, f"{STOPPED} 8%")
+        graph.add(zp.Text(stop.begins_s, top, str(number), valign="top").color(STOPPED))
+    return graph
 
 
-def _draw_verdicts(axes: Axes, timeline: Timeline) -> None:
-    for phase in timeline.verdicts.done:
-        axes.axvspan(phase.begins_s, phase.ends_s, color=VERDICTS[phase.state.verdict], linewidth=0)
-    verdicts = dict.fromkeys(phase.state.verdict for phase in timeline.verdicts.done)
-    for verdict in verdicts:
-        axes.plot([], [], color=VERDICTS[verdict], linewidth=6, label=verdict)
-    if verdicts:
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.3), frameon=False, fontsize=8)
-    axes.set_yticks([])
-    axes.set_ylabel("verdict", rotation=0, ha="right", va="center")
+def _verdicts(timeline: Timeline) -> zp.Graph:
+    graph = _rows(timeline, ["verdict"])
+    phases = timeline.verdicts.done
+    for phase in phases:
+        _span(graph, phase, VERDICTS[phase.state.verdict])
+    for verdict in dict.fromkeys(phase.state.verdict for phase in phases):
+        _line(graph, Series(), VERDICTS[verdict], verdict, width=6)
+    return graph
 
 
-def _draw_events(axes: Axes, timeline: Timeline) -> None:
+def _events(timeline: Timeline) -> zp.Graph:
     services = sorted({each.service for each in timeline.events})
-    for each in timeline.events:
-        row = services.index(each.service)
-        axes.plot(each.at_s, row, "|", color=LEVELS[each.event.level], markersize=9)
-    axes.set_yticks(range(len(services)), services, fontsize=7)
-    axes.set_ylim(len(services) - 0.5, -0.5)
-    axes.set_ylabel("events", rotation=0, ha="right", va="center", labelpad=24)
+    graph = _rows(timeline, services, "time, s")
+    for level, color in LEVELS.items():
+        events = [each for each in timeline.events if each.event.level == level]
+        if events:
+            rows = [-services.index(each.service) for each in events]
+            ticks = zp.Scatter([each.at_s for each in events], rows)
+            graph.add(ticks.marker("|", 5).color(color))
+    return graph
 
 
-def _shade(axes: Axes, stops: Iterable[Stop]) -> None:
-    for number, stop in enumerate(stops, 1):
-        axes.axvspan(stop.begins_s, stop.ends_s, color=STOPPED, alpha=0.08, linewidth=0)
-        axes.annotate(
-            str(number), (stop.begins_s, 1), xycoords=("data", "axes fraction"), fontsize=8,
-            color=STOPPED, weight="bold", va="bottom",
-        )  # fmt: skip
+def _line(
+    graph: zp.Graph,
+    series: Series,
+    color: str,
+    label: str,
+    *,
+    width: float = 1.2,
+    dash: DashTypes = "-",
+) -> None:
+    line = BrokenLine(series)
+    graph.add(line.name(label).color(color).strokewidth(width).stroke(dash))
 
 
-def _mark(axes: Axes, place: tuple[float, float], marker: str, label: str) -> None:
-    axes.plot(*place, marker, color=TEXT, markersize=6)
-    axes.annotate(label, place, xytext=(6, 6), textcoords="offset points", color=TEXT)
+def _span(graph: zp.Graph, period: Period, color: str) -> None:
+    """Shade a period over the graph's full height."""
+    span = zp.Rectangle(period.begins_s, -BEYOND, period.lasts_s, 2 * BEYOND)
+    graph.add(span.fill(color).color("none"))
 
 
-def _plot(axes: Axes, series: Series, **style: object) -> None:
-    times, values = downsampled(series.times, series.values)
-    axes.plot(times, values, **{"linewidth": 1.2, **style})  # type: ignore[arg-type]
+def _bar(graph: zp.Graph, period: tuple[float, float], row: int, color: str, width: float) -> None:
+    graph.add(zp.PolyLine(period, (-row, -row)).color(color).strokewidth(width))
 
 
-def _set_time(axes: Axes, timeline: Timeline) -> None:
-    axes.set_xlim(0, max(timeline.lasted_s, math.ulp(1.0)))
-    axes.set_xlabel("time, s")
+def _mark(graph: zp.Graph, place: tuple[float, float], shape: MarkerTypes, label: str) -> None:
+    graph.add(zp.Point(place).marker(shape, 4).label(label).color(TEXT))
+
+
+def _fit(graph: zp.Graph, timeline: Timeline) -> None:
+    """Show the whole path in a frame of ``PATH_ASPECT``, with equal scales."""
+    (left, right), (bottom, top) = (
+        (min(values), max(values))
+        for values in (
+            [x for segment in timeline.path for x in segment.xs],
+            [y for segment in timeline.path for y in segment.ys],
+        )
+    )
+    height = 1.1 * max((right - left) / PATH_ASPECT, top - bottom, 0.1)
+    width = PATH_ASPECT * height
+    graph.xrange((left + right - width) / 2, (left + right + width) / 2)
+    graph.yrange((bottom + top - height) / 2, (bottom + top + height) / 2)
+    graph.equal_aspect()

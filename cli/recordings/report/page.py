@@ -9,7 +9,7 @@ from cli.inspect.addressing import chunks
 from cli.latency import NAMES
 from cli.recordings.report import figures
 from cli.recordings.report.timeline import Timeline
-from cli.recordings.report.timing import Reaction, Stream, reactions
+from cli.recordings.report.timing import reactions
 from common.freshness import NS_PER_S
 from services.recorder.reader import Reader
 
@@ -27,8 +27,11 @@ def timeline_of(reader: Reader) -> Timeline:
 
 def page(timeline: Timeline, reader: Reader) -> str:
     """Return the page of a recording that has been read to its end."""
-    streams = sorted(timeline.streams.values(), key=lambda stream: (order(stream), stream.key))
+    # The fastest streams first, event-driven keys last.
+    streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
+    bridges = (ends for (name, _), ends in timeline.healths.items() if name == "bridge")
+    has_ranges = any(series.times for series in timeline.ranges.values())
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters |= {"clock": clock, "figure": figure, "ms": ms}
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
@@ -37,11 +40,11 @@ def page(timeline: Timeline, reader: Reader) -> str:
         about=summary(timeline, reader),
         warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
-        reactions=[(label(one.name), "." in one.name, one) for one in measured(timeline)],
+        reactions=[(label(one.name), "." in one.name, one) for one in reactions(bridges)],
         events=timeline.events[:EVENTS_MAX],
         path=figures.path(timeline) if timeline.path else "",
         speeds=figures.speeds(timeline),
-        ranges=figures.ranges(timeline) if has_ranges(timeline) else "",
+        ranges=figures.ranges(timeline) if has_ranges else "",
         arrivals=figures.arrivals(timeline, streams, names),
     )
 
@@ -80,25 +83,10 @@ def warnings(timeline: Timeline, reader: Reader) -> list[str]:
     return found
 
 
-def measured(timeline: Timeline) -> list[Reaction]:
-    """Return the bridge's reaction times."""
-    return reactions(ends for (service, _), ends in timeline.healths.items() if service == "bridge")
-
-
 def label(name: str) -> str:
     """Return the display name of a reaction or of a hop."""
     last = name.rpartition(".")[2]
     return NAMES.get(last, last)
-
-
-def has_ranges(timeline: Timeline) -> bool:
-    """Return whether the recording contains sonar ranges."""
-    return any(series.times for series in timeline.ranges.values())
-
-
-def order(stream: Stream) -> float:
-    """Return a sort key: the fastest streams first, event-driven keys last."""
-    return -stream.expected_hz
 
 
 def clock(seconds: float) -> str:

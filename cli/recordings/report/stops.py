@@ -16,17 +16,23 @@ StateT = TypeVar("StateT")
 
 
 @dataclass(slots=True)
-class Phase(Generic[StateT]):
-    """A period of constant state; ``state`` is its first message."""
+class Period:
+    """A part of a recording."""
 
     begins_s: float
     ends_s: float
-    state: StateT
 
     @property
     def lasts_s(self) -> float:
         """Return the duration."""
         return self.ends_s - self.begins_s
+
+
+@dataclass(slots=True)
+class Phase(Period, Generic[StateT]):
+    """A period of constant state; ``state`` is its first message."""
+
+    state: StateT
 
 
 @dataclass(slots=True)
@@ -49,21 +55,14 @@ class Phases(Generic[StateT]):
 
 
 @dataclass(slots=True)
-class Stop:
+class Stop(Period):
     """A stop of the vehicle."""
 
-    begins_s: float
-    ends_s: float
     was_driving: bool  # the vehicle moved before
     verdict: str  # the first one
     reasons: dict[str, str] = field(default_factory=dict)  # text by name, in order of appearance
     latched: dict[str, None] = field(default_factory=dict)  # in order; these needed a reset
     over: bool = False  # it ended before the recording, or safety's messages, ended
-
-    @property
-    def lasts_s(self) -> float:
-        """Return the duration."""
-        return self.ends_s - self.begins_s
 
     def add(self, phase: Phase[SafetyState], causes: Iterable[Cause]) -> None:
         """Add a phase to the stop."""

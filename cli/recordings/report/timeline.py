@@ -1,17 +1,17 @@
 """Timeline of a recording: time series, path, phases and events for the plots. Pure.
 
 Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
-NaN in a gap, so that no line is drawn through it.
+NaN in a gap and for a non-finite value, so that no line is drawn through it.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import singledispatchmethod
 from itertools import pairwise
 
 from cli.recordings.report.stops import Phases, Stop, stops
 from cli.recordings.report.timing import Stream
+from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
     SONAR_NAMES,
@@ -44,7 +44,7 @@ class Series:
             self.times.append(self.times[-1])
             self.values.append(NAN)
         self.times.append(at_s)
-        self.values.append(NAN if value is None else value)
+        self.values.append(value if value is not None and math.isfinite(value) else NAN)
 
 
 @dataclass(slots=True)
@@ -126,28 +126,27 @@ class Timeline:
         """Return the stops commanded by safety."""
         return stops(self.verdicts.done)
 
-    @singledispatchmethod
     def _add(self, message: Message, key: str, at_s: float) -> None:
         """Add a message by its type; other types are only counted."""
+        match message:
+            case Drive():
+                source = key.rpartition("/")[2]
+                self.linear.requested.setdefault(source, Series()).add(at_s, message.linear)
+                self.angular.requested.setdefault(source, Series()).add(at_s, message.angular)
+            case Motion():
+                self.linear.allowed.add(at_s, message.linear)
+                self.angular.allowed.add(at_s, message.angular)
+            case Velocity():
+                self.linear.measured.add(at_s, message.linear)
+                self.angular.measured.add(at_s, message.angular)
+            case Odometry() if finite(message.x, message.y):
+                self._add_pose(message, at_s)
+            case SafetyState():
+                self._add_state(message, at_s)
+            case _:
+                self._add_sensor_or_report(message, key, at_s)
 
-    @_add.register
-    def _(self, message: Drive, key: str, at_s: float) -> None:
-        source = key.rpartition("/")[2]
-        self.linear.requested.setdefault(source, Series()).add(at_s, message.linear)
-        self.angular.requested.setdefault(source, Series()).add(at_s, message.angular)
-
-    @_add.register
-    def _(self, message: Motion, key: str, at_s: float) -> None:
-        self.linear.allowed.add(at_s, message.linear)
-        self.angular.allowed.add(at_s, message.angular)
-
-    @_add.register
-    def _(self, message: Velocity, key: str, at_s: float) -> None:
-        self.linear.measured.add(at_s, message.linear)
-        self.angular.measured.add(at_s, message.angular)
-
-    @_add.register
-    def _(self, message: Odometry, key: str, at_s: float) -> None:
+    def _add_pose(self, message: Odometry, at_s: float) -> None:
         epoch = (message.boot, message.epoch)
         if not self.path or self.path[-1].epoch != epoch:
             self.path.append(PathSegment(epoch))
@@ -156,17 +155,7 @@ class Timeline:
         segment.xs.append(message.x)
         segment.ys.append(message.y)
 
-    @_add.register
-    def _(self, message: Ultrasonic, key: str, at_s: float) -> None:
-        for name, distance in zip(SONAR_NAMES, message.ranges, strict=True):
-            self.ranges[name].add(at_s, distance)
-
-    @_add.register
-    def _(self, message: Bumper, key: str, at_s: float) -> None:
-        self.pressed.add(at_s, message.pressed, message.pressed)
-
-    @_add.register
-    def _(self, message: SafetyState, key: str, at_s: float) -> None:
+    def _add_state(self, message: SafetyState, at_s: float) -> None:
         self.linear.upper.add(at_s, message.limits.forward)
         self.linear.lower.add(at_s, -message.limits.backward)
         self.angular.upper.add(at_s, message.limits.angular)
@@ -174,15 +163,19 @@ class Timeline:
         value = message.verdict, message.latched, tuple(cause.name for cause in message.causes)
         self.verdicts.add(at_s, value, message)
 
-    @_add.register
-    def _(self, message: Event, key: str, at_s: float) -> None:
-        self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
-
-    @_add.register
-    def _(self, message: Health, key: str, at_s: float) -> None:
-        process = key.split("/")[-2], message.boot
-        first, _ = self.healths.get(process, (message, message))
-        self.healths[process] = first, message
+    def _add_sensor_or_report(self, message: Message, key: str, at_s: float) -> None:
+        match message:
+            case Ultrasonic():
+                for name, distance in zip(SONAR_NAMES, message.ranges, strict=True):
+                    self.ranges[name].add(at_s, distance)
+            case Bumper():
+                self.pressed.add(at_s, message.pressed, message.pressed)
+            case Event():
+                self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
+            case Health():
+                process = key.split("/")[-2], message.boot
+                first, _ = self.healths.get(process, (message, message))
+                self.healths[process] = first, message
 
 
 def downsampled(

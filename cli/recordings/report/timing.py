@@ -90,17 +90,12 @@ def reactions(processes: Iterable[tuple[Health, Health]]) -> list[Reaction]:
         bounds = late.bounds or bounds
         for name, each in late.durations.items():
             before = early.durations.get(name)
-            counts = _since(before, each)
-            sums.setdefault(name, Counter()).update(dict(enumerate(counts)))
+            counts = sums.setdefault(name, Counter())
+            counts.update(dict(enumerate(each.counts)))
+            counts.subtract(dict(enumerate(before.counts if before else ())))
             if before is None or each.worst > before.worst:
                 worst[name] = max(worst.get(name, 0.0), each.worst)
     return [_reaction(name, bounds, counts, worst.get(name)) for name, counts in sums.items()]
-
-
-def _since(before: Durations | None, now: Durations) -> list[int]:
-    if before is None:
-        return list(now.counts)
-    return [late - early for early, late in zip(before.counts, now.counts, strict=True)]
 
 
 def _reaction(

@@ -1,0 +1,83 @@
+"""Figures of a report: gaps, ids, and drawings of almost nothing."""
+
+import math
+import re
+from xml.etree import ElementTree as ET
+
+import msgspec
+import pytest
+
+from cli.recordings.report import figures
+from cli.recordings.report.timeline import Timeline
+from cli.recordings.report.timing import Stream
+from common.messages import Drive, Limits, SafetyState
+from tests.cli.recordings.report import drive_fixture
+from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
+
+
+def timeline_of_the_drive() -> Timeline:
+    timeline = Timeline()
+    for arrival in drive():
+        timeline.add(*arrival)
+    return timeline
+
+
+def lines_of(svg: str, color: str) -> list[str]:
+    """Return the points of each line of this colour, without those of the legend."""
+    paths = ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}path")
+    return [path.attrib["d"] for path in paths if path.get("stroke") == color]
+
+
+def test_a_gap_breaks_the_line() -> None:
+    timeline = timeline_of_the_drive()
+    whole = lines_of(figures.speeds(timeline), figures.MEASURED)
+    timeline.linear.measured.values[50] = math.nan
+    broken = lines_of(figures.speeds(timeline), figures.MEASURED)
+    assert len(broken) == len(whole) + 1
+    assert not any("nan" in points for points in broken)
+
+
+def test_the_path_has_equal_scales() -> None:
+    timeline = timeline_of_the_drive()
+    segment = timeline.path[0]
+    segment.times[:], segment.xs[:], segment.ys[:] = [0.0, 9.0], [0.0, 2.0], [0.0, 1.0]
+    (points,) = lines_of(figures.path(timeline), figures.MEASURED)
+    (x1, y1), (x2, y2) = (map(float, at) for at in re.findall(r"([\d.]+),([\d.]+)", points))
+    assert abs((x2 - x1) - 2 * (y1 - y2)) < 0.5
+
+
+def test_gaps_of_a_stream_are_red() -> None:
+    stream = Stream("t2/v1/001/tel/bridge/velocity")
+    for at_s in (0.0, 0.02, 0.5, 0.52):
+        stream.add(at_s, None)
+    drawn = figures.arrivals(Timeline(lasted_s=1.0), [stream], ["tel/bridge/velocity"])
+    assert len(lines_of(drawn, figures.STOPPED)) == 1
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_non_finite_values_are_left_out(value: float) -> None:
+    timeline = Timeline()
+    pose = drive_fixture.odometry(1)
+    for number, message in enumerate(
+        (
+            msgspec.structs.replace(pose, x=value),
+            Drive(seq=1, boot=1, linear=value, angular=value, echo=1),
+            SafetyState(
+                verdict="run", latched=(), causes=(), source=None, heartbeat=1, text="",
+                limits=Limits(forward=value, backward=value, angular=value),
+            ),
+        )
+    ):  # fmt: skip
+        timeline.add(*drive_fixture.at("@cmd/drive/teleop", message, number / 10))
+    assert timeline.path == []
+    assert "requested by teleop" in figures.speeds(timeline)
+    timeline.add(*drive_fixture.at("tel/odom/odometry", pose, 1.0))
+    assert "start" in figures.path(timeline)
+
+
+def test_a_recording_of_one_unknown_message() -> None:
+    timeline = Timeline()
+    timeline.add("t2/v1/001/tel/<mine>", None, BEGIN_NS)
+    assert "linear, m/s" in figures.speeds(timeline)
+    drawn = figures.arrivals(timeline, list(timeline.streams.values()), ["<mine>"])
+    assert "&lt;mine&gt;" in drawn
