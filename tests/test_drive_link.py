@@ -144,6 +144,7 @@ def test_a_copied_authority_moves_nothing(stack: RunningStack, observer: Observe
     assert stack.last() == "brake"
 
 
+@pytest.mark.campaign
 def test_a_number_far_ahead_does_not_lock_safety_out(
     stack: RunningStack, observer: Observer
 ) -> None:
@@ -158,6 +159,7 @@ def test_a_number_far_ahead_does_not_lock_safety_out(
     wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
 
 
+@pytest.mark.campaign
 def test_copied_measurements_are_no_inputs_of_safety(
     stack: RunningStack, observer: Observer
 ) -> None:
@@ -174,6 +176,7 @@ def test_copied_measurements_are_no_inputs_of_safety(
     armed(observer)
 
 
+@pytest.mark.campaign
 def test_an_observer_at_the_router_sees_each_motion_once(
     stack: RunningStack, observer: Observer
 ) -> None:

@@ -39,7 +39,7 @@ def patient() -> SimulatedStack:
     return driven(PATIENT, 2 * LAP_S)
 
 
-@pytest.mark.parametrize("made", [quick, patient])
+@pytest.mark.parametrize("made", [quick, pytest.param(patient, marks=pytest.mark.campaign)])
 def test_the_lap_is_driven_as_it_should_be(made: Callable[[], SimulatedStack]) -> None:
     it = made()
     assert it.lap.step is None, f"stuck at: {it.lap.step.name}"

@@ -26,12 +26,17 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
-from common.motion import STANDING_MPS, STANDING_RADPS, is_standing
+from common.motion import (
+    AWAY_M,
+    AWAY_RAD,
+    DRIFT_RADPS,
+    LEAK_S,
+    STANDING_MPS,
+    STANDING_RADPS,
+    is_standing,
+)
 
 SLACK_S = 0.5
-AWAY_M, AWAY_RAD = 0.05, 0.05
-LEAK_S = 5.0  # time constant of the integrated velocities
-DRIFT_RADPS = 0.001  # of the heading counter
 
 
 class Travel(Struct):

@@ -36,18 +36,24 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
-from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
+from common.motion import (
+    AWAY_M,
+    AWAY_RAD,
+    DRIFT_RADPS,
+    LEAK_S,
+    STANDING_MPS,
+    STANDING_RADPS,
+    STILL,
+    Twist,
+)
 from services.safety.config import Safety
 
 GRACE_NS = NS_PER_S // 2  # on top of v / a
 LONGEST_STOP_NS = 3 * NS_PER_S  # limit of v / a + grace for any settings
 BRIEF_NS = NS_PER_S // 2  # a shorter motion does not renew the time limit
 CONFIRM_NS = NS_PER_S // 5  # of standstill until the place is recorded
-AWAY = 0.05  # m and rad
-LEAK_S = 5.0  # time constant of the integrated velocities
-DRIFT_RADPS = 0.001  # of the heading counter
 LONGEST_GAP_S = 0.1  # between two velocities; over longer gaps the motion is unknown
-FASTEST_MPS = 1.5  # plausible for a counter step, which may be ``AWAY`` in any time
+FASTEST_MPS = 1.5  # plausible for a counter step, which may always be ``AWAY_M``
 FASTEST_RADPS = 2.0
 
 
@@ -139,7 +145,7 @@ class Supervisor(Struct, frozen=True):
 
     def _stay(self, standstill: Standstill, known: Latest[Twist] | None, now_ns: int) -> Standstill:
         ways = (standstill.integrated, standstill.counted)
-        if all(max(abs(way.linear), abs(way.angular)) <= AWAY for way in ways):
+        if all(abs(way.linear) <= AWAY_M and abs(way.angular) <= AWAY_RAD for way in ways):
             return standstill
         left = replace(standstill, left=True)
         return _begin(left, Phase.STOPPING, self._due_ns(known, now_ns))
@@ -241,9 +247,9 @@ def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill
     step = newest.value.distance - before.value.distance
     turn = math.remainder(newest.value.heading - before.value.heading, math.tau)
     drift = DRIFT_RADPS * gap_s
-    turned = standstill.counted.angular + _credible(turn, FASTEST_RADPS * gap_s)
+    turned = standstill.counted.angular + _credible(turn, max(AWAY_RAD, FASTEST_RADPS * gap_s))
     counted = Twist(
-        standstill.counted.linear + _credible(step, FASTEST_MPS * gap_s),
+        standstill.counted.linear + _credible(step, max(AWAY_M, FASTEST_MPS * gap_s)),
         math.copysign(max(0.0, abs(turned) - drift), turned),
     )
     return replace(standstill, counted=counted)
@@ -262,4 +268,4 @@ def _identity(counters: Mileage) -> tuple[int, int]:
 
 def _credible(step: float, bound: float) -> float:
     """Return a step of a counter; 0 for an implausible one (too large, NaN)."""
-    return step if abs(step) <= max(AWAY, bound) else 0.0
+    return step if abs(step) <= bound else 0.0

@@ -102,6 +102,7 @@ def status_of(server: Server) -> int:
             return error.code
 
 
+@pytest.mark.campaign
 def test_beyond_the_limit_only_an_emergency_stop_is_served(
     endpoint: str, peer: Peer, tmp_path: Path
 ) -> None:

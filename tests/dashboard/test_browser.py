@@ -62,6 +62,7 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     assert problems == []
 
 
+@pytest.mark.campaign
 def test_the_content_of_the_page(page: Page, stack: RunningStack) -> None:
     wait_for_text(page, "#verdict", "STOP")
     wait_for_text(page, "#sentence", "No source requests motion.")
@@ -119,6 +120,7 @@ def test_driving_by_keyboard_and_a_lost_focus(page: Page, stack: RunningStack) -
     page.keyboard.up("s")
 
 
+@pytest.mark.campaign
 def test_a_lost_key_up_releases(page: Page, stack: RunningStack) -> None:
     take_control(page)
     ways: tuple[Callable[[], None], ...] = (
@@ -146,6 +148,7 @@ PAD = """() => {
 }"""
 
 
+@pytest.mark.campaign
 def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     def deadman(down: bool) -> None:
         page.evaluate("down => { window.pad.buttons[4].pressed = down; }", down)
@@ -178,6 +181,7 @@ def test_a_page_in_the_background_releases(page: Page, stack: RunningStack) -> N
     page.keyboard.up("w")
 
 
+@pytest.mark.campaign
 def test_driving_by_touch_and_a_stop_from_another_viewer(
     browser: Browser, page: Page, server: Server, stack: RunningStack
 ) -> None:
@@ -205,6 +209,7 @@ def test_driving_by_touch_and_a_stop_from_another_viewer(
     wait_for_text(page, "#driver", "No driver")
 
 
+@pytest.mark.campaign
 def test_a_second_finger_stops(browser: Browser, server: Server) -> None:
     context, phone, finger = phone_of(browser, server, "en-GB")
     take_control(phone)
@@ -227,6 +232,7 @@ def test_one_tap_stops(page: Page, stack: RunningStack) -> None:
     reset_all(page)
 
 
+@pytest.mark.campaign
 def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: RunningStack) -> None:
     take_control(page)
     drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
@@ -240,6 +246,7 @@ def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: Ru
     page.keyboard.up("w")
 
 
+@pytest.mark.campaign
 def test_nothing_is_wider_than_the_screen(page: Page) -> None:
     for width in (360, 390, 768, 1440):
         page.set_viewport_size({"width": width, "height": 844})

@@ -117,6 +117,7 @@ def test_unknown_arguments_change_nothing(
     assert not home.exists()
 
 
+@pytest.mark.campaign
 def test_the_dry_run_uses_the_same_arguments(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:
@@ -148,6 +149,7 @@ def test_a_damaged_wheelhouse_is_rejected(
     assert list(home.iterdir()) == []
 
 
+@pytest.mark.campaign
 def test_a_wheel_with_another_hash_is_rejected(
     home: Path, house: Callable[[str], Path], run: Run
 ) -> None:

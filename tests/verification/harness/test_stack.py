@@ -91,7 +91,14 @@ def drives(stack: RunningStack, presser: KeyPresser) -> None:
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")
 
 
-@pytest.mark.parametrize("victim", ["teleop", "safety", "router"])
+@pytest.mark.parametrize(
+    "victim",
+    [
+        "safety",
+        pytest.param("teleop", marks=pytest.mark.campaign),
+        pytest.param("router", marks=pytest.mark.campaign),
+    ],
+)
 def test_the_death_of_any_part_stops_the_vehicle(
     stack: RunningStack, presser: KeyPresser, victim: str
 ) -> None:
@@ -108,6 +115,7 @@ def test_the_death_of_any_part_stops_the_vehicle(
     assert stack.last() in ("stop", "brake")
 
 
+@pytest.mark.campaign
 def test_a_board_that_comes_back_is_not_driven_by_what_is_still_asked(
     stack: RunningStack, source: ConstantSource
 ) -> None:

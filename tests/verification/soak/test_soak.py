@@ -74,6 +74,7 @@ def test_without_proc_the_error_names_it(
     assert "needs /proc" in capsys.readouterr().err
 
 
+@pytest.mark.campaign
 def test_ctrl_c_ends_it_with_what_is_known_and_leaves_nothing(tmp_path: Path) -> None:
     words = soak_command("--minutes", "5", "--out", str(tmp_path / "out"))
     with running(words, tmp_path / "said") as process:
