@@ -1,6 +1,6 @@
 """``python -m tools.run_tests ARGUMENTS``: pytest, with a second run of the tests that failed.
 
-Most tests start real processes with real time limits, and four run at once. A host that stalls
+Most tests start real processes with real time limits, and several run at once. A host that stalls
 processes fails a few of them. So the tests that failed run a second time, one by one, with the
 machine to themselves. A test that fails again fails the run; the others are listed at the end.
 
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 FAILED = 1  # pytest's exit code for failed tests, as opposed to usage errors and interrupts
-RETRIED_MAX = 12
+RETRIED_MAX = 30
 CACHE = Path(".pytest_cache/v/cache/lastfailed")
 
 

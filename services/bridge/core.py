@@ -73,18 +73,15 @@ class Core:
         self._faults: dict[Side, int] = {}
         parts = self.readiness, self.motions, self._ports, self._poll
         self.report = LinkReport(config.board, *parts)
+        echo = self.readiness.on_echo
         self._handlers: dict[type[Frame], Handler] = {
             reports.VelocityReport: self._on_velocity,
             reports.BumperReport: self._on_bumper,
             reports.DistanceReport: self._on_distance,
             reports.UltrasonicReport: self._on_ultrasonic,
             reports.DriverReport: self._on_driver,
-            reports.UltrasonicBrakeReport: lambda frame, _, __, out: self.readiness.on_echo(
-                frame.on, None, out
-            ),
-            reports.BumperBrakeReport: lambda frame, _, __, out: self.readiness.on_echo(
-                None, frame.on, out
-            ),
+            reports.UltrasonicBrakeReport: lambda frame, _, __, out: echo(frame.on, None, out),
+            reports.BumperBrakeReport: lambda frame, _, __, out: echo(None, frame.on, out),
             reports.LedReport: lambda frame, _, __, out: self.operator.on_led_echo(frame.done, out),
         }
         self._reflex = Reflex(self._framing)
@@ -200,7 +197,13 @@ class Core:
         asked_ns = self._poll.answered("mileage", now_ns)
         after = self._translator.mileage(frame, self.readiness.epoch)
         before = self._mileage
-        if before is not None and self._is_new_board(before, after, now_ns):
+        if before is not None and restarted(
+            before.value,
+            after,
+            before.age_s(now_ns),
+            unbroken=self.readiness.link.up_ns <= before.received_ns,
+            silent=self.readiness.gap_ns > before.received_ns,
+        ):
             self.readiness.on_restart(now_ns, out)
             self._bumper = BumperFilter()
             self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
@@ -208,15 +211,6 @@ class Core:
         self._mileage = Latest(after, asked_ns)
         self.motions.on_mileage(after, now_ns)
         out.publish("mileage", after, raw)
-
-    def _is_new_board(self, before: Latest[m.Mileage], after: m.Mileage, now_ns: int) -> bool:
-        return restarted(
-            before.value,
-            after,
-            before.age_s(now_ns),
-            unbroken=self.readiness.link.up_ns <= before.received_ns,
-            silent=self.readiness.gap_ns > before.received_ns,
-        )
 
     def _on_driver(self, frame: reports.DriverReport, raw: bytes, now_ns: int, out: Output) -> None:
         side = frame.side.name.lower()
@@ -246,8 +240,7 @@ class Core:
     def led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Output:
         """Process a call that sets a lamp channel; the answer names ``caller``."""
         out = Output()
-        frame = self.operator.on_led(request, caller, now_ns, out)
-        if frame is not None:
+        if frame := self.operator.on_led(request, caller, now_ns, out):
             self._ask(frame, now_ns, out)
         return out
 
@@ -292,8 +285,6 @@ class Core:
     def _ask(self, frame: Frame, now_ns: int, out: Output) -> None:
         """Send a query or a setting from the port that receives its answers."""
         self.motions.send(frame, self._ports.to_ask(ANSWERS[frame.ID], now_ns), out)
-
-    # --- the end ----------------------------------------------------------------------------
 
     def stop(self, now_ns: int) -> Output:
         """Stop the vehicle before exit; ``motions.is_stopped`` reports standstill."""
