@@ -115,6 +115,20 @@ def creeps(fixture: PolicyFixture, ticks: int = 10) -> None:
         fixture.tick()
 
 
+def test_a_creep_between_counters_that_are_not_finite_latches() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.linear = fixture.angular = 0.0
+    fixture.tick(50)
+    at = fixture.distance
+    for _ in range(10):
+        fixture.distance = math.nan
+        fixture.tick()
+        at += 0.01
+        fixture.distance = at
+        fixture.tick()
+    assert "uncommanded_motion" in fixture.state.latches
+
+
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_a_creep_that_only_the_counters_show_latches(interrupted: bool) -> None:
     fixture = PolicyFixture().ready()
