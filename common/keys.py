@@ -93,7 +93,7 @@ VELOCITY = Topic(
     "measured velocity, as the board sends it",
 )
 MILEAGE = Topic(
-    "tel/bridge/mileage", m.Mileage, 50, FAST, "bridge", "the board's own distance and heading"
+    "tel/bridge/mileage", m.Mileage, 25, FAST, "bridge", "the board's own distance and heading"
 )
 ULTRASONIC = Topic("tel/bridge/ultrasonic", m.Ultrasonic, 20, FAST, "bridge", "eight ranges")
 BUMPER = Topic("tel/bridge/bumper", m.Bumper, 50, FAST, "bridge", "the bumper strip")
@@ -104,7 +104,7 @@ SWITCHES = Topic(
     "tel/bridge/switches", m.Switches, 1, SLOW, "bridge", "the board's own emergency brakes"
 )
 LINK = Topic("tel/bridge/link", m.Link, 5, FAST, "bridge", "the link to the board")
-ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 50, FAST, "odom", "pose and twist")
+ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 25, FAST, "odom", "pose and twist")
 SAFETY = Topic(
     "tel/safety/state",
     m.SafetyState,

@@ -1,12 +1,14 @@
-"""Event loop of a service: one thread for sockets, timers, and calls from other threads.
+"""Event loop of a service: sockets, timers, and calls from other threads, one at a time.
 
-All decisions of a service run here, one at a time, so that its cores need no locks. Zenoh's threads
-only ``post``.
+A handler runs only in the thread that holds the loop's lock, so that the cores need no locks of
+their own. The loop's thread holds it except while it sleeps. Then another thread may ``submit`` a
+call and run it at once, without waking the loop's thread: ``docs/adr/0002-one-thread.md``.
 """
 
 import contextlib
 import selectors
 import socket
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -16,6 +18,7 @@ from msgspec import Struct
 from common.freshness import NS_PER_S
 
 Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
+Call = Callable[[], object]
 
 
 class Timer(Struct):
@@ -42,17 +45,31 @@ class Timer(Struct):
 
 
 class Loop:
-    """Runs handlers as they become due, until ``stop``."""
+    """Runs handlers as they become due, until ``stop``.
+
+    Its lock is held from the start, and after ``run``: nothing runs beside the construction and the
+    exit of a service.
+    """
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
         self._timers: list[Timer] = []
-        self._posted: deque[Callable[[], object]] = deque()
+        self._posted: deque[Call] = deque()  # for the loop's thread
+        self._submitted: deque[Call] = deque()  # for the thread that holds the lock
         self._wake_in, self._wake_out = socket.socketpair()
         self._wake_in.setblocking(False)
         self._wake_out.setblocking(False)
         self._selector.register(self._wake_out, selectors.EVENT_READ, self._drain)
         self._stopped = False
+        self._error: BaseException | None = None  # of a submitted call, for the loop's thread
+        self._lock = threading.Lock()
+        self._holder = 0  # thread id; 0 while the lock is free
+        self._acquire()
+
+    @property
+    def held(self) -> bool:
+        """Whether the calling thread holds the lock: it may call a core."""
+        return self._holder == threading.get_ident()
 
     def watch(self, sock: socket.socket, handler: Handler) -> None:
         """Call the handler whenever the socket is readable."""
@@ -67,27 +84,61 @@ class Loop:
         self._timers.append(timer)
         return timer
 
-    def post(self, call: Callable[[], object]) -> None:
+    def post(self, call: Call) -> None:
         """Queue a call from any thread; the loop's thread makes it."""
         self._posted.append(call)
-        # A full socket already holds a wake-up; a closed one needs none.
-        with contextlib.suppress(OSError):
-            self._wake_in.send(b"\0")
+        self._wake()
+
+    def submit(self, call: Call) -> None:
+        """Make a call from any thread: at once in this thread if the lock is free.
+
+        Otherwise the thread that holds it makes the call, before or after it releases the lock.
+        This never waits: a caller that waited would stamp its next sample too late.
+        """
+        self._submitted.append(call)
+        if self._error is not None or not self._lock.acquire(blocking=False):
+            return
+        self._holder = threading.get_ident()
+        try:
+            self._make(self._submitted)
+        except BaseException as error:  # ``run`` raises it in the loop's thread
+            self._error = error
+            self._wake()
+        finally:
+            self._release()
+        # Calls that arrived meanwhile are the loop's: this thread must return to its samples.
+        if self._submitted:
+            self._wake()
 
     def stop(self) -> None:
         """Make ``run`` return after the current call; safe in a signal handler."""
         self._stopped = True
-        self.post(lambda: None)
+        self._wake()
 
     def run(self) -> None:
-        """Run until ``stop``, which may precede this call; may be run again after that."""
+        """Run until ``stop``, which may precede this call; may be run again after that.
+
+        Raise the error of a submitted call.
+        """
+        self._holder = threading.get_ident()
         while not self._stopped:
-            for key, _ in self._selector.select(self._until_due_s()):
+            for key, _ in self._select():
                 key.data(time.monotonic_ns())
-            # Posted calls first: timers check the age of data.
-            self._make_posted()
+            if self._error is not None:
+                raise self._error
+            # Calls of other threads first: timers check the age of data.
+            self._make(self._posted)
+            self._make(self._submitted)
             self._call_due()
         self._stopped = False
+
+    def hold(self, timeout_s: float) -> None:
+        """Keep all other threads from making calls, for the end of the process.
+
+        For a signal handler: it may have interrupted the thread that holds the lock.
+        """
+        if not self.held and self._lock.acquire(timeout=timeout_s):
+            self._holder = threading.get_ident()
 
     def close(self) -> None:
         """Close the descriptors."""
@@ -102,6 +153,24 @@ class Loop:
             timer.late_ns = 0
         return late_ns / NS_PER_S
 
+    def _select(self) -> list[tuple[selectors.SelectorKey, int]]:
+        """Sleep without the lock until a socket is readable or a timer is due."""
+        until_s = self._until_due_s()
+        self._release()
+        try:
+            # A call submitted after this check finds the lock free.
+            return self._selector.select(0 if self._submitted else until_s)
+        finally:
+            self._acquire()
+
+    def _acquire(self) -> None:
+        self._lock.acquire()
+        self._holder = threading.get_ident()
+
+    def _release(self) -> None:
+        self._holder = 0
+        self._lock.release()
+
     def _until_due_s(self) -> float | None:
         if not self._timers:
             return None
@@ -112,11 +181,15 @@ class Loop:
         for timer in self._timers:
             timer.call(time.monotonic_ns())
 
+    def _wake(self) -> None:
+        # A full socket already holds a wake-up; a closed one needs none.
+        with contextlib.suppress(OSError):
+            self._wake_in.send(b"\0")
+
     def _drain(self, _: int) -> None:
         with contextlib.suppress(BlockingIOError):
             self._wake_out.recv(65_536)  # the rest wakes the loop again
-        self._make_posted()
 
-    def _make_posted(self) -> None:
-        for _ in range(len(self._posted)):
-            self._posted.popleft()()
+    def _make(self, calls: deque[Call]) -> None:
+        for _ in range(len(calls)):
+            calls.popleft()()

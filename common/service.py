@@ -21,6 +21,7 @@ import msgspec
 from common import keys, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
+from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, sources
 from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
@@ -31,6 +32,7 @@ from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
+HOLD_TIMEOUT_S = 0.1  # limit for a handler of another thread, before the exit actions
 NICENESS = 10  # of services that do not drive
 
 
@@ -42,10 +44,12 @@ class Node(Generic[C]):
 
     drive: DriveLink  # of bridge and safety, see ``open_drive``
 
-    def __init__(self, name: str, loaded: Loaded[C]) -> None:
+    def __init__(self, name: str, loaded: Loaded[C], *, in_place: bool = False) -> None:
+        """Set up; ``in_place``: handlers of the bus run in Zenoh's threads (``Loop.submit``)."""
         self.name = name
         self.config: C = loaded.config
         self.loop = Loop()
+        self._submit = self.loop.submit if in_place else self.loop.post
         self.log = log.Logger()
         self.bus = self.open_bus()
         self.counters: Counter[str] = Counter()
@@ -60,7 +64,7 @@ class Node(Generic[C]):
 
     def open_bus(self) -> Bus:
         """Return a bus with its own session, not yet open; the first one is ``bus``."""
-        return Bus(self.config.bus, self.config.robot.id, self.loop.post)
+        return Bus(self.config.bus, self.config.robot.id, self.loop.post, self._submit)
 
     def open_drive(self, *, listens: bool) -> DriveLink:
         """Create this service's end of the drive link; it opens and closes with ``bus``."""
@@ -126,15 +130,21 @@ def run(
     argv: Sequence[str] | None = None,
     *,
     priority: int = 0,
+    in_place: bool = False,
 ) -> int:
-    """Run a service and return its exit code; ``priority`` is one of ``realtime``'s."""
+    """Run a service and return its exit code.
+
+    ``priority`` is one of ``realtime``'s. With ``in_place`` handlers of the bus also run in Zenoh's
+    threads, while the loop sleeps; they must not wait for files or for other hosts.
+    """
+    os.environ.setdefault(RUNTIME_ENV, ONE_POOL)
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
         if priority and loaded.config.robot.realtime:
             realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
         log.configure(loaded.config.log, name)
-        node = Node(name, loaded)
+        node = Node(name, loaded, in_place=in_place)
     except ConfigError as error:
         print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - whatever the log's format
         return EXIT_CONFIG
@@ -246,6 +256,7 @@ def _on_signal(node: Node[C], exit_actions: ExitActions) -> None:
     def leave(number: int, _: FrameType | None) -> None:
         if exit_actions.running:
             return  # the interrupted call ends the process
+        node.loop.hold(HOLD_TIMEOUT_S)
         try:
             exit_actions.run()
         finally:

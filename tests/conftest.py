@@ -8,6 +8,7 @@ import pytest
 from hypothesis import settings
 
 from common import log
+from common.bus.session import RUNTIME_ENV
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
 
@@ -29,6 +30,15 @@ def _own_logs() -> Iterator[None]:
             root.removeHandler(handler)
     root.setLevel(before[1])
     ours.setLevel(before[2])
+
+
+@pytest.fixture(autouse=True)
+def _own_runtime() -> Iterator[None]:
+    """Undo what a service that ran in this process has set for Zenoh in its children."""
+    before = os.environ.get(RUNTIME_ENV)
+    yield
+    if before is None:
+        os.environ.pop(RUNTIME_ENV, None)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ SHIPPED: Mapping[Frame, float] = {STANDS: 50.0}
 TENFOLD: Mapping[Frame, float] = {
     STANDS: 500.0,
     reports.BumperReport(False): 450.0,
-    reports.DistanceReport(0, 0): 450.0,
+    reports.DistanceReport(0, 0): 225.0,
     CLEAR: 180.0,
 }
 

@@ -31,7 +31,7 @@ KINDS: Kinds = {
 # Queries with their rates in Hz.
 QUERIES = {
     framed(0x7602, b""): 50.0,
-    framed(0x7600, b""): 50.0,
+    framed(0x7600, b""): 25.0,
     framed(0x7601, b""): 20.0,
     framed(0x7605, b"\0"): 2.0,
     framed(0x7605, b"\1"): 2.0,

@@ -10,7 +10,7 @@ from pathlib import Path
 from cli.keys.access import access_control
 from cli.run.router_probe import RouterProbe
 from common import log, members, realtime
-from common.bus.session import READERS, READERS_ENV, router, router_config
+from common.bus.session import READERS, RUNTIME_ENV, router, router_config
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
         printed = json.dumps(router_config(config.bus, access, config.robot.id), indent=2)
         write_text(printed, options.print)
         return 0
-    os.environ.setdefault(READERS_ENV, READERS)  # Zenoh reads it once, on first use
+    os.environ.setdefault(RUNTIME_ENV, READERS)  # Zenoh reads it once, on first use
     if config.robot.realtime:
         realtime.request(realtime.ROUTER)
     log.configure(config.log, "router")

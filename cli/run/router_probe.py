@@ -22,7 +22,7 @@ import msgspec
 from cli.run.router_attempts import MISSES, Attempts
 from common import child_process, realtime
 from common import log as logs
-from common.bus.session import READERS_ENV, answers, router_at
+from common.bus.session import RUNTIME_ENV, answers, router_at
 from common.child_process import Backoff
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Log
@@ -76,7 +76,7 @@ class RouterProbe:
 
     def _follow(self, on_answer: Callable[[], None]) -> None:
         with subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, env=child_process.environ() | {READERS_ENV: POOL}
+            self._command, stdout=subprocess.PIPE, env=child_process.environ() | {RUNTIME_ENV: POOL}
         ) as self._probe:
             if self._stopped.is_set():  # stopped while the probe started
                 self._probe.kill()

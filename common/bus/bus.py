@@ -42,9 +42,14 @@ class Bus:
 
     Declare first, then ``open``: a thread retries until a router answers, and the declarations are
     made as soon as the session is open. Zenoh renews them after a router's restart.
+
+    ``post`` passes a call to the owner's thread. ``submit`` passes it the handling of a sample, a
+    query or an answer, which by default is the same.
     """
 
-    def __init__(self, where: settings.BusSettings, robot: str, post: Post) -> None:
+    def __init__(
+        self, where: settings.BusSettings, robot: str, post: Post, submit: Post | None = None
+    ) -> None:
         self.robot = robot
         # Not by `secrets`: it loads OpenSSL, 5 ms and 5 MB in each process.
         self.boot = int.from_bytes(os.urandom(8), "big") >> 1
@@ -55,6 +60,7 @@ class Bus:
         self.counters: Counter[str] = Counter(overrun=0, undecodable=0)
         self.publishers: list[Publisher[Any]] = []
         self.post = post
+        self.submit = submit or post
         self._declarations: list[Callable[[zenoh.Session], Any]] = []
         self._declared: list[Any] = []  # references keep them alive
         self._session: zenoh.Session | None = None
@@ -248,8 +254,8 @@ class Bus:
             self._declared.append(declare(self._session))
 
     def _hand_over(self, call: Callable[[], None]) -> None:
-        """Post the call to the owner's thread, unless the bus is closed by then."""
-        self.post(lambda: None if self._closed else call())
+        """Submit the call, unless the bus is closed by then."""
+        self.submit(lambda: None if self._closed else call())
 
     def _subscribe(
         self, key: str, take: Callable[[zenoh.Sample, int], None], depth: int, history: int
@@ -265,7 +271,7 @@ class Bus:
             if items.add((sample, time.monotonic_ns())):
                 self.counters["overrun"] += 1
             else:
-                self.post(drain)
+                self.submit(drain)
 
         def declare(session: zenoh.Session) -> Any:
             if not history:

@@ -37,7 +37,7 @@ class DriveLink(Bus):
         self.other = "safety" if listens else "bridge"
         self.socket = socket_path(bus.where, bus.robot)
         prepare(self.socket)
-        super().__init__(bus.where, bus.robot, bus.post)
+        super().__init__(bus.where, bus.robot, bus.post, bus.submit)
         self.boot, self.counts, self.counters = bus.boot, bus.counts, bus.counters
         bus.links.append(self)
 

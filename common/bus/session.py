@@ -25,9 +25,12 @@ WARN_PERIOD_S = 5.0  # between two warnings
 BLOCKED_TIMEOUT_US = 100_000
 # Zenoh closes a dead TCP link in a reader thread shared with other links, and waits up to 10 s for
 # unsent data (SO_LINGER; no setting). The default is two threads, as many as a laptop has sessions.
-# Each link that dies within 10 s occupies one; idle ones cost 20 kB. A router reads `READERS_ENV`.
+# Each link that dies within 10 s occupies one; idle ones cost 20 kB.
 READERS = "(rx:(worker_threads:32))"
-READERS_ENV = "ZENOH_RUNTIME"
+# A service has one link, or two to its own host. Its pools share the threads of one: by default
+# each packet wakes a thread in three of them.
+ONE_POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
+RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, on first use
 # Timeout of one connection attempt: five round trips of a bad link. After a change of address, a
 # host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000

@@ -6,6 +6,7 @@ measured here, after all of that.
 """
 
 import time
+from functools import partial
 from typing import Any
 
 from common import keys
@@ -13,16 +14,16 @@ from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.bus.publisher import Publisher
+from common.freshness import NS_PER_S
 from common.motion import Command
 from common.service import Node
-from services.bridge.config import BridgeConfig
+from services.bridge.config import BridgeConfig, tick_s
 from services.bridge.core import Core
 from services.bridge.guard_ipc import Heartbeat, Inherited
 from services.bridge.output import Output, Send
 from services.bridge.timing import Timings
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
-TICK_S = 0.01
 LINK_S = 0.2
 MOTIONS = 8  # queue length
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
@@ -38,6 +39,7 @@ class Bridge:
         self._heartbeat = Heartbeat(inherited.heartbeat, self._on_no_guard) if inherited else None
         self._timings = Timings()
         self._core = Core(node.config, node.bus.boot, node.counters, time.monotonic_ns())
+        self._ticked_ns = time.monotonic_ns()
         self._unsent: Send | None = None  # the BRAKE that the system did not send
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
@@ -58,9 +60,11 @@ class Bridge:
 
     def _begin(self) -> None:
         loop = self._node.loop
-        for sock in self._sockets.sockets:
-            loop.watch(sock, self._read)
-        loop.every(TICK_S, self._on_tick)
+        for port, sock in enumerate(self._sockets.sockets):
+            loop.watch(sock, partial(self._on_readable, port))
+        period_s = tick_s(self._node.config.bridge)
+        self._late_ns = round(1.5 * period_s * NS_PER_S)
+        loop.every(period_s, self._on_tick)
         loop.every(LINK_S, self._on_link)
         loop.every(1.0, self._on_second)
         self._node.timing = self._timings.message
@@ -69,11 +73,15 @@ class Bridge:
 
     # --- in -----------------------------------------------------------------------------------
 
-    def _read(self, now_ns: int) -> None:
-        """Process the datagrams waiting in the sockets."""
+    def _on_readable(self, port: int, now_ns: int) -> None:
+        self._read(now_ns, port)
+
+    def _read(self, now_ns: int, *ports: int) -> None:
+        """Process the datagrams waiting in the sockets of these ports."""
         # The port of the commands first: after a stall both ports have datagrams, and the other one
         # must not take over only because it is read first.
-        for port, datagram, ancillary, read_ns in self._sockets.read(self._core.motions.port):
+        first = self._core.motions.port
+        for port, datagram, ancillary, read_ns in self._sockets.read(first, *ports):
             hit, braked_ns, seq = self._core.reflex(datagram), 0, None
             if hit is not None:
                 braked_ns = self._brake(hit.brake)
@@ -107,9 +115,11 @@ class Bridge:
         self._do(self._core.led(request, caller, time.monotonic_ns()))
 
     def _on_tick(self, now_ns: int) -> None:
-        # Read the sockets first: after a stall of this loop, queued datagrams are not yet counted,
-        # and the board would seem silent.
-        self._read(now_ns)
+        if now_ns - self._ticked_ns > self._late_ns:
+            # Read the sockets first: after a stall of this loop, queued datagrams are not yet
+            # counted, and the board would seem silent.
+            self._read(now_ns, *range(len(self._sockets.sockets)))
+        self._ticked_ns = now_ns
         unsent = self._unsent
         out = self._core.tick(now_ns, self._sockets.send_errors)
         self._do(out)

@@ -22,7 +22,9 @@ def main() -> int:
     inherited = received(os.environ)
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run("bridge", BridgeConfig, lambda node: Bridge(node, inherited), priority=ahead)
+    return run(
+        "bridge", BridgeConfig, lambda node: Bridge(node, inherited), priority=ahead, in_place=True
+    )
 
 
 if __name__ == "__main__":

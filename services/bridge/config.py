@@ -19,6 +19,9 @@ ASKED: dict[str, type[Frame]] = {
 }
 ANSWERS = {kind.frame.ID: kind.frame for kind in reports.FROM_BOARD.values()}
 
+# The lease, the silence of the board and the guard's patience are ten ticks each.
+TICK_MAX_S = 0.02
+
 Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
@@ -60,7 +63,7 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
     require_switches: bool = True  # the board must echo that its emergency brakes are on
     bumper_rate: Rate = 50.0
     ultrasonic_rate: Rate = 20.0
-    mileage_rate: Rate = 50.0
+    mileage_rate: Rate = 25.0
     driver_rate: Rate = 2.0  # for each side
 
     def __post_init__(self) -> None:
@@ -88,6 +91,11 @@ def queries(bridge: Bridge) -> list[tuple[str, Frame, float]]:
         ("driver_left", commands.DriverQuery(Side.LEFT), bridge.driver_rate),
         ("driver_right", commands.DriverQuery(Side.RIGHT), bridge.driver_rate),
     ]
+
+
+def tick_s(bridge: Bridge) -> float:
+    """Return the period of the bridge's tick in seconds: each query finds its tick."""
+    return min(TICK_MAX_S, *(1 / rate_hz for _, _, rate_hz in queries(bridge)))
 
 
 def ports_of(config: BridgeConfig, now_ns: int) -> Ports:

@@ -9,7 +9,7 @@ datagram   the same datagram                  messages; answers of calls; events
 motion     each message on ``@cmd/motion``    the frame that the lease allows
 switches,  an operator's calls                frames; the board's echo answers them later
 led
-tick       every 10 ms                        queries; STOP or BRAKE if due; events
+tick       every 20 ms                        queries; STOP or BRAKE if due; events
 second     once a second                      the switches' message; rates for the link message
 link       5 times a second, and on a change  the link message
 stop, exit the end of the process             STOP or BRAKE
@@ -29,7 +29,7 @@ from common.motion import Command
 from common.wire import reports
 from common.wire.frame import OPENING, Frame, Side
 from common.wire.framing import Framing, Received
-from services.bridge.config import ANSWERS, ASKED, STEADY, BridgeConfig, ports_of, queries
+from services.bridge.config import ANSWERS, ASKED, STEADY, BridgeConfig, ports_of, queries, tick_s
 from services.bridge.link_report import LinkReport
 from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
@@ -65,7 +65,7 @@ class Core:
         self.readiness = Readiness(settings, config.board)
         self.operator = Operator(self.readiness, settings.echo_timeout)
         self._ports = ports_of(config, now_ns)
-        self._poll = Poll(queries(settings), settings.answer_timeout, STEADY)
+        self._poll = Poll(queries(settings), settings.answer_timeout, STEADY, tick_s(settings))
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message
         self._lost = 0  # bumper polls lost, at the newest sample

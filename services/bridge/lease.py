@@ -20,7 +20,7 @@ latch owner  an authority that ended with a  its successor has latched in its pl
              latch that was not reset        the owner of that latch in ``predecessor``
 ============ =============================== =================================================
 
-When the lease is over: STOP at once and then at 20 Hz, and BRAKE from ``coast_ns`` on while the
+When the lease is over: STOP at once and then at 25 Hz, and BRAKE from ``coast_ns`` on while the
 vehicle is not known to be at standstill (``standstill`` defines that time). BRAKE continues if it
 was the authority's last order. The authority is identified by the ``boot`` of the sender; until its
 lease is over, others are refused.
@@ -45,7 +45,7 @@ from common.freshness import NS_PER_S
 from common.messages import Motion
 from common.motion import BRAKE, RUN, STOP, Command
 
-STOP_PERIOD_NS = NS_PER_S // 20
+STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: 25 Hz, whatever the jitter
 AT_ONCE = -STOP_PERIOD_NS  # a send time so old that the next STOP is due
 SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 90 decisions a second
 

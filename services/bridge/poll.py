@@ -40,8 +40,13 @@ class Poll:
         queries: Iterable[tuple[str, Frame, float]],
         timeout_s: float,
         steady: Collection[str] = (),
+        tick_s: float = 0.0,
     ) -> None:
-        """Set up with name, frame and rate (Hz) of each query, and the names of the steady ones."""
+        """Set up with name, frame and rate (Hz) of each query, and the names of the steady ones.
+
+        ``tick_s``: the period at which ``due`` is called. A query is sent at the nearest tick.
+        """
+        self._early_ns = round(tick_s * NS_PER_S) // 2
         self.queries = {
             name: Query(name, frame, round(NS_PER_S / rate_hz)) for name, frame, rate_hz in queries
         }
@@ -96,7 +101,7 @@ class Poll:
             query.sent_ns = None
             query.missed += 1
             query.slowdown = min(2 * query.slowdown, SLOWEST)
-        if now_ns < query.due_ns:
+        if now_ns + self._early_ns < query.due_ns:
             return False
         # Keep the period while on time; after a stall start a new one instead of catching up.
         period_ns = query.period_ns * query.slowdown

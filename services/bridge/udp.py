@@ -46,17 +46,14 @@ class Sockets:
         self.wall = WallClock()
         for sock in self.sockets:
             enable_timestamps(sock)
-        ports = range(len(self.sockets))
-        # By the port to read first: all of them, in that order.
-        self._orders = [(first, *(p for p in ports if p != first)) for first in ports]
 
-    def read(self, first: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
+    def read(self, *ports: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
         """Yield the board's datagrams: port, bytes, ancillary data, read time.
 
-        The port of the index ``first`` is read first. A full burst ends with a short sleep: without
-        it, Linux kills a SCHED_FIFO process in a flood (``realtime.limit``).
+        ``ports`` are indices, in the order of reading. A full burst ends with a short sleep:
+        without it, Linux kills a SCHED_FIFO process in a flood (``realtime.limit``).
         """
-        for port in self._orders[first]:
+        for port in dict.fromkeys(ports):
             sock = self.sockets[port]
             for _ in range(BURST):
                 try:

@@ -1,4 +1,8 @@
-"""Odometry on the bus: counters and velocities in, pose and twist out at 50 Hz."""
+"""Odometry on the bus: counters and velocities in, pose and twist out.
+
+Each counter sample is followed by an estimate. While counters are missing, each velocity is.
+Without a subscriber nothing is sent, and the pose is estimated less often, for the trajectory.
+"""
 
 import time
 
@@ -17,6 +21,9 @@ from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
 from services.odom.pose import Pose, Trajectory
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
+CHECK_S = 0.25  # between two checks for that
+NO_COUNTERS_NS = NS_PER_S // 10  # until velocities are followed by an estimate
+UNREAD_NS = NS_PER_S // 10  # between two estimates while nothing subscribes to them
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
@@ -28,7 +35,8 @@ class Odometer:
         self._node = node
         self._estimator = Estimator(settings)
         self._trajectory = Trajectory(settings.path_spacing, settings.path_points)
-        self._published_ns: int | None = None
+        self._counted_ns = 0  # the newest counter sample
+        self._estimated_ns = 0
         self._silent = True  # no input yet
         self._slip = False
         self._echoes = Echoes()
@@ -40,13 +48,18 @@ class Odometer:
         bus.serve(keys.SET_POSE, self._on_set_pose)
         path_key = keys.info_key(bus.robot, node.name, "path")
         bus.answer(path_key, self._trajectory_json, "application/json")
-        node.loop.every(1 / keys.ODOMETRY.rate_hz, self._on_tick)
+        node.loop.every(CHECK_S, self._check_silence)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
-        self._note(self._estimator.on_velocity(arrival.message, arrival.received_ns))
+        now_ns = arrival.received_ns
+        self._note(self._estimator.on_velocity(arrival.message, now_ns))
+        if now_ns - self._counted_ns > NO_COUNTERS_NS:
+            self._estimate()
 
     def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
+        self._counted_ns = arrival.received_ns
         self._note(self._estimator.on_mileage(arrival.message, arrival.received_ns))
+        self._estimate()
 
     def _note(self, outcome: Outcome) -> None:
         if outcome in REFUSALS:
@@ -73,12 +86,14 @@ class Odometer:
         self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
         caller.reply(m.Done(text=text, boot=self._node.bus.boot))
 
-    def _on_tick(self, now_ns: int) -> None:
+    def _estimate(self) -> None:
+        now_ns = time.monotonic_ns()
+        if not self._to_odometry.passed_on and now_ns - self._estimated_ns < UNREAD_NS:
+            return
         odometry = self._estimator.estimate(now_ns)
         if odometry is None:
-            self._report_silence(now_ns)
             return
-        self._published_ns = now_ns
+        self._estimated_ns = now_ns
         self._to_odometry.put(odometry)
         self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
         if self._silent:
@@ -86,8 +101,8 @@ class Odometer:
             self._node.event("heard", "info", "counters and velocities are received")
         self._report_slip(odometry)
 
-    def _report_silence(self, now_ns: int) -> None:
-        if self._silent or self._published_ns is None or now_ns - self._published_ns < SILENT_NS:
+    def _check_silence(self, now_ns: int) -> None:
+        if self._silent or now_ns - self._estimated_ns < SILENT_NS:
             return
         self._silent = True
         self._node.event(

@@ -130,8 +130,8 @@ def test_stop_becomes_break_when_it_does_not_help(age: int, standing: bool, orde
     assert on_tick(over, NOW + age, LEASE, COAST, standing)[1] is order
 
 
-@pytest.mark.parametrize(("wait", "due"), [(50 * MS - 1, False), (50 * MS, True)])
-def test_stop_goes_out_at_20_hz(wait: int, due: bool) -> None:
+@pytest.mark.parametrize(("wait", "due"), [(30 * MS - 1, False), (30 * MS, True)])
+def test_stop_is_sent_at_every_second_tick(wait: int, due: bool) -> None:
     over = Lease(over_since_ns=NOW, sent_ns=NOW)
     after, order = on_tick(over, NOW + wait, LEASE, COAST, True)
     assert (order is Command.STOP) is due
@@ -143,11 +143,11 @@ def test_a_lease_that_lives_but_is_not_ready_still_stops() -> None:
     assert on_tick(state, NOW, LEASE, COAST, False)[1] is Command.STOP
 
 
-def test_the_frame_of_a_message_counts_for_the_20_hz() -> None:
+def test_the_frame_of_a_message_counts_for_the_25_hz() -> None:
     state, order, _ = obey(replace(ARMED, ready=False), stop())
     assert order is Command.STOP
-    assert on_tick(state, NOW + 50 * MS - 1, LEASE, COAST, False) == (state, None)
-    assert on_tick(state, NOW + 50 * MS, LEASE, COAST, False)[1] is Command.STOP
+    assert on_tick(state, NOW + 30 * MS - 1, LEASE, COAST, False) == (state, None)
+    assert on_tick(state, NOW + 30 * MS, LEASE, COAST, False)[1] is Command.STOP
 
 
 def test_a_message_ends_the_stopping_of_a_lease_that_was_over() -> None:

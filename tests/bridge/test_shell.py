@@ -51,7 +51,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     made.say_bytes(HIT)
 
     def brakes() -> bool:
-        bridge._read(time.monotonic_ns())
+        bridge._read(time.monotonic_ns(), 0, 1)
         return made.motions[-1:] != [] and made.motions[-1].kind is MotionKind.BREAK
 
     wait_until(brakes, "BRAKE")
@@ -81,7 +81,7 @@ def test_a_network_that_fails_is_silence(made: Board) -> None:
     sockets = Sockets(Settings(port=made.address[1], listen_ports=tuple(made.ports)))
     sockets.close()
     sockets.sockets = [Broken(), Broken()]  # type: ignore[list-item]
-    assert list(sockets.read(0)) == []
+    assert list(sockets.read(0, 1)) == []
 
 
 class Refusing:

@@ -4,6 +4,8 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -58,3 +60,23 @@ def test_without_the_right_all_stays_as_it_was() -> None:
 def test_other_systems_go_on_as_ordinary() -> None:
     other = "import sys; sys.platform = 'darwin'; "
     assert output_of(f"{other}r.request(1); r.limit(); print(r.priority())") == ["0"]
+
+
+@needs_right
+def test_all_threads_that_may_hold_the_loops_lock_have_one_priority(endpoint: str) -> None:
+    """Otherwise an ordinary thread that holds it, and is not scheduled, delays a SCHED_FIFO one."""
+    sets = "--set", f"bus.connect={endpoint}", "--set", "robot.realtime=true"
+    command = [sys.executable, "-m", "services.safety", *sets]
+    environ = {name: value for name, value in os.environ.items() if name != "T2__ROBOT__REALTIME"}
+    with subprocess.Popen(command, env=environ, stderr=subprocess.PIPE) as process:
+        assert process.stderr is not None
+        try:
+            assert b"started" in process.stderr.readline()
+            time.sleep(1.0)  # until the sessions are open, and Zenoh's threads with them
+            tasks = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
+            found = [(os.sched_getscheduler(t), os.sched_getparam(t).sched_priority) for t in tasks]
+        finally:
+            process.kill()
+    assert len(found) > 10  # the loop, the log, Zenoh's runtime, one for each subscription
+    flags = os.SCHED_RESET_ON_FORK
+    assert {(policy & ~flags, priority) for policy, priority in found} == {(os.SCHED_FIFO, SAFETY)}

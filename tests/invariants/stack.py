@@ -53,7 +53,7 @@ class Sockets:
         self._process = process
         self._framing = Framing()
 
-    def read(self, first: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
+    def read(self, first: int, *_: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
         """Yield what waits, after the oracle has seen it."""
         inbox = self._stack.vehicle.inbox
         while inbox:

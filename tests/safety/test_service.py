@@ -233,8 +233,9 @@ def test_the_program_opens_a_reader_and_closes_it(
         argv: object,
         *,
         priority: int,
+        in_place: bool,
     ) -> int:
-        assert priority == realtime.SAFETY
+        assert (priority, in_place) == (realtime.SAFETY, True)
         node = make_node(endpoint, "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]')
         opened.append(node.open_bus())
         monkeypatch.setattr(node, "open_bus", lambda: opened[0])

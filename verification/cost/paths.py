@@ -58,7 +58,7 @@ def node(name: str, root: type[C]) -> Node[C]:
         patch("os.urandom", lambda size: (BOOT << 1).to_bytes(size, "big")),
     ):
         log.configure(loaded.config.log, name)
-        return Node(name, loaded)
+        return Node(name, loaded, in_place=True)
 
 
 class BridgePaths:
@@ -92,12 +92,11 @@ class BridgePaths:
 
     def second(self, command: Command = Command.RUN) -> None:
         """One second: ticks, queries and answers, velocities, motions, the link."""
-        for tick in range(100):
-            self.clock.now_ns += 10 * MS
-            if tick % 2:
-                self._receive("velocity")
-                self._move(command)
+        for _ in range(50):
+            self.clock.now_ns += 20 * MS
             self._node.loop._call_due()
+            self.take("velocity")  # and the board's answers
+            self._move(command)
         os.read(self._guard, 4096)
 
     def velocity(self) -> None:
@@ -137,7 +136,7 @@ class BridgePaths:
         """Process this frame, on both ports."""
         self.clock.now_ns += STEP_NS
         self._receive(name)
-        self._bridge._read(self.clock.now_ns)
+        self._bridge._read(self.clock.now_ns, 0, 1)
 
     def _move(self, command: Command, judged: int = 0) -> None:
         now_ns = self.clock.now_ns

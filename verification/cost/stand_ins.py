@@ -80,22 +80,27 @@ class Session:
         """Ignore it: there are no queries."""
 
     def deliver(self, key: str, message: Message, subscription: str) -> None:
-        """Deliver a message as Zenoh's thread does, and run the loop once."""
+        """Deliver a message as Zenoh's thread does while the loop sleeps: it is handled at once."""
         self.deliver_encoded(key, codec.encode(message), subscription)
 
     def deliver_encoded(self, key: str, payload: bytes, subscription: str) -> None:
         """Deliver an encoded message in the same way."""
         sample = Sample(zenoh.KeyExpr(key), zenoh.ZBytes(payload), None)
+        self._loop._release()
         self._queues[subscription](sample)
-        self._loop._drain(0)
+        self._loop._acquire()
+        assert self._loop._error is None, self._loop._error
 
 
 class Sink:
     """A declared publisher."""
 
+    matching = True  # there is a subscriber
+
     def __init__(self, session: Session, key: str) -> None:
         self._session = session
         self.key = key
+        self.matching_status = self
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         """Store the newest message."""
