@@ -1,6 +1,6 @@
 """Typed Zenoh bus: the only package that imports zenoh.
 
-Zenoh calls back on its own threads. These callbacks only queue the sample and ``post`` it; decoding
-and handling happen in the owner's thread. ``docs/adr/0003-zenoh.md`` lists the measurements behind
-this design.
+Zenoh calls back on its own threads. These callbacks stamp and queue the sample and submit its
+handling to the owner's loop, which admits one thread at a time (``docs/adr/0002-one-thread.md``).
+``docs/adr/0003-zenoh.md`` lists the measurements behind this design.
 """
