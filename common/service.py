@@ -131,13 +131,14 @@ def run(
     *,
     priority: int = 0,
     in_place: bool = False,
+    links: int = 1,
 ) -> int:
-    """Run a service and return its exit code.
+    """Run a service with this number of Zenoh sessions; return its exit code.
 
     ``priority`` is one of ``realtime``'s. With ``in_place`` handlers of the bus also run in Zenoh's
     threads, while the loop sleeps; they must not wait for files or for other hosts.
     """
-    os.environ.setdefault(RUNTIME_ENV, ONE_POOL)
+    os.environ.setdefault(RUNTIME_ENV, ONE_POOL.format(links=links))
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
         if priority and loaded.config.robot.realtime:

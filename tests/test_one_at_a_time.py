@@ -139,18 +139,19 @@ class Crowd:
 
     def source(self, name: str) -> None:
         while not self._ended.is_set():
-            echo = self.state.heartbeat if self.state else None
+            echo = self.state.heartbeat if self.state else 0
             self._drives[name].put(m.Drive(linear=0.2, angular=0.1, echo=echo))
             time.sleep(0.004)
 
     def operator(self) -> None:
         while not self._ended.is_set():
             if (state := self.state) is not None:
-                for call, request in (
+                calls: list[tuple[Any, Any]] = [
                     (keys.RESET, reset_request(state)),
                     (keys.SET_POSE, m.PoseRequest(x=0.0, y=0.0, heading=0.0, echo=state.heartbeat)),
                     (keys.SET_LED, m.LedRequest(channel=1, mode=1)),
-                ):
+                ]
+                for call, request in calls:
                     self._bus.call(call, request, self._on_answer, lambda _: None)
             time.sleep(0.03)
 

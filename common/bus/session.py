@@ -27,9 +27,13 @@ BLOCKED_TIMEOUT_US = 100_000
 # unsent data (SO_LINGER; no setting). The default is two threads, as many as a laptop has sessions.
 # Each link that dies within 10 s occupies one; idle ones cost 20 kB.
 READERS = "(rx:(worker_threads:32))"
-# A service has one link, or two to its own host. Its pools share the threads of one: by default
-# each packet wakes a thread in three of them.
-ONE_POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
+# All pools of a service share the threads of one: by default each packet wakes a thread in three of
+# them. One thread for each link, because a dead TCP link occupies its thread: with a single one, a
+# router's host that is cut off stopped the drive link for 10 s.
+ONE_POOL = (
+    "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),"
+    "app:(worker_threads:{links}))"
+)
 RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, on first use
 # Timeout of one connection attempt: five round trips of a bad link. After a change of address, a
 # host may wait this long for an attempt from the old address.

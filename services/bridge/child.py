@@ -23,7 +23,12 @@ def main() -> int:
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
     return run(
-        "bridge", BridgeConfig, lambda node: Bridge(node, inherited), priority=ahead, in_place=True
+        "bridge",
+        BridgeConfig,
+        lambda node: Bridge(node, inherited),
+        priority=ahead,
+        in_place=True,
+        links=2,  # to the router and to safety
     )
 
 

@@ -25,7 +25,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             node.log.warning("unsafe overrides are active", settings=list(accepted))
 
     try:
-        return run("safety", SafetyConfig, build, argv, priority=realtime.SAFETY, in_place=True)
+        return run(
+            "safety",
+            SafetyConfig,
+            build,
+            argv,
+            priority=realtime.SAFETY,
+            in_place=True,
+            links=3,  # two to the router, one to the bridge
+        )
     finally:
         for estop_bus in estop_buses:
             estop_bus.close()

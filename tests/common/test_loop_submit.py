@@ -70,11 +70,11 @@ def test_what_arrives_during_a_submitted_call_is_the_loops() -> None:
     homes: list[int] = []
 
     def first() -> None:
-        loop.submit(lambda: homes.append(threading.get_ident()))  # the lock is taken
+        it.submit(lambda: homes.append(threading.get_ident()))  # the lock is taken
 
-    with running(Loop()) as loop:
-        asleep(loop)
-        loop.submit(first)
+    with running(Loop()) as it:
+        asleep(it)
+        it.submit(first)
         wait_until(lambda: homes, "the second call")
     assert threading.get_ident() not in homes
 

@@ -234,8 +234,9 @@ def test_the_program_opens_a_reader_and_closes_it(
         *,
         priority: int,
         in_place: bool,
+        links: int,
     ) -> int:
-        assert (priority, in_place) == (realtime.SAFETY, True)
+        assert (priority, in_place, links) == (realtime.SAFETY, True, 3)
         node = make_node(endpoint, "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]')
         opened.append(node.open_bus())
         monkeypatch.setattr(node, "open_bus", lambda: opened[0])
