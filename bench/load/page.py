@@ -127,7 +127,7 @@ def hour(by_name: ByName) -> str:
 def added(by_name: ByName, process: str) -> str:
     """Return the CPU seconds that a consumer adds to a process in an hour, and the noise."""
     both = [by_name[candidate, "cpu", process].samples_ns for candidate in (CHAIN, OBSERVED)]
-    without, beside = map(median, both)
+    without, beside = (median(some) for some in both)
     spread = max(max(some) - min(some) for some in both)
     noise = ", within noise" if abs(beside - without) <= spread else ""
     return f"{(beside - without) / 1e9 * HOUR_S:,.0f} s{noise}"
