@@ -47,10 +47,13 @@ def summary(answers: Iterable[tuple[str, Sequence[Target]]]) -> str:
 
 
 def verdict_of(row: str, targets: Iterable[Target]) -> str:
-    """Return the verdict on a row of a table; empty without a target."""
+    """Return the verdict on a row of a table with its worst miss; empty without a target."""
     ours = [each for each in targets if each.row == row]
     missed = [each for each in ours if not each.is_reached]
-    if not missed:
-        return f"{len(ours)} of {len(ours)} reached" if ours else ""
-    ratios = "; ".join(f"{each.figure}: × {each.ratio:.2f} of × {each.limit:g}" for each in missed)
-    return f"{len(ours) - len(missed)} of {len(ours)} reached; missed {ratios}"
+    if not ours:
+        return ""
+    verdict = f"{len(ours) - len(missed)} of {len(ours)} reached"
+    if missed:
+        worst = max(missed, key=lambda each: abs(each.ratio / each.limit - 1))
+        verdict += f", worst × {worst.ratio:.2f} of × {worst.limit:g}"
+    return verdict

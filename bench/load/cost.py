@@ -31,7 +31,7 @@ from verification.harness.process_stats import CpuShares, memory, tree
 from verification.harness.waiting import wait_until
 
 TURNS = 3
-WATCHED_S = 8.0  # in a turn
+WATCHED_S = 6.0  # in a turn
 PATIENCE_S = 120.0
 
 

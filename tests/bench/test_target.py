@@ -24,6 +24,6 @@ def test_the_summary_has_each_question_once() -> None:
 
 def test_a_row_counts_its_targets() -> None:
     every = [SLOW, FAST, MUCH]
-    assert verdict_of("T2", every) == "1 of 2 reached; missed p50: 3 us: × 1.50 of × 1.3"
+    assert verdict_of("T2", every) == "1 of 2 reached, worst × 1.50 of × 1.3"
     assert verdict_of("frames", every) == "1 of 1 reached"
     assert verdict_of("loop", every) == ""
