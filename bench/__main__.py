@@ -7,19 +7,16 @@ import argparse
 import platform
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 
 from bench.command import measure as command_measure
 from bench.growth import measure as growth_measure
 from bench.growth import page as growth_page
-from bench.growth import plot as growth_plot
 from bench.load import measure as load_measure
 from bench.load import page as load_page
-from bench.load import plot as load_plot
 from bench.path import page as path_page
 from bench.reaction import measure as reaction_measure
 from bench.reaction import page as reaction_page
@@ -27,7 +24,7 @@ from bench.reaction import plot as reaction_plot
 from bench.series import RAW, Measured, Series, load, store
 from bench.start import measure as start_measure
 from bench.start import page as start_page
-from bench.start import plot as start_plot
+from bench.target import Target, summary
 from bench.telemetry import measure as telemetry_measure
 from bench.telemetry import page as telemetry_page
 from common.freshness import NS_PER_S
@@ -37,14 +34,18 @@ PAGE = Path(__file__).with_name("page.md")
 UNMEASURED = 3  # exit code when packages or samples are missing
 
 
+Questions = Mapping[str, Callable[[Sequence[Series]], list[Target]]]
+
+
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """One section of the document: measurement, blocks and plot."""
+    """One or more sections of the document: measurement, blocks, targets by question, plot."""
 
     measure: Callable[[], list[Series]]
     versions: Callable[[], str]
     blocks: Callable[[Sequence[Series]], dict[str, str]]
-    draw: Callable[[Path, Sequence[Series]], None]
+    questions: Questions
+    draw: Callable[[Path, Sequence[Series]], None] | None = None
 
 
 BENCHMARKS = {
@@ -52,28 +53,48 @@ BENCHMARKS = {
         reaction_measure.measure,
         reaction_measure.versions,
         reaction_page.blocks,
-        partial(reaction_plot.draw, what="contact to BRAKE"),
-    ),
-    "start": Benchmark(
-        start_measure.measure, start_measure.versions, start_page.blocks, start_plot.draw
+        {"How soon after a contact does the vehicle brake?": reaction_page.targets},
+        reaction_plot.draw,
     ),
     "command": Benchmark(
         command_measure.measure,
         command_measure.versions,
         path_page.blocks,
-        partial(reaction_plot.draw, what="request to frame"),
+        {"How soon does a request reach the wheels?": path_page.targets},
     ),
     "telemetry": Benchmark(
         telemetry_measure.measure,
         telemetry_measure.versions,
         telemetry_page.blocks,
-        partial(reaction_plot.draw, what="frame to consumer"),
+        {
+            "How soon does a consumer have a sample?": telemetry_page.targets,
+            "How old are the samples that safety decides on?": telemetry_page.age_targets,
+        },
     ),
     "load": Benchmark(
-        load_measure.measure, load_measure.versions, load_page.blocks, load_plot.draw
+        load_measure.measure,
+        load_measure.versions,
+        load_page.blocks,
+        {
+            "How many frames and consumers does the bridge serve?": load_page.throughput_targets,
+            "What does the stack cost on board?": load_page.cost_targets,
+        },
+    ),
+    "start": Benchmark(
+        start_measure.measure,
+        start_measure.versions,
+        start_page.blocks,
+        {"How soon after the start is the first STOP sent?": start_page.targets},
     ),
     "growth": Benchmark(
-        growth_measure.measure, growth_measure.versions, growth_page.blocks, growth_plot.draw
+        growth_measure.measure,
+        growth_measure.versions,
+        growth_page.blocks,
+        {
+            "Does the cost grow faster than the number of consumers or bytes?": (
+                growth_page.targets
+            ),
+        },
     ),
 }
 
@@ -96,9 +117,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     text = page(found)
     print(text)
     for name, one in found.items():
-        BENCHMARKS[name].draw(RAW / f"{name}.png", one.series)
-        if options.out:
-            BENCHMARKS[name].draw(plot_file(options.out, name), one.series)
+        draw = BENCHMARKS[name].draw
+        if draw:
+            draw(plot_file(options.out, name) if options.out else RAW / f"{name}.png", one.series)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
     return 0
@@ -122,11 +143,20 @@ def measured(benchmark: Benchmark) -> Measured:
 
 def page(results: dict[str, Measured]) -> str:
     """Return the document; the name of a benchmark prefixes its blocks."""
-    blocks: dict[str, str] = {}
+    blocks: dict[str, str] = {"summary": summary(answers(results))}
     for name, one in results.items():
         own = BENCHMARKS[name].blocks(one.series) | {"where": one.where, "noise": one.noise}
         blocks |= {f"{name}_{block}": text for block, text in own.items()}
     return PAGE.read_text(encoding="utf-8").format(**blocks)
+
+
+def answers(results: Mapping[str, Measured]) -> list[tuple[str, list[Target]]]:
+    """Return the targets by question, in the order of the document."""
+    return [
+        (question, targets(results[name].series))
+        for name, benchmark in BENCHMARKS.items()
+        for question, targets in benchmark.questions.items()
+    ]
 
 
 def plot_file(out: Path, name: str) -> Path:

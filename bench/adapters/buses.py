@@ -1,28 +1,30 @@
-"""The other buses: the broker that each needs, and its adapter."""
+"""The other buses: the router that each needs, and its adapter."""
 
 import contextlib
 import socket
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from pathlib import Path
 
-from bench.path.processes import module, running
+from bench.path.processes import Command, module, one_pool, running
 from verification.harness.bus import set_options
-from verification.harness.ports import accepts_connections, free_port
-from verification.harness.waiting import wait_until
+from verification.harness.ports import free_port
 
 
 @dataclass(frozen=True, slots=True)
 class OtherBus:
-    """A bus; its context runs the broker and yields the address."""
+    """A bus; its context runs the router, if any, and yields the address."""
 
     title: str
     name: str  # of its adapter
     run: Callable[[], AbstractContextManager[str]]
     package: str = ""  # required, by its name in requirements-bench.lock
-    program: str = ""
+    pooled: bool = False  # Zenoh's runtimes share one pool of threads, as in T2's services
+
+    def module(self, name: str, *words: object) -> Command:
+        """Return the command of a process on this bus."""
+        command = module(name, *words)
+        return one_pool(command) if self.pooled else command
 
 
 @contextlib.contextmanager
@@ -32,64 +34,28 @@ def udp() -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def zmq() -> Iterator[str]:
-    """Yield an IPC address."""
-    with tempfile.TemporaryDirectory() as folder:
-        yield f"ipc://{folder}/bus"
-
-
-@contextlib.contextmanager
 def dds() -> Iterator[str]:
     """Yield an unused domain."""
     yield str(1 + free_port() % 200)
 
 
 @contextlib.contextmanager
-def lcm() -> Iterator[str]:
-    """Yield a multicast URL whose packets stay on this host."""
-    yield f"udpm://239.255.76.67:{free_port(socket.SOCK_DGRAM)}?ttl=0"
-
-
-@contextlib.contextmanager
-def mqtt() -> Iterator[str]:
-    """Run a broker on loopback."""
-    broker = free_port()
-    with running(["mosquitto", "-p", str(broker)]):
-        wait_until(lambda: accepts_connections(broker), "mosquitto")
-        yield str(broker)
-
-
-@contextlib.contextmanager
-def redis() -> Iterator[str]:
-    """Run a server without persistence."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = f"{folder}/redis.sock"
-        server = ["redis-server", "--port", "0", "--unixsocket", path, "--save", ""]
-        with running([*server, "--dir", folder]):
-            wait_until(Path(path).exists, "redis-server")
-            yield path
-
-
-@contextlib.contextmanager
-def zenoh(*, realtime: bool = False) -> Iterator[str]:
-    """Run the T2 router; with ``realtime`` as SCHED_FIFO, as in T2."""
+def zenoh() -> Iterator[str]:
+    """Run the T2 router as shipped, with SCHED_FIFO."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    with running(
-        module(
-            "cli router",
-            *set_options(f"bus.listen={endpoint}", f"robot.realtime={str(realtime).lower()}"),
-        )
-    ):
+    with running(module("cli router", *set_options(f"bus.listen={endpoint}"))):
         yield endpoint
 
 
+@contextlib.contextmanager
+def direct() -> Iterator[str]:
+    """Yield the endpoint on which the process at the board listens."""
+    yield f"tcp/127.0.0.1:{free_port()}"
+
+
 UDP = OtherBus("UDP", "udp", udp)
+DDS = OtherBus("CycloneDDS", "dds", dds, "cyclonedds")
 ZENOH = OtherBus("Zenoh, a router", "zenoh", zenoh)
-OTHERS = (
-    OtherBus("CycloneDDS", "dds", dds, "cyclonedds"),
-    OtherBus("ZeroMQ, IPC", "zmq", zmq, "pyzmq"),
-    OtherBus("LCM", "lcm", lcm, "lcm"),
-    OtherBus("MQTT, mosquitto", "mqtt", mqtt, "paho-mqtt", "mosquitto"),
-    OtherBus("Redis, unix socket", "redis", redis, "redis", "redis-server"),
-    ZENOH,
-)
+POOLED = OtherBus("Zenoh, a router, one pool", "zenoh", zenoh, pooled=True)
+DIRECT = OtherBus("Zenoh, direct", "zenoh_direct", direct)
+OTHERS = (DDS, ZENOH, POOLED)

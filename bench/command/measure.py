@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager
 
 from bench.adapters import buses
 from bench.path import processes, rows, stack
-from bench.path.page import FLOOR
-from bench.path.processes import module, running
+from bench.path.page import FLOOR, T2
+from bench.path.processes import SCHED_FIFO, module, one_pool, running
 from bench.path.vehicle import Ports
 from bench.series import Series
 from common.settings import BusSettings
@@ -28,7 +28,7 @@ def t2(title: str, home: Callable[..., AbstractContextManager[BusSettings]]) -> 
     def start(ports: Ports) -> Iterator[None]:
         with home(ports.board, ports.to, *STEEP) as bus:
             source = module("bench.command.source", ports.source, "t2", *stack.client_sets(bus))
-            with running(source):
+            with running(one_pool(source)):
                 yield
 
     return rows.Row(title, start)
@@ -40,17 +40,18 @@ def between(title: str, other: buses.OtherBus) -> rows.Row:
     @contextlib.contextmanager
     def start(ports: Ports) -> Iterator[None]:
         with other.run() as where:
-            writer = module("bench.command.frame_writer", ports.to, ports.board, other.name, where)
-            source = module("bench.command.source", ports.source, "by", other.name, where)
+            frames = ports.to, ports.board, other.name, where
+            writer = other.module(f"{SCHED_FIFO} bench.command.frame_writer", *frames)
+            source = other.module("bench.command.source", ports.source, "by", other.name, where)
             with running(writer, source):
                 yield
 
-    return rows.Row(title, start, other.package, other.program)
+    return rows.Row(title, start, other.package)
 
 
 ROWS = (
     between(FLOOR, buses.UDP),
-    t2("T2", stack.local),
+    t2(T2, stack.local),
     t2("T2, mutual TLS", stack.secured),
     *(between(other.title, other) for other in buses.OTHERS),
 )

@@ -1,1 +1,1 @@
-"""CPU and delay over the number of consumers, robots, keys and bytes."""
+"""CPU and delay over the number of consumers and bytes."""

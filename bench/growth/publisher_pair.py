@@ -1,15 +1,13 @@
-"""``python -m bench.growth.publisher_pair ENDPOINT KEYS BYTES HZ``: a publisher and a subscriber.
+"""``python -m bench.growth.publisher_pair ENDPOINT BYTES HZ``: a publisher and a subscriber.
 
-Plain Zenoh sessions at a router. The messages, BYTES each, go to the KEYS in rotation.
+Plain Zenoh sessions at a router; messages of BYTES each.
 """
 
-import contextlib
 import itertools
 import struct
 import sys
 import threading
 import time
-from collections.abc import Sequence
 
 import zenoh
 
@@ -17,16 +15,13 @@ from bench.load.consumer import plain
 from verification.harness.child_process import serve
 
 HEAD = struct.Struct("<QQ")  # number and time of sending: the smallest message
-KEY = "t2/v1/001/tel/bench/{}"
-# Zenoh's client takes quadratic time to declare the keys of a session.
-KEYS_PER_SESSION = 500
+KEY = "t2/v1/001/tel/bench"
 
 
 class Receiver:
     """Records age and number of each message."""
 
     def __init__(self) -> None:
-        self.declared_s = 0.0  # to declare all keys
         self.begin()
 
     def begin(self) -> None:
@@ -41,7 +36,7 @@ class Receiver:
         self.numbers.append(number)
 
     def end(self) -> object:
-        """Return the ages, the share that arrived, and the time to declare all keys."""
+        """Return the ages, and the share that arrived."""
         numbers, ages_ns = (
             list(self.numbers),
             list(self.ages_ns),
@@ -50,40 +45,29 @@ class Receiver:
         return {
             "ages_ns": ages_ns,
             "arrived": len(numbers) / sent,
-            "declared_s": self.declared_s,
         }
 
 
 def main() -> None:
     """Publish until standard input ends."""
     endpoint, *numbers = sys.argv[1:]
-    keys, size, hz = map(int, numbers)
-    names = [KEY.format(number) for number in range(keys)]
+    size, hz = map(int, numbers)
     receiver, left = Receiver(), threading.Event()
-    with contextlib.ExitStack() as held:
-        near = held.enter_context(zenoh.open(plain(endpoint)))
-        declared, begin_s = [], time.monotonic()
-        for first in range(0, keys, KEYS_PER_SESSION):
-            far = held.enter_context(zenoh.open(plain(endpoint)))
-            declared += [
-                far.declare_subscriber(name, receiver.take)
-                for name in names[first : first + KEYS_PER_SESSION]
-            ]
-        receiver.declared_s = time.monotonic() - begin_s
+    with zenoh.open(plain(endpoint)) as near, zenoh.open(plain(endpoint)) as far:
+        declared = far.declare_subscriber(KEY, receiver.take)
         serve(receiver.begin, receiver.end, left.set)
-        put(near, names, bytes(size - HEAD.size), hz, left)
+        put(near, bytes(size - HEAD.size), hz, left)
+        declared.undeclare()
 
 
-def put(
-    session: zenoh.Session, names: Sequence[str], rest: bytes, hz: float, left: threading.Event
-) -> None:
-    """Publish at a rate to the keys in rotation, until stopped."""
+def put(session: zenoh.Session, rest: bytes, hz: float, left: threading.Event) -> None:
+    """Publish at a rate until stopped."""
     due_s = time.monotonic()
-    for number, name in enumerate(itertools.cycle(names)):
+    for number in itertools.count():
         if left.wait(max(0.0, due_s - time.monotonic())):
             return
         head = HEAD.pack(number, time.monotonic_ns())
-        session.put(name, head + rest, congestion_control=zenoh.CongestionControl.DROP)
+        session.put(KEY, head + rest, congestion_control=zenoh.CongestionControl.DROP)
         due_s += 1 / hz
 
 

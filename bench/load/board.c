@@ -5,12 +5,13 @@
  * FROM and TO are its own port and the reader's on loopback. FRAMES is FRAME@HZ, a periodic frame, or
  * QUERY=FRAME, the answer to a query; frames are hexadecimal. A line "HZ COUNT" on standard input
  * sends the first FRAME COUNT times at that rate; afterwards a line on standard output has the
- * nanoseconds that this took. Ends with standard input.
+ * nanoseconds that this took. After a line "bytes" it has the bytes received and sent so far, with
+ * the headers of IPv4 and UDP. Ends with standard input.
  */
 #include "../path/datagram.h"
 #include <unistd.h>
 
-enum { MOST = 32 };
+enum { MOST = 32, HEADERS = 28 };
 static const int64_t FOREVER = INT64_MAX;
 
 typedef struct {
@@ -27,6 +28,7 @@ static int sock;
 static Stream streams[MOST];
 static Answer answers[MOST];
 static int streaming, answering;
+static long long received, sent;
 
 static void start(Stream *s, double hz, int64_t count) {
     s->period_ns = hz > 0 ? S / hz : 0;
@@ -49,7 +51,10 @@ static void add(const char *word) {
     }
 }
 
-static void transmit(const Datagram *d) { send(sock, d->bytes, d->size, 0); }
+static void transmit(const Datagram *d) {
+    send(sock, d->bytes, d->size, 0);
+    sent += HEADERS + d->size;
+}
 
 static int64_t due_ns(const Stream *s) {
     return s->sent < s->count ? s->begin_ns + (int64_t)(s->sent * s->period_ns) : FOREVER;
@@ -71,10 +76,12 @@ static int64_t send_due(void) {
 
 static void answer(void) {
     unsigned char got[LONGEST];
-    for (ssize_t size; (size = recv(sock, got, LONGEST, MSG_DONTWAIT)) > 0;)
+    for (ssize_t size; (size = recv(sock, got, LONGEST, MSG_DONTWAIT)) > 0;) {
+        received += HEADERS + size;
         for (Answer *a = answers; a < answers + answering; a++)
             if ((size_t)size == a->query.size && !memcmp(got, a->query.bytes, size))
                 transmit(&a->frame);
+    }
 }
 
 static void execute(void) {
@@ -85,6 +92,10 @@ static void execute(void) {
     if (size <= 0)
         exit(0);
     line[size] = 0;
+    if (!strcmp(line, "bytes\n")) {
+        printf("%lld %lld\n", received, sent);
+        return;
+    }
     if (sscanf(line, "%lf %lld", &hz, &count) != 2 || !streaming)
         fail("HZ COUNT");
     start(&streams[0], hz, count);

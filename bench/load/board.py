@@ -25,14 +25,7 @@ ANSWERS: Mapping[Frame, Frame] = {
     commands.BumperBrakeSet(True): reports.BumperBrakeReport(True),
 }
 STANDS = reports.VelocityReport(0, 0)
-# Periodic frames in Hz. TENFOLD: ten times the shipped rates together with the bridge's queries.
-SHIPPED: Mapping[Frame, float] = {STANDS: 50.0}
-TENFOLD: Mapping[Frame, float] = {
-    STANDS: 500.0,
-    reports.BumperReport(False): 450.0,
-    reports.DistanceReport(0, 0): 225.0,
-    CLEAR: 180.0,
-}
+SHIPPED: Mapping[Frame, float] = {STANDS: 50.0}  # periodic frames in Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +36,20 @@ class Board:
 
     def send(self, hz: float, count: int) -> float:
         """Send velocity reports at a rate; return the reached rate."""
+        return count * 1e9 / int(self._execute(f"{hz} {count}"))
+
+    def counted(self) -> tuple[int, int]:
+        """Return the bytes received and sent so far, with the headers of IPv4 and UDP."""
+        received, sent = map(int, self._execute("bytes").split())
+        return received, sent
+
+    def _execute(self, line: str) -> str:
         out, back = self.process.stdin, self.process.stdout
         assert out is not None
         assert back is not None
-        out.write(f"{hz} {count}\n")
+        out.write(f"{line}\n")
         out.flush()
-        took_ns = int(back.readline())
-        return count * 1e9 / took_ns
+        return back.readline()
 
 
 def compiled(folder: Path) -> Path:

@@ -1,11 +1,7 @@
-"""``python -m bench.path.background_consumer CONFIG MS``: subscribe to everything, MS per sample.
-
-It blocks Zenoh's own thread meanwhile, so that unread samples wait in the link and not in a queue.
-"""
+"""``python -m bench.path.background_consumer CONFIG``: subscribe to everything and decode it."""
 
 import sys
 import threading
-import time
 
 import msgpack
 import zenoh
@@ -15,13 +11,12 @@ from common import keys
 EVERYTHING = (f"{keys.ROOT}/001/**", f"{keys.ROOT}/001/@cmd/**")
 
 
-def main(config: str, ms: float) -> None:
+def main(config: str) -> None:
     """Receive until killed."""
 
     def take(sample: zenoh.Sample) -> None:
         if sample.payload:
             msgpack.unpackb(sample.payload.to_bytes())
-        time.sleep(ms / 1000)
 
     with zenoh.open(zenoh.Config.from_json5(config)) as session:
         callback = zenoh.handlers.Callback(take, indirect=False)
@@ -31,4 +26,4 @@ def main(config: str, ms: float) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], float(sys.argv[2]))
+    main(sys.argv[1])

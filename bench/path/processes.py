@@ -9,8 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Protocol
 
+from common.bus.session import ONE_POOL, RUNTIME_ENV
+
 Command = Sequence[str]
 ROBOTS = Path("out/robot/bin/python")
+SCHED_FIFO = "bench.path.sched_fifo"  # before the name of a module
 
 
 @contextlib.contextmanager
@@ -37,6 +40,11 @@ def module(name: str, *words: object) -> Command:
     return [sys.executable, "-m", *name.split(), *map(str, words)]
 
 
+def one_pool(command: Command) -> Command:
+    """Return the command with Zenoh's runtimes on one pool of threads, as T2's services set it."""
+    return ["env", f"{RUNTIME_ENV}={ONE_POOL}", *command]
+
+
 def robots_python() -> str:
     """Return a Python with only a robot's packages, made by `make bench`, else this Python.
 
@@ -59,14 +67,14 @@ def compiled(source: Path, folder: Path) -> Path:
     return made
 
 
-def lacking(package: str, program: str) -> str:
-    """Return the missing one of a package and a program; both may be empty."""
+def lacking(package: str) -> str:
+    """Return the package if it is missing, else an empty string."""
     try:
         if package:
             version(package)
     except PackageNotFoundError:
         return package
-    return program if program and shutil.which(program) is None else ""
+    return ""
 
 
 class Optional(Protocol):
@@ -82,7 +90,7 @@ class Optional(Protocol):
 
     @property
     def lacks(self) -> str:
-        """The missing package or program; empty when the row can run."""
+        """The missing package; empty when the row can run."""
 
 
 def versions(rows: Sequence[Optional]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bench.path.processes import lacking, loaded
 from bench.path.vehicle import Ports, Vehicle, compiled, free_ports
-from bench.reaction.page import LOADS
+from bench.reaction.responders import LOADS
 from bench.series import Series
 
 SEED = 20_240_607
@@ -24,12 +24,11 @@ class Row:
     name: str
     start: Callable[[Ports], AbstractContextManager[None]]
     package: str = ""  # required, by its name in requirements-bench.lock
-    program: str = ""
 
     @property
     def lacks(self) -> str:
-        """The missing package or program; empty when the row can run."""
-        return lacking(self.package, self.program)
+        """The missing package; empty when the row can run."""
+        return lacking(self.package)
 
 
 def measured(rows: Sequence[Row], blocks: int, rounds: int, *, requests: bool) -> list[Series]:

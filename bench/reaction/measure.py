@@ -8,7 +8,6 @@ from pathlib import Path
 
 from bench.path import processes
 from bench.reaction.board import Programs, compiled
-from bench.reaction.page import LOADS
 from bench.reaction.responders import RESPONDERS, Responder
 from bench.series import Series
 from common import realtime
@@ -22,14 +21,12 @@ BUSY = 4  # processes with a busy loop, on the busy host
 def measure(blocks: int = BLOCKS, hits: int = HITS) -> list[Series]:
     """Return the samples of all responders."""
     here = [each for each in RESPONDERS if not each.lacks]
-    samples: dict[tuple[str, str], list[int]] = {
-        (each.name, load): [] for each in here for load in LOADS
-    }
+    turns = [(each, load) for each in here for load in each.loads]
+    samples: dict[tuple[str, str], list[int]] = {(each.name, load): [] for each, load in turns}
     shuffler = random.Random(SEED)
     with tempfile.TemporaryDirectory() as folder:
         programs = compiled(Path(folder))
         for _ in range(blocks):
-            turns = [(each, load) for each in here for load in LOADS]
             shuffler.shuffle(turns)
             for responder, load in turns:
                 with processes.loaded(BUSY if load == "busy" else 0):

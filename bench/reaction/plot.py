@@ -1,4 +1,4 @@
-"""Plot of rows under both loads: the share of samples that took longer, over time."""
+"""Plot of all responders under both loads: the share of samples that took longer, over time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from bench.reaction.page import LOADS
+from bench.reaction.responders import LOADS
 from bench.series import Series
 
 COLOURS = 10  # then repeated in the next style
 STYLES = "-", "--", ":"
 
 
-def draw(file: Path, series: Sequence[Series], what: str) -> None:
+def draw(file: Path, series: Sequence[Series]) -> None:
     """Draw the quiet host on the left, the busy one on the right."""
     figure = Figure(figsize=(15, 5), layout="constrained")
     FigureCanvasAgg(figure)
@@ -23,7 +23,7 @@ def draw(file: Path, series: Sequence[Series], what: str) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_title(load)
-        axes.set_xlabel(f"{what}, us")
+        axes.set_xlabel("contact to BRAKE, us")
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("share that took longer")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right upper")

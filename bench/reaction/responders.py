@@ -3,16 +3,16 @@
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 from bench.adapters import buses
-from bench.path.processes import lacking, module, running
-from bench.path.stack import BRIDGE, SAFETY, plain, services
+from bench.path.processes import SCHED_FIFO, lacking, module, running
+from bench.path.stack import BRIDGE, plain, services
 from bench.reaction.board import BREAK, HIT, STOP, Programs
 from verification.harness.bus import at
 from verification.harness.ports import free_port
 
+LOADS = ("quiet", "busy")
 Start = Callable[[Programs, int, int], AbstractContextManager[None]]  # its port, the board's port
 
 
@@ -23,15 +23,12 @@ class Responder:
     name: str
     start: Start
     package: str = ""  # required, by its name in requirements-bench.lock
-    program: str = ""
+    loads: Sequence[str] = LOADS
 
     @property
     def lacks(self) -> str:
-        """The missing package or program; empty when the row can run."""
-        return lacking(self.package, self.program)
-
-
-NO_ROUTER = "bench.reaction.no_router"
+        """The missing package; empty when the row can run."""
+        return lacking(self.package)
 
 
 def echo(programs: Programs, port: int, _: int) -> AbstractContextManager[None]:
@@ -39,80 +36,59 @@ def echo(programs: Programs, port: int, _: int) -> AbstractContextManager[None]:
     return running([programs.echo, str(port), HIT, BREAK, STOP])
 
 
-def alone(name: str, prefix: str = "") -> Start:
+def loop(_: Programs, port: int, __: int) -> AbstractContextManager[None]:
     """Run one process without T2."""
-    return lambda _, port, __: running(module(f"{prefix} bench.reaction.{name}", port))
+    return running(module(f"{SCHED_FIFO} bench.reaction.loop", port))
 
 
-def stack(
-    bridge: str = BRIDGE,
-    safety: str = SAFETY,
-    attached: Sequence[str] = (),
-    sets: Sequence[str] = (),
-) -> Start:
+def stack(bridge: str = BRIDGE, attached: int = 0, sets: Sequence[str] = ()) -> Start:
     """Run router, bridge, safety and an operator that resets latches.
 
-    As shipped, except for the arguments; ``attached`` has the ms per sample of each consumer.
+    As shipped, except for the arguments; ``attached`` is the number of consumers of everything.
     """
 
     def start(_: Programs, port: int, board: int) -> AbstractContextManager[None]:
         endpoint = f"tcp/127.0.0.1:{free_port()}"
-        listen = f"bus.listen={endpoint}"
-        ours = services(board, port, listen, *sets, bridge=bridge, safety=safety)
-        ours = ours[1:] if safety == NO_ROUTER else ours  # safety listens instead of the router
-        beside = [
-            module("bench.path.background_consumer", plain(at(endpoint)), ms) for ms in attached
-        ]
+        ours = services(board, port, f"bus.listen={endpoint}", *sets, bridge=bridge)
+        beside = [module("bench.path.background_consumer", plain(at(endpoint)))] * attached
         return running(*ours, module("bench.reaction.resetter", endpoint), *beside)
 
     return start
 
 
-def pair(other: buses.OtherBus, prefix: str = "") -> Responder:
+def pair(other: buses.OtherBus, prefix: str = SCHED_FIFO) -> Start:
     """Run one process at the board and one that decides, on another bus."""
 
     @contextlib.contextmanager
     def start(_: Programs, port: int, __: int) -> Iterator[None]:
         script = f"{prefix} bench.adapters {other.name}"
-        with (
-            other.run() as where,
-            running(module(script, "decide", where), module(script, "board", port, where)),
-        ):
-            yield
+        with other.run() as where:
+            decides = other.module(script, "decide", where)
+            with running(decides, other.module(script, "board", port, where)):
+                yield
 
-    title = other.title + (FIFO if prefix else "")
-    return Responder(title, start, other.package, other.program)
+    return start
 
 
-@contextlib.contextmanager
-def direct() -> Iterator[str]:
-    """Yield the endpoint on which the process at the board listens."""
-    yield f"tcp/127.0.0.1:{free_port()}"
+def realtime(other: buses.OtherBus) -> Responder:
+    """Return the row of another bus with SCHED_FIFO."""
+    return Responder(other.title + FIFO, pair(other), other.package)
 
 
-FIFO = ", SCHED_FIFO"
-FLOOR, LOOP, REFLEX = "C, compares bytes", "Python, one process", "T2, reflex"
-JUDGED, DDS, ZENOH = "T2, judged stop", buses.OTHERS[0].title, buses.ZENOH.title
+FIFO, QUIET = ", SCHED_FIFO", LOADS[:1]
+FLOOR, LOOP, REFLEX = "C, compares bytes", "Python, one process" + FIFO, "T2, reflex"
+JUDGED, ORDINARY = "T2, judged stop", "T2, judged stop, ordinary"
+DDS, DDS_FIFO = buses.DDS.title, buses.DDS.title + FIFO
+ZENOH, POOLED = buses.ZENOH.title + FIFO, buses.POOLED.title + FIFO
 NO_REFLEX = "bench.reaction.no_reflex"
-SCHED_FIFO = "bench.path.sched_fifo"
-ORDINARY = ("robot.realtime=false",)
-FIVE, SLOW = ("0",) * 5, ("50",)
 RESPONDERS = (
     Responder(FLOOR, echo),
-    Responder(LOOP, alone("loop")),
-    Responder(LOOP + FIFO, alone("loop", SCHED_FIFO)),
-    Responder("asyncio, one process", alone("asyncio_loop")),
+    Responder(LOOP, loop),
     Responder(REFLEX, stack()),
-    Responder(f"{REFLEX}, ordinary", stack(sets=ORDINARY)),
-    Responder(f"{REFLEX}, 5 consumers attached", stack(attached=FIVE)),
-    Responder(f"{REFLEX}, a slow consumer", stack(attached=SLOW)),
+    Responder(f"{REFLEX}, 5 consumers attached", stack(attached=5)),
     Responder(JUDGED, stack(NO_REFLEX)),
-    Responder(f"{JUDGED}, ordinary", stack(NO_REFLEX, sets=ORDINARY)),
-    Responder(f"{JUDGED}, 5 consumers attached", stack(NO_REFLEX, attached=FIVE)),
-    Responder(f"{JUDGED}, a slow consumer", stack(NO_REFLEX, attached=SLOW)),
-    Responder(f"{JUDGED}, no router", stack(NO_REFLEX, NO_ROUTER)),
-    *map(pair, buses.OTHERS),
-    pair(buses.OTHERS[0], SCHED_FIFO),
-    pair(replace(buses.ZENOH, run=partial(buses.zenoh, realtime=True)), SCHED_FIFO),
-    pair(buses.OtherBus("Zenoh, direct", "zenoh_direct", direct), SCHED_FIFO),
+    Responder(f"{JUDGED}, 5 consumers attached", stack(NO_REFLEX, attached=5)),
+    *map(realtime, (*buses.OTHERS, buses.DIRECT)),
+    Responder(ORDINARY, stack(NO_REFLEX, sets=("robot.realtime=false",)), loads=QUIET),
+    Responder(DDS, pair(buses.DDS, ""), buses.DDS.package, QUIET),
 )

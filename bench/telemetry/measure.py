@@ -10,16 +10,16 @@ import msgspec
 
 from bench.adapters import buses
 from bench.path import processes, rows, stack
-from bench.path.page import FLOOR
-from bench.path.processes import loaded, module, running
+from bench.path.page import FLOOR, T2
+from bench.path.processes import SCHED_FIFO, loaded, module, running
 from bench.path.vehicle import Ports, compiled, free_ports
-from bench.reaction.page import LOADS
+from bench.reaction.responders import LOADS
 from bench.series import Series
 from bench.telemetry.page import AGE
 from common.settings import BusSettings
 from verification.harness.waiting import wait_until
 
-BLOCKS, ROUNDS = 2, 200
+BLOCKS, ROUNDS = 2, 250
 DECISIONS = 1_000
 PATIENCE_S = 120.0  # a decision comes every 20 ms at least
 
@@ -32,16 +32,16 @@ def frames() -> rows.Row:
 def t2(
     title: str,
     home: Callable[..., AbstractContextManager[BusSettings]] = stack.local,
-    attached: Sequence[str] = (),
+    attached: int = 0,
 ) -> rows.Row:
-    """Run T2 as shipped with a consumer, and background consumers with ms per sample."""
+    """Run T2 as shipped with a consumer, and some background consumers."""
 
     @contextlib.contextmanager
     def start(ports: Ports) -> Iterator[None]:
         with home(ports.board, ports.to) as bus:
             config = stack.plain(bus)
             ours = consumer(ports, "t2", config)
-            others = [module("bench.path.background_consumer", config, ms) for ms in attached]
+            others = [module("bench.path.background_consumer", config)] * attached
             with running(*others, ours):
                 yield
 
@@ -54,11 +54,13 @@ def between(other: buses.OtherBus) -> rows.Row:
     @contextlib.contextmanager
     def start(ports: Ports) -> Iterator[None]:
         with other.run() as where:
-            forwarder = module("bench.telemetry.forwarder", ports.to, other.name, where)
-            with running(forwarder, consumer(ports, "by", other.name, where)):
+            frames = ports.to, other.name, where
+            forwarder = other.module(f"{SCHED_FIFO} bench.telemetry.forwarder", *frames)
+            witness = ports.witness, "by", other.name, where
+            with running(forwarder, other.module("bench.telemetry.consumer", *witness)):
                 yield
 
-    return rows.Row(other.title, start, other.package, other.program)
+    return rows.Row(other.title, start, other.package)
 
 
 def consumer(ports: Ports, *words: object) -> Sequence[str]:
@@ -68,10 +70,9 @@ def consumer(ports: Ports, *words: object) -> Sequence[str]:
 
 ROWS = (
     frames(),
-    t2("T2"),
-    t2("T2, 5 consumers", attached=["0"] * 4),
-    t2("T2, 20 consumers", attached=["0"] * 19),
-    t2("T2, a slow one beside", attached=["50"]),
+    t2(T2),
+    t2("T2, 5 consumers", attached=4),
+    t2("T2, 20 consumers", attached=19),
     t2("T2, mutual TLS", stack.secured),
     *map(between, buses.OTHERS),
 )

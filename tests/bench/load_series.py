@@ -3,11 +3,8 @@
 from bench.load import page
 from bench.series import Series
 
-PROCESSES = {
-    page.CHAIN: ("router", "bridge"),
-    page.BARE: ("at the board", "decides"),
-    page.BUS: ("router", "decides"),
-}
+PROCESSES = "router", "bridge"
+FACTORS = {page.CHAIN: 30, page.OBSERVED: 33, page.BARE: 5, page.BUS: 25, page.POOLED: 20}
 
 
 def made_up() -> list[Series]:
@@ -20,11 +17,13 @@ def made_up() -> list[Series]:
         made.append(Series(name=(*name, "delay"), samples_ns=[400_000] * 9, note=note))
         for candidate in ("router", "bridge", "machine"):
             made.append(Series(name=(*name, candidate), samples_ns=[250_000_000]))
-    for candidate, each in ((page.CHAIN, 30), (page.BARE, 20), (page.BUS, 25)):
-        for what, value in (("shipped", 1e6), ("tenfold", 1e7), ("rss", 3e6), ("pss", 1e6)):
-            for name_of in PROCESSES[candidate]:
+    for candidate, each in FACTORS.items():
+        for what, value in (("cpu", 1e6), ("rss", 3e6), ("pss", 1e6)):
+            for name_of in PROCESSES:
                 made.append(sample(candidate, what, name_of, each * value))
             made.append(sample(candidate, what, page.TOGETHER, 2 * each * value))
+        for link in (page.TO_BOARD, page.TO_BRIDGE, page.CONSUMER):
+            made.append(sample(candidate, "bytes", link, 10_000))
     return made
 
 

@@ -1,7 +1,6 @@
 """Made-up times of starts."""
 
 from bench.series import Series
-from bench.start.page import MEMORY
 from bench.start.rows import (
     BARE,
     BRIDGE,
@@ -13,8 +12,4 @@ from bench.start.rows import (
 
 def made_up(stop_ms: int, samples: int = 10) -> list[Series]:
     times = {NOTHING: 10, BARE: 40, (BRIDGE, FIRST_BREAK): 100, (BRIDGE, FIRST_STOP): stop_ms}
-    return [
-        *(Series(name=name, samples_ns=[ms * 1_000_000] * samples) for name, ms in times.items()),
-        Series(name=(MEMORY, "guard"), samples_ns=(), note="20000000 10000000"),
-        Series(name=(MEMORY, "bridge"), samples_ns=(), note="160000000 90000000"),
-    ]
+    return [Series(name=name, samples_ns=[ms * 1_000_000] * samples) for name, ms in times.items()]

@@ -17,6 +17,7 @@ from bench.load.board import ANSWERS, FRAMING, STANDS, board, compiled
 from bench.load.frames import read
 from bench.load.loss import Passage
 from bench.load.stack import Ports
+from bench.series import Series
 from common.wire import commands
 from common.wire.framing import Received
 from services.bridge.config import Bridge, queries
@@ -57,6 +58,12 @@ def test_the_board_sends_a_number_of_frames_and_answers(program: Path, sock: soc
         for query, answer in ANSWERS.items():
             sock.sendto(FRAMING.pack(query), ("127.0.0.1", port))
             assert sock.recv(2048) == FRAMING.pack(answer)
+        headers = 28 * len(ANSWERS)
+        queries, answers = (
+            headers + sum(len(FRAMING.pack(frame)) for frame in some)
+            for some in (ANSWERS.keys(), ANSWERS.values())
+        )
+        assert it.counted() == (queries, answers)
         reached_hz = it.send(1000.0, 20)
         assert [sock.recv(2048) for _ in range(20)] == [FRAMING.pack(STANDS)] * 20
         assert 0 < reached_hz < 1100
@@ -92,9 +99,9 @@ def test_the_two_processes_query_read_and_drive(sock: socket.socket) -> None:
 @CC
 @pytest.mark.campaign
 def test_frames_are_counted_through_the_bridge(program: Path) -> None:
-    made = {one.name: one for one in throughput.measure(program, [2], [100], 0.3)}
-    name = "frames", "2", "100"
-    assert len(made[*name, "delay"].samples_ns) == 2 * 30
+    made = {one.name: one for one in throughput.measure(program, [1], [100], 0.3)}
+    name = "frames", "1", "100"
+    assert len(made[*name, "delay"].samples_ns) == 30
     assert set(made) == {
         (*name, candidate) for candidate in ("delay", "router", "bridge", "machine")
     }
@@ -102,14 +109,20 @@ def test_frames_are_counted_through_the_bridge(program: Path) -> None:
 
 @CC
 @pytest.mark.campaign
-def test_both_are_measured_in_turns(program: Path) -> None:
-    by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.3)}
-    chain = {name[2] for name in by_name if name[0] == page.CHAIN}
-    assert chain == {"router", "guard", "bridge", "safety", "odom", page.TOGETHER}
-    for candidate in (page.CHAIN, page.BARE, page.BUS):
-        for what in ("tenfold", "rss", "pss"):
-            assert page.middle(by_name, candidate, what, page.TOGETHER) > 0
-    assert page.cost(by_name).count("\n") == 1 + len(chain) + 3 + 4
+@pytest.mark.parametrize("name", [page.OBSERVED, page.BARE, page.POOLED])
+def test_each_candidate_is_measured(
+    name: str, program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cost, "CANDIDATES", {name: cost.CANDIDATES[name]})
+    by_name = {one.name: one for one in cost.measure(program, turns=1, seconds=0.5)}
+    processes = page.processes(by_name, name)
+    for what in ("rss", "pss"):
+        assert page.middle(by_name, name, what, page.TOGETHER) > 0
+    assert page.middle(by_name, name, "bytes", page.TO_BRIDGE) > 1000
+    assert page.middle(by_name, name, "bytes", page.TO_BOARD) > 1000
+    if name == page.OBSERVED:
+        assert set(processes) == {"router", "guard", "bridge", "safety", "odom", page.TOGETHER}
+        assert page.middle(by_name, name, "bytes", page.CONSUMER) > 1000
 
 
 def test_datagrams_that_the_kernel_drops_are_counted(sock: socket.socket) -> None:
@@ -162,7 +175,7 @@ def test_a_turn_in_which_a_process_ends_is_empty(program: Path) -> None:
     @contextlib.contextmanager
     def ended(_: Ports) -> Iterator[cost.Running]:
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
-            yield {"it": process.pid}, lambda: process.communicate() is not None
+            yield cost.Running({"it": process.pid}, lambda: process.communicate() is not None)
 
     assert cost.turn(program, ended, 0.0) == {}
 
@@ -186,27 +199,38 @@ def test_the_highest_rate_is_found(most: int) -> None:
 
 
 def test_a_rate_counts_when_no_lower_rate_lost_anything() -> None:
-    blocks = page.blocks(made_up())
-    _, _, one, five, twenty = blocks["throughput"].splitlines()
-    assert one == "| 1 | 6,000 | 400 | 400 | 25 | 25 | 25 | 8,000 | 9 in the socket |"
-    assert five.endswith("| 2,000 | 7 in the socket |")
-    assert twenty == "| 20 | 0 | - | - | - | - | - | 500 | much |"
-    assert blocks["throughput_verdict"].splitlines() == [
-        "- to 1 consumer: 6,000 of 5,000 frames/s: reached",
-        "- to 5 consumers: 1,000 of 5,000 frames/s: not reached",
-        "- to 20 consumers: 0 of 5,000 frames/s: not reached",
-    ]
+    made = made_up()
+    _, _, one, five, twenty = page.blocks(made)["throughput"].splitlines()
+    assert one == (
+        "| 1 | 6,000 | 400 | 400 | 25 | 25 | 25 | 8,000 | 9 in the socket | 1 of 1 reached |"
+    )
+    assert five.endswith("| 2,000 | 7 in the socket |  |")
+    assert twenty == "| 20 | 0 | - | - | - | - | - | 500 | much |  |"
+    (target,) = page.throughput_targets(made)
+    assert target.cells[1:] == ["5,000 frames/s", "× 1.20", "at least × 1", "reached"]
 
 
 def test_cost_is_compared_with_the_two_processes() -> None:
-    blocks = page.blocks(made_up())
+    made = made_up()
+    blocks = page.blocks(made)
     assert blocks["turns"] == "3"
-    assert blocks["cost"].splitlines()[4] == "| T2 | together | 6.0 | 60.0 | 180 | 60 |"
-    assert blocks["cost_verdict"].splitlines() == [
-        f"- CPU at the shipped rates beside {page.BARE}: × 1.5 of × 1.5: reached",
-        f"  - {page.BUS}: × 1.2",
-        f"- CPU at tenfold beside {page.BARE}: × 1.5 of × 1.5: reached",
-        f"  - {page.BUS}: × 1.2",
-        "- memory together, PSS (shared pages once): 60 of 150 MB: reached",
-        "- memory together, RSS (shared pages in each): 180 of 150 MB: not reached",
-    ]
+    rows = blocks["cost"].splitlines()
+    assert rows[4] == "| T2 | together | 6.0 | × 1.5 | 180 | 60 | 2 of 2 reached |"
+    assert rows[5] == f"| {page.BARE} | together | 1.0 | × 0.2 | 30 | 10 |  |"
+    assert [target.ratio for target in page.cost_targets(made)] == [1.5, 0.4]
+
+
+def test_an_hour_has_cpu_seconds_and_bytes() -> None:
+    rows = page.blocks(made_up())["hour"].splitlines()
+    assert "| T2 | CPU, together | 216 s |" in rows
+    assert f"| {page.OBSERVED} | CPU added to the router | 11 s |" in rows
+    assert f"| {page.OBSERVED} | to the consumer | 36.0 MB |" in rows
+
+
+def test_what_a_consumer_adds_is_compared_with_the_noise() -> None:
+    turns = {page.CHAIN: [10, 12, 30], page.OBSERVED: [20, 24, 30]}
+    by_name: dict[tuple[str, ...], Series] = {
+        (name, "cpu", "router"): Series(name=("it",), samples_ns=[each * 10**6 for each in some])
+        for name, some in turns.items()
+    }
+    assert page.added(by_name, "router") == "43 s, within noise"

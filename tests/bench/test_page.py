@@ -9,8 +9,7 @@ import pytest
 from bench import __main__ as bench
 from bench import series as kept
 from bench.path.page import FLOOR
-from bench.reaction.page import LOADS
-from bench.reaction.responders import FIFO, JUDGED, LOOP, REFLEX, ZENOH
+from bench.reaction.responders import JUDGED, LOADS, LOOP, REFLEX
 from bench.series import Measured, Series, store
 from bench.telemetry.page import AGE, STREAMS
 from tests.bench import growth_series, load_series, start_series
@@ -19,7 +18,7 @@ from tests.bench import growth_series, load_series, start_series
 def reaction() -> list[Series]:
     return [
         Series(name=(name, load), samples_ns=[100_000] * 10)
-        for name in (LOOP, REFLEX, JUDGED, ZENOH + FIFO)
+        for name in (LOOP, REFLEX, JUDGED)
         for load in LOADS
     ]
 
@@ -69,10 +68,11 @@ def test_the_document_is_printed_again_from_stored_samples(
     assert bench.main(["--again", "--out", "performance.md"]) == 0
     text = (folder / "performance.md").read_text(encoding="utf-8")
     assert "Measured on a day: a machine. Quiet. 10 round trips a row" in text
-    assert f"| {REFLEX} | 100 | 100 | 100 | × 1.0 | 100 | 100 | 100 | × 1.0 |" in text
-    for name in bench.BENCHMARKS:
-        assert f"images/performance-{name}.png" in text
-        assert (folder / f"images/performance-{name}.png").stat().st_size > 1000
+    assert f"| {REFLEX} | 100 | 100 | 100 | × 1.0 | 100 | 100 | 100 | × 1.0 | 4 of 4 re" in text
+    assert "images/performance-reaction.png" in text
+    assert (folder / "images/performance-reaction.png").stat().st_size > 1000
+    questions = [name for each in bench.BENCHMARKS.values() for name in each.questions]
+    assert all(f"\n## {question}\n" in text for question in questions)
     assert text in capsys.readouterr().out
 
 
@@ -81,15 +81,15 @@ def test_a_benchmark_is_measured_stored_and_printed(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     it = bench.BENCHMARKS["command"]
-    made = bench.Benchmark(path, lambda: "pyzmq 1.0", it.blocks, it.draw)
+    made = bench.Benchmark(path, lambda: "a bus 1.0", it.blocks, it.questions)
     monkeypatch.setitem(bench.BENCHMARKS, "command", made)
     store_made_up(*(name for name in bench.BENCHMARKS if name != "command"))
     assert bench.main(["--only", "command"]) == 0
     printed = capsys.readouterr().out
-    assert "; pyzmq 1.0; 0 minutes. A sleeping process was stalled for at most " in printed
+    assert "; a bus 1.0; 0 minutes. A sleeping process was stalled for at most " in printed
     assert bench.main(["--again"]) == 0
     assert capsys.readouterr().out == printed
-    files = {f"{name}.{kind}" for name in bench.BENCHMARKS for kind in ("json.gz", "png")}
+    files = {f"{name}.json.gz" for name in bench.BENCHMARKS} | {"reaction.png"}
     assert {file.name for file in (folder / kept.RAW).iterdir()} == files
 
 
@@ -108,9 +108,9 @@ def test_a_missing_package_is_named(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lacking() -> str:
-        raise ModuleNotFoundError(name="zmq")
+        raise ModuleNotFoundError(name="cyclonedds")
 
-    made = bench.Benchmark(lambda: [], lacking, lambda series: {}, lambda file, series: None)
+    made = bench.Benchmark(lambda: [], lacking, lambda series: {}, {})
     monkeypatch.setitem(bench.BENCHMARKS, "command", made)
     assert bench.main(["--only", "command"]) == bench.UNMEASURED
-    assert capsys.readouterr().err == "zmq is not installed; run make bench\n"
+    assert capsys.readouterr().err == "cyclonedds is not installed; run make bench\n"

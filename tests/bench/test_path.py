@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.adapters.buses import POOLED
 from bench.adapters.protocols import STAMP, packed, stamped, unpacked
 from bench.command import measure as command
 from bench.path import page, rows
@@ -21,9 +22,10 @@ from bench.telemetry.page import blocks as telemetry_blocks
 
 BENCHMARKS = {"command": command.ROWS, "telemetry": telemetry.ROWS}
 LOST = -1
-CROWDED = "T2, 20 consumers"  # like 5 consumers, too much load for a test
+# One of each kind; the others differ in an argument.
+TRIED = (page.FLOOR, "T2", "T2, mutual TLS", POOLED.title)
 EACH = [
-    (part, row) for part, all_rows in BENCHMARKS.items() for row in all_rows if row.name != CROWDED
+    (part, row) for part, all_rows in BENCHMARKS.items() for row in all_rows if row.name in TRIED
 ]
 
 wants_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -111,8 +113,16 @@ def path() -> list[Series]:
 
 def test_a_row_is_compared_with_the_floor() -> None:
     found = page.blocks(path())
-    assert found["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |"
+    assert (
+        found["table"].splitlines()[3] == "| T2 | 30 | 60 | 60 | × 3.0 | 30 | 60 | 60 | × 3.0 |  |"
+    )
     assert found["samples"] == "10"
+
+
+def test_t2_is_compared_with_zenoh_of_one_pool() -> None:
+    assert page.targets(path()) == []
+    beside = [made_up(POOLED.title, load, times_us=12) for load in ("quiet", "busy")]
+    assert [target.verdict for target in page.targets(path() + beside)] == ["not reached"] * 2
 
 
 def test_lost_rounds_are_no_samples_and_are_named() -> None:
@@ -139,8 +149,10 @@ def aged() -> list[Series]:
 
 def test_ages_are_compared_with_the_limits() -> None:
     lines = ages({one.name: one for one in aged()}).splitlines()
-    assert lines[2] == "| velocity | 50 | 1.5 | 3.0 | 3.0 | 1.5 | 3.0 | 3.0 | 200 |"
-    assert [line.split(" | ")[-1] for line in lines[3:]] == ["300 |", "150 |"]
+    assert lines[2] == (
+        "| velocity | 50 | 1.5 | 3.0 | 3.0 | 1.5 | 3.0 | 3.0 | 200 | 2 of 2 reached |"
+    )
+    assert [line.split(" | ")[-2] for line in lines[3:]] == ["300", "150"]
 
 
 def test_ages_are_not_rows_of_the_path() -> None:

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from bench.reaction.board import STOP
-from bench.start.measure import held
-from bench.start.page import ENOUGH, blocks
+from bench.start.page import ENOUGH, blocks, targets
 from bench.start.rows import (
     BARE,
     BRIDGE,
@@ -64,29 +63,20 @@ def lives(pid: int) -> bool:
     return stat.rpartition(")")[2].split()[0] != "Z"
 
 
-@LINUX
-def test_the_memory_of_each_process() -> None:
-    sizes = held(settled_s=0.0)
-    assert len(sizes) == 5
-    assert all(0 < pss <= rss for rss, pss in sizes.values())
-
-
 def test_the_table_is_in_the_order_of_the_starts() -> None:
     found = blocks(list(reversed(made_up(200))))
     assert found["samples"] == "10"
     assert found["table"].splitlines()[2:] == [
-        "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |",
-        "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |",
-        "| T2, guard and bridge | first BRAKE | 100 | 100 |  | × 2.5 |",
-        "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 |",
+        "| `python -c pass` | its end | 10 | 10 |  | × 0.2 |  |",
+        "| Python, a script | first STOP | 40 | 40 |  | × 1.0 |  |",
+        "| T2, guard and bridge | first BRAKE | 100 | 100 |  | × 2.5 |  |",
+        "| T2, guard and bridge | first STOP | 200 | 200 |  | × 5.0 | 1 of 1 reached |",
     ]
-    assert found["memory"].splitlines()[-1] == "| all | 180.0 | 100.0 |"
-    assert "| 200 | 200 | 200 | × 5.0 |" in blocks(made_up(200, ENOUGH))["table"]
+    assert "| 200 | 200 | 200 | × 5.0 | 1 of 1 reached |" in blocks(made_up(200, ENOUGH))["table"]
 
 
 @pytest.mark.parametrize(("stop_ms", "word"), [(250, "reached"), (251, "not reached")])
-def test_the_verdict_names_each_target(stop_ms: int, word: str) -> None:
-    assert blocks(made_up(stop_ms))["verdict"].splitlines() == [
-        f"- T2's first STOP, p50: {stop_ms} of 250 ms: {word}",
-        "- memory of all on board, PSS: 100 of 150 MB: reached",
-    ]
+def test_the_first_stop_has_a_target(stop_ms: int, word: str) -> None:
+    (target,) = targets(made_up(stop_ms))
+    assert target.cells[0] == f"{BRIDGE}, {FIRST_STOP}, p50: {stop_ms} ms"
+    assert target.verdict == word
