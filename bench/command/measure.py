@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from bench.adapters import buses
 from bench.path import processes, rows, stack
 from bench.path.page import FLOOR, T2
-from bench.path.processes import SCHED_FIFO, module, one_pool, running
+from bench.path.processes import SCHED_FIFO, module, running
 from bench.path.vehicle import Ports
 from bench.series import Series
 from common.settings import BusSettings
@@ -28,7 +28,7 @@ def t2(title: str, home: Callable[..., AbstractContextManager[BusSettings]]) -> 
     def start(ports: Ports) -> Iterator[None]:
         with home(ports.board, ports.to, *STEEP) as bus:
             source = module("bench.command.source", ports.source, "t2", *stack.client_sets(bus))
-            with running(one_pool(source)):
+            with running(source):
                 yield
 
     return rows.Row(title, start)

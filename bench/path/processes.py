@@ -42,7 +42,7 @@ def module(name: str, *words: object) -> Command:
 
 def one_pool(command: Command) -> Command:
     """Return the command with Zenoh's runtimes on one pool of threads, as T2's services set it."""
-    return ["env", f"{RUNTIME_ENV}={ONE_POOL}", *command]
+    return ["env", f"{RUNTIME_ENV}={ONE_POOL.format(links=1)}", *command]
 
 
 def robots_python() -> str:
