@@ -17,6 +17,8 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 
+AT_ONCE_MAX = 4  # submitted calls that one sender makes; more are the loop's
+
 Handler = Callable[[int], object]  # takes the monotonic time in nanoseconds
 Call = Callable[[], object]
 
@@ -78,10 +80,11 @@ class Loop:
     def every(self, period_s: float, handler: Handler) -> Timer:
         """Call the handler every ``period_s`` seconds, the first time at once.
 
-        Like ``watch``, call it in the loop's own thread; other threads use ``post``.
+        Like ``watch``, call it before ``run`` or in a handler; other threads use ``post``.
         """
         timer = Timer(round(period_s * NS_PER_S), time.monotonic_ns(), handler)
         self._timers.append(timer)
+        self._wake()  # the handler that calls this may run in another thread
         return timer
 
     def post(self, call: Call) -> None:
@@ -92,15 +95,16 @@ class Loop:
     def submit(self, call: Call) -> None:
         """Make a call from any thread: at once in this thread if the lock is free.
 
-        Otherwise the thread that holds it makes the call, before or after it releases the lock.
-        This never waits: a caller that waited would stamp its next sample too late.
+        Otherwise the thread that holds it makes the call, or wakes the loop's thread for it. This
+        never waits for the lock: a caller that waited would stamp its next sample too late.
         """
         self._submitted.append(call)
-        if self._error is not None or not self._lock.acquire(blocking=False):
+        if not self._lock.acquire(blocking=False):
             return
         self._holder = threading.get_ident()
         try:
-            self._make(self._submitted)
+            if self._error is None:
+                self._make(self._submitted, AT_ONCE_MAX)
         except BaseException as error:  # ``run`` raises it in the loop's thread
             self._error = error
             self._wake()
@@ -122,10 +126,11 @@ class Loop:
         """
         self._holder = threading.get_ident()
         while not self._stopped:
-            for key, _ in self._select():
-                key.data(time.monotonic_ns())
+            ready = self._select()
             if self._error is not None:
                 raise self._error
+            for key, _ in ready:
+                key.data(time.monotonic_ns())
             # Calls of other threads first: timers check the age of data.
             self._make(self._posted)
             self._make(self._submitted)
@@ -190,6 +195,7 @@ class Loop:
         with contextlib.suppress(BlockingIOError):
             self._wake_out.recv(65_536)  # the rest wakes the loop again
 
-    def _make(self, calls: deque[Call]) -> None:
-        for _ in range(len(calls)):
+    def _make(self, calls: deque[Call], most: int | None = None) -> None:
+        count = len(calls)
+        for _ in range(count if most is None else min(count, most)):
             calls.popleft()()

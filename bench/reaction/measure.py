@@ -14,7 +14,7 @@ from common import realtime
 from verification.harness.ports import udp_ports
 
 SEED = 20_240_607
-BLOCKS, HITS, WARM = 2, 750, 20
+BLOCKS, HITS, WARM = 2, 400, 20
 BUSY = 4  # processes with a busy loop, on the busy host
 
 

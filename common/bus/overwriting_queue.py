@@ -1,4 +1,4 @@
-"""Bounded queue between Zenoh's threads and the owner's thread; it overwrites the oldest item."""
+"""Bounded queue between Zenoh's threads and a handler; it overwrites the oldest item."""
 
 import threading
 from collections import deque

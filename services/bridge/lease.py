@@ -45,9 +45,9 @@ from common.freshness import NS_PER_S
 from common.messages import Motion
 from common.motion import BRAKE, RUN, STOP, Command
 
-STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: 25 Hz, whatever the jitter
+STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: about 25 Hz
 AT_ONCE = -STOP_PERIOD_NS  # a send time so old that the next STOP is due
-SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 90 decisions a second
+SEQ_STEP_MAX = 1 << 20  # over three hours: safety makes 50 to 75 decisions a second
 
 
 class Refusal(StrEnum):

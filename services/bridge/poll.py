@@ -112,5 +112,5 @@ class Poll:
         if query.losses is not None:
             query.losses.on_poll(now_ns)
             # After a late poll, wait half a period at least: the answer needs that time.
-            query.due_ns = max(query.due_ns, now_ns + period_ns // 2)
+            query.due_ns = max(query.due_ns, now_ns + period_ns // 2 + self._early_ns)
         return True

@@ -19,8 +19,9 @@ from common.freshness import NS_PER_S
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
 
-ASK_NS = NS_PER_S // 10
-AGAIN_NS = NS_PER_S // 5
+# Half a tick less than 0.1 and 0.2 s: the tick that is due may come early.
+ASK_NS = NS_PER_S * 9 // 100
+AGAIN_NS = NS_PER_S * 19 // 100
 UNECHOED = 5  # consecutive sends (1 s) after which an earlier echo no longer counts
 GAP_NS = 60 * NS_PER_S // 1000  # of silence; the velocity comes every 20 ms
 

@@ -1,7 +1,7 @@
 """Odometry on the bus: counters and velocities in, pose and twist out.
 
 Each counter sample is followed by an estimate. While counters are missing, each velocity is.
-Without a subscriber nothing is sent, and the pose is estimated less often, for the trajectory.
+Zenoh sends nothing to the router without a subscriber.
 """
 
 import time
@@ -23,7 +23,6 @@ from services.odom.pose import Pose, Trajectory
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.25  # between two checks for that
 NO_COUNTERS_NS = NS_PER_S // 10  # until velocities are followed by an estimate
-UNREAD_NS = NS_PER_S // 10  # between two estimates while nothing subscribes to them
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
@@ -88,8 +87,6 @@ class Odometer:
 
     def _estimate(self) -> None:
         now_ns = time.monotonic_ns()
-        if not self._to_odometry.passed_on and now_ns - self._estimated_ns < UNREAD_NS:
-            return
         odometry = self._estimator.estimate(now_ns)
         if odometry is None:
             return

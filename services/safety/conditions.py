@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 # The bridge ends a hit after three clear samples, so a hit is at least three samples long. Fewer
 # lost samples cannot hide it.
-LOST_SAMPLES = 3
+LOST_SAMPLES = 3  # between two decisions, at most
 MOVED_ALONE = "The vehicle moved without a command while safety was absent."
 # Of the polls of the last 0.2 s, ten at the full rate: this many lost ones can hide a hit of 60 ms.
 LOST_POLLS = 3

@@ -25,6 +25,7 @@ from common.messages import (
     ResetRequest,
 )
 from common.service import Node
+from services.safety.conditions import LOST_SAMPLES
 from services.safety.config import SafetyConfig
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
 from services.safety.policy import Policy, brake_for_contact
@@ -110,8 +111,10 @@ class SafetyService:
         brake = brake_for_contact(self._state, self._inputs)
         if brake is not None:
             self._motion_publisher.put(brake)
-        # Half of all samples are one more that says the bumper is free, and changes no verdict.
-        if bumper.pressed or before is None or differs(bumper, before.value):
+        # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
+        # the samples since the last one: too many would look like lost ones.
+        due = bumper.seq - self._state.verdict.acked[1] >= LOST_SAMPLES
+        if due or bumper.pressed or before is None or differs(bumper, before.value):
             self._decide()
 
     def _on_drive(self, arrival: Arrival[Drive]) -> None:

@@ -102,6 +102,24 @@ def test_a_pause_is_not_caught_up_in_a_burst() -> None:
     assert polled.queries["bumper"].due_ns == 5040 * MS
 
 
+def test_a_query_is_sent_at_the_nearest_tick() -> None:
+    polled = Poll([("bumper", BumperQuery(), 50.0)], 0.1, tick_s=0.02)
+    for tick in (1001, 1020, 1041, 1059, 1080):  # jitter of a millisecond costs no poll
+        assert polled.due(tick * MS), tick
+        polled.answered("bumper", tick * MS)
+
+
+def test_after_a_late_tick_the_answer_has_half_a_period() -> None:
+    polled = Poll([("bumper", BumperQuery(), 50.0)], 0.1, ("bumper",), tick_s=0.02)
+    polled.due(1000 * MS)
+    polled.answered("bumper", 1004 * MS)
+    assert polled.due(1039 * MS)  # 19 ms late
+    assert not polled.due(1040 * MS)
+    polled.answered("bumper", 1043 * MS)
+    assert polled.due(1060 * MS)
+    assert polled.lost("bumper", 1060 * MS) == 0
+
+
 # --- steady queries -----------------------------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from common.loop import Loop
+from common.loop import AT_ONCE_MAX, Loop
 from verification.harness.bus import running
 from verification.harness.waiting import wait_until
 
@@ -77,6 +77,33 @@ def test_what_arrives_during_a_submitted_call_is_the_loops() -> None:
         it.submit(first)
         wait_until(lambda: homes, "the second call")
     assert threading.get_ident() not in homes
+
+
+def test_a_sender_makes_few_calls_of_others() -> None:
+    """The rest is the loop's, so that the sender returns to its samples soon."""
+    homes: list[int] = []
+    full, free = threading.Event(), threading.Event()
+
+    def block() -> None:
+        full.set()
+        free.wait(20)
+
+    def submit_many() -> None:
+        for _ in range(3 * AT_ONCE_MAX):
+            it._submitted.append(lambda: homes.append(threading.get_ident()))
+
+    with running(Loop()) as it:
+        it.post(block)
+        assert full.wait(20)
+        submit_many()
+        free.set()
+        wait_until(lambda: len(homes) == 3 * AT_ONCE_MAX, "all calls")
+        asleep(it)
+        homes.clear()
+        submit_many()
+        it.submit(lambda: None)
+        wait_until(lambda: len(homes) == 3 * AT_ONCE_MAX, "all calls")
+    assert homes.count(threading.get_ident()) == AT_ONCE_MAX
 
 
 def test_nothing_is_called_before_and_after_the_run(loop: Loop) -> None:
