@@ -80,7 +80,7 @@ class Session:
         """Ignore it: there are no queries."""
 
     def deliver(self, key: str, message: Message, subscription: str) -> None:
-        """Deliver a message as Zenoh's thread does while the loop sleeps: it is handled at once."""
+        """Deliver a message as Zenoh's thread does while the loop sleeps: it is handled soon."""
         self.deliver_encoded(key, codec.encode(message), subscription)
 
     def deliver_encoded(self, key: str, payload: bytes, subscription: str) -> None:
@@ -89,6 +89,7 @@ class Session:
         self._loop._release()
         self._queues[subscription](sample)
         self._loop._acquire()
+        self._loop._make(self._loop._posted)  # a sample right behind another one is the loop's
         assert self._loop._error is None, self._loop._error
 
 
