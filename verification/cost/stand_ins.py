@@ -86,9 +86,9 @@ class Session:
     def deliver_encoded(self, key: str, payload: bytes, subscription: str) -> None:
         """Deliver an encoded message in the same way."""
         sample = Sample(zenoh.KeyExpr(key), zenoh.ZBytes(payload), None)
-        self._loop._release()
+        self._loop._lock.release()
         self._queues[subscription](sample)
-        self._loop._acquire()
+        self._loop._lock.acquire()
         self._loop._make(self._loop._posted)  # a sample right behind another one is the loop's
         assert self._loop._error is None, self._loop._error
 

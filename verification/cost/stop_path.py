@@ -21,7 +21,7 @@ from unittest.mock import patch
 
 from common import codec, keys
 from common import messages as m
-from verification.cost.paths import ROBOT, BridgePaths, SafetyPaths
+from verification.cost.paths import ROBOT, STEP_NS, BridgePaths, SafetyPaths
 from verification.cost.stand_ins import BoardSocket, Clock, Sink
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -84,9 +84,11 @@ def judged() -> Way:
     with trace.until(Sink, "put", lambda sink, *_: sink.key == bumper):
         bridge.take("hit")
     safety.clock.install()
+    safety.clock.now_ns += STEP_NS
     with trace.until(Sink, "put", lambda sink, *_: sink.key == motion):
         safety.link.deliver_encoded(bumper, bridge.session.sent[bumper], bumper)
     bridge.clock.install()
+    bridge.clock.now_ns += STEP_NS
     brake = bridge.from_authority(codec.decode(safety.session.sent[motion], m.Motion))
     payload = codec.encode(brake)
     with trace.until(BoardSocket, "sendto", lambda *_: True):
