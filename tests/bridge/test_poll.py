@@ -109,6 +109,14 @@ def test_a_query_is_sent_at_the_nearest_tick() -> None:
         polled.answered("bumper", tick * MS)
 
 
+def test_a_query_is_at_most_half_a_tick_early() -> None:
+    polled = Poll([("bumper", BumperQuery(), 50.0)], 0.1, tick_s=0.02)
+    polled.due(1000 * MS)
+    polled.answered("bumper", 1001 * MS)
+    assert not polled.due(1010 * MS - 1)
+    assert polled.due(1010 * MS)
+
+
 def test_after_a_late_tick_the_answer_has_half_a_period() -> None:
     polled = Poll([("bumper", BumperQuery(), 50.0)], 0.1, ("bumper",), tick_s=0.02)
     polled.due(1000 * MS)
