@@ -13,9 +13,9 @@ from msgspec import Struct
 
 from common import codec, settings
 from common.bus.calls import Answers, Caller
-from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Opener, copied
+from common.bus.subscriber import Post, Subscriber, Take
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.messages import Message
@@ -24,11 +24,6 @@ from common.sample import Sample
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
 R = TypeVar("R", bound=Struct)
-
-Post = Callable[[Callable[[], None]], None]
-
-# A sample that arrives within this time after its callback returned has probably waited for it.
-WAITED_NS = 1_000_000
 
 
 class Arrival(Struct, Generic[M], frozen=True):
@@ -260,42 +255,13 @@ class Bus:
         """Submit the call, unless the bus is closed by then."""
         self.submit(lambda: None if self._closed else call())
 
-    def _subscribe(
-        self, key: str, take: Callable[[zenoh.Sample, int], None], depth: int, history: int
-    ) -> None:
-        items: OverwritingQueue[tuple[zenoh.Sample, int]] = OverwritingQueue(depth)
+    def _subscribe(self, key: str, take: Take, depth: int, history: int) -> None:
+        def take_if_open(sample: zenoh.Sample, received_ns: int) -> None:
+            if not self._closed:
+                take(sample, received_ns)
 
-        def drain() -> None:
-            came = None if self._closed else items.take()
-            if came:
-                take(*came)
-
-        returned_ns = 0
-
-        def queue(sample: zenoh.Sample) -> None:
-            nonlocal returned_ns
-            now_ns = time.monotonic_ns()
-            if items.add((sample, now_ns)):
-                self.counters["overrun"] += 1
-            elif now_ns - returned_ns < WAITED_NS:
-                # In a flood this thread only stamps: samples that waited would look fresh.
-                self.post(drain)
-            else:
-                self.submit(drain)
-            returned_ns = time.monotonic_ns()
-
-        def declare(session: zenoh.Session) -> Any:
-            if not history:
-                return session.declare_subscriber(key, queue)
-            return zenoh.ext.declare_advanced_subscriber(
-                session,
-                key,
-                queue,
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-            )
-
-        self._declare(declare)
+        made = Subscriber(key, take_if_open, depth, history, self.counters)
+        self._declare(lambda session: made.declare(session, self.post, self.submit))
 
     def _query(
         self, key: str, payload: bytes | None, answers: Answers[Any], timeout_s: float

@@ -15,7 +15,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static
 
-from common.bus.bus import Post
+from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
 from services.teleop import motion_panel, panels
 from services.teleop.config import Teleop

@@ -18,6 +18,23 @@ from verification.harness.waiting import wait_until
 _robots = count(1)
 
 
+@contextlib.contextmanager
+def stalled(loop: Loop) -> Iterator[None]:
+    """Stall a running loop in a handler while the context lasts."""
+    held, go_on = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        held.set()
+        go_on.wait(20)
+
+    loop.post(hold)
+    assert held.wait(20)
+    try:
+        yield
+    finally:
+        go_on.set()
+
+
 class BusFixture:
     """Opens what a test needs on the bus and closes it at the end."""
 
@@ -54,21 +71,9 @@ class BusFixture:
         wait_until(lambda: bus.connected, "a session with the router")
         return bus
 
-    @contextlib.contextmanager
-    def stalled(self) -> Iterator[None]:
+    def stalled(self) -> contextlib.AbstractContextManager[None]:
         """Stall the loop while the context lasts."""
-        held, go_on = threading.Event(), threading.Event()
-
-        def hold() -> None:
-            held.set()
-            go_on.wait(20)
-
-        self.loop.post(hold)
-        assert held.wait(20)
-        try:
-            yield
-        finally:
-            go_on.set()
+        return stalled(self.loop)
 
     def session(self) -> zenoh.Session:
         """Open a bare session, as a stranger would."""

@@ -9,6 +9,7 @@ from functools import partial
 import pytest
 
 from common.loop import AT_ONCE_MAX, Loop
+from tests.common.bus_fixture import stalled
 from verification.harness.bus import running
 from verification.harness.waiting import wait_until
 
@@ -46,20 +47,12 @@ def test_a_sleeping_loop_leaves_the_call_to_its_sender() -> None:
 
 def test_a_busy_loop_makes_the_call_itself_and_nobody_waits() -> None:
     homes: list[int] = []
-    busy, free = threading.Event(), threading.Event()
-
-    def block() -> None:
-        busy.set()
-        free.wait(20)
-
-    with running(Loop()) as loop:
-        loop.post(block)
-        assert busy.wait(20)
-        began_s = time.monotonic()
-        loop.submit(lambda: homes.append(threading.get_ident()))
-        waited_s = time.monotonic() - began_s
-        assert homes == []
-        free.set()
+    with running(Loop()) as it:
+        with stalled(it):
+            began_s = time.monotonic()
+            it.submit(lambda: homes.append(threading.get_ident()))
+            waited_s = time.monotonic() - began_s
+            assert homes == []
         wait_until(lambda: homes, "the call")
     assert threading.get_ident() not in homes
     assert waited_s < 5  # as opposed to 20
@@ -82,21 +75,14 @@ def test_what_arrives_during_a_submitted_call_is_the_loops() -> None:
 def test_a_sender_makes_few_calls_of_others() -> None:
     """The rest is the loop's, so that the sender returns to its samples soon."""
     homes: list[int] = []
-    full, free = threading.Event(), threading.Event()
-
-    def block() -> None:
-        full.set()
-        free.wait(20)
 
     def submit_many() -> None:
         for _ in range(3 * AT_ONCE_MAX):
             it._submitted.append(lambda: homes.append(threading.get_ident()))
 
     with running(Loop()) as it:
-        it.post(block)
-        assert full.wait(20)
-        submit_many()
-        free.set()
+        with stalled(it):
+            submit_many()
         wait_until(lambda: len(homes) == 3 * AT_ONCE_MAX, "all calls")
         asleep(it)
         homes.clear()
@@ -178,18 +164,9 @@ def test_a_held_loop_calls_nothing_more(loop: Loop) -> None:
 
 
 def test_a_hung_handler_delays_the_hold_for_no_longer_than_that() -> None:
-    busy, free = threading.Event(), threading.Event()
-
-    def block() -> None:
-        busy.set()
-        free.wait(20)
-
-    with running(Loop()) as loop:
-        loop.post(block)
-        assert busy.wait(20)
-        loop.hold(0.01)
-        assert not loop.held
-        free.set()
+    with running(Loop()) as it, stalled(it):
+        it.hold(0.01)
+        assert not it.held
 
 
 class OneAtATime:

@@ -11,7 +11,7 @@ from textual.events import AppBlur, Key
 from textual.pilot import Pilot
 
 from common import keys
-from common.bus.bus import Post
+from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
 from common.messages import Cause, ReleaseRequest, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
