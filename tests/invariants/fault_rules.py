@@ -10,9 +10,6 @@ from common import keys
 from common import messages as m
 from common.motion import Twist
 from common.wire.frame import Side
-from tests.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance, Envelope
-from tests.invariants.process import ROBOT
-from tests.invariants.stack import Stack
 from tests.invariants.strategies import (
     BUS,
     CABLE,
@@ -25,6 +22,9 @@ from tests.invariants.strategies import (
     RANGES_MM,
     SHORT,
 )
+from verification.invariants.net import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance, Envelope
+from verification.invariants.process import ROBOT
+from verification.invariants.stack import Stack
 
 
 class FaultRules(RuleBasedStateMachine):

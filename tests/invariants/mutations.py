@@ -20,9 +20,9 @@ from services.bridge.lease import Lease
 from services.bridge.output import Send
 from services.bridge.readiness import Readiness
 from services.bridge.reflex import Hit
-from tests.invariants.net import Disturbance, Envelope
-from tests.invariants.process import ROBOT, DriveEnd
-from tests.invariants.stack import Stack
+from verification.invariants.net import Disturbance, Envelope
+from verification.invariants.process import ROBOT, DriveEnd
+from verification.invariants.stack import Stack
 
 # Owner, attribute and replacement of a protection; its scenario; the oracle's objection.
 Mutation = tuple[object, str, object, Callable[[Stack], None], str]

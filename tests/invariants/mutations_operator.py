@@ -7,7 +7,7 @@ from services.safety import latches
 from services.safety.latches import Held
 from services.safety.release import Release
 from tests.invariants.mutations import Mutation, hold
-from tests.invariants.stack import Stack
+from verification.invariants.stack import Stack
 
 
 def standing_pressed(stack: Stack) -> None:

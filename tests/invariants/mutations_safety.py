@@ -12,7 +12,7 @@ from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
 from services.safety.zones import Zones
 from tests.invariants.mutations import Mutation
-from tests.invariants.stack import Stack
+from verification.invariants.stack import Stack
 
 FAULT_MM = 0xFFFF
 

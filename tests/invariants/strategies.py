@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from common import messages as m
 from common.motion import Command
-from tests.invariants.net import CLEAR, Disturbance
-from tests.invariants.vehicle import NO_ECHO_MM
+from verification.invariants.net import CLEAR, Disturbance
+from verification.invariants.vehicle import NO_ECHO_MM
 
 BUS = st.sampled_from(["drive", "motion", "state", "streams"])
 CABLE = st.sampled_from(["to_board", "from_board"])

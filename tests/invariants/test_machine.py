@@ -15,8 +15,6 @@ from hypothesis.stateful import initialize, invariant, rule, run_state_machine_a
 from common import messages as m
 from common.wire.frame import Side
 from tests.invariants.fault_rules import FaultRules
-from tests.invariants.net import ECHO_MS, HOLD_MS, MS, Disturbance
-from tests.invariants.oracle import STEP_NS
 from tests.invariants.strategies import (
     BUS,
     DIRECTIONS,
@@ -31,7 +29,9 @@ from tests.invariants.strategies import (
     SPEEDS,
     TURNS,
 )
-from tests.invariants.vehicle import NO_ECHO_MM
+from verification.invariants.net import ECHO_MS, HOLD_MS, MS, Disturbance
+from verification.invariants.oracle import STEP_NS
+from verification.invariants.vehicle import NO_ECHO_MM
 
 PATIENCE = 3  # rules
 SEEDS, EXAMPLES_PER_SEED = 8, 9

@@ -7,7 +7,7 @@ from common.motion import Twist
 from tests.invariants.mutations import MUTATIONS, driving, hold
 from tests.invariants.mutations_operator import OPERATOR_MUTATIONS
 from tests.invariants.mutations_safety import SAFETY_MUTATIONS, driver_blinks
-from tests.invariants.stack import Stack
+from verification.invariants.stack import Stack
 
 ALL = MUTATIONS | OPERATOR_MUTATIONS | SAFETY_MUTATIONS
 

@@ -11,7 +11,7 @@ from common.bus.bus import Arrival
 from common.keys import Call, Topic
 from common.loop import Timer
 from common.messages import Message
-from tests.invariants.net import Caller, Envelope, Net, Subscription
+from verification.invariants.net import Caller, Envelope, Net, Subscription
 
 ROBOT = "001"
 M = TypeVar("M", bound=Message)

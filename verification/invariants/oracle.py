@@ -15,11 +15,11 @@ from common.freshness import NS_PER_S
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
-from tests.invariants.bridge_book import BridgeBook
-from tests.invariants.net import MS, Envelope
-from tests.invariants.operator_book import Hold
-from tests.invariants.process import Process, Watch
-from tests.invariants.safety_book import FAST_S, SafetyBook
+from verification.invariants.bridge_book import BridgeBook
+from verification.invariants.net import MS, Envelope
+from verification.invariants.operator_book import Hold
+from verification.invariants.process import Process, Watch
+from verification.invariants.safety_book import FAST_S, SafetyBook
 
 # The bridge's lease and tick; the guard needs less.
 BUDGET_NS = 230 * MS

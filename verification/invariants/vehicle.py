@@ -12,7 +12,7 @@ from common.wire.reports import VelocityReport
 from sim.board import Board
 from sim.config import Drive, Sim
 from sim.vehicle import next_twist
-from tests.invariants.net import MS, Net
+from verification.invariants.net import MS, Net
 
 STEP_NS, STREAM_NS = 10 * MS, 20 * MS
 NO_ECHO_MM = 5000

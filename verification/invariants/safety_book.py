@@ -21,9 +21,9 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from tests.invariants.operator_book import OperatorBook
-from tests.invariants.sonars import SONARS, approach, shown
-from tests.invariants.standstill_book import StandstillBook
+from verification.invariants.operator_book import OperatorBook
+from verification.invariants.sonars import SONARS, approach, shown
+from verification.invariants.standstill_book import StandstillBook
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}

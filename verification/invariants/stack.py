@@ -22,10 +22,10 @@ from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService
-from tests.invariants.net import MS, Envelope, Net
-from tests.invariants.oracle import STEP_NS, Oracle
-from tests.invariants.process import ROBOT, Process
-from tests.invariants.vehicle import Vehicle
+from verification.invariants.net import MS, Envelope, Net
+from verification.invariants.oracle import STEP_NS, Oracle
+from verification.invariants.process import ROBOT, Process
+from verification.invariants.vehicle import Vehicle
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
