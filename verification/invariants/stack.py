@@ -1,10 +1,11 @@
-"""Stack: the real shells of bridge and safety, a vehicle and operators, in simulated time."""
+"""The real shells of bridge and safety, a vehicle and operators, in simulated time."""
 
 import sys
 import time as real_time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 from unittest.mock import patch
 
 import msgspec
@@ -14,23 +15,20 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from common.operator import release_request, reset_request
 from common.wire.commands import MotionCommand, MotionKind
-from common.wire.framing import Framing, Received
-from common.wire.reports import FROM_BOARD
+from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.rx_timestamp import Receipt, WallClock
-from services.bridge.udp import Ancillary
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService
 from verification.invariants.net import MS, Envelope, Net
 from verification.invariants.oracle import STEP_NS, Oracle
 from verification.invariants.process import ROBOT, Process
-from verification.invariants.vehicle import Vehicle
+from verification.invariants.stand_ins import Clock, Sockets
+from verification.invariants.vehicle import Complaints, OnMotion, Vehicle
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
-
 
 # The modules of the services that look at the clock.
 TIMED = [
@@ -38,40 +36,6 @@ TIMED = [
     for name, module in sys.modules.items()
     if name.startswith("services.") and getattr(module, "time", None) is real_time
 ]
-
-
-class Sockets:
-    """The bridge's end of the cable; one port is enough here."""
-
-    refused = send_errors = 0
-    last_foreign_source = None
-
-    def __init__(self, stack: "Stack", process: Process) -> None:
-        self.sockets = [object()]
-        self.wall = WallClock()
-        self._stack = stack
-        self._process = process
-        self._framing = Framing()
-
-    def read(self, first: int, *_: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
-        """Yield what waits, after the oracle has seen it."""
-        inbox = self._stack.vehicle.inbox
-        while inbox:
-            datagram = inbox.popleft()
-            parts = self._framing.read(datagram, FROM_BOARD)
-            frames = [part.frame for part in parts if isinstance(part, Received)]
-            self._stack.oracle.on_report(self._process, frames)
-            yield first, datagram, [], self._stack.net.now_ns
-
-    def receipt(self, _: Ancillary, read_ns: int) -> Receipt:
-        """Return when a datagram was read; nobody has stamped it."""
-        return Receipt(None, read_ns)
-
-    def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
-        """Send to the board, with the oracle's complaints."""
-        complaints = self._stack.oracle.on_leaving(self._process, datagram)
-        self._stack.vehicle.receive(datagram, complaints)
-        return True
 
 
 class Stick:
@@ -103,14 +67,36 @@ class Stick:
         process.send(Envelope(key, drive, process.boot, process.net.now_ns))
 
 
-class Stack:
-    """Everything, turned by hand; ``run`` lets time pass."""
+class Board(Protocol):
+    """What the stack needs of a simulated vehicle."""
 
-    def __init__(self) -> None:
+    inboxes: tuple[deque[bytes], ...]  # the bridge's, by port
+
+    @property
+    def silent(self) -> bool:
+        """Whether the board is frozen."""
+
+    def receive(self, datagram: bytes, port: int, complaints: Complaints) -> None:
+        """Send a datagram to the board."""
+
+    def turn(self) -> None:
+        """Advance to the current time."""
+
+    def power_cycle(self, duration_ms: int) -> None:
+        """Restart the board."""
+
+
+V = TypeVar("V", bound=Board)
+
+
+class Chain(Generic[V]):
+    """Bridge, safety, a vehicle and operators, turned by hand; ``run`` lets time pass."""
+
+    def __init__(self, make_vehicle: Callable[[Net, OnMotion], V], step_ns: int = STEP_NS) -> None:
         self.net = Net(START_NS)
         self.oracle = Oracle(START_NS)
-        self.vehicle = Vehicle(self.net)
-        self.vehicle.on_motion = self.oracle.on_board
+        self.vehicle = make_vehicle(self.net, self.oracle.on_board)
+        self._step_ns = step_ns
         self._boots = 1000
         self._brake_ns: int | None = None  # when the guard brakes next
         self._starts: dict[str, int] = {}
@@ -127,7 +113,7 @@ class Stack:
         """Advance the time."""
         end_ns = self.net.now_ns + duration_ms * MS
         while self.net.now_ns < end_ns:
-            self.net.now_ns += STEP_NS
+            self.net.now_ns += self._step_ns
             self.oracle.now_ns = self.net.now_ns
             with self.time():
                 self._turn()
@@ -140,7 +126,7 @@ class Stack:
         self.vehicle.turn()
         self._guard()
         self.net.turn()
-        for process in (self.bridge, self.safety):
+        for process in self.processes():
             process.turn()
             self.net.turn()
         if self.net.now_ns % ASK_NS == 0:
@@ -154,9 +140,13 @@ class Stack:
         if self.bridge.alive or (self._brake_ns or 0) > self.net.now_ns:
             return
         self._brake_ns = self.net.now_ns + BREAK_NS
-        self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), ())
+        self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), 0, ())
 
     # --- processes --------------------------------------------------------------------------
+
+    def processes(self) -> Iterable[Process]:
+        """Return the services, in the order of their turns."""
+        return self.bridge, self.safety
 
     def _process(self, name: str, config: Any) -> Process:
         self._boots += 1
@@ -185,7 +175,8 @@ class Stack:
         self._starts[name] = self.net.now_ns + pause_ms * MS
         self._brake_ns = None
         if name == "bridge":
-            self.vehicle.inbox.clear()
+            for inbox in self.vehicle.inboxes:
+                inbox.clear()
 
     def stall(self, name: str, duration_ms: int) -> None:
         """Stall a process for this time."""
@@ -265,12 +256,8 @@ class Stack:
                 module.time = time  # type: ignore[attr-defined]
 
 
-class Clock:
-    """Stands for the module ``time``."""
+class Stack(Chain[Vehicle]):
+    """The chain with a vehicle whose sensors are set by the test."""
 
-    def __init__(self, net: Net) -> None:
-        self._net = net
-
-    def monotonic_ns(self) -> int:
-        """Return the simulated time."""
-        return self._net.now_ns
+    def __init__(self) -> None:
+        super().__init__(Vehicle)

@@ -17,12 +17,13 @@ from verification.invariants.net import MS, Net
 STEP_NS, STREAM_NS = 10 * MS, 20 * MS
 NO_ECHO_MM = 5000
 Complaints = tuple[str, ...]
+OnMotion = Callable[[MotionCommand, Complaints], None]  # the board takes a command
 
 
 class Vehicle:
     """Receives datagrams with their complaints, and sends reports."""
 
-    def __init__(self, net: Net) -> None:
+    def __init__(self, net: Net, on_motion: OnMotion) -> None:
         self.received = 0  # frames
         self.ranges = [NO_ECHO_MM] * 8
         self.board = Board(Wire(), Sim(), self._measure())
@@ -31,8 +32,8 @@ class Vehicle:
         self.pressed = False
         self.silent_until_ns = 0
         self.reports_velocity = True
-        self.inbox: deque[bytes] = deque()  # for the bridge
-        self.on_motion: Callable[[MotionCommand, Complaints], None] = lambda *_: None
+        self.inboxes: tuple[deque[bytes], ...] = (deque(), deque())  # the bridge's, by port
+        self._on_motion = on_motion
         self._net = net
         self._framing = Framing()
         self._due_ns = self._stream_ns = net.now_ns
@@ -65,9 +66,9 @@ class Vehicle:
     def say_bytes(self, datagram: bytes) -> None:
         """Send any bytes to the bridge."""
         if not self.silent:
-            self._net.later("from_board", lambda: self.inbox.append(datagram))
+            self._net.later("from_board", lambda: self.inboxes[0].append(datagram))
 
-    def receive(self, datagram: bytes, complaints: Complaints) -> None:
+    def receive(self, datagram: bytes, port: int, complaints: Complaints) -> None:
         """Send a datagram to the board."""
         moves = any(isinstance(frame, MotionCommand) for frame in frames(self._framing, datagram))
         kind = "motion" if moves else "query"  # or all that is lost might be of one kind
@@ -90,7 +91,7 @@ class Vehicle:
             self.received += 1
             answer = self.board.answer(frame)
             if isinstance(frame, MotionCommand):
-                self.on_motion(frame, complaints)
+                self._on_motion(frame, complaints)
             if answer is not None:
                 self.say(answer)
 

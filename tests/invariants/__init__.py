@@ -1,0 +1,1 @@
+"""The invariants: a search with random events, and mutants of the protections."""
