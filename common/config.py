@@ -31,6 +31,8 @@ FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 # Replaced settings and their replacements.
 REPLACED = {
     "wire.angular_unit": "wire.command_angular_unit and wire.feedback_angular_unit",
+    "sim.sonar_noise": "sim.sonar.noise",
+    "sim.sonar_cone": "sim.sonar.cone",
 } | {
     f"{section}.i_accept": f"{section}.unsafe_overrides"
     for section in ("safety", "bridge", "board", "bus", "teleop", "metrics")

@@ -8,9 +8,10 @@ from msgspec import Meta, Struct
 
 from common.config import read_toml
 from common.errors import ConfigError
+from common.motion import Command
 from common.settings import Board, Section, Shared, Vehicle, Wire
 from sim.geometry import Rectangle
-from sim.requests import Script
+from sim.requests import Chance, Hits, Port, Script, Where
 from sim.world import Plan, World
 
 F = TypeVar("F", bound=Struct)
@@ -18,10 +19,39 @@ F = TypeVar("F", bound=Struct)
 WORLDS = Path(__file__).parent / "worlds"
 
 Rate = Annotated[float, Meta(ge=0.01, le=100.0)]
+BrakeRate = Annotated[float, Meta(ge=0.1, le=1000.0)]
+
+
+class Sonar(Section, frozen=True, kw_only=True):
+    """The eight sonars. Chances are those of each reading of each sonar, 20 a second."""
+
+    noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.005  # m, standard deviation
+    cone: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.5  # rad, whole opening
+    quantum: Annotated[float, Meta(ge=0.001, le=0.1)] = 0.001  # m, step of the reported ranges
+    # m, the longest range that is reported; at most vehicle.sonar_max
+    saturation: Annotated[float, Meta(ge=0.5, le=20.0)] = 20.0
+    floor_chance: Chance = 0.0  # that the floor echoes
+    floor_range: Annotated[float, Meta(ge=0.1, le=5.0)] = 1.0  # m, along the beam
+    cross_talk: Chance = 0.0  # that the echo of a neighbour's pulse is taken, if it comes first
+    vanish: Chance = 0.0  # that an echo is lost
+    vanish_readings: Annotated[int, Meta(ge=1, le=200)] = 1  # for how many readings it stays lost
+
+
+class Bumper(Section, frozen=True, kw_only=True):
+    """The switch of the bumper strip."""
+
+    # s after each press and release in which the switch opens and closes at random
+    bounce: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+
+
+class Body(Section, frozen=True, kw_only=True):
+    """The body at an obstacle."""
+
+    rebound: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.0  # share of the speed, backward
 
 
 class Drive(Section, frozen=True, kw_only=True):
-    """Motor dynamics: the speed loop of RUN, and the ramp of STOP (manual 2.2).
+    """Motor dynamics: the speed loop of RUN, the ramp of STOP, and BRAKE (manual 2.2).
 
     The real figures are unknown. These brake harder than the 0.6 m/s^2 that safety assumes.
     """
@@ -30,25 +60,82 @@ class Drive(Section, frozen=True, kw_only=True):
     angular_acceleration: Rate = 3.0  # rad/s^2, on RUN
     coast: Rate = 0.8  # m/s^2, on STOP
     angular_coast: Rate = 2.0  # rad/s^2, on STOP
+    brake: BrakeRate = 1000.0  # m/s^2, on BRAKE; 1000: at once
+    angular_brake: BrakeRate = 1000.0  # rad/s^2, on BRAKE
     # The motion in a 10 ms step must be shorter than the smallest body, or it could pass a wall.
     max_linear: Annotated[float, Meta(gt=0.0, le=5.0)] = 1.5  # m/s
     max_angular: Annotated[float, Meta(gt=0.0, le=3.0)] = 1.5  # rad/s
+    dead_time: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # s until a command has any effect
+    lag: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s, time constant of RUN and STOP
+    dead_zone: Annotated[float, Meta(ge=0.0, le=0.3)] = 0.0  # m/s of a side, slower stands still
+    # The right wheels are faster than commanded by half of this share, the left ones slower.
+    asymmetry: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0
+    weak_wheel: Chance = 0.0  # share of its speed and force that one left wheel lacks
+    # rad; the ground falls ahead. STOP ramps to a standstill and lets go of the wheels.
+    slope: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0
+
+
+class Velocity(Section, frozen=True, kw_only=True):
+    """Errors of the reported velocity; the counters have none."""
+
+    noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # m/s, standard deviation
+    angular_noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # rad/s
+    bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # m/s
+    angular_bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # rad/s
+
+
+class Firmware(Section, frozen=True, kw_only=True):
+    """Behaviour of the board that the manual leaves open."""
+
+    answers: Where = "asked"  # where answers go: to the port that asked, by default
+    hits: Hits = "answers"  # where reports of a pressed bumper go
+    echoes: bool = True  # whether it echoes its emergency brake switches
+    ignores: tuple[Command, ...] = ()  # motion commands that it does not obey
+    # s without a motion command until the board does STOP by itself; 0: never
+    watchdog: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
+    split: Chance = 0.0  # that a frame is sent in two datagrams
+    # s that frames wait to be sent in one datagram; 0: one datagram for each
+    merge: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
+
+
+class Line(Section, frozen=True, kw_only=True):
+    """Faults of one direction of the cable, as of ``sim.requests.Wire``; chances of a datagram."""
+
+    port: Port = "both"  # of the PC's two, the one with these faults
+    drop: Chance = 0.0
+    duplicate: Chance = 0.0
+    reorder: Chance = 0.0
+    corrupt: Chance = 0.0
+    join: Chance = 0.0
+    delay: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s
+    jitter: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s, maximum additional delay
+
+
+class Cable(Section, frozen=True, kw_only=True):
+    """The cable between board and PC."""
+
+    to_pc: Line = Line()
+    to_board: Line = Line()
 
 
 class Sim(Section, frozen=True, kw_only=True):
-    """The simulated vehicle and its world."""
+    """The simulated vehicle and its world. The defaults are kind; see the profiles."""
 
     world: str = "office"  # a name in sim/worlds, or the path of a TOML file
-    seed: Annotated[int, Meta(ge=0)] = 1  # of sonar noise and cable faults
+    seed: Annotated[int, Meta(ge=0)] = 1  # of all noise and faults
     control_port: Annotated[int, Meta(ge=0, le=65535)] = 0  # UDP on 127.0.0.1; 0: none
-    drive: Drive = Drive()
-    sonar_noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.005  # m, standard deviation
-    sonar_cone: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.5  # rad, whole opening
     # How the board's own emergency brakes work is unknown. Its sonar brake acts closer than
     # safety's margin of 0.20 m: it is the second line of defence.
     brake_range: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15  # m
     bumper_brake: Literal["toward", "all"] = "toward"  # what it refuses while pressed
     led_channels: Annotated[int, Meta(ge=0, le=256)] = 16  # the board refuses others
+    sonar: Sonar = Sonar()
+    bumper: Bumper = Bumper()
+    body: Body = Body()
+    drive: Drive = Drive()
+    velocity: Velocity = Velocity()
+    firmware: Firmware = Firmware()
+    cable: Cable = Cable()
 
 
 class Config(Shared, frozen=True, kw_only=True):

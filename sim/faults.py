@@ -7,12 +7,14 @@ are delivered at once and in order.
 
 import heapq
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from common.freshness import NS_PER_S
 from sim.requests import Wire
 
 REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
+NONE = Wire()
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +27,14 @@ class Datagram:
 
 
 class Cable:
-    """One direction; a datagram is taken out when it is due."""
+    """One direction; a datagram is taken out when it is due.
 
-    def __init__(self, seed: int) -> None:
-        self.faults = Wire()
+    ports: the PC's; needed only by faults of one of them.
+    """
+
+    def __init__(self, seed: int, faults: Wire | None = None, ports: Sequence[int] = ()) -> None:
+        self.faults = faults or NONE
+        self._ports = ports
         self._random = random.Random(seed)
         self._under_way: list[tuple[int, int, Datagram]] = []  # due, order, datagram
         self._held: dict[int, bytes] = {}
@@ -37,20 +43,21 @@ class Cable:
 
     def put(self, datagram: Datagram, now_ns: int) -> None:
         """Send a datagram."""
-        if self._happens(self.faults.drop):
+        faults = self.faults if self._affects(datagram.port) else NONE
+        if self._happens(faults.drop):
             return
-        if self._happens(self.faults.corrupt):
+        if self._happens(faults.corrupt):
             datagram = replace(datagram, payload=self._flip(datagram.payload))
-        if self._happens(self.faults.foreign):
+        if self._happens(faults.foreign):
             datagram = replace(datagram, foreign=True)
         payload = self._held.pop(datagram.port, b"") + datagram.payload
-        if self._happens(self.faults.join):
+        if self._happens(faults.join):
             self._held[datagram.port] = payload
             return
-        for _ in range(2 if self._happens(self.faults.duplicate) else 1):
-            left_ns = self._leaves_ns(len(payload), now_ns)
+        for _ in range(2 if self._happens(faults.duplicate) else 1):
+            left_ns = self._leaves_ns(faults, len(payload), now_ns)
             if left_ns is not None:
-                due_ns = left_ns + round(self._delay_s() * NS_PER_S)
+                due_ns = left_ns + round(self._delay_s(faults) * NS_PER_S)
                 heapq.heappush(
                     self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
                 )
@@ -68,13 +75,18 @@ class Cable:
         """Return when the next one arrives; None when nothing is under way."""
         return self._under_way[0][0] if self._under_way else None
 
-    def _leaves_ns(self, size: int, now_ns: int) -> int | None:
+    def _affects(self, port: int) -> bool:
+        """Return whether the faults are those of this port of the PC."""
+        which = self.faults.port
+        return which == "both" or port == self._ports[0 if which == "first" else -1]
+
+    def _leaves_ns(self, faults: Wire, size: int, now_ns: int) -> int | None:
         """Return when so many bytes have left, after all before them; None if none may wait."""
-        if self.faults.rate is None:
+        if faults.rate is None:
             return now_ns
-        a_byte_ns = 8 * NS_PER_S / self.faults.rate
+        a_byte_ns = 8 * NS_PER_S / faults.rate
         begins_ns = max(now_ns, self._free_ns)
-        if (begins_ns - now_ns) / a_byte_ns + size > self.faults.queue:
+        if (begins_ns - now_ns) / a_byte_ns + size > faults.queue:
             return None
         self._free_ns = begins_ns + round(size * a_byte_ns)
         return self._free_ns
@@ -83,8 +95,7 @@ class Cable:
         # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.
         return chance > 0 and self._random.random() < chance
 
-    def _delay_s(self) -> float:
-        faults = self.faults
+    def _delay_s(self, faults: Wire) -> float:
         late = self._random.uniform(0.0, faults.jitter) if faults.jitter else 0.0
         return faults.delay + late + (REORDER_S if self._happens(faults.reorder) else 0.0)
 

@@ -1,6 +1,8 @@
 """Fault injection: requests from the control socket or a script, applied to the simulation."""
 
+import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import STILL
@@ -94,7 +96,9 @@ class Injection:
             case q.Flood():
                 simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
             case q.Firmware():  # pragma: no branch - there is no other
-                simulation.firmware = request
+                simulation.firmware = replace(
+                    simulation.firmware, **msgspec.structs.asdict(request)
+                )
 
     def _wire(self, faults: q.Wire) -> None:
         if faults.direction in ("to_pc", "both"):

@@ -21,6 +21,8 @@ SonarName = Literal[
 ]
 ReportName = Literal["velocity", "mileage", "ultrasonic", "bumper", "driver"]
 Where = Literal["asked", "first", "second", "both"]  # of the PC's two ports
+Hits = Literal["answers", "asked", "first", "second", "both"]  # "answers": where answers go
+Port = Literal["first", "second", "both"]
 Seconds = Annotated[float, Meta(ge=0.0, le=3600.0)]
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -73,7 +75,7 @@ class Firmware(Request, frozen=True, kw_only=True, tag="firmware"):
     """Make the board deviate from the manual; fields left out mean the default."""
 
     answers: Where = "asked"  # where answers go: to the port that asked, by default
-    hits: Where | None = None  # where reports of a pressed bumper go; None: as answers
+    hits: Hits = "answers"  # where reports of a pressed bumper go
     echoes: bool = True  # whether it echoes its emergency brake switches
     ignores: tuple[Command, ...] = ()  # motion commands that it does not obey
 
@@ -97,6 +99,7 @@ class Wire(Request, frozen=True, kw_only=True, tag="wire"):
     """Cable faults from now on, each with its probability; defaults mean none."""
 
     direction: Literal["to_pc", "to_board", "both"] = "both"
+    port: Port = "both"  # of the PC's two, the one with these faults
     drop: Chance = 0.0
     duplicate: Chance = 0.0
     reorder: Chance = 0.0  # delayed until later datagrams have overtaken it

@@ -11,6 +11,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+import msgspec
+
 from common.freshness import NS_PER_S
 from common.motion import STILL, Command
 from common.wire import reports as r
@@ -19,10 +21,10 @@ from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
 from sim import trace as t
 from sim.board import Board
-from sim.config import Config
+from sim.config import Config, Line
 from sim.faults import Cable, Datagram
 from sim.geometry import Rectangle
-from sim.requests import Firmware, Where
+from sim.requests import Where, Wire
 from sim.sonar import Sonars
 from sim.vehicle import move, next_twist, wheel_angles
 from sim.world import Plan, World
@@ -53,10 +55,12 @@ class Simulation:
         self.twist = STILL
         self.pressed_by_hand = False
         sim = config.sim
-        self.sonars = Sonars(config.vehicle, sim.sonar_cone, sim.sonar_noise, sim.seed)
+        self.sonars = Sonars(config.vehicle, sim.sonar, sim.seed)
         self._ranges = self.sonars.measure(self.world, self.pose)
         self.board = Board(config.wire, sim, self._ranges)
-        self.to_pc, self.to_board = Cable(sim.seed + 1), Cable(sim.seed + 2)
+        ports = config.board.listen_ports
+        self.to_pc = Cable(sim.seed + 1, _faults(sim.cable.to_pc), ports)
+        self.to_board = Cable(sim.seed + 2, _faults(sim.cable.to_board), ports)
         self.counters: Counter[str] = Counter()
         self._config = config
         self._framing = Framing(config.wire.crc, config.wire.crc_covers)
@@ -67,7 +71,7 @@ class Simulation:
         self._silent_until_ns = now_ns
         self._powered = True
         self.muted: frozenset[type[Frame]] = frozenset()
-        self.firmware = Firmware()
+        self.firmware = sim.firmware
         self._loss: tuple[frozenset[type[Frame]], int] = frozenset(), 1
         self._loss_counts: Counter[type[Frame]] = Counter()
         self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
@@ -228,7 +232,7 @@ class Simulation:
         if isinstance(frame, ECHOES) and not self.firmware.echoes:
             return
         where = self.firmware.answers
-        if isinstance(frame, r.BumperReport) and frame.on and self.firmware.hits is not None:
+        if isinstance(frame, r.BumperReport) and frame.on and self.firmware.hits != "answers":
             where = self.firmware.hits
         for port in self._ports(where, asked):
             self._send(frame, port, now_ns)
@@ -283,3 +287,7 @@ class Simulation:
 
     def _silent(self, now_ns: int) -> bool:
         return now_ns < self._silent_until_ns
+
+
+def _faults(line: Line) -> Wire:
+    return Wire(**msgspec.structs.asdict(line))

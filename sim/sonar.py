@@ -10,6 +10,7 @@ import random
 from common.messages import SONAR_NAMES
 from common.settings import Mount, Vehicle, sonar_mounts
 from common.wire.reports import SONAR_FAULT_MM
+from sim.config import Sonar as Settings
 from sim.geometry import Pose, ray
 from sim.requests import Sonar
 from sim.world import World
@@ -21,16 +22,13 @@ Ranges = tuple[int, ...]  # mm, of the eight in the manual's order
 
 
 class Sonars:
-    """The eight of them, in the manual's order, with what is injected with each.
+    """The eight of them, in the manual's order, with what is injected with each."""
 
-    cone: the whole opening, rad. noise: standard deviation, m.
-    """
-
-    def __init__(self, vehicle: Vehicle, cone: float, noise: float, seed: int) -> None:
+    def __init__(self, vehicle: Vehicle, settings: Settings, seed: int) -> None:
         self._mounts = sonar_mounts(vehicle)
         self._nearest, self._farthest = vehicle.sonar_min, vehicle.sonar_max
-        self._fan = tuple(cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
-        self._noise = noise
+        self._fan = tuple(settings.cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
+        self._noise = settings.noise
         self._random = random.Random(seed)
         self._injected: dict[str, Sonar] = {}
         self._last = dict.fromkeys(SONAR_NAMES, self._in_mm(self._farthest))

@@ -25,7 +25,7 @@ EMPTY = Plan(title="nothing")
 
 def config(**sections: dict[str, Any]) -> Config:
     """Return settings without noise, over the defaults."""
-    sections["sim"] = {"sonar_noise": 0.0, "bumper_brake": "toward"} | sections.get("sim", {})
+    sections["sim"] = {"sonar": {"noise": 0.0}, "bumper_brake": "toward"} | sections.get("sim", {})
     return msgspec.convert(sections, Config)
 
 

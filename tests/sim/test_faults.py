@@ -6,7 +6,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
-from sim.requests import Wire
+from sim.requests import Port, Wire
 
 MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
 
@@ -64,6 +64,14 @@ def test_joining_puts_one_before_the_next_of_the_same_port() -> None:
     cable.put(Datagram(b"c", 4002), 0)
     cable.put(Datagram(b"d", 4002), 0)
     assert [d.payload for d in cable.take(0)] == [b"ac", b"d"]
+
+
+@pytest.mark.parametrize(("port", "hit"), [("first", 4002), ("second", 4001)])
+def test_faults_may_be_those_of_one_port(port: Port, hit: int) -> None:
+    cable = Cable(1, Wire(port=port, drop=1.0), (4002, 4001))
+    for each in (4002, 4001):
+        cable.put(Datagram(b"a", each), 0)
+    assert [d.port for d in cable.take(0)] == [each for each in (4002, 4001) if each != hit]
 
 
 def test_foreign_ones_are_marked() -> None:

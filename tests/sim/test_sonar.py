@@ -5,6 +5,7 @@ import pytest
 
 from common.messages import SONAR_NAMES
 from common.settings import Vehicle
+from sim.config import Sonar as Settings
 from sim.geometry import Pose
 from sim.requests import Sonar, SonarName
 from sim.sonar import Sonars
@@ -18,7 +19,7 @@ HERE = Pose(0.0, 0.0, 0.0)
 
 
 def sonars(cone: float = 0.0, noise: float = 0.0, seed: int = 1) -> Sonars:
-    return Sonars(VEHICLE, cone, noise, seed)
+    return Sonars(VEHICLE, Settings(cone=cone, noise=noise), seed)
 
 
 def measured(sonars: Sonars, name: str, pose: Pose = HERE, world: World = ROOM) -> int:

@@ -101,7 +101,7 @@ def lap(seed: int) -> tuple[bytes, bytes]:
     boxes = ({"name": "step", "x": 2.0, "y": 1.0, "length": 0.4, "width": 0.4, "low": True},)
     walls = [{"points": [[-2, -2], [4, -2], [4, 3], [-2, 3], [-2, -2]]}]
     script = Script(steps=(Step(at=9.0, request=PowerCycle()), Step(at=4.0, request=LOSSY)))
-    noisy = config(sim={"seed": seed, "sonar_noise": 0.01})
+    noisy = config(sim={"seed": seed, "sonar": {"noise": 0.01}})
     sim = SimFixture(room(*boxes, walls=walls), noisy, script)
     for linear, angular, seconds in LAP:
         for _ in range(round(seconds * 10)):

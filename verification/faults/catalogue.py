@@ -4,6 +4,7 @@ import signal
 from collections.abc import Callable
 from typing import get_args
 
+from msgspec.structs import replace
 from zenoh import CongestionControl
 
 from common.motion import Command
@@ -80,7 +81,7 @@ def signals(
 
 def wire(**what: float) -> Callable[[StackFixture], int]:
     """Disturb the datagrams from the board."""
-    return do(Wire(direction="to_pc", **what))
+    return do(replace(Wire(direction="to_pc"), **what))
 
 
 FORWARD: tuple[SonarName, ...] = ("front_left", "front", "front_right")

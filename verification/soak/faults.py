@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from random import Random
 from typing import Literal, get_args
 
+from msgspec.structs import replace
+
 from sim import requests as q
 
 PAUSE_S = (3.0, 7.0)  # between the end of a fault and the next one
@@ -67,7 +69,7 @@ def _lasts(random: Random) -> float:
 def _wire(name: str, **chances: float) -> tuple[str, Draw]:
     def draw(random: Random) -> Fault:
         direction = random.choice(DIRECTIONS)
-        wire = q.Wire(direction=direction, **chances)
+        wire = replace(q.Wire(direction=direction), **chances)
         return Fault(f"wire {name}", _lasts(random), wire, NO_FAULT)
 
     return f"wire {name}", draw

@@ -36,6 +36,7 @@ from services.safety.config import Safety
 from services.safety.inputs import DriveRequest, Event, Inputs
 from services.safety.policy import Policy
 from sim.config import Drive as Motors
+from sim.config import Sonar as SonarSettings
 from sim.geometry import Rectangle
 from sim.sonar import Sonars
 from sim.vehicle import move, next_twist
@@ -80,7 +81,7 @@ class Walk:
         self.body = Rectangle(vehicle.length / 2, vehicle.width / 2)
         self.pose, self.twist, self.contacts = plan.start.pose, STILL, 0
         sonars = replace(vehicle, sonar_max=saturation)
-        self.sonars = Sonars(sonars, 0.5, noise, seed)
+        self.sonars = Sonars(sonars, SonarSettings(noise=noise), seed)
         self.random = random.Random(seed)
         self.policy = Policy(Safety(), vehicle)
         self.state = self.policy.start()
