@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet vehicles bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -50,7 +50,8 @@ MANY = -n 6 --dist worksteal
 FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/safety/test_walk.py tests/tools/test_docs_current.py
+SEARCH = tests/invariants tests/verification/vehicles/test_runs.py tests/safety/test_walk.py \
+  tests/tools/test_docs_current.py
 WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
 # Failed tests run a second time, alone: docs/adr/0026-second-run.md.
@@ -89,6 +90,8 @@ compose-test: $(STAMP) ## test the containers on a Docker engine: build, drive, 
 roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roaming.md
 	$(BIN)/python -m verification.roaming --out docs/roaming.md
 
+vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
+	$(BIN)/python -m verification.vehicles --runs $(or $(N),1000) --out docs/vehicles.md
 
 check: lint types cover search ## what CI runs: format, lint, spelling, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

@@ -134,7 +134,8 @@ def issue_keys(folder: Path) -> tuple[Path, Path]:
     robot, driver = folder / "robot.001", folder / "driver.anna"
     with redirect_stdout(io.StringIO()):
         site = Site(folder)
-        site.keys("issue", "driver", "anna", "--robot", "001")
+        sources = ("--source", "teleop", "--source", "demo")  # the lap's source is demo
+        site.keys("issue", "driver", "anna", "--robot", "001", *sources)
         site.keys("issue", "robot", "001", "--address", "127.0.0.1", "--address", "router")
     for file in (robot, *robot.iterdir()):
         shutil.chown(file, CONTAINER_USER, CONTAINER_USER)

@@ -110,6 +110,7 @@ class Process:
         self.net = net
         self.config = config
         self.boot = boot
+        self.robot = ROBOT
         self.alive = True
         self.stalled_until_ns = 0
         self.taking: Envelope | None = None  # the envelope being handled
@@ -187,6 +188,9 @@ class Process:
 
     def announce(self, key: str) -> None:
         """Do nothing: every key reaches every subscription here."""
+
+    def answer(self, key: str, make: Callable[[], bytes], encoding: str) -> None:
+        """Do nothing: nobody asks for JSON here."""
 
     def serve(self, call: Call[Any, Any], handler: Callable[[Any, Any], None]) -> None:
         """Register the handler of a call."""

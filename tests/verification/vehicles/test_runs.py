@@ -1,0 +1,79 @@
+"""A hundred random vehicles; ``make vehicles N=1000`` drives more of them."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from services.safety.zones import Limit, Zones
+from verification.vehicles.campaign import read
+from verification.vehicles.draw import draw
+from verification.vehicles.judge import Stop
+from verification.vehicles.page import page
+from verification.vehicles.run import Result, fails_as, run
+
+BATCHES, BATCH = 25, 4
+
+# Runs that once broke an invariant or stopped without need.
+FOUND: list[int] = []
+
+
+@pytest.mark.parametrize("batch", range(BATCHES))
+def test_no_vehicle_breaks_an_invariant(batch: int) -> None:
+    for seed in range(batch * BATCH, (batch + 1) * BATCH):
+        result = run(draw(seed))
+        assert not result.violations, seed
+        assert not result.stops, seed
+
+
+@pytest.mark.parametrize("seed", FOUND)
+def test_what_was_found_stays_fixed(seed: int) -> None:
+    result = run(draw(seed))
+    assert not result.violations
+    assert result.completed
+
+
+def test_a_run_is_the_same_each_time() -> None:
+    assert replace(run(draw(3)), cpu_s=0.0) == replace(run(draw(3)), cpu_s=0.0)
+
+
+def test_a_safety_that_ignores_walls_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Zones, "limit", lambda *_: Limit(1.0))
+    assert any(run(draw(seed, faulty=False)).violations for seed in range(10))
+
+
+def result(seed: int, **fields: object) -> Result:
+    usual = Result(
+        seed=seed, values={}, faulty=False, violations=[], stops=[], finished=True, seconds=10.0,
+        cpu_s=1.0, metres=3.0, contacts=0, errors=[],
+    )  # fmt: skip
+    return msgspec.convert(msgspec.to_builtins(usual) | msgspec.to_builtins(fields), Result)
+
+
+def test_a_failure_is_the_same_without_its_numbers() -> None:
+    same = fails_as(result(1, violations=["a RUN is held for more than 230 ms"]))
+    assert same(result(1, violations=["a RUN is held for more than 380 ms"]))
+    assert not same(result(1, violations=["a hit without a BRAKE at once"]))
+    stopped = fails_as(result(1, stops=[Stop(1.0, "silent", "")]))
+    assert stopped(result(1, stops=[Stop(2.0, "silent", "")]))
+    assert not stopped(result(1, stops=[Stop(1.0, "bumper", "")]))
+    assert fails_as(result(1, finished=False))(result(1, finished=False))
+
+
+def test_the_page_names_what_happened(tmp_path: Path) -> None:
+    stop = Stop(3.0, "silent", "An input is too old.")
+    found = [
+        run(draw(0, faulty=False)),
+        result(5, stops=[stop]),
+        result(6, violations=["safety: too fast"], faulty=True),
+        result(7, finished=False),
+    ]
+    file = tmp_path / "runs.jsonl"
+    file.write_bytes(b"".join(msgspec.json.encode(one) + b"\n" for one in found))
+    assert list(read(file).values()) == found
+    text = page(found)
+    assert "| `silent` | 1 | 1 | 5 |" in text
+    assert "| 6 | yes | safety: too fast |" in text
+    assert "| 7 | no | the script was not finished |" in text
+    assert "`sim.drive.slope`" in text
