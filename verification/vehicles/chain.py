@@ -56,7 +56,7 @@ class VehicleChain(Chain[SimulatedVehicle]):
         self.hand.send(Envelope(key, m.Message(), self.hand.boot, self.net.now_ns))
 
     def act(self) -> None:
-        """Let the operator act, and make the calls."""
+        """Ask the operator what to hold, and make the calls."""
         operator = self.operator
         held = operator.held
         operator.act(self.net.now_ns)

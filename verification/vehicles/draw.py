@@ -87,7 +87,7 @@ def ranges() -> tuple[Range, ...]:
 
 
 def draw(seed: int, *, faulty: bool | None = None) -> Draw:
-    """Draw the parameters of a run; every second one has faults unless told otherwise."""
+    """Draw the parameters of a run; every second one has faults by default."""
     chance = random.Random(seed)
     if faulty is None:
         faulty = chance.random() < FAULTY

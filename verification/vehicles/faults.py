@@ -1,4 +1,4 @@
-"""Faults of a draw, each at its time; ``fault.*`` in ``ranges.toml`` tells how long they last."""
+"""Faults of a draw, each at its time; ``fault.*`` in ``ranges.toml`` has their durations."""
 
 from collections.abc import Callable
 
