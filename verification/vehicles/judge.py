@@ -17,6 +17,8 @@ NEAR_M = 0.60
 AGO_S = 1.0  # a contact or a wall justifies a stop for this long
 ASKED_S = 0.2  # a request needs this long to show
 READY_S = 4.0  # from the start until the vehicle may drive
+ROLLED_M = 0.03  # from a standstill, by a slope; safety trips after 0.05 m
+MOVES_MPS, MOVES_RADPS = 0.02, 0.03
 TRANSIENT = ("blocked", "no_request", "two_publishers")
 FOLLOWING = ("neutral",)  # another cause came first
 CHI2_95 = 7.81  # three degrees of freedom
@@ -38,6 +40,7 @@ class Judge:
         self._start_ns = start_ns
         self._judged: set[int] = set()  # occurrences of causes
         self._near_ns = self._contact_ns = -NS_PER_S * 10
+        self._stood_m: float | None = None  # the way driven when it came to stand
 
     def look(self, operator: Operator, truth: Truth, now_ns: int) -> None:
         """Judge the causes of the state that operators see."""
@@ -45,6 +48,10 @@ class Judge:
             self._contact_ns = now_ns
         if truth.clearance is not None and truth.clearance < NEAR_M:
             self._near_ns = now_ns
+        if truth.command.kind == "run":
+            self._stood_m = None
+        elif self._stood_m is None and not _moves(truth):
+            self._stood_m = truth.distance
         state, at_s = operator.seen, (now_ns - self._start_ns) / NS_PER_S
         if state is None or at_s < READY_S:
             return
@@ -55,18 +62,26 @@ class Judge:
                 continue
             if cause.name in TRANSIENT and not asks:
                 continue
-            if not self._justified(cause, now_ns):
+            if not self._justified(cause, truth, now_ns):
                 self.stops.append(Stop(round(at_s, 2), cause.name, cause.text))
             self._judged.add(cause.id)
 
-    def _justified(self, cause: m.Cause, now_ns: int) -> bool:
+    def _justified(self, cause: m.Cause, truth: Truth, now_ns: int) -> bool:
         if cause.name in FOLLOWING:
             return True
         if cause.name == "blocked":
             return now_ns - self._near_ns < AGO_S * NS_PER_S
         if cause.name == "contact":
             return now_ns - self._contact_ns < AGO_S * NS_PER_S
+        if cause.name == "not_stopping":
+            return _moves(truth)
+        if cause.name == "uncommanded_motion":
+            return self._stood_m is not None and truth.distance - self._stood_m > ROLLED_M
         return False
+
+
+def _moves(truth: Truth) -> bool:
+    return abs(truth.linear) > MOVES_MPS or abs(truth.angular) > MOVES_RADPS
 
 
 class PoseError(Struct, frozen=True):
