@@ -145,7 +145,7 @@ class Policy:
             ),
         ]
         held = observe(state.latches, seen, now_ns, settle_ns, state.decision)
-        was_good, is_good = not _settling(state.latches), not _settling(held)
+        was_good, is_good = not _failing(state.latches), not _failing(held)
         budget = state.fault_budget.updated(now_ns, was_good and not is_good, is_good)
         flapping = Observation("flapping", budget.is_spent, tick)
         held = observe(held, [flapping], now_ns, decision=state.decision)
@@ -182,6 +182,8 @@ class Policy:
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command = COMMANDS[worst]
+        if command is STOP and state.standstill.rolls:
+            command = BRAKE
         verdict = Verdict(
             name=_name(worst, held),
             command=command,
@@ -225,8 +227,13 @@ def _barring(held: Latches) -> set[str]:
     return {name for name in held if bars_motion(name)}
 
 
-def _settling(held: Latches) -> bool:
+def _settling(held: Iterable[str]) -> bool:
     return any(clears(name) is Clears.SETTLED for name in held)
+
+
+def _failing(held: Latches) -> bool:
+    """Return whether an input fails; a vehicle that rolls down a slope is none."""
+    return _settling(name for name in held if name != "not_stopping")
 
 
 def _acked(inputs: Inputs) -> tuple[int, int]:

@@ -18,6 +18,9 @@ unknown velocity is not standstill. A motion of less than 0.5 s adds its duratio
 and does not renew the limit, unless the vehicle stood meanwhile. Otherwise repeated short motions
 would postpone the limit without end.
 
+A vehicle that rolled on, for example down a slope, is held by BRAKE until the next motion: STOP
+would release its wheels again.
+
 The distance from that place is measured twice. The board's counters show a slow creep. The
 velocities show a fast motion, even while the counters are not answered. Neither may trip by noise,
 drift or a restart of the board:
@@ -97,6 +100,7 @@ class Standstill(Struct, frozen=True):
     integrated: Twist = STILL  # m and rad, from the velocities
     counted: Twist = STILL  # m and rad, from the counters
     left: bool = False  # whether the vehicle has just left the place of its standstill
+    rolls: bool = False  # STOP did not make it stand since the last motion: BRAKE holds it
 
     def is_late(self, now_ns: int) -> bool:
         """Return whether the time limit has passed without a known standstill."""
@@ -135,6 +139,8 @@ class Supervisor(Struct, frozen=True):
             return self._stay(after, known, now_ns)
         if after.due_ns is None and known is not None:
             after = replace(after, due_ns=self._due_ns(known, now_ns))
+        if known is not None and after.is_late(now_ns):
+            after = replace(after, rolls=True)
         return _settle(after, now_ns)
 
     def _stop(self, standstill: Standstill, known: Latest[Twist] | None, now_ns: int) -> Standstill:
@@ -185,7 +191,7 @@ def _move(standstill: Standstill, now_ns: int) -> Standstill:
     """Return the state of a motion; the time limit is kept until the vehicle stands."""
     began_ns = standstill.began_ns if standstill.phase is Phase.MOVING else now_ns
     due_ns = None if standstill.velocities.standing else standstill.due_ns
-    return replace(_begin(standstill, Phase.MOVING, due_ns), began_ns=began_ns)
+    return replace(_begin(standstill, Phase.MOVING, due_ns), began_ns=began_ns, rolls=False)
 
 
 def _settle(standstill: Standstill, now_ns: int) -> Standstill:

@@ -29,10 +29,46 @@ def test_a_stop_that_does_not_stop_becomes_a_brake(linear: float, angular: float
     assert f"{linear:.2f} m/s" in fixture.state.latches["not_stopping"].text
     assert fixture.tick(500).name == "brake"
     fixture.linear, fixture.angular = 0.0, 0.0
-    assert fixture.drive(0.3, seconds=1.0).command == "stop"  # a neutral request first
+    assert fixture.drive(0.3, seconds=1.0).name == "inhibited"  # a neutral request first
     fixture.linear = fixture.angular = None
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
+
+
+def test_a_vehicle_that_rolled_on_is_held_by_brake_until_it_drives_again() -> None:
+    fixture = PolicyFixture().running(0.28)
+    fixture.linear = 0.28
+    until(fixture, "brake")
+    fixture.linear = 0.0
+    for _ in range(200):
+        assert fixture.tick().command == "brake"
+    assert fixture.verdict.name == "stop"
+    assert "not_stopping" not in fixture.state.latches
+    fixture.linear = None
+    fixture.drive()
+    assert fixture.drive(0.3, seconds=1.0).command == "run"
+    until(fixture, "stop")  # as before it rolled
+
+
+def test_a_vehicle_whose_velocity_was_unknown_is_not_held_by_brake() -> None:
+    fixture = PolicyFixture().running(0.28)
+    fixture.muted = {"velocity"}
+    until(fixture, "brake")
+    fixture.muted, fixture.linear = set(), 0.0
+    until(fixture, "stop")
+
+
+def test_a_slope_does_not_exhaust_the_fault_budget() -> None:
+    fixture = PolicyFixture().ready()
+    for _ in range(10):
+        fixture.linear = None
+        fixture.drive()
+        fixture.drive(0.28, seconds=0.8)
+        fixture.linear = 0.1
+        until(fixture, "brake")
+        fixture.linear = 0.0
+        fixture.tick(50)
+    assert "flapping" not in fixture.state.latches
 
 
 def test_a_request_of_zero_commands_standstill_as_well() -> None:
