@@ -232,7 +232,7 @@ def _settling(held: Iterable[str]) -> bool:
 
 
 def _failing(held: Latches) -> bool:
-    """Return whether an input fails; a vehicle that rolls down a slope is none."""
+    """Return whether an input fails; a vehicle that rolls down a slope is not an input."""
     return _settling(name for name in held if name != "not_stopping")
 
 
