@@ -44,14 +44,7 @@ class Judge:
 
     def look(self, operator: Operator, truth: Truth, now_ns: int) -> None:
         """Judge the causes of the state that operators see."""
-        if truth.contact or truth.pressed:
-            self._contact_ns = now_ns
-        if truth.clearance is not None and truth.clearance < NEAR_M:
-            self._near_ns = now_ns
-        if truth.command.kind == "run":
-            self._stood_m = None
-        elif self._stood_m is None and not _moves(truth):
-            self._stood_m = truth.distance
+        self._note(truth, now_ns)
         state, at_s = operator.seen, (now_ns - self._start_ns) / NS_PER_S
         if state is None or at_s < READY_S:
             return
@@ -65,6 +58,17 @@ class Judge:
             if not self._justified(cause, truth, now_ns):
                 self.stops.append(Stop(round(at_s, 2), cause.name, cause.text))
             self._judged.add(cause.id)
+
+    def _note(self, truth: Truth, now_ns: int) -> None:
+        """Note what may justify a stop."""
+        if truth.contact or truth.pressed:
+            self._contact_ns = now_ns
+        if truth.clearance is not None and truth.clearance < NEAR_M:
+            self._near_ns = now_ns
+        if truth.command.kind == "run":
+            self._stood_m = None
+        elif self._stood_m is None and not _moves(truth):
+            self._stood_m = truth.distance
 
     def _justified(self, cause: m.Cause, truth: Truth, now_ns: int) -> bool:
         if cause.name in FOLLOWING:
