@@ -53,7 +53,10 @@ def read(files: Sequence[Path]) -> Measured:
         if streams.problem:
             raise RobotError(f"{file}: {streams.problem}")
         found, reasons = find_stops(streams, file.name)
-        stops += found
+        known = {stop.command for stop in stops}
+        new = [stop for stop in found if stop.command not in known]
+        stops += new
+        left_out["in two recordings"] += len(found) - len(new)
         left_out += reasons
         period_s = max(period_s, streams.period_s)
     if not stops:
@@ -62,7 +65,7 @@ def read(files: Sequence[Path]) -> Measured:
             f"no stop to measure: a STOP or BRAKE from a steady speed, until standstill "
             f"({reasons_text or 'no RUN with speed ends'})"
         )
-    return Measured(stops, left_out, period_s)
+    return Measured(stops, +left_out, period_s)
 
 
 def refused(config: Everything, proposal: Settings) -> str:

@@ -102,6 +102,7 @@ class Stop:
     distance: float  # m, by the counters, from the command to standstill
     braked: bool = False  # BRAKE followed the STOP before standstill
     file: str = ""
+    command: tuple[int, int] = (0, 0)  # boot of safety and time; the same in two recordings of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,7 @@ class Begin:
 
     kind: Kind
     at_ns: int
+    boot: int  # of safety
     brake: Motion | None
     other: Motion | None
 
@@ -139,7 +141,7 @@ def begins(motions: Sequence[Motion]) -> Iterator[Begin]:
         later = motions[index + 1 :]
         brake = (m for m in later if kind == "stop" and m.command is Command.BRAKE)
         other = (m for m in later if m.command not in (now.command, Command.BRAKE))
-        yield Begin(kind, now.mono_ns, next(brake, None), next(other, None))
+        yield Begin(kind, now.mono_ns, now.boot, next(brake, None), next(other, None))
 
 
 def measure(streams: Streams, begin: Begin, file: str = "") -> Stop:
@@ -158,7 +160,17 @@ def measure(streams: Streams, begin: Begin, file: str = "") -> Stop:
         part = [v for v in window if v.mono_ns <= brake.mono_ns]
     reaction, deceleration = slope([(_s(v, begin), sign * v.linear) for v in part], speed)
     direction: Direction = "forward" if sign > 0 else "backward"
-    return Stop(begin.kind, direction, speed, reaction, deceleration, distance, braked, file)
+    return Stop(
+        begin.kind,
+        direction,
+        speed,
+        reaction,
+        deceleration,
+        distance,
+        braked,
+        file,
+        command=(begin.boot, begin.at_ns),
+    )
 
 
 def slope(points: Sequence[Point], speed: float) -> tuple[float, float]:

@@ -75,7 +75,7 @@ class StopMaker:
     def _add(self, it: SimFixture, message: Motion | Velocity | Mileage) -> None:
         at_ns = it.now_ns + self._offset_ns
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
-        self.streams.add(type(message)(**fields | {"mono_ns": at_ns}))
+        self.streams.add(type(message)(**fields | {"mono_ns": at_ns, "boot": self.seed}))
 
 
 def stop(speed: float, reaction: float = 0.1, deceleration: float = 0.8, **given: object) -> Stop:

@@ -36,8 +36,8 @@ def record(path: Path, streams: Streams) -> Path:
     return path
 
 
-def driven(*speeds: float, coast: float = 0.8) -> Streams:
-    maker = StopMaker(5, delay=0.05, jitter=0.02, coast=coast)
+def driven(*speeds: float, coast: float = 0.8, seed: int = 5) -> Streams:
+    maker = StopMaker(seed, delay=0.05, jitter=0.02, coast=coast)
     for speed in speeds:
         maker.stop(speed).stop(-speed)
     return maker.streams
@@ -61,13 +61,23 @@ def test_safe_settings(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_json_of_two_recordings(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = record(tmp_path / "b.mcap", driven(0.6, coast=0.3))
+    other = record(tmp_path / "b.mcap", driven(0.6, coast=0.3, seed=6))
     assert main(["checkout", "stop", str(path), str(other), "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
     assert [stop["file"] for stop in printed["stops"]] == ["a.mcap"] * 10 + ["b.mcap"] * 2
     assert printed["stops"][10]["deceleration"] == pytest.approx(0.3, rel=0.02)
     assert printed["stops"][10]["long"]
     assert printed["present"]["verdict"] == "not safe"
+
+
+def test_a_stop_in_two_recordings_counts_once(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The black box records what a continuous recording also has."""
+    assert main(["checkout", "stop", str(path), str(path), "--json", *SAFE]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert len(printed["stops"]) == 10
+    assert printed["left_out"] == {"in two recordings": 10}
 
 
 def test_proposed_settings_that_safety_refuses(

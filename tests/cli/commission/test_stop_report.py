@@ -93,6 +93,7 @@ def test_json() -> None:
     assert printed["stops"][10] == {
         "kind": "brake", "direction": "forward", "speed": 0.6, "reaction": 0.1,
         "deceleration": 0.8, "distance": 0.62, "file": "a.mcap", "braked": False, "long": True,
+        "command": [0, 0],
     }  # fmt: skip
     assert not printed["stops"][0]["long"]
     assert printed["left_out"] == {"turning": 1}

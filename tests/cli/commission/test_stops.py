@@ -27,7 +27,7 @@ def streams(*extra: Message, sign: int = 1, speed: float = 0.8, until_s: float =
     """Return a drive with a STOP at 0 s: 50 velocities and 25 counters a second."""
     made = Streams()
     made.add(at(replace(RUN, linear=sign * speed), -0.02))
-    made.add(at(Motion(command=Command.STOP), 0.0))
+    made.add(at(Motion(command=Command.STOP, boot=6), 0.0))
     distance = 7.0
     for number in range(-15, round(until_s * 50)):
         now = number / 50 + 0.005
@@ -47,6 +47,7 @@ def test_a_stop_is_measured(sign: int, direction: str) -> None:
     assert not left_out
     assert (stop.kind, stop.direction, stop.file) == ("stop", direction, "a.mcap")
     assert stop.speed == 0.8
+    assert stop.command == (6, 10 * NS_PER_S)
     assert stop.reaction == pytest.approx(0.1, abs=0.002)
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
     assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
