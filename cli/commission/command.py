@@ -36,7 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "stop: fit safety's settings to the stops in recordings",
     )  # fmt: skip
     parser.add_argument(
-        "files", metavar="RECORDING", type=Path, nargs="*", help="recordings (.mcap), for `stop`"
+        "files",
+        metavar="RECORDING",
+        type=Path,
+        nargs="*",
+        help="recordings (.mcap), directly after `stop`",
     )
     parser.add_argument(
         "--only", action="append", choices=NAMES, metavar="STEP", default=[],
