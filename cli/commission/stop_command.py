@@ -15,10 +15,12 @@ from cli.inspect.session import wants_json
 from cli.recordings.info import open_recording
 from cli.settings import Everything
 from common.errors import ConfigError, RobotError
+from common.keys import ROOT
 from services.safety.config import SafetyConfig
 
 # A reading is up to one period of the sonars old, and up to one period of the bridge's queries.
 READING_PERIODS = 2
+KINDS = {"Motion", "Velocity", "Mileage", "Bumper"}  # the messages that ``Streams`` takes
 
 
 def run(options: argparse.Namespace, config: Everything) -> int:
@@ -45,13 +47,7 @@ def read(files: Sequence[Path]) -> Measured:
     left_out: Counter[str] = Counter()
     period_s = 0.0
     for file in files:
-        streams = Streams()
-        with open_recording(file) as reader:
-            for entry in reader:
-                if (message := entry.message) is not None:
-                    streams.add(message)
-        if streams.problem:
-            raise RobotError(f"{file}: {streams.problem}")
+        streams = read_streams(file)
         found, reasons = find_stops(streams, file.name)
         known = {stop.command for stop in stops}
         new = [stop for stop in found if stop.command not in known]
@@ -66,6 +62,21 @@ def read(files: Sequence[Path]) -> Measured:
             f"({reasons_text or 'no RUN with speed ends'})"
         )
     return Measured(stops, +left_out, period_s)
+
+
+def read_streams(file: Path) -> Streams:
+    """Return the messages of one recording; raise ``RobotError`` if it shows no stops."""
+    streams, robots = Streams(), set()
+    with open_recording(file) as reader:
+        for entry in reader:
+            if entry.kind in KINDS and (message := entry.message) is not None:
+                streams.add(message)
+                robots.add(entry.key.removeprefix(f"{ROOT}/").split("/")[0])
+    if len(robots) > 1:
+        raise RobotError(f"{file}: has several robots ({', '.join(sorted(robots))}): record one")
+    if streams.problem:
+        raise RobotError(f"{file}: {streams.problem}")
+    return streams
 
 
 def refused(config: Everything, proposal: Settings) -> str:

@@ -23,7 +23,7 @@ PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
 SAFE = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
 
 
-def record(path: Path, streams: Streams) -> Path:
+def record(path: Path, streams: Streams, other: str = "001") -> Path:
     messages: list[tuple[str, Message]] = [
         (key, each) for name, key in PATHS.items() for each in getattr(streams, name)
     ]
@@ -32,6 +32,8 @@ def record(path: Path, streams: Streams) -> Path:
         at_s = each.mono_ns / NS_PER_S
         writer.write(bare(key, codec.encode(each), codec.encoding(type(each)), at_s))
     writer.write(bare("tel/mine", b"\xc1", at_s=at_s))
+    last = bare(key, codec.encode(each), codec.encoding(type(each)), at_s)
+    writer.write(replace(last, key=last.key.replace("001", other)))
     writer.close()
     return path
 
@@ -117,6 +119,8 @@ def test_unsuitable_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     coarse.velocities = coarse.velocities[::5]
     error = refused(capsys, "stop", record(tmp_path / "coarse.mcap", coarse))
     assert "has a velocity each 0.10 s, too coarse" in error
+    error = refused(capsys, "stop", record(tmp_path / "robots.mcap", driven(0.5), "002"))
+    assert "has several robots (001, 002): record one" in error
     two = driven(0.5)
     two.motions = [replace(motion, host=9) for motion in two.motions]
     assert "several hosts" in refused(capsys, "stop", record(tmp_path / "two.mcap", two))
