@@ -26,6 +26,8 @@ FEWEST = 5  # stops of one kind and direction
 SPREAD = 2.0  # between the fastest and the slowest stop
 FASTEST = 0.8  # of safety.max_linear; the fit is not extrapolated further
 VELOCITY_STEP = 0.001  # m/s
+NO_BOUND = 1000.0  # m/s^2, in place of an upper bound of the deceleration
+DIGITS = 6  # in 0.01; less is rounding of floats
 SPEEDS = 10  # at which two settings are compared, up to safety.max_linear
 REQUIRED: tuple[tuple[Kind, Direction], ...] = (("stop", "forward"), ("stop", "backward"))
 
@@ -130,13 +132,13 @@ def propose(
     slowest_reaction = max(fit.reaction.next_high for fit in found.values())
     weakest = min(fit.deceleration.next_low for fit in found.values())
     least, most = PROTECTIVE["deceleration"]
-    if weakest < least:
+    deceleration = min(most, _down(weakest))
+    if deceleration < least:
         return (
             f"the next stop may decelerate with {weakest:.2f} m/s2 only, and safety accepts "
             f"{least:g} m/s2 or more: check the brakes, and record more stops"
         )
     react = max(PROTECTIVE["react"][0], _up(slowest_reaction + sensing_s))
-    deceleration = min(most, _down(weakest))
     over = max(s.distance - stopping_distance(s.speed, react, deceleration) for s in stops)
     return Settings(react, deceleration, _up(present.margin + max(0.0, over)))
 
@@ -186,18 +188,17 @@ def _fit(stops: Sequence[Stop], period_s: float) -> Fit:
 
 
 def _inverse(slowness: Estimate) -> Estimate:
-    """Return the estimate of a deceleration; infinity where it has no upper bound."""
+    """Return the estimate of a deceleration."""
     one = slowness
     low, high, next_low, next_high = (
-        1 / value if value > 0 else math.inf
-        for value in (one.high, one.low, one.next_high, one.next_low)
+        1 / max(value, 1 / NO_BOUND) for value in (one.high, one.low, one.next_high, one.next_low)
     )
     return Estimate(1 / one.mean, low, high, next_low, next_high)
 
 
 def _up(value: float) -> float:
-    return math.ceil(round(value * 100, 6)) / 100
+    return math.ceil(round(value * 100, DIGITS)) / 100
 
 
 def _down(value: float) -> float:
-    return math.floor(round(value * 100, 6)) / 100
+    return math.floor(round(value * 100, DIGITS)) / 100

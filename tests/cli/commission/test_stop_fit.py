@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from statistics import mean
+from statistics import NormalDist, mean
 
 import pytest
 from msgspec.structs import replace as changed
@@ -21,6 +21,7 @@ from cli.commission.stop_fit import (
 from cli.commission.stops import Stop, find_stops
 from common.motion import Command
 from services.safety.config import Safety
+from services.safety.stop_distance import stopping_distance
 from tests.cli.commission.stops_fixture import SPEEDS, StopMaker, stop, stops
 
 
@@ -34,6 +35,12 @@ from tests.cli.commission.stops_fixture import SPEEDS, StopMaker, stop, stops
 )  # fmt: skip
 def test_quantiles_as_in_the_tables(confidence: float, freedom: int, quantile: float) -> None:
     assert student(confidence, freedom) == pytest.approx(quantile, rel=2e-3)
+
+
+def test_each_term_of_the_expansion() -> None:
+    """At z = 2 with one degree of freedom, worked out by hand."""
+    terms = 10 / 4 + 294 / 96 + 1098 / 384 + 169950 / 92160
+    assert student(NormalDist().cdf(2.0), 1) == pytest.approx(2.0 + terms, rel=1e-12)
 
 
 def test_the_bounds_of_the_mean_and_of_the_next_value() -> None:
@@ -53,7 +60,7 @@ def test_a_brake_within_a_period_has_a_bound_too() -> None:
     found, _ = find_stops(maker.streams)
     fit = fits(found, maker.streams.period_s)["brake", "forward"]
     assert 5 < fit.deceleration.next_low < fit.deceleration.low < fit.deceleration.mean
-    assert fit.deceleration.next_high == math.inf
+    assert fit.deceleration.next_high == 1000.0
 
 
 def test_the_groups() -> None:
@@ -99,6 +106,9 @@ def test_the_speeds_that_are_missing() -> None:
     assert list(missing(stops([0.5, 0.6, 0.7, 0.8, 1.0]), 1.0)) == []
     brakes = [stop(speed, kind="brake") for speed in (0.1, 0.2, 0.3, 0.4, 0.5)]
     assert "BRAKE forward from at least" in next(missing([*stops(), *brakes], 1.0))
+    one = stop(0.5, kind="brake", direction="backward")
+    (text,) = missing([one, *stops([0.3, 0.5, 0.7, 0.9, 1.2]), *brakes], 1.2)
+    assert text.startswith("BRAKE forward from at least 0.96 m/s (the fastest is 0.50 m/s)")
 
 
 def proposed(found: Sequence[Stop], present: Safety | None = None) -> Settings:
@@ -163,6 +173,8 @@ def test_room_is_what_safety_keeps() -> None:
 def test_stops_that_were_too_long() -> None:
     present = Safety()
     reckoned = 0.5 * 0.25 + 0.25 / 1.2
+    exact = stopping_distance(0.5, 0.25, 0.6)
+    assert too_long([stop(0.5, distance=exact)], present) == []
     found = [stop(0.5, distance=reckoned - 1e-9), stop(0.5, distance=reckoned + 1e-9), stop(0.3)]
     assert too_long(found, present) == [1]
 
