@@ -146,7 +146,7 @@ def begins(motions: Sequence[Motion]) -> Iterator[Begin]:
         yield Begin(kind, now.mono_ns, now.boot, next(brake, None), next(other, None))
 
 
-def measure(streams: Streams, begin: Begin, file: str = "") -> Stop:
+def measure(streams: Streams, begin: Begin, file: str) -> Stop:
     """Return a stop; raise ``UnsuitableError`` if it is left out."""
     window = _until_standstill(streams.velocities, begin)
     end_ns = window[-1].mono_ns
@@ -185,8 +185,7 @@ def slope(points: Sequence[Point], speed: float) -> tuple[float, float]:
         if below == len(points):
             raise UnsuitableError("changed to BRAKE before it slowed down")
         part = (points[above], points[below])
-    times, speeds = zip(*part, strict=True)
-    rate, at_zero = linear_regression(times, speeds)
+    rate, at_zero = linear_regression([s for s, _ in part], [v for _, v in part])
     if rate >= 0:
         raise UnsuitableError("the speed does not fall steadily")
     return (speed - at_zero) / rate, -rate

@@ -152,6 +152,19 @@ def test_a_slow_stop_is_left_out() -> None:
     assert len(found) == 1
 
 
+def test_reasons_are_counted() -> None:
+    found, left_out = find_stops(StopMaker().stop(0.05).stop(0.05).stop(0.5).streams)
+    assert left_out == {"slower than 0.1 m/s": 2}
+    assert [stop.file for stop in found] == [""]
+
+
+def test_speed_and_direction_are_those_at_the_command() -> None:
+    """The next velocity may already be another one."""
+    other = changed(streams(), lambda v, now: replace(v, linear=-0.7) if 0 < now < 0.01 else v)
+    (stop,), _ = find_stops(other)
+    assert (stop.speed, stop.direction) == (0.8, "forward")
+
+
 def test_a_turning_vehicle_is_left_out() -> None:
     def turned(rate: float) -> Streams:
         return changed(streams(), lambda v, now: replace(v, angular=rate if now < 0.01 else 0.0))
@@ -258,9 +271,9 @@ def test_what_begins_a_stop() -> None:
 
 
 def test_a_rate_that_is_not_falling() -> None:
-    with pytest.raises(UnsuitableError, match="does not fall steadily"):
+    with pytest.raises(UnsuitableError, match="^the speed does not fall steadily$"):
         slope([(0.0, 1.0), (0.1, 0.2), (0.2, 0.5), (0.3, 0.8), (0.4, 0.0)], 1.0)
-    with pytest.raises(UnsuitableError, match="does not fall steadily"):
+    with pytest.raises(UnsuitableError, match="^the speed does not fall steadily$"):
         slope([(0.0, 1.0), (0.1, 0.5), (0.2, 0.5), (0.3, 0.5), (0.4, 0.0)], 1.0)
 
 
