@@ -271,9 +271,9 @@ def test_what_begins_a_stop() -> None:
 
 
 def test_a_rate_that_is_not_falling() -> None:
-    with pytest.raises(UnsuitableError, match="^the speed does not fall steadily$"):
+    with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
         slope([(0.0, 1.0), (0.1, 0.2), (0.2, 0.5), (0.3, 0.8), (0.4, 0.0)], 1.0)
-    with pytest.raises(UnsuitableError, match="^the speed does not fall steadily$"):
+    with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
         slope([(0.0, 1.0), (0.1, 0.5), (0.2, 0.5), (0.3, 0.5), (0.4, 0.0)], 1.0)
 
 
