@@ -9,11 +9,13 @@ from pathlib import Path
 
 import msgspec
 
+from cli.commission import stop_command
 from cli.commission.bus_session import CheckoutSession
 from cli.commission.operator import S, Step, prompt, show, sign, walk
 from cli.commission.report import Report, Row, render
 from cli.commission.steps import STEPS
 from cli.commission.watchdog import WATCHDOG, BoardMaster
+from cli.inspect.session import add_output
 from cli.settings import Everything
 from common import log
 from common.cli_args import VERSION, add_sources, sources
@@ -29,9 +31,17 @@ HEALTH_S = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "part", nargs="?", choices=["watchdog"],
-        help="test the board's own command watchdog, with the stack down",
+        "part", nargs="?", choices=["watchdog", "stop"],
+        help="watchdog: test the board's own command watchdog, with the stack down; "
+        "stop: fit safety's settings to the stops in recordings",
     )  # fmt: skip
+    parser.add_argument(
+        "files",
+        metavar="RECORDING",
+        type=Path,
+        nargs="*",
+        help="recordings (.mcap), directly after `stop`",
+    )
     parser.add_argument(
         "--only", action="append", choices=NAMES, metavar="STEP", default=[],
         help=f"run this step only; may be repeated: {', '.join(NAMES)}",
@@ -39,21 +49,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
     )
+    add_output(parser)
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the steps and write the report; return 0 if all passed and the operator signed."""
     loaded = load(Everything, sources(options))
+    check_options(options)
+    if options.part == "stop":
+        return stop_command.run(options, loaded.config)
     file = report_file(options, loaded.config.robot.id)
-    if options.part and options.only:
-        raise ConfigError("--only: the watchdog test has no steps")
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C
     report = check_board(loaded) if options.part else check_stack(loaded, options.only)
     file.write_text(render(report), encoding="utf-8")
     print(f"\n{'Passed' if report.passed else 'NOT PASSED'}. The report: {file}", flush=True)
     return 0 if report.passed else 1
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Refuse options that do not belong to the requested part."""
+    if options.part and options.only:
+        raise ConfigError(f"--only: the {options.part} test has no steps")
+    if options.part == "stop" and options.report:
+        raise ConfigError("--report: the stop test writes no report; -o json prints its result")
+    if options.part != "stop" and options.files:
+        raise ConfigError(f"{options.files[0]}: only `t2 checkout stop` reads recordings")
+    if options.part != "stop" and options.output != "text":
+        raise ConfigError("-o: only `t2 checkout stop` has other formats than text")
 
 
 def check_stack(loaded: Loaded[Everything], only: Sequence[str]) -> Report:

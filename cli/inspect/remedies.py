@@ -34,6 +34,10 @@ SONAR_NEAR = "remove the object that covers it"
 DRIVER = "switch the vehicle off and on; check what the fault names; then reset"
 SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
 ONE_DRIVER = "stop one of the two programs; `t2 services` lists them"
+LONG_STOPS = (
+    "drive slowly; record stops with `t2 record`, then `t2 checkout stop RECORDING` proposes "
+    "settings; the event long_stop has the distances"
+)
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
 
 # By the names of the causes in safety's state.

@@ -37,6 +37,7 @@ from services.safety.sonar import Rules
 from services.safety.sonar_array import SonarFilter
 from services.safety.standstill import Measured, Standstill, supervisor
 from services.safety.state import RELEASE, State, Verdict
+from services.safety.stop_distance import StopDistance, stop_gauge
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
 AGAINST_MPS = 0.1  # against the command; above noise and lag
@@ -61,6 +62,7 @@ class Policy:
             self.planner.zones, rules, settings.ultrasonic_age, self.planner.creep_room
         )
         self._supervisor = supervisor(settings)
+        self._stop_gauge = stop_gauge(settings)
         patience_s = settings.runaway_time
         self._linear = Bounds(
             settings.deceleration, settings.runaway_linear, AGAINST_MPS, patience_s
@@ -84,7 +86,11 @@ class Policy:
         state = self._arm(state, now_ns)
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
         verdict = replace(verdict, refused=refused, reply=reply)
-        return replace(state, decided_ns=now_ns, verdict=verdict), verdict
+        stop_distance = self._stop_distance(state, inputs, verdict, now_ns)
+        return (
+            replace(state, decided_ns=now_ns, verdict=verdict, stop_distance=stop_distance),
+            verdict,
+        )
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         if not isinstance(inputs.event, DriveRequest):
@@ -127,6 +133,13 @@ class Policy:
         latest = Latest(known, velocity.received_ns) if known and velocity else None
         seen = Measured(latest, inputs.mileage if inputs.counter else None)
         return self._supervisor.follow(state.standstill, commanded, seen, now_ns)
+
+    def _stop_distance(
+        self, state: State, inputs: Inputs, verdict: Verdict, now_ns: int
+    ) -> StopDistance:
+        sent = state.verdict.twist if state.verdict.command is RUN else None
+        running = verdict.command is RUN
+        return self._stop_gauge.follow(state.stop_distance, sent, running, inputs, now_ns)
 
     def _observe(self, state: State, inputs: Inputs, now_ns: int) -> State:
         settle_ns = round(self.settings.settle * NS_PER_S)

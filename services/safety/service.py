@@ -166,6 +166,7 @@ class SafetyService:
             self._publish_state(now_ns)
         for transition in transitions(before, self._state, event):
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
+            self._node.counters["long_stops"] += transition.name == "long_stop"
 
     def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))

@@ -11,6 +11,7 @@ from services.safety.release import Release
 from services.safety.runaway import Axis
 from services.safety.sonar_array import SonarArray, SonarOverrides
 from services.safety.standstill import Standstill
+from services.safety.stop_distance import StopDistance
 from services.safety.trajectory import Trajectory
 
 RELEASE = "release"  # in place of the source's name while a release moves the vehicle
@@ -47,6 +48,7 @@ class State(Struct, frozen=True):
     linear: Axis = Axis()
     angular: Axis = Axis()
     standstill: Standstill = Standstill()
+    stop_distance: StopDistance = StopDistance()
     fault_budget: FaultBudget = FaultBudget()
     release: Release = Release()
     trajectory: Trajectory = Trajectory()

@@ -18,6 +18,8 @@ SETTINGS = """\
 source_paths =
     common
     services
+    sim
+    cli
 only_mutate = {file}
 # Without conftest the tests do not load zenoh; this profile makes hypothesis deterministic.
 pytest_add_cli_args =
@@ -40,7 +42,7 @@ class TrialError(Exception):
 def run(file: str, tests: Sequence[str], where: Path) -> tuple[int, list[Mutant]]:
     """Return the number of mutants of a file, and the survivors."""
     shutil.rmtree(where, ignore_errors=True)
-    for part in ("common", "services", "tests"):
+    for part in ("common", "services", "sim", "cli", "tests"):
         shutil.copytree(part, where / part, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy("pyproject.toml", where)
     settings = SETTINGS.format(file=file, tests="\n    ".join(tests))

@@ -3,6 +3,7 @@
 from typing import Any, get_args
 
 import pytest
+from msgspec.structs import replace
 
 from cli.inspect import remedies
 from cli.inspect.diagnosis import Finding, Observation
@@ -10,6 +11,7 @@ from cli.inspect.vehicle import STREAMS, diagnose_vehicle, drivers, driving, lin
 from common import messages as m
 from common.messages import FaultName
 from services.safety.causes import RULES
+from tests.cli.inspect.tool import health
 
 CLEAR: Any = ("ok",) * 8
 
@@ -183,3 +185,12 @@ def test_no_cause() -> None:
 def test_every_cause_and_every_fault_has_a_remedy() -> None:
     assert remedies.CAUSES.keys() == {rule.name for rule in RULES}
     assert remedies.FAULTS.keys() == set(get_args(FaultName))
+
+
+@pytest.mark.parametrize(("count", "levels"), [(0, []), (3, ["wrong"])])
+def test_stops_that_were_longer_than_reckoned(count: int, levels: list[str]) -> None:
+    state = seen(health={"safety": replace(health("safety"), counters={"long_stops": count})})
+    found = [each for each in safety(state) if "reckons with" in each.text]
+    assert [each.level for each in found] == levels
+    assert all(each.text.endswith("longer than it reckons with: 3") for each in found)
+    assert all("t2 checkout stop" in each.todo for each in found)

@@ -1,0 +1,139 @@
+"""``t2 checkout stop`` on recordings of the simulator in simulated time."""
+
+import json
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from cli.__main__ import main
+from cli.commission.stops import Streams
+from common import codec
+from common.cli_args import EXIT_CONFIG
+from common.freshness import NS_PER_S
+from common.messages import Message
+from common.settings import Vehicle
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
+from tests.cli.commission.stops_fixture import StopMaker
+from tests.recorder.samples import bare
+
+PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
+         "mileages": "tel/bridge/mileage"}  # fmt: skip
+SAFE = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
+
+
+def record(path: Path, streams: Streams, other: str = "001") -> Path:
+    messages: list[tuple[str, Message]] = [
+        (key, each) for name, key in PATHS.items() for each in getattr(streams, name)
+    ]
+    writer = RecordingWriter(path, Encoder(Vehicle()), {"robot": "001"})
+    for key, each in sorted(messages, key=lambda one: one[1].mono_ns):
+        at_s = each.mono_ns / NS_PER_S
+        writer.write(bare(key, codec.encode(each), codec.encoding(type(each)), at_s))
+    writer.write(bare("tel/mine", b"\xc1", at_s=at_s))
+    last = bare(key, codec.encode(each), codec.encoding(type(each)), at_s)
+    writer.write(replace(last, key=last.key.replace("001", other)))
+    writer.close()
+    return path
+
+
+def driven(*speeds: float, coast: float = 0.8, seed: int = 5) -> Streams:
+    maker = StopMaker(seed, delay=0.05, jitter=0.02, coast=coast)
+    for speed in speeds:
+        maker.stop(speed).stop(-speed)
+    return maker.streams
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("stops")
+    return record(folder / "a.mcap", driven(0.3, 0.5, 0.7, 0.9, 1.0))
+
+
+def test_safe_settings(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["checkout", "stop", str(path), *SAFE]) == 0
+    printed, errors = capsys.readouterr()
+    assert printed.count("a.mcap") == 10
+    assert "\n[safety]\nreact = 0." in printed
+    assert "\nThey are safe" in printed
+    assert not errors
+
+
+def test_json_of_two_recordings(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = record(tmp_path / "b.mcap", driven(0.6, coast=0.3, seed=6))
+    assert main(["checkout", "stop", str(path), str(other), "--json"]) == 1
+    printed = json.loads(capsys.readouterr().out)
+    assert [stop["file"] for stop in printed["stops"]] == ["a.mcap"] * 10 + ["b.mcap"] * 2
+    assert printed["stops"][10]["deceleration"] == pytest.approx(0.3, rel=0.02)
+    assert printed["stops"][10]["long"]
+    assert printed["present"]["verdict"] == "not safe"
+
+
+def test_a_stop_in_two_recordings_counts_once(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The black box records what a continuous recording also has."""
+    assert main(["checkout", "stop", str(path), str(path), "--json", *SAFE]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert len(printed["stops"]) == 10
+    assert printed["left_out"] == {"in two recordings": 10}
+
+
+def test_proposed_settings_that_safety_refuses(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    near = ("--set", "vehicle.sonar_max=1.0")
+    assert main(["checkout", "stop", str(path), *SAFE, *near]) in (0, 1)
+    assert "are refused with these files: sonar_max 1 m is too near" in capsys.readouterr().err
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: object, code: int = 1) -> str:
+    assert main(["checkout", *map(str, words)]) == code
+    return capsys.readouterr().err
+
+
+def test_recordings_without_a_stop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    slow = record(tmp_path / "slow.mcap", driven(0.05))
+    error = refused(capsys, "stop", slow)
+    assert "no stop to measure: a STOP or BRAKE from a steady speed" in error
+    assert "(2 slower than 0.1 m/s)" in error
+    still = driven(0.5)
+    still.motions = [motion for motion in still.motions if motion.command == "stop"]
+    error = refused(capsys, "stop", record(tmp_path / "still.mcap", still))
+    assert "(no RUN with speed ends)" in error
+
+
+def test_unsuitable_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = tmp_path / "a.txt"
+    text.write_text("no recording")
+    assert "is not an MCAP file" in refused(capsys, "stop", text)
+    assert "cannot be read" in refused(capsys, "stop", tmp_path / "none.mcap")
+    blind = driven(0.5)
+    blind.velocities = []
+    error = refused(capsys, "stop", record(tmp_path / "blind.mcap", blind))
+    assert "blind.mcap: has no tel/bridge/velocity: record all keys with `t2 record`" in error
+    coarse = driven(0.5)
+    coarse.velocities = coarse.velocities[::5]
+    error = refused(capsys, "stop", record(tmp_path / "coarse.mcap", coarse))
+    assert "has a velocity each 0.10 s, too coarse" in error
+    error = refused(capsys, "stop", record(tmp_path / "robots.mcap", driven(0.5), "002"))
+    assert "has several robots (001, 002): record one" in error
+    two = driven(0.5)
+    two.motions = [replace(motion, host=9) for motion in two.motions]
+    assert "several hosts" in refused(capsys, "stop", record(tmp_path / "two.mcap", two))
+
+
+def test_options_of_another_part(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    error = refused(capsys, "stop", code=EXIT_CONFIG)
+    assert "name at least one recording: start `t2 record` on the robot" in error
+    error = refused(capsys, "stop", path, "--only", "link", code=EXIT_CONFIG)
+    assert "--only: the stop test has no steps" in error
+    error = refused(capsys, "stop", path, "--report", "x.md", code=EXIT_CONFIG)
+    assert "--report: the stop test writes no report" in error
+    error = refused(capsys, "watchdog", path, code=EXIT_CONFIG)
+    assert "only `t2 checkout stop` reads recordings" in error
+    error = refused(capsys, "watchdog", "--json", code=EXIT_CONFIG)
+    assert "-o: only `t2 checkout stop`" in error

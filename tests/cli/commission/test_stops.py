@@ -1,0 +1,323 @@
+"""Stops in recorded messages: found, measured, or left out with the reason."""
+
+from collections.abc import Callable, Sequence
+
+import pytest
+from msgspec.structs import replace
+
+from cli.commission.stops import Streams, UnsuitableError, find_stops, slope
+from common.freshness import NS_PER_S
+from common.messages import Bumper, Health, Message, Mileage, Motion, Velocity
+from common.motion import Command
+from tests.cli.commission.stops_fixture import StopMaker
+
+RUN = Motion(command=Command.RUN, linear=0.8)
+
+
+def at(message: Message, seconds: float) -> Message:
+    return replace(message, mono_ns=NS_PER_S * 10 + round(seconds * NS_PER_S))
+
+
+def speed_at(seconds: float, speed: float = 0.8) -> float:
+    """Return a speed that falls by 0.5 m/s^2, 0.1 s after the command at 0 s."""
+    return round(max(0.0, speed - 0.5 * max(0.0, seconds - 0.1)), 3)
+
+
+def streams(*extra: Message, sign: int = 1, speed: float = 0.8, until_s: float = 2.5) -> Streams:
+    """Return a drive with a STOP at 0 s: 50 velocities and 25 counters a second."""
+    made = Streams()
+    made.add(at(replace(RUN, linear=sign * speed), -0.02))
+    made.add(at(Motion(command=Command.STOP, boot=6), 0.0))
+    distance = 7.0
+    for number in range(-15, round(until_s * 50)):
+        now = number / 50 + 0.005
+        linear = sign * speed_at(now, speed)
+        distance += linear / 50
+        made.add(at(Velocity(linear=linear, angular=0.0), now))
+        if number % 2 == 0:
+            made.add(at(Mileage(distance=round(distance, 3), heading=0.0, epoch=0, boot=3), now))
+    for message in extra:
+        made.add(message)
+    return made
+
+
+@pytest.mark.parametrize(("sign", "direction"), [(1, "forward"), (-1, "backward")])
+def test_a_stop_is_measured(sign: int, direction: str) -> None:
+    (stop,), left_out = find_stops(streams(sign=sign), "a.mcap")
+    assert not left_out
+    assert (stop.kind, stop.direction, stop.file) == ("stop", direction, "a.mcap")
+    assert stop.speed == 0.8
+    assert stop.command == (6, 10 * NS_PER_S)
+    assert stop.reaction == pytest.approx(0.1, abs=0.002)
+    assert stop.deceleration == pytest.approx(0.5, abs=0.002)
+    assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
+
+
+def test_the_distance_begins_between_two_counters() -> None:
+    made = Streams()
+    made.add(at(RUN, -0.02))
+    made.add(at(Motion(command=Command.STOP), 0.0))
+    for number in range(-15, 8):
+        now = number * 0.02 + 0.01
+        made.add(at(Velocity(linear=0.8 if now < 0.05 else 0.0, angular=0.0), now))
+    for now, distance in ((-0.03, 1.0), (0.01, 1.032), (0.05, 1.064), (0.09, 1.1), (0.13, 1.2)):
+        made.add(at(Mileage(distance=distance, heading=0.0, epoch=0), now))
+    (stop,), _ = find_stops(made)
+    assert stop.distance == pytest.approx(1.1 - 1.024)
+    assert stop.reaction == pytest.approx(0.03)
+    assert stop.deceleration == pytest.approx(0.8 / 0.02)
+
+
+@pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])
+def test_the_simulators_stops(command: Command) -> None:
+    """BRAKE stops the simulated vehicle within a period: its deceleration is a lower bound."""
+    maker = StopMaker(delay=0.1, jitter=0.0, coast=0.7)
+    for speed in (0.3, -0.8):
+        maker.stop(speed, command)
+    found, left_out = find_stops(maker.streams)
+    assert not left_out
+    assert [stop.kind for stop in found] == [command] * 2
+    assert [stop.direction for stop in found] == ["forward", "backward"]
+    for stop in found:
+        assert 0.08 <= stop.reaction <= 0.131
+        slow = stop.speed / 0.02 if command is Command.BRAKE else 0.7
+        assert stop.deceleration == pytest.approx(slow, rel=0.03)
+        braked = stop.speed**2 / 1.4 if command is Command.STOP else 0.0
+        assert stop.distance == pytest.approx(braked + stop.speed * stop.reaction, abs=0.012)
+
+
+def commanding(command: Command, seconds: float, linear: float = 0.0) -> Message:
+    return at(Motion(command=command, linear=linear), seconds)
+
+
+def changed(made: Streams, change: Callable[[Velocity, float], Velocity | None]) -> Streams:
+    """Return streams with other velocities; None removes one."""
+    all_of = [(v, v.mono_ns / NS_PER_S - 10) for v in made.velocities]
+    made.velocities = [new for v, now in all_of if (new := change(v, now)) is not None]
+    return made
+
+
+def left(made: Streams) -> str:
+    found, reasons = find_stops(made)
+    assert not found
+    assert list(reasons.values()) == [1]
+    return next(iter(reasons))
+
+
+def test_a_command_before_standstill_ends_the_stop() -> None:
+    for linear in (0.5, 0.0):
+        made = streams(commanding(Command.RUN, 1.0, linear))
+        assert left(made) == "changed to RUN before standstill"
+    stands_s = 1.685  # the second velocity below 0.02 m/s
+    assert speed_at(stands_s - 0.02) < 0.02 < speed_at(stands_s - 0.04)
+    assert "changed to RUN" in left(streams(commanding(Command.RUN, stands_s)))
+    found, _ = find_stops(streams(commanding(Command.RUN, stands_s + 0.001, 0.5)))
+    assert len(found) == 1
+    found, _ = find_stops(streams(commanding(Command.STOP, 0.5)))
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize(("brake_s", "braked"), [(1.0, True), (1.685, True), (1.686, False)])
+def test_brake_after_stop(brake_s: float, braked: bool) -> None:
+    """The vehicle stops at once from then on; the deceleration is that of STOP."""
+    made = streams(commanding(Command.BRAKE, brake_s))
+    made = changed(made, lambda v, now: replace(v, linear=0.0) if now > brake_s else v)
+    (stop,), _ = find_stops(made)
+    assert (stop.kind, stop.braked) == ("stop", braked)
+    assert stop.reaction == pytest.approx(0.1, abs=0.002)
+    assert stop.deceleration == pytest.approx(0.5, abs=0.002)
+
+
+def test_brake_after_stop_before_it_slowed_down() -> None:
+    """0.72 m/s is 90 % of the speed, reached after 0.26 s: three velocities at 0.305 s."""
+    for brake_s in (0.1, 0.3):
+        made = streams(commanding(Command.BRAKE, brake_s))
+        assert left(made) == "changed to BRAKE before it slowed down"
+    (stop,), _ = find_stops(streams(commanding(Command.BRAKE, 0.31)))
+    assert stop.deceleration == pytest.approx(0.5, abs=0.03)
+
+
+def test_stop_after_brake_is_left_out() -> None:
+    made = streams(commanding(Command.STOP, 1.0))
+    made.motions[1] = replace(made.motions[1], command=Command.BRAKE)
+    assert left(made) == "changed to STOP before standstill"
+    made.motions[2] = replace(made.motions[2], command=Command.BRAKE)
+    (stop,), _ = find_stops(made)
+    assert (stop.kind, stop.braked) == ("brake", False)
+
+
+def test_a_slow_stop_is_left_out() -> None:
+    assert left(streams(speed=0.099)) == "slower than 0.1 m/s"
+    found, _ = find_stops(streams(speed=0.1))
+    assert len(found) == 1
+
+
+def test_reasons_are_counted() -> None:
+    found, left_out = find_stops(StopMaker().stop(0.05).stop(0.05).stop(0.5).streams)
+    assert left_out == {"slower than 0.1 m/s": 2}
+    assert [stop.file for stop in found] == [""]
+
+
+def test_speed_and_direction_are_those_at_the_command() -> None:
+    """The next velocity may already be another one."""
+    other = changed(streams(), lambda v, now: replace(v, linear=-0.7) if 0 < now < 0.01 else v)
+    (stop,), _ = find_stops(other)
+    assert (stop.speed, stop.direction) == (0.8, "forward")
+
+
+def test_a_turning_vehicle_is_left_out() -> None:
+    def turned(rate: float) -> Streams:
+        return changed(streams(), lambda v, now: replace(v, angular=rate if now < 0.01 else 0.0))
+
+    assert left(turned(0.11)) == "turning"
+    assert left(turned(-0.11)) == "turning"
+    assert len(find_stops(turned(0.1))[0]) == 1
+
+
+@pytest.mark.parametrize(
+    ("off", "seconds", "steady"),
+    [(0.039, -0.19, True), (0.041, -0.19, False), (-0.041, -0.19, False), (0.1, -0.22, True)],
+)
+def test_an_accelerating_vehicle_is_left_out(off: float, seconds: float, steady: bool) -> None:
+    """5 % of 0.8 m/s, in the 0.2 s before the newest velocity at the command."""
+
+    def before(v: Velocity, now: float) -> Velocity:
+        return replace(v, linear=0.8 + off) if now < seconds else v
+
+    made = changed(streams(), before)
+    assert (len(find_stops(made)[0]) == 1) is steady
+    if not steady:
+        assert left(made) == "not at a steady speed"
+
+
+def test_a_slow_vehicle_may_scatter_by_3_cm_a_second() -> None:
+    def before(off: float) -> Streams:
+        made = streams(speed=0.2)
+        return changed(made, lambda v, now: replace(v, linear=0.2 + off) if now < -0.1 else v)
+
+    assert len(find_stops(before(0.029))[0]) == 1
+    assert left(before(0.031)) == "not at a steady speed"
+
+
+def test_missing_velocities() -> None:
+    none = changed(streams(), lambda v, now: v if now > 0 else None)
+    assert left(none) == "velocities are missing"
+    old = changed(streams(), lambda v, now: v if now > 0 or now < -0.1 else None)
+    assert left(old) == "velocities are missing"
+    gap = changed(streams(), lambda v, now: v if not 0.5 < now < 0.6 else None)
+    assert left(gap) == "velocities are missing"
+    short = changed(streams(), lambda v, now: v if not 0.5 < now < 0.58 else None)
+    assert len(find_stops(short)[0]) == 1
+    assert left(streams(until_s=1.5)) == "the recording ends before standstill"
+    one = changed(streams(), lambda v, now: v if now < 0.0 else None)
+    assert left(one) == "the recording ends before standstill"
+
+
+def test_a_single_velocity_of_zero_is_no_standstill() -> None:
+    glitch = changed(streams(), lambda v, now: replace(v, linear=0.0) if 0.5 < now < 0.52 else v)
+    (stop,), _ = find_stops(glitch)
+    assert stop.distance > 0.7
+
+
+def test_a_pressed_bumper() -> None:
+    assert left(streams(at(Bumper(pressed=True), 0.0))) == "the bumper was pressed"
+    assert left(streams(at(Bumper(pressed=True), 1.685))) == "the bumper was pressed"
+    for bumper, now in ((False, 0.5), (True, -0.01), (True, 1.69)):
+        found, _ = find_stops(streams(at(Bumper(pressed=bumper), now)))
+        assert len(found) == 1
+
+
+def counted(keep: Callable[[float], bool]) -> Streams:
+    made = streams()
+    made.mileages = [m for m in made.mileages if keep(m.mono_ns / NS_PER_S - 10)]
+    return made
+
+
+def test_missing_counters() -> None:
+    for keep in (
+        lambda now: now > 0,
+        lambda now: now < 1.69,
+        lambda now: now < 0,
+        lambda now: not -0.1 < now < 0.15,
+        lambda now: not 1.7 < now < 1.9,
+    ):
+        assert left(counted(keep)) == "counters are missing"
+    for keep in (lambda now: not -0.1 < now < 0.05, lambda now: not 1.7 < now < 1.88):
+        assert len(find_stops(counted(keep))[0]) == 1
+
+
+@pytest.mark.parametrize("change", [{"epoch": 1}, {"boot": 4}])
+def test_a_restart_during_the_stop(change: dict[str, int]) -> None:
+    made = streams()
+    half = len(made.mileages) // 2
+    made.mileages[half:] = [replace(m, **change) for m in made.mileages[half:]]
+    assert left(made) == "bridge or board restarted"
+    made.mileages = made.mileages[:3] + [replace(m, **change) for m in made.mileages[3:]]
+    assert len(find_stops(made)[0]) == 1
+
+
+def test_what_begins_a_stop() -> None:
+    """Only the first STOP or BRAKE after a RUN with speed."""
+    made = streams()
+    made.motions = [
+        Motion(command=Command.STOP),
+        Motion(command=Command.RUN, linear=0.0004),
+        Motion(command=Command.STOP),
+        Motion(command=Command.STOP),
+        Motion(command=Command.RUN, linear=0.5),
+        Motion(command=Command.RUN, linear=0.5),
+    ]
+    assert find_stops(made) == ([], {})
+
+
+def test_a_rate_that_is_not_falling() -> None:
+    with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
+        slope([(0.0, 1.0), (0.1, 0.2), (0.2, 0.5), (0.3, 0.8), (0.4, 0.0)], 1.0)
+    with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
+        slope([(0.0, 1.0), (0.1, 0.5), (0.2, 0.5), (0.3, 0.5), (0.4, 0.0)], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "reaction", "deceleration"),
+    [
+        ((1.0, 0.8, 0.5, 0.2, 0.0), 0.0333333, 3.0),  # a line through three velocities
+        ((1.0, 1.0, 0.6, 0.3, 0.0), 0.1, 1 / 0.3),  # two: between 1.0 and 0.0
+        ((1.0, 0.95, 0.9, 0.5, 0.1, 0.05), 0.175, 4.0),  # 0.9 and 0.1 belong to the slope
+        ((1.0, 0.5, 1.0, 0.8, 0.5, 0.2, 0.0), 0.2333333, 3.0),  # from the last full speed
+    ],
+)
+def test_the_slope(speeds: Sequence[float], reaction: float, deceleration: float) -> None:
+    points = [(number / 10, speed) for number, speed in enumerate(speeds)]
+    assert slope(points, 1.0) == pytest.approx((reaction, deceleration), rel=1e-5)
+
+
+def test_the_first_velocity_may_be_slower_than_the_others() -> None:
+    assert slope([(0.0, 0.5), (0.1, 0.0)], 1.0) == pytest.approx((-0.1, 5.0))
+
+
+def test_problems_of_a_recording() -> None:
+    assert not streams().problem
+    made = Streams()
+    assert made.period_s == 0.0
+    made.add(Health(service="x", version="", uptime=0, rates={}, counters={}, lateness=0, rss=0))
+    assert made.problem == (
+        "has no @cmd/motion and no tel/bridge/velocity and no tel/bridge/mileage: "
+        "record all keys with `t2 record`"
+    )
+    one = streams()
+    one.velocities.clear()
+    assert one.problem.startswith("has no tel/bridge/velocity:")
+    two = streams()
+    two.mileages[3] = replace(two.mileages[3], host=5)
+    assert two.problem.startswith("has messages of several hosts, or of two boots")
+
+
+def test_a_downsampled_recording_is_refused() -> None:
+    coarse = streams()
+    coarse.velocities = coarse.velocities[::5]
+    assert coarse.period_s == pytest.approx(0.1)
+    assert coarse.problem.startswith("has a velocity each 0.10 s, too coarse for a stop")
+    assert "bus.laptop_rate" in coarse.problem
+    thirty = streams()
+    thirty.velocities = [at(Velocity(linear=0, angular=0), n * 0.03) for n in range(5)]  # type: ignore[misc]
+    assert not thirty.problem
