@@ -15,7 +15,7 @@ from verification.outside.cable import GOOD, Cable, Packing, Port
 from verification.outside.sonars import NO_ECHO_MM, Ring, before
 from verification.outside.vehicle import Vehicle
 
-VELOCITY_S, STEP_S = 0.02, 0.005
+VELOCITY_S, ECHO_S, STEP_S = 0.02, 0.05, 0.005
 TOUCH = 0.005  # m, travel of the bumper strip
 BOTH = (0, 1)
 
@@ -55,14 +55,15 @@ class Board:
     command_unit: float = wire.DECIDEGREES_PER_RADIAN  # of the angular velocity, for one rad/s
 
     def __post_init__(self) -> None:
+        self.sonars = [NO_ECHO_MM] * 8
         self.wall: float | None = None  # where an obstacle ends the vehicle's way, by its distance
         self.wall_echoes = True
         self.contacts: list[float] = []  # times at which the vehicle touched it
         self._changed = 0.0  # when that last began or ended
         self._touching = False
         self._to_host, self._to_board = Cable(), Cable()
+        self._echoes = list(self.sonars)  # of the last round
         self.bumper = 0  # the byte that is reported
-        self.sonars = [NO_ECHO_MM] * 8
         self.commands: list[wire.Command] = []
         self.received: list[tuple[float, int, bytes]] = []  # time, id, payload
         self.reported: list[tuple[float, float]] = []  # velocities to report next, instead of true
@@ -102,13 +103,16 @@ class Board:
         return sum(at >= since and name == command for at, name, _ in list(self.received))
 
     def _run(self) -> None:
-        due = step_at = time.monotonic()
+        due = echo_due = step_at = time.monotonic()
         while not self._ended.is_set():
             now = time.monotonic()
             if now >= due:
                 due = max(due + VELOCITY_S, now)
                 self._report_velocity()
                 self._deliver()
+            if now >= echo_due:
+                echo_due = max(echo_due + ECHO_S, now)
+                self._echoes = self.ring.report(self._ranges())
             readable, _, _ = select.select([self._socket], [], [], STEP_S)
             self._receive() if readable else None
             now = time.monotonic()
@@ -195,7 +199,7 @@ class Board:
             distance, heading = self.vehicle.distance, self.vehicle.heading
             return wire.distance(distance + step * 0.001, heading + step * 0.00175)[8:]
         if command == wire.SONAR:
-            return struct.pack("<8H", *self.ring.report(self._ranges()))
+            return struct.pack("<8H", *self._echoes)
         if command == wire.BUMPER:
             return bytes([self._bumper() if index in self.faults.hit_ports else 0])
         if command == wire.DRIVER:

@@ -14,9 +14,9 @@ COURSE = (
     "85 % of the requested speed, no stop without need; BRAKE within 0.1 s of an e-stop and of a "
     "contact, no RUN forward later; stops before a wall"
 )
-FREE_S = 6.0
+FREE_S = 5.0
 UNDER_WAY_S = 0.15  # a RUN that was sent before the stop may arrive later
-WALL_M, LOW_M = 2.0, 1.0
+WALL_M, LOW_M = 1.5, 0.6
 FAR_M = 0.6  # a stop farther from the wall is a stop without need
 
 
@@ -70,7 +70,8 @@ def free_way(bed: Testbed, found: Findings, speed: float, share: float) -> None:
         good = brake is not None and brake <= 0.1 and not late
         found.add(f"e-stop: BRAKE {seconds(brake)}, {len(late)} RUN later", good)
     stands(bed)
-    found.add("" if bed.operator.reset() else "no reset", not bed.observer.latched)
+    if not bed.operator.reset():
+        found.add(f"no reset: {text(bed)}", good=False)
 
 
 def wall(bed: Testbed, found: Findings, speed: float) -> None:
@@ -101,7 +102,7 @@ def low_obstacle(bed: Testbed, found: Findings) -> None:
     vehicle, board = bed.board.vehicle, bed.board
     bed.arm(5.0)
     with bed.source() as source:
-        board.wall, board.wall_echoes = vehicle.distance + LOW_M, False
+        board.wall_echoes, board.wall = False, vehicle.distance + LOW_M
         source.request(0.3)
         if not wait_for(lambda: board.contacts, 12.0):
             found.add(f"no contact: {text(bed)}", good=False)

@@ -44,7 +44,7 @@ def profile_no_switch_echo(bed: Testbed) -> Result:
 @scenario(
     22,
     "the first port loses one datagram in five, either way",
-    COURSE + " (0.15 s here; it may creep at 0.15 m/s)",
+    COURSE,
     faults=lambda: Faults(ports=(Port(lost=0.2), Port())),
 )
 def profile_lossy_port(bed: Testbed) -> Result:

@@ -99,9 +99,9 @@ def profile_slope(bed: Testbed) -> Result:
 
 @scenario(
     21,
-    "velocities with noise of 0.03 m/s and 0.04 rad/s and a bias; standing for 15 s after a reset",
+    "velocities with noise of 0.015 m/s and 0.02 rad/s and a bias; standing for 15 s after a reset",
     COURSE + "; nothing is latched at standstill",
-    faults=lambda: Faults(noise=(0.03, 0.04), bias=(0.005, 0.01)),
+    faults=lambda: Faults(noise=(0.015, 0.02), bias=(0.005, 0.01)),
 )
 def profile_noisy_velocity(bed: Testbed) -> Result:
     found = course(bed)

@@ -91,7 +91,7 @@ def comes_off(bed: Testbed, found: Findings) -> None:
     refusals = bed.operator.hold_release("backward", 3.0)
     time.sleep(0.5)
     gap = (board.wall or 0.0) - board.vehicle.distance
-    why = "" if gap > 0.01 or not refusals else f" ({refusals[-1]})"
-    found.add(f"released: {gap * 100:.1f} cm off{why}", gap > 0.01)
+    why = f" ({refusals[-1]})" if refusals else ""
+    found.add(f"released: {gap * 100:.1f} cm off{why}", gap > 0.005)
     done = bed.operator.reset()
     found.add("reset" if done else f"no reset: {text(bed)}", done)
