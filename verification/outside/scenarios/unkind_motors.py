@@ -10,7 +10,10 @@ from verification.outside.testbed import Result, Testbed, fitted, scenario, seco
 from verification.outside.vehicle import Motors
 
 SLOPE = math.radians(2)
-ROLLED_M = 0.05 + 0.06  # until the motion is known, and until BRAKE has stopped it
+SPEED = 0.4  # m/s
+LIMIT_S = SPEED / 0.6 + 0.5  # by the shipped settings
+ROLLED_M = 0.20  # no standstill was confirmed before, so that the time limit counts
+NOISE_S = 0.3
 
 
 @scenario(
@@ -69,12 +72,13 @@ def profile_weak_wheel(bed: Testbed) -> Result:
 @scenario(
     21,
     "let go on a slope of 2 degrees: STOP comes to rest, then the vehicle rolls",
-    f"BRAKE holds it after {ROLLED_M * 100:.0f} cm at most; after a reset it drives on",
+    f"BRAKE within v / a + 0.5 s ({LIMIT_S:.2f} s), {ROLLED_M * 100:.0f} cm at most; drives on "
+    "after a reset",
 )
 def profile_slope(bed: Testbed) -> Result:
     found, vehicle = Findings([], []), bed.board.vehicle
     with bed.source() as source:
-        bed.drive(source, 0.4)
+        bed.drive(source, SPEED)
         vehicle.motors = Motors(slope=SLOPE)
         at = time.monotonic()
         source.silence()
@@ -84,7 +88,8 @@ def profile_slope(bed: Testbed) -> Result:
     time.sleep(1.5)
     rolled = vehicle.distance - rest
     found.add(f"BRAKE {seconds(brake)} after letting go, rolled {rolled * 100:.1f} cm",
-              brake is not None and rolled <= ROLLED_M and vehicle.linear == 0)  # fmt: skip
+              brake is not None and brake <= LIMIT_S + NOISE_S and rolled <= ROLLED_M
+              and vehicle.linear == 0)  # fmt: skip
     found.add(f"latched: {', '.join(bed.observer.latched) or 'nothing'}", good=True)
     done = bed.operator.reset()
     found.add("reset" if done else f"no reset: {text(bed)}", done)
