@@ -2,10 +2,9 @@
 
 A setting is named by its path, ``board.port``. Sources in order of precedence, the last one wins:
 files, tables that a program passes, environment (``T2__BOARD__PORT``, in any case), ``--set
-board.port=4002``. Tables are merged
-across sources. Sections of other services are ignored; unknown sections and fields are refused,
-because a misspelt setting would be lost silently. A certificate's file name is relative to the
-settings file that contains it.
+board.port=4002``. Tables are merged across sources. Sections of other services are ignored; unknown
+sections and fields are refused, because a misspelt setting would be lost silently. A certificate's
+file name is relative to the settings file that contains it.
 """
 
 import difflib

@@ -34,6 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
     profiles.tables(options.profile)  # refuses an unknown one before anything starts
+    if options.no_sim and options.profile:
+        raise ConfigError(
+            "--profile changes the simulated vehicle: leave --no-sim or --profile out"
+        )
     config = load(Everything, sources(options)).config
     if config.robot.realtime:
         realtime.request(realtime.SUPERVISOR, alone=True)
@@ -69,7 +73,7 @@ def selected(available: Commands, only: str | None) -> Commands:
 def commands(options: argparse.Namespace) -> Commands:
     """Return the commands by name: later processes depend on earlier ones."""
     passed = passed_on(options)
-    # Soak and tests create their own options, and always need a router.
+    # Demo, soak and tests create their own options, and always need a router.
     modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
     if not options.no_sim:
         world = ["--world", options.world] if options.world else []

@@ -135,6 +135,11 @@ def test_an_unknown_profile_starts_nothing() -> None:
         run(options(profile=["moon"]))
 
 
+def test_a_real_vehicle_has_no_profile() -> None:
+    with pytest.raises(ConfigError, match="leave --no-sim or --profile out"):
+        run(options(profile=["slope"], no_sim=True))
+
+
 def test_only_one_process() -> None:
     everything = commands(options())
     assert selected(everything, None) == everything
