@@ -1,10 +1,10 @@
 """Configuration loading: TOML files, environment and command line to frozen structs.
 
 A setting is named by its path, ``board.port``. Sources in order of precedence, the last one wins:
-files, environment (``T2__BOARD__PORT``, in any case), ``--set board.port=4002``. Tables are merged
-across sources. Sections of other services are ignored; unknown sections and fields are refused,
-because a misspelt setting would be lost silently. A certificate's file name is relative to the
-settings file that contains it.
+files, tables that a program passes, environment (``T2__BOARD__PORT``, in any case), ``--set
+board.port=4002``. Tables are merged across sources. Sections of other services are ignored; unknown
+sections and fields are refused, because a misspelt setting would be lost silently. A certificate's
+file name is relative to the settings file that contains it.
 """
 
 import difflib
@@ -21,6 +21,8 @@ from msgspec import Struct
 from common.errors import ConfigError
 
 C = TypeVar("C", bound=Struct)
+
+Table = tuple[str, Mapping[str, Any]]  # origin, and settings by path
 
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
@@ -51,6 +53,7 @@ class Sources(Struct, frozen=True):
     files: Sequence[Path] = (DEFAULT_FILE,)
     environ: Mapping[str, str] = msgspec.field(default_factory=lambda: dict(os.environ))
     sets: Sequence[str] = ()
+    tables: Sequence[Table] = ()  # on top of the files
 
 
 class Setting(Struct, frozen=True):
@@ -72,6 +75,8 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
     given: dict[str, Setting] = {}
     for file in sources.files:
         given |= _from_file(file)
+    for origin, table in sources.tables:
+        given |= {path: Setting(value, origin) for path, value in table.items()}
     given |= _from_environ(root, sources.environ)
     given |= _from_sets(root, sources.sets)
     names = {part.name for part in msgspec.structs.fields(root)}

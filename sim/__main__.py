@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from common import log, realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError
+from sim import profiles
 from sim.config import Config, load_plan, load_script
 from sim.process import Process, Trace
 from sim.requests import Script
@@ -19,6 +22,8 @@ from sim.requests import Script
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the simulator's options."""
     parser.add_argument("--world", help="name of a file in sim/worlds, or path of a TOML file")
+    profiles.add_argument(parser)
+    parser.add_argument("--list-profiles", action="store_true", help="list the profiles and end")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="write a trace file")
     parser.add_argument("--faults", type=Path, metavar="FILE", help="fault script")
     add_sources(parser)
@@ -26,9 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM; raise ``ConfigError`` before anything opens."""
+    if options.list_profiles:
+        print(profiles.listing())
+        return 0
     world = [f"sim.world={options.world}"] if options.world is not None else []
     options.sets = [*options.sets, *world]
-    config = load(Config, sources(options)).config
+    given = replace(sources(options), tables=profiles.tables(options.profile))
+    config = load(Config, given).config
     plan = load_plan(config.sim.world, config.vehicle)
     script = load_script(options.faults) if options.faults else Script()
     if config.robot.realtime:
@@ -44,7 +53,10 @@ def run(options: argparse.Namespace) -> int:
             for name in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(name, lambda *_: process.loop.stop())
             log.Logger().info(
-                "started", world=plan.title, board=f"{config.board.address}:{config.board.port}"
+                "started",
+                world=plan.title,
+                profiles=options.profile,
+                board=f"{config.board.address}:{config.board.port}",
             )
             process.run()
     return 0

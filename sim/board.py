@@ -1,7 +1,8 @@
 """The simulated main board: state, answers, and the effect of the current command.
 
-It holds the last motion command indefinitely: no watchdog is documented. It has two emergency
-brakes, off at power-on, which override that command. The real behaviour is unknown; here it is:
+It holds the last motion command indefinitely: no watchdog is documented; ``sim.firmware`` can have
+one. It has two emergency brakes, off at power-on, which override that command. The real behaviour
+is unknown; here it is:
 
 =================== ===============================================================================
 brake               while active, the board does BRAKE instead of the command
@@ -17,6 +18,7 @@ A faulty sonar brakes nothing. A motion command has no answer: the velocity is s
 """
 
 import math
+import random
 
 from common.motion import Twist
 from common.settings import Wire
@@ -44,6 +46,7 @@ class Board:
         self._command_unit = RADIANS[wire.command_angular_unit]
         self._feedback_unit = RADIANS[wire.feedback_angular_unit]
         self._settings = settings
+        self._random = random.Random(f"velocity {settings.seed}")
         self._twist = Twist()
         self._ranges = ranges
         self.pressed = False
@@ -95,13 +98,17 @@ class Board:
 
     def velocity(self) -> r.VelocityReport:
         """Return the continuous velocity report."""
-        return r.VelocityReport(
-            round(self._twist.linear * 1000), round(self._twist.angular / self._feedback_unit)
-        )
+        error = self._settings.velocity
+        linear = self._twist.linear + error.bias + self._noise(error.noise)
+        angular = self._twist.angular + error.angular_bias + self._noise(error.angular_noise)
+        return r.VelocityReport(round(linear * 1000), round(angular / self._feedback_unit))
 
     def driver(self, side: Side) -> r.DriverReport:
         """Return a driver report, sent on a query and on a fault."""
         return r.DriverReport(side, self.driver_bits[side])
+
+    def _noise(self, deviation: float) -> float:
+        return self._random.gauss(0.0, deviation) if deviation else 0.0
 
     def _set(self, frame: c.UltrasonicBrakeSet | c.BumperBrakeSet | c.LedSet) -> Frame:
         if isinstance(frame, c.UltrasonicBrakeSet):

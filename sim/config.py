@@ -119,7 +119,7 @@ class Cable(Section, frozen=True, kw_only=True):
 
 
 class Sim(Section, frozen=True, kw_only=True):
-    """The simulated vehicle and its world. The defaults are kind; see the profiles."""
+    """The simulated vehicle and its world. The defaults are ideal; see the profiles."""
 
     world: str = "office"  # a name in sim/worlds, or the path of a TOML file
     seed: Annotated[int, Meta(ge=0)] = 1  # of all noise and faults

@@ -64,17 +64,17 @@ class Injection:
         """Return the reason of a refusal, empty when done."""
         match request:
             case q.Place():
-                return self._place(request.pose)
+                return self._place(request.pose, now_ns)
             case q.AddBox():
-                return self._rebuild(self._simulation.world.with_box(request.box))
+                return self._rebuild(self._simulation.world.with_box(request.box), now_ns)
             case q.RemoveBox():
-                return self._remove(request.name)
+                return self._remove(request.name, now_ns)
             case q.Wire():
                 self._wire(request)
             case q.Mute():
-                self._simulation.muted = _kinds(request.reports)
+                self._simulation.output.muted = _kinds(request.reports)
             case q.Lose():
-                self._simulation.lose(_kinds(request.reports), request.every)
+                self._simulation.output.lose(_kinds(request.reports), request.every)
             case _:
                 self._inject_board(request, now_ns)
         return ""
@@ -84,7 +84,7 @@ class Injection:
         match request:
             case q.Bumper():
                 simulation.pressed_by_hand = request.pressed
-                simulation.update_bumper()
+                simulation.update_bumper(now_ns)
             case q.Sonar():
                 simulation.sonars.inject(request)
             case q.Driver():
@@ -96,9 +96,8 @@ class Injection:
             case q.Flood():
                 simulation.flood(request.rate, request.seconds, request.garbage, now_ns)
             case q.Firmware():  # pragma: no branch - there is no other
-                simulation.firmware = replace(
-                    simulation.firmware, **msgspec.structs.asdict(request)
-                )
+                settings = simulation.output.settings
+                simulation.output.settings = replace(settings, **msgspec.structs.asdict(request))
 
     def _wire(self, faults: q.Wire) -> None:
         if faults.direction in ("to_pc", "both"):
@@ -106,27 +105,27 @@ class Injection:
         if faults.direction in ("to_board", "both"):
             self._simulation.to_board.faults = faults
 
-    def _place(self, pose: Pose) -> str:
+    def _place(self, pose: Pose, now_ns: int) -> str:
         simulation = self._simulation
         if simulation.world.blocks(simulation.body, pose):
             return f"an obstacle is at x {pose.x:g}, y {pose.y:g}"
         simulation.pose, simulation.twist = pose, STILL
-        simulation.update_bumper()
+        simulation.update_bumper(now_ns)
         return ""
 
-    def _rebuild(self, world: World) -> str:
+    def _rebuild(self, world: World, now_ns: int) -> str:
         simulation = self._simulation
         if world.blocks(simulation.body, simulation.pose):
             return "an obstacle would overlap the vehicle"
         simulation.world = world
-        simulation.update_bumper()
+        simulation.update_bumper(now_ns)
         return ""
 
-    def _remove(self, name: str) -> str:
+    def _remove(self, name: str, now_ns: int) -> str:
         names = [box.name for box in self._simulation.world.boxes]
         if name not in names:
             return f"no box is called {name!r}; there are: {', '.join(names) or 'none'}"
-        return self._rebuild(self._simulation.world.without(name))
+        return self._rebuild(self._simulation.world.without(name), now_ns)
 
 
 def _kinds(names: tuple[q.ReportName, ...]) -> frozenset[type[Frame]]:

@@ -17,16 +17,19 @@ from common.freshness import NS_PER_S
 from common.motion import STILL, Command
 from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.frame import Frame, Side
+from common.wire.frame import Side
 from common.wire.framing import Framing, Received
 from sim import trace as t
-from sim.board import Board
+from sim.board import STOP, Board
+from sim.bumper import Switch
 from sim.config import Config, Line
 from sim.faults import Cable, Datagram
+from sim.firmware import Output
 from sim.geometry import Rectangle
-from sim.requests import Where, Wire
+from sim.motors import Motors
+from sim.requests import Wire
 from sim.sonar import Sonars
-from sim.vehicle import move, next_twist, wheel_angles
+from sim.vehicle import move, rebounded, wheel_angles
 from sim.world import Plan, World
 
 STEP_NS = NS_PER_S // 100
@@ -36,7 +39,6 @@ TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
 GARBAGE = b"GS" + bytes(20)  # starts with a frame's magic
 
-ECHOES = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
 COMMANDS = {
     MotionKind.STOP: Command.STOP,
     MotionKind.RUN: Command.RUN,
@@ -64,16 +66,16 @@ class Simulation:
         self.counters: Counter[str] = Counter()
         self._config = config
         self._framing = Framing(config.wire.crc, config.wire.crc_covers)
+        self.output = Output(sim.firmware, self._framing, ports, sim.seed)
+        self._motors = Motors(sim.drive, config.vehicle.track)
+        self._switch = Switch(sim.bumper.bounce, sim.seed)
+        self._commanded_ns = now_ns
         self._records: list[t.Line] = []
         self._steps = 0
         self._driven = 0.0
         self._contact = self.world.contact(self.body, self.pose)
         self._silent_until_ns = now_ns
         self._powered = True
-        self.muted: frozenset[type[Frame]] = frozenset()
-        self.firmware = sim.firmware
-        self._loss: tuple[frozenset[type[Frame]], int] = frozenset(), 1
-        self._loss_counts: Counter[type[Frame]] = Counter()
         self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
         self._flood_until_ns = now_ns
         self._reported_pressed = False
@@ -132,17 +134,12 @@ class Simulation:
         self._flood = rate * STEP_NS // NS_PER_S, GARBAGE if garbage else None
         self._flood_until_ns = now_ns + round(seconds * NS_PER_S)
 
-    def lose(self, reports: frozenset[type[Frame]], every: int) -> None:
-        """Drop every n-th of these reports from now on."""
-        self._loss = reports, every
-        self._loss_counts.clear()
-
     def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
         """Set a driver's fault bits; the board reports a fault unsolicited."""
         changed = bits != self.board.driver_bits[side]
         self.board.driver_bits[side] = bits
         if changed and bits:
-            self._send_to_all(self.board.driver(side), now_ns)
+            self._send(self.output.unasked(self.board.driver(side)), now_ns)
 
     def truth(self, now_ns: int) -> t.Truth:
         """Return the true state."""
@@ -157,7 +154,7 @@ class Simulation:
             distance=self._driven,
             clearance=clearance if math.isfinite(clearance) else None,
             contact=self._contact,
-            pressed=self._pressed(),
+            pressed=self._switch.closed,
             wheels=wheel_angles(self.twist, self._config.vehicle),
             command=self._command,
             braking=self.board.braking(),
@@ -166,22 +163,25 @@ class Simulation:
             silent=self._silent(now_ns),
         )
 
-    def update_bumper(self) -> None:
+    def update_bumper(self, now_ns: int) -> None:
         """Update the bumper after a change of world, pose or hand."""
         self._contact = self.world.contact(self.body, self.pose)
-        self.board.sense(self.twist, self._ranges, self._pressed())
+        self._sense(now_ns)
 
     def _step(self) -> None:
         self._steps += 1
         self._update_power()
+        self._update_watchdog()
         self._move(STEP_NS / NS_PER_S)
         if self._steps % SONAR_STEPS == 0:
             self._ranges = self.sonars.measure(self.world, self.pose)
-        self.board.sense(self.twist, self._ranges, self._pressed())
+        self._sense(self.now_ns)
         if self._steps % STREAM_STEPS == 0:
-            self._send_to_all(self.board.velocity(), self.now_ns)
+            self._send(self.output.unasked(self.board.velocity()), self.now_ns)
         if self.now_ns < self._flood_until_ns:
             self._send_flood(*self._flood)
+        if self._is_merged():
+            self._send(self.output.merged(), self.now_ns)
         if self._steps % TRUTH_STEPS == 0:
             self.record(self.truth(self.now_ns))
 
@@ -190,15 +190,24 @@ class Simulation:
             self._powered = True
             self.record(t.Power(mono_ns=self.now_ns, on=True))
 
+    def _is_merged(self) -> bool:
+        wait_ns = self.output.settings.merge * NS_PER_S
+        return wait_ns > 0 and self._steps % max(1, round(wait_ns / STEP_NS)) == 0
+
+    def _update_watchdog(self) -> None:
+        silence_s = (self.now_ns - self._commanded_ns) / NS_PER_S
+        if 0 < self.output.settings.watchdog < silence_s:
+            self.board.command = STOP
+
     def _move(self, dt: float) -> None:
         command = self.board.drive()
-        drive = self._config.sim.drive
-        twist = next_twist(self.twist, command.kind, self.board.target(command), drive, dt)
+        twist = self._motors.follow(self.twist, command.kind, self.board.target(command), dt)
         if twist == STILL:
             self.twist = twist
             return
         way = move(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
-        self.pose, self.twist = way.pose, STILL if way.held else twist
+        rebound = self._config.sim.body.rebound
+        self.pose, self.twist = way.pose, rebounded(twist, rebound) if way.held else twist
         self._driven += abs(way.distance)
         self.board.count(way.distance, way.turn)
         self._contact = self.world.contact(self.body, self.pose)
@@ -221,32 +230,12 @@ class Simulation:
             if isinstance(part.frame, MotionCommand):
                 self._hold(part.frame, now_ns)
                 self.record(self._command)
-                if self._command.kind in self.firmware.ignores:
+                self._commanded_ns = now_ns
+                if self._command.kind in self.output.settings.ignores:
                     continue
             answer = self.board.answer(part.frame)
             if answer is not None:
-                self._answer(answer, datagram.port, now_ns)
-
-    def _answer(self, frame: Frame, asked: int, now_ns: int) -> None:
-        """Send an answer to the ports that this firmware uses, unless it is suppressed."""
-        if isinstance(frame, ECHOES) and not self.firmware.echoes:
-            return
-        where = self.firmware.answers
-        if isinstance(frame, r.BumperReport) and frame.on and self.firmware.hits != "answers":
-            where = self.firmware.hits
-        for port in self._ports(where, asked):
-            self._send(frame, port, now_ns)
-
-    def _ports(self, where: Where, asked: int) -> Sequence[int]:
-        ports = self._config.board.listen_ports
-        return {"asked": (asked,), "first": ports[:1], "second": ports[-1:], "both": ports}[where]
-
-    def _is_lost(self, kind: type[Frame]) -> bool:
-        kinds, every = self._loss
-        if kind not in kinds:
-            return False
-        self._loss_counts[kind] += 1
-        return self._loss_counts[kind] % every == 0
+                self._send(self.output.answer(answer, datagram.port), now_ns)
 
     def _hold(self, command: MotionCommand, now_ns: int) -> None:
         target = self.board.target(command)
@@ -257,20 +246,16 @@ class Simulation:
             angular=target.angular,
         )
 
-    def _send_to_all(self, frame: Frame, now_ns: int) -> None:
-        for port in self._config.board.listen_ports:
-            self._send(frame, port, now_ns)
-
     def _send_flood(self, count: int, garbage: bytes | None) -> None:
         payload = garbage or self._framing.pack(self.board.velocity())
         ports = self._config.board.listen_ports
         for number in range(0 if self._silent(self.now_ns) else count):
             self.to_pc.put(Datagram(payload, ports[number % len(ports)]), self.now_ns)
 
-    def _send(self, frame: Frame, port: int, now_ns: int) -> None:
-        kind = type(frame)
-        if not self._silent(now_ns) and kind not in self.muted and not self._is_lost(kind):
-            self.to_pc.put(Datagram(self._framing.pack(frame), port), now_ns)
+    def _send(self, datagrams: Sequence[Datagram], now_ns: int) -> None:
+        if not self._silent(now_ns):
+            for datagram in datagrams:
+                self.to_pc.put(datagram, now_ns)
 
     def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
         if datagram.foreign:
@@ -282,8 +267,9 @@ class Simulation:
                 self._reported_pressed = part.frame.on
                 self.record(t.BumperSent(mono_ns=now_ns, pressed=self._reported_pressed))
 
-    def _pressed(self) -> bool:
-        return self._contact or self.pressed_by_hand
+    def _sense(self, now_ns: int) -> None:
+        self._switch.touch(self._contact or self.pressed_by_hand, now_ns)
+        self.board.sense(self.twist, self._ranges, self._switch.closed)
 
     def _silent(self, now_ns: int) -> bool:
         return now_ns < self._silent_until_ns

@@ -2,7 +2,7 @@
 
 Each sends a cone, here a fan of rays; the nearest surface in it is the echo, with noise. What the
 real sensors report at the ends of their range is unknown; these report 0 when something is too near
-to measure, and their maximum range without an echo.
+to measure, and their maximum range without an echo. ``sim.sonar`` makes them worse.
 """
 
 import random
@@ -11,6 +11,7 @@ from common.messages import SONAR_NAMES
 from common.settings import Mount, Vehicle, sonar_mounts
 from common.wire.reports import SONAR_FAULT_MM
 from sim.config import Sonar as Settings
+from sim.echoes import Echoes
 from sim.geometry import Pose, ray
 from sim.requests import Sonar
 from sim.world import World
@@ -26,10 +27,13 @@ class Sonars:
 
     def __init__(self, vehicle: Vehicle, settings: Settings, seed: int) -> None:
         self._mounts = sonar_mounts(vehicle)
-        self._nearest, self._farthest = vehicle.sonar_min, vehicle.sonar_max
+        self._nearest = vehicle.sonar_min
+        self._farthest = min(vehicle.sonar_max, settings.saturation)
+        self._quantum_mm = round(settings.quantum * 1000)
         self._fan = tuple(settings.cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
         self._noise = settings.noise
         self._random = random.Random(seed)
+        self._echoes = Echoes(settings, seed)
         self._injected: dict[str, Sonar] = {}
         self._last = dict.fromkeys(SONAR_NAMES, self._in_mm(self._farthest))
 
@@ -39,9 +43,11 @@ class Sonars:
 
     def measure(self, world: World, pose: Pose) -> Ranges:
         """Return the reported ranges from this pose."""
-        return tuple(self._report(mount, world, pose) for mount in self._mounts)
+        distances = [self._distance(mount, world, pose) for mount in self._mounts]
+        taken = self._echoes.taken(distances)
+        return tuple(map(self._report, self._mounts, taken))
 
-    def _report(self, mount: Mount, world: World, pose: Pose) -> int:
+    def _report(self, mount: Mount, distance: float) -> int:
         noise = self._random.gauss(0.0, self._noise)  # always drawn: independent of faults
         injected = self._injected.get(mount.name)
         if injected is not None and injected.fault:
@@ -51,11 +57,11 @@ class Sonars:
         if injected is not None and injected.range is not None:
             value = self._in_mm(injected.range)
         else:
-            value = self._in_mm(self._echo(mount, world, pose) + noise)
+            value = self._in_mm(distance + noise)
         self._last[mount.name] = value
         return value
 
-    def _echo(self, mount: Mount, world: World, pose: Pose) -> float:
+    def _distance(self, mount: Mount, world: World, pose: Pose) -> float:
         x, y = pose.outward(mount.x, mount.y)
         middle = pose.heading + mount.yaw
         return min(
@@ -66,4 +72,5 @@ class Sonars:
     def _in_mm(self, distance: float) -> int:
         if distance < self._nearest:
             return TOO_NEAR_MM
-        return round(min(distance, self._farthest) * 1000)
+        mm = round(min(distance, self._farthest) * 1000)
+        return round(mm / self._quantum_mm) * self._quantum_mm

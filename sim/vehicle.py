@@ -14,6 +14,8 @@ from common.wire.commands import MotionKind
 from sim.config import Drive
 from sim.geometry import Pose
 
+WHEELS = 4
+SETTLED = 1e-4  # m/s or rad/s from its target, where a lag ends
 BISECTIONS = 12  # of one step, 15 mm at 1.5 m/s: contact is found to a few micrometres
 
 
@@ -29,21 +31,25 @@ class Movement:
 
 def next_twist(twist: Twist, kind: MotionKind, target: Twist, drive: Drive, dt: float) -> Twist:
     """Return the velocity after ``dt`` seconds under a command (manual 2.2)."""
+    goal, force, share = STILL, 1 - drive.weak_wheel / WHEELS, dt / (dt + drive.lag)
     if kind is MotionKind.BREAK:
-        return STILL
-    if kind is MotionKind.STOP:
-        return Twist(
-            _toward(twist.linear, 0.0, drive.coast * dt),
-            _toward(twist.angular, 0.0, drive.angular_coast * dt),
+        linear, angular, force, share = drive.brake, drive.angular_brake, 1.0, 1.0
+    elif kind is MotionKind.STOP:
+        linear, angular = drive.coast, drive.angular_coast
+    else:
+        linear, angular = drive.acceleration, drive.angular_acceleration
+        goal = Twist(
+            clamp(target.linear, drive.max_linear), clamp(target.angular, drive.max_angular)
         )
     return Twist(
-        _toward(twist.linear, clamp(target.linear, drive.max_linear), drive.acceleration * dt),
-        _toward(
-            twist.angular,
-            clamp(target.angular, drive.max_angular),
-            drive.angular_acceleration * dt,
-        ),
+        _toward(twist.linear, goal.linear, linear * force * dt, share),
+        _toward(twist.angular, goal.angular, angular * force * dt, share),
     )
+
+
+def rebounded(twist: Twist, share: float) -> Twist:
+    """Return the velocity after a contact, from the one before."""
+    return Twist(-share * twist.linear, -share * twist.angular) if share else STILL
 
 
 def moved(pose: Pose, twist: Twist, dt: float) -> Pose:
@@ -84,5 +90,7 @@ def _wheel_angle(twist: Twist, x: float, y: float) -> float:
     return math.atan2(left, forward)
 
 
-def _toward(value: float, target: float, most: float) -> float:
-    return value + clamp(target - value, most)
+def _toward(value: float, target: float, most: float, share: float) -> float:
+    """Return a value nearer to its target: by this share of the way, and by so much at most."""
+    way = target - value
+    return value + clamp(way if abs(way) < SETTLED else way * share, most)

@@ -25,6 +25,7 @@ from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import NS_PER_S
 from common.loop import Loop
+from sim import profiles
 from sim.config import load_plan
 
 WORLD = "office"
@@ -38,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
     )
+    profiles.add_argument(parser)
     add_sources(parser)
 
 
@@ -50,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
             f"the demo needs {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
         ) from None
     options.no_sim, options.world = False, WORLD
+    profiles.tables(options.profile)  # refuses an unknown one before anything starts
     prepare_folder(options)
     stall_s = host_stalls.measured()
     options.sets = host_stalls.with_accepted_joined(

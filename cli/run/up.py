@@ -13,6 +13,7 @@ from common import child_process, log, realtime
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError
+from sim import profiles
 
 Commands = list[tuple[str, Sequence[str]]]
 
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-sim", action="store_true", help="use a real board")
     parser.add_argument("--only", metavar="NAME", help="start only this process, such as bridge")
     parser.add_argument("--world", help="world of the simulated vehicle; sim.world by default")
+    profiles.add_argument(parser)
     parser.add_argument(
         "--no-router", action="store_true", help="use a running router, such as zenohd"
     )
@@ -31,6 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
+    profiles.tables(options.profile)  # refuses an unknown one before anything starts
+    if options.no_sim and options.profile:
+        raise ConfigError(
+            "--profile changes the simulated vehicle: leave --no-sim or --profile out"
+        )
     config = load(Everything, sources(options)).config
     if config.robot.realtime:
         realtime.request(realtime.SUPERVISOR, alone=True)
@@ -69,7 +76,9 @@ def commands(options: argparse.Namespace) -> Commands:
     # Demo, soak and tests create their own options, and always need a router.
     modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
     if not options.no_sim:
-        modules["sim"] = ["sim", *(["--world", options.world] if options.world else [])]
+        world = ["--world", options.world] if options.world else []
+        unkind = [word for name in vars(options).get("profile", ()) for word in ("--profile", name)]
+        modules["sim"] = ["sim", *world, *unkind]
     modules |= {name: [f"services.{name}"] for name in ("bridge", "safety", "odom")}
     return [(name, child_process.command(*words, *passed)) for name, words in modules.items()]
 

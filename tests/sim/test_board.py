@@ -1,4 +1,5 @@
 import math
+import statistics
 from typing import Any
 
 import msgspec
@@ -10,7 +11,7 @@ from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from sim.board import BREAK, STOP, Board
-from sim.config import Sim
+from sim.config import Sim, Velocity
 from sim.sonar import Ranges
 
 CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
@@ -218,3 +219,15 @@ def test_a_bumper_brake_may_refuse_all() -> None:
     some = hit(0.5, bumper_brake="all")
     some.answer(BACKWARD)
     assert some.drive() == BREAK
+
+
+def test_velocities_with_noise_and_bias() -> None:
+    some = board(velocity=Velocity(noise=0.02, angular_noise=0.03, bias=0.01, angular_bias=-0.02))
+    some.sense(Twist(0.5, 0.1), CLEAR, pressed=False)
+    reports = [some.velocity() for _ in range(2000)]
+    linear = [report.linear_mmps / 1000 for report in reports]
+    angular = [math.radians(report.angular_raw / 10) for report in reports]
+    assert statistics.mean(linear) == pytest.approx(0.51, abs=0.002)
+    assert statistics.stdev(linear) == pytest.approx(0.02, abs=0.002)
+    assert statistics.mean(angular) == pytest.approx(0.08, abs=0.003)
+    assert statistics.stdev(angular) == pytest.approx(0.03, abs=0.003)

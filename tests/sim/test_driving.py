@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame
-from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, room
+from sim import trace as t
+from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, config, room
 
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 
@@ -140,3 +141,12 @@ def test_it_never_penetrates_and_is_always_finite(
             truth = sim.truth
             numbers = truth.x, truth.y, truth.heading, truth.linear, truth.angular, truth.distance
             assert all(math.isfinite(number) for number in numbers)
+
+
+def test_a_body_rebounds_from_a_wall_and_is_driven_at_it_again() -> None:
+    sim = SimFixture(WALL_AHEAD, config(sim={"body": {"rebound": 0.3}}))
+    sim.run(0.5)
+    sim.after(6.0)
+    speeds = [line.linear for line in sim.of(t.Truth)]
+    assert -0.15 <= min(speeds) < -0.03
+    assert sim.simulation.pose.x > 3.0 - 0.55 - 0.03

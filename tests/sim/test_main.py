@@ -209,6 +209,7 @@ def test_a_taken_port_ends_it_with_a_clear_sentence(
     ("words", "named"),
     [
         (["--world", "moon"], "sim.world = 'moon'"),
+        (["--profile", "moon"], "--profile moon: no such file"),
         (["--set", "sim.drive.coast=0"], "sim.drive.coast = 0"),
         (["--set", "sim.sed=1"], "did you mean 'seed'"),
         (["--faults", "nowhere.toml"], "nowhere.toml: cannot be read"),
@@ -220,6 +221,11 @@ def test_bad_settings_end_it_with_what_is_wrong(
 ) -> None:
     assert main(words) == EXIT_CONFIG
     assert named in capsys.readouterr().err
+
+
+def test_the_profiles_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--list-profiles"]) == 0
+    assert "short-sonar " in capsys.readouterr().out
 
 
 def test_without_control_port_and_trace_there_is_neither(bench: Bench) -> None:

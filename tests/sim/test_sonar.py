@@ -123,3 +123,15 @@ def test_a_fault_does_not_change_the_noise_of_others() -> None:
 
 def test_requests_name_the_sonars_as_messages_do() -> None:
     assert SonarName.__args__ == SONAR_NAMES  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("gap", "expected"), [(1.234, 1230), (1.236, 1240), (9.0, 3000)])
+def test_coarse_ones_that_saturate_early(gap: float, expected: int) -> None:
+    wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
+    some = Sonars(VEHICLE, Settings(noise=0.0, cone=0.0, quantum=0.01, saturation=3.0), 1)
+    assert measured(some, "front", world=World.of(wall)) == expected
+
+
+def test_false_echoes_are_reported() -> None:
+    some = Sonars(VEHICLE, Settings(noise=0.0, floor_chance=1.0, floor_range=1.5), 1)
+    assert measured(some, "front") == 1500

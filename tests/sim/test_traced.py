@@ -52,7 +52,7 @@ def test_the_trace_knows_when_the_first_frame_said_so() -> None:
 def test_a_frame_that_does_not_arrive_said_nothing(lost: Wire) -> None:
     sim = SimFixture()
     sim.simulation.pressed_by_hand = True
-    sim.simulation.update_bumper()
+    sim.simulation.update_bumper(sim.now_ns)
     sim.simulation.to_pc.faults = lost
     sim.say(c.BumperQuery())
     assert sim.of(t.BumperSent) == []

@@ -1,4 +1,4 @@
-"""Independent main board: UDP, a simple vehicle, and faults that a scenario switches on."""
+"""Independent main board: UDP, a vehicle, sonars, and faults that a scenario switches on."""
 
 import contextlib
 import random
@@ -11,9 +11,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from verification.outside import wire
+from verification.outside.cable import GOOD, Cable, Packing, Port
+from verification.outside.sonars import NO_ECHO_MM, Ring, before
+from verification.outside.vehicle import Vehicle
 
-VELOCITY_S, STEP_S = 0.02, 0.005
-NO_ECHO_MM = 20_000
+VELOCITY_S, ECHO_S, STEP_S = 0.02, 0.05, 0.005
+TOUCH = 0.005  # m, travel of the bumper strip
 BOTH = (0, 1)
 
 
@@ -33,43 +36,10 @@ class Faults:
     dither: bool = False  # counters go forth and back by one step, velocities are a little off
     bias: tuple[float, float] = (0.0, 0.0)  # m/s and rad/s that the velocity is off
     silent: bool = False  # nothing is sent, nothing is received
-
-
-@dataclass
-class Vehicle:
-    """A vehicle that follows the last command; no watchdog on the board."""
-
-    linear: float = 0.0
-    angular: float = 0.0
-    distance: float = 0.0
-    heading: float = 0.0
-    travelled: float = 0.0  # m, either way
-    acceleration: float = 1.2
-    deceleration: float = 0.8  # on STOP
-    brake: float = 5.0
-    angular_ratio: float = 2.5  # angular limits by the linear ones
-
-    def follow(self, command: wire.Command, faults: Faults, step: float) -> None:
-        """Advance by a step."""
-        slower = abs(command.linear) + abs(command.angular) < abs(self.linear) + abs(self.angular)
-        if command.kind == "brake":
-            self._approach(0.0, 0.0, self.brake * step)
-        elif faults.keeps_rolling and (slower or command.kind == "stop"):
-            pass
-        elif command.kind == "run":
-            self._approach(command.linear, command.angular, self.acceleration * step)
-        elif faults.drift is not None:
-            self.linear, self.angular = faults.drift
-        else:
-            self._approach(0.0, 0.0, self.deceleration * step)
-        self.distance += self.linear * step
-        self.travelled += abs(self.linear) * step
-        self.heading += self.angular * step
-
-    def _approach(self, linear: float, angular: float, most: float) -> None:
-        self.linear += max(-most, min(most, linear - self.linear))
-        most *= self.angular_ratio
-        self.angular += max(-most, min(most, angular - self.angular))
+    noise: tuple[float, float] = (0.0, 0.0)  # m/s and rad/s, standard deviation of velocities
+    bounce: float = 0.0  # s that the bumper's switch chatters after each change
+    watchdog: float = 0.0  # s without a command until the board stops by itself; 0: never
+    ports: tuple[Port, Port] = GOOD
 
 
 @dataclass
@@ -80,10 +50,20 @@ class Board:
     host_ports: tuple[int, int]
     faults: Faults = field(default_factory=Faults)
     vehicle: Vehicle = field(default_factory=Vehicle)
+    ring: Ring = field(default_factory=Ring)
+    packing: Packing = field(default_factory=Packing)
+    command_unit: float = wire.DECIDEGREES_PER_RADIAN  # of the angular velocity, for one rad/s
 
     def __post_init__(self) -> None:
-        self.bumper = 0  # the byte that is reported
         self.sonars = [NO_ECHO_MM] * 8
+        self.wall: float | None = None  # where an obstacle ends the vehicle's way, by its distance
+        self.wall_echoes = True
+        self.contacts: list[float] = []  # times at which the vehicle touched it
+        self._changed = 0.0  # when that last began or ended
+        self._touching = False
+        self._to_host, self._to_board = Cable(), Cable()
+        self._echoes = list(self.sonars)  # of the last round
+        self.bumper = 0  # the byte that is reported
         self.commands: list[wire.Command] = []
         self.received: list[tuple[float, int, bytes]] = []  # time, id, payload
         self.reported: list[tuple[float, float]] = []  # velocities to report next, instead of true
@@ -110,7 +90,7 @@ class Board:
         self.faults.silent = True
         time.sleep(dark)
         self._command = wire.Command(0.0, "stop", 0.0, 0.0)
-        self.vehicle = Vehicle()
+        self.vehicle = Vehicle(motors=self.vehicle.motors)
         self.brakes = dict.fromkeys(self.brakes, False)
         self.faults.silent = False
 
@@ -123,21 +103,44 @@ class Board:
         return sum(at >= since and name == command for at, name, _ in list(self.received))
 
     def _run(self) -> None:
-        due = step_at = time.monotonic()
+        due = echo_due = step_at = time.monotonic()
         while not self._ended.is_set():
             now = time.monotonic()
             if now >= due:
                 due = max(due + VELOCITY_S, now)
                 self._report_velocity()
+                self._deliver()
+            if now >= echo_due:
+                echo_due = max(echo_due + ECHO_S, now)
+                self._echoes = self.ring.report(self._ranges())
             readable, _, _ = select.select([self._socket], [], [], STEP_S)
             self._receive() if readable else None
             now = time.monotonic()
+            self._watch(now)
             self.vehicle.follow(self._command, self.faults, now - step_at)
+            self._touch(now)
+            self._deliver()
             step_at = now
+
+    def _watch(self, now: float) -> None:
+        if 0 < self.faults.watchdog < now - self._command.at:
+            self._command = wire.Command(now, "stop", 0.0, 0.0)
+
+    def _touch(self, now: float) -> None:
+        """End the vehicle's way at the obstacle, and press the bumper there."""
+        if self.wall is not None and self.vehicle.distance > self.wall:
+            self.vehicle.collide(self.wall)
+        touching = self.wall is not None and self.vehicle.distance > self.wall - TOUCH
+        if touching != self._touching:
+            self._touching, self._changed = touching, now
+            self.contacts += [now] if touching else []
 
     def _report_velocity(self) -> None:
         off = self.faults.bias
-        true = self.vehicle.linear + off[0], self.vehicle.angular + off[1]
+        noise = [random.gauss(0.0, deviation) for deviation in self.faults.noise]
+        true = (
+            self.vehicle.linear + off[0] + noise[0], self.vehicle.angular + off[1] + noise[1]
+        )  # fmt: skip
         if self.faults.dither:
             true = random.uniform(-0.03, 0.03), random.uniform(-0.03, 0.03)
         velocity = self.reported.pop(0) if self.reported else true
@@ -147,17 +150,29 @@ class Board:
     def _receive(self) -> None:
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             while True:
-                datagram, _ = self._socket.recvfrom(2048)
+                datagram, (_, port) = self._socket.recvfrom(2048)
                 if self.faults.silent:
                     continue
-                now = time.monotonic()
-                for command, payload in wire.frames(datagram):
-                    self.received.append((now, command, payload))
-                    self._execute(command, payload, now)
+                index = self.host_ports.index(port) if port in self.host_ports else 0
+                self._to_board.put(datagram, index, self.faults.ports[index], time.monotonic())
+                self._deliver()
+
+    def _deliver(self) -> None:
+        """Pass on what has arrived by now at either end."""
+        now = time.monotonic()
+        for datagram, _ in self._to_board.take(now):
+            for command, payload in wire.frames(datagram):
+                self.received.append((now, command, payload))
+                self._execute(command, payload, now)
+        for datagram, index in self.packing.collected(now):
+            self._to_host.put(datagram, index, self.faults.ports[index], now)
+        for datagram, index in self._to_host.take(time.monotonic()):
+            with contextlib.suppress(OSError):
+                self._socket.sendto(datagram, ("127.0.0.1", self.host_ports[index]))
 
     def _execute(self, command: int, payload: bytes, now: float) -> None:
         if command == wire.MOTION:
-            self._command = wire.motion(payload, now)
+            self._command = wire.motion(payload, now, self.command_unit)
             self.commands.append(self._command)
             return
         if command in self.brakes:
@@ -184,14 +199,23 @@ class Board:
             distance, heading = self.vehicle.distance, self.vehicle.heading
             return wire.distance(distance + step * 0.001, heading + step * 0.00175)[8:]
         if command == wire.SONAR:
-            return struct.pack("<8H", *self.sonars)
+            return struct.pack("<8H", *self._echoes)
         if command == wire.BUMPER:
-            return bytes([self.bumper if index in self.faults.hit_ports else 0])
+            return bytes([self._bumper() if index in self.faults.hit_ports else 0])
         if command == wire.DRIVER:
             return payload + bytes(4)
         return bytes([0x55]) if command == wire.LED else payload
 
-    def _send(self, datagram: bytes, index: int) -> None:
+    def _ranges(self) -> list[int]:
+        if self.wall is None or not self.wall_echoes:
+            return self.sonars
+        return before(self.sonars, self.wall - self.vehicle.distance)
+
+    def _bumper(self) -> int:
+        chatters = time.monotonic() < self._changed + self.faults.bounce
+        return self.bumper or (random.randint(0, 1) if chatters else int(self._touching))
+
+    def _send(self, frame: bytes, index: int) -> None:
         if not self.faults.silent:
-            with contextlib.suppress(OSError):
-                self._socket.sendto(datagram, ("127.0.0.1", self.host_ports[index]))
+            for datagram in self.packing.pack(frame, index):
+                self._to_host.put(datagram, index, self.faults.ports[index], time.monotonic())

@@ -13,6 +13,7 @@ from verification.outside import wire
 from verification.outside.board import Board, Faults
 from verification.outside.clients import LINK, STATE, Observer, Operator, Source, session
 from verification.outside.stack import Stack, free_port, wait_for
+from verification.outside.vehicle import Motors
 
 UP_S = 20.0
 
@@ -103,6 +104,18 @@ class Testbed:
         return [c for c in moving if not sign or c.linear * sign > 0]
 
 
+Prepare = Callable[[Board], object]  # of a board, before it starts
+
+
+def fitted(motors: Motors, brake: float = 5.0) -> Prepare:
+    """Return the preparation of a vehicle with these motors; brake: m/s^2, of BRAKE."""
+
+    def prepare(board: Board) -> None:
+        board.vehicle.motors, board.vehicle.brake = motors, brake
+
+    return prepare
+
+
 @dataclass(frozen=True)
 class Scenario:
     """A situation, and what is expected of every tree in it."""
@@ -114,6 +127,7 @@ class Scenario:
     sets: Sequence[str] = ()
     sets_if_known: Sequence[str] = ()  # all of them where the tree's config knows the first
     faults: Callable[[], Faults] = Faults
+    prepare: Prepare = lambda board: None
     armed: bool = True  # whether the bridge has to arm before it begins
     supervised: bool = False  # whether `t2 up` starts the services
 
@@ -130,13 +144,14 @@ def scenario(
     sets: Sequence[str] = (),
     sets_if_known: Sequence[str] = (),
     faults: Callable[[], Faults] = Faults,
+    prepare: Prepare = lambda board: None,
     armed: bool = True,
     supervised: bool = False,
 ) -> Callable[[Run], Run]:
     """Add a scenario to the list."""
 
     def add(run: Run) -> Run:
-        given = sets, sets_if_known, faults, armed, supervised
+        given = sets, sets_if_known, faults, prepare, armed, supervised
         SCENARIOS.append(Scenario(line, name, expected, run, *given))
         return run
 
@@ -161,6 +176,7 @@ def testbed(tree: Path, scenario: Scenario) -> Iterator[Testbed]:
         *(scenario.sets_if_known if knows(tree, scenario.sets_if_known) else ()),
     ]
     board = Board(port, (first, second), scenario.faults())
+    scenario.prepare(board)
     stack = Stack(tree, sets)
     with contextlib.ExitStack() as ends:
         ends.callback(stack.close)

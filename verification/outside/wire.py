@@ -71,10 +71,10 @@ def magnitude(value: float) -> int:
     return size | 0x8000 if value < 0 and size else size
 
 
-def motion(payload: bytes, at: float) -> Command:
-    """Return what a motion frame commands."""
+def motion(payload: bytes, at: float, unit: float = DECIDEGREES_PER_RADIAN) -> Command:
+    """Return what a motion frame commands; the unit is that of the angular velocity."""
     kind, linear, angular = struct.unpack("<BHH", payload)
-    return Command(at, KINDS[kind], signed(linear) / 1000, signed(angular) / DECIDEGREES_PER_RADIAN)
+    return Command(at, KINDS[kind], signed(linear) / 1000, signed(angular) / unit)
 
 
 def velocity(linear: float, angular: float) -> bytes:

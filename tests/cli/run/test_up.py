@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from cli.run.up import commands, selected
+from cli.run.up import commands, run, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
@@ -122,6 +122,22 @@ def test_settings_sources_are_passed_to_all_processes() -> None:
         assert command[-len(passed) :] == passed, name
     assert " ".join(made["sim"][1:6]) == "-P -m sim --world x"
     assert " ".join(made["router"][1:5]) == "-P -m cli router"
+
+
+def test_profiles_are_those_of_the_simulated_vehicle_alone() -> None:
+    made = dict(commands(options(profile=["slope", "one-port"])))
+    assert " ".join(made["sim"][1:8]) == "-P -m sim --profile slope --profile one-port"
+    assert not [name for name, command in made.items() if name != "sim" and "slope" in command]
+
+
+def test_an_unknown_profile_starts_nothing() -> None:
+    with pytest.raises(ConfigError, match="known profiles are"):
+        run(options(profile=["moon"]))
+
+
+def test_a_real_vehicle_has_no_profile() -> None:
+    with pytest.raises(ConfigError, match="leave --no-sim or --profile out"):
+        run(options(profile=["slope"], no_sim=True))
 
 
 def test_only_one_process() -> None:

@@ -8,6 +8,9 @@ from verification.outside.scenarios import (
     restarts,
     sonar,
     standstill,
+    unkind_link,
+    unkind_motors,
+    unkind_sensors,
 )
 from verification.outside.testbed import SCENARIOS
 
@@ -20,4 +23,7 @@ __all__ = [
     "restarts",
     "sonar",
     "standstill",
+    "unkind_link",
+    "unkind_motors",
+    "unkind_sensors",
 ]
