@@ -5,8 +5,11 @@ around its pose, length along the heading.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
+
+EDGE = 1e-9  # m, rounding at the side of a cone
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,3 +116,23 @@ def ray(x: float, y: float, angle: float, segment: Segment) -> float:
     rx, ry = segment.ax - x, segment.ay - y
     along, where = (rx * dy - ry * dx) / cross, (rx * sin - ry * cos) / cross
     return along if along >= 0 and 0 <= where <= 1 else math.inf
+
+
+def in_cone(
+    x: float, y: float, middle: float, half: float, segments: Iterable[Segment]
+) -> list[Segment]:
+    """Return the segments that a cone from x, y may touch, a superset; ``half`` < pi / 2, rad.
+
+    A cheap filter before ``ray``: the others lie beyond one of its two sides.
+    """
+    right_x, right_y = math.cos(middle - half), math.sin(middle - half)
+    left_x, left_y = math.cos(middle + half), math.sin(middle + half)
+    kept = []
+    for s in segments:
+        ax, ay, bx, by = s.ax - x, s.ay - y, s.bx - x, s.by - y
+        if right_x * ay - right_y * ax < -EDGE and right_x * by - right_y * bx < -EDGE:
+            continue
+        if left_x * ay - left_y * ax > EDGE and left_x * by - left_y * bx > EDGE:
+            continue
+        kept.append(s)
+    return kept

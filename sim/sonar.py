@@ -12,7 +12,7 @@ from common.settings import Mount, Vehicle, sonar_mounts
 from common.wire.reports import SONAR_FAULT_MM
 from sim.config import Sonar as Settings
 from sim.echoes import Echoes
-from sim.geometry import Pose, ray
+from sim.geometry import Pose, in_cone, ray
 from sim.requests import Sonar
 from sim.world import World
 
@@ -31,6 +31,7 @@ class Sonars:
         self._farthest = min(vehicle.sonar_max, settings.saturation)
         self._quantum_mm = round(settings.quantum * 1000)
         self._fan = tuple(settings.cone * (k / (RAYS - 1) - 0.5) for k in range(RAYS))
+        self._half = settings.cone / 2
         self._noise = settings.noise
         self._random = random.Random(seed)
         self._echoes = Echoes(settings, seed)
@@ -64,8 +65,9 @@ class Sonars:
     def _distance(self, mount: Mount, world: World, pose: Pose) -> float:
         x, y = pose.outward(mount.x, mount.y)
         middle = pose.heading + mount.yaw
+        seen = in_cone(x, y, middle, self._half, world.visible)
         return min(
-            (ray(x, y, middle + aside, s) for aside in self._fan for s in world.visible),
+            (ray(x, y, middle + aside, s) for aside in self._fan for s in seen),
             default=self._farthest,
         )
 
