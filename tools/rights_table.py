@@ -13,6 +13,7 @@ MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 ROLES: Mapping[str, Rights] = {
     "viewer": access.viewer(),
     "driver of 001": access.driver((MINE,), OPERATORS_SOURCES),
+    "device lidar of 001": access.device((MINE,), ("lidar",)),
     "fleet": access.fleet(),
     "site's router": access.site(),
     "router of 001": access.robot(MINE),
@@ -27,6 +28,9 @@ CLASSES: Mapping[str, str] = {
     "requests to move": keys.DRIVE.on(MINE, source="teleop"),
     "requests to move as a source that is not hers": keys.DRIVE.on(MINE, source="nav"),
     "requests to move another robot": keys.DRIVE.on(OTHER, source="teleop"),
+    "speed limits": keys.LIMIT.on(MINE, source="lidar"),
+    "speed limits as a source that is not hers": keys.LIMIT.on(MINE, source="person"),
+    "speed limits of another robot": keys.LIMIT.on(OTHER, source="lidar"),
     "what safety lets through": keys.MOTION.on(MINE),
     "emergency stop": keys.estop_key(MINE),
     "emergency stop of another robot": keys.estop_key(OTHER),

@@ -34,6 +34,8 @@ SONAR_NEAR = "remove the object that covers it"
 DRIVER = "switch the vehicle off and on; check what the fault names; then reset"
 SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
 ONE_DRIVER = "stop one of the two programs; `t2 services` lists them"
+LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
+LIMIT_SILENT = "start its program, check its network and certificate; see safety.limits"
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
 
 # By the names of the causes in safety's state.
@@ -56,16 +58,19 @@ CAUSES = {
     "bumper_lossy": "check the cable and the board's load: t2 echo tel/bridge/bumper",
     "silent": SILENT,
     "unarmed": "see the link above: the bridge reports what it waits for",
+    "limit_stop": f"clear the area; then release the controls and drive; {LIMIT}",
+    "limit_silent": LIMIT_SILENT,
     "two_publishers": ONE_DRIVER,
     "neutral": "release the controls, then drive",
     "blocked": "drive another way, or remove the obstacle",
     "no_request": "",
     "release": "",
+    "limit": LIMIT,
     "obstacle": "drive another way, or remove the obstacle",
     "sonar": SONAR_FAULT,
 }
 # Causes of normal operation, with or without a driver.
-NORMAL = ("no_request", "release", "neutral", "obstacle", "blocked")
+NORMAL = ("no_request", "release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
 
 FAULTS = {
     "over_current": "over-current: a wheel is blocked",

@@ -96,6 +96,8 @@ def rights(member: Member) -> Rights:
         return site()
     if member.role == "driver":
         return driver(member.robots, member.sources or (ANY,))
+    if member.role == "device":
+        return device(member.robots, member.sources)
     return fleet() if member.role == "fleet" else viewer()
 
 
@@ -123,6 +125,14 @@ def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
     }
 
 
+def device(robots: Iterable[str], sources: Sequence[str]) -> Rights:
+    """Return the rights to see everything, and to stop and limit the given robots."""
+    own_robots, viewing = tuple(robots), viewer()
+    limits = (keys.LIMIT.on(each, source=source) for each in own_robots for source in sources)
+    stops = (keys.estop_key(each) for each in own_robots)
+    return {**viewing, "write": (*viewing["write"], *limits, *stops)}
+
+
 def fleet() -> Rights:
     """Return the rights to see everything, and to stop any robot."""
     viewing = viewer()
@@ -136,7 +146,7 @@ def site() -> Rights:
         "know": EVERYTHING,
         "recall": RECALLED,
         "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
-        "write": actuation_keys(ANY),
+        "write": (*actuation_keys(ANY), keys.LIMIT.on(ANY, source=ANY)),
     }
 
 

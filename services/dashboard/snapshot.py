@@ -11,7 +11,7 @@ from msgspec import Struct, convert
 
 from common import keys
 from common.codec import finite
-from common.messages import Cause, Driver, Limits, Link, Release, Switches
+from common.messages import Cause, Driver, Limits, LimitState, Link, Release, Switches
 from common.settings import Vehicle
 from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
@@ -28,6 +28,7 @@ class State(Struct, frozen=True):
     causes: tuple[Cause, ...]
     limits: Limits
     release: Release | None
+    limit_sources: tuple[LimitState, ...]
 
 
 class DriverState(Struct, frozen=True):

@@ -1,11 +1,12 @@
 """Settings of the safety service; unsafe values need an explicit override."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from common import settings
+from common.members import SourceName
 
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
@@ -46,6 +47,7 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
 # ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
 MAX_LEASE_S = 0.5  # a longer ``sources.NAME.lease`` needs an override
+MAX_LIMIT_LEASE_S = 1.0  # a longer ``limits.NAME.lease`` likewise
 
 
 class Source(settings.Section, frozen=True, kw_only=True):
@@ -54,6 +56,16 @@ class Source(settings.Section, frozen=True, kw_only=True):
     priority: Annotated[int, Meta(ge=0, le=1000)]
     lease: Seconds  # s that a request holds
     operator: bool = False  # a person holds it, and may creep past a faulty sonar
+
+
+Silence = Literal["ignore", "stop"]
+
+
+class LimitSource(settings.Section, frozen=True, kw_only=True):
+    """A source of speed limits; every field is required, because no default fits all."""
+
+    lease: Seconds  # s that a limit holds
+    silence: Silence  # what the end of the lease does, and a start without any limit
 
 
 def _sources() -> dict[str, Source]:
@@ -71,6 +83,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
     sources: dict[str, Source] = msgspec.field(default_factory=_sources)
+    limits: dict[SourceName, LimitSource] = msgspec.field(default_factory=dict)
 
     max_linear: Positive = 1.0  # m/s
     max_angular: Positive = 1.0  # rad/s
@@ -121,6 +134,9 @@ class Safety(settings.Section, frozen=True, kw_only=True):
             allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
             given[f"sources.{name}.operator"] = source.operator
             allowed[f"sources.{name}.operator"] = (False, name in HELD)
+        for name, limits in self.limits.items():
+            given[f"limits.{name}.lease"] = limits.lease
+            allowed[f"limits.{name}.lease"] = (0.0, MAX_LIMIT_LEASE_S)
         settings.check_protections(given, allowed, self.unsafe_overrides)
         priorities = [source.priority for source in self.sources.values()]
         if len(set(priorities)) < len(priorities):

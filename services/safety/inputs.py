@@ -9,6 +9,7 @@ from common.messages import (
     Direction,
     Drive,
     Driver,
+    Limit,
     Link,
     Mileage,
     SafetyState,
@@ -27,6 +28,14 @@ class DriveRequest(Struct, frozen=True):
     drive: Drive | None
     received_ns: int = 0
     shares_clock: bool = False  # whether its timestamp is of this host's clock
+
+
+class LimitRequest(Struct, frozen=True):
+    """A speed limit of a source; ``limit`` is None for an invalid payload."""
+
+    source: str
+    limit: Limit | None
+    received_ns: int = 0
 
 
 class Estop(Struct, frozen=True):
@@ -48,7 +57,7 @@ class Hold(Struct, frozen=True):
     echo: int | None = None
 
 
-Event = DriveRequest | Estop | Reset | Hold
+Event = DriveRequest | LimitRequest | Estop | Reset | Hold
 
 
 class Inputs(Struct, frozen=True):

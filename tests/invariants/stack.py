@@ -20,8 +20,9 @@ from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
-from services.safety.config import SafetyConfig
+from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from tests.invariants.limits import IGNORED, LEASE_S, NEEDED, Limiter
 from tests.invariants.net import MS, Envelope, Net
 from tests.invariants.oracle import STEP_NS, Oracle
 from tests.invariants.process import ROBOT, Process
@@ -74,6 +75,12 @@ class Sockets:
         return True
 
 
+LIMITS = {
+    NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
+    IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
+}
+
+
 class Stick:
     """A source that publishes drive requests while ``requested`` is set."""
 
@@ -119,6 +126,10 @@ class Stack:
         self.sticks = {
             name: Stick(name, self._process("stick", None)) for name in ("teleop", "nav")
         }
+        self.limiters = {
+            name: Limiter(name, self._process("limiter", None)) for name in (NEEDED, IGNORED)
+        }
+        self.limiters[NEEDED].caps = (None, None)
         self.hand = self._process("hand", None)
         self.seen: m.SafetyState | None = None  # the newest state that operators see
         self.hand.subscribe(keys.SAFETY, self._look)
@@ -146,6 +157,8 @@ class Stack:
         if self.net.now_ns % ASK_NS == 0:
             for stick in self.sticks.values():
                 stick.request()
+            for limiter in self.limiters.values():
+                limiter.publish()
             self.net.turn()
         self.oracle.on_step(self.vehicle.silent)
 
@@ -163,7 +176,7 @@ class Stack:
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
-        config = SafetyConfig() if name == "safety" else BridgeConfig()
+        config = SafetyConfig(safety=Safety(limits=LIMITS)) if name == "safety" else BridgeConfig()
         process = self._process(name, config)
         self.oracle.on_start(process)
         with self.time():

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
-from services.safety.arbiter import Channel
+from services.safety.arbiter import DriveChannel
 from services.safety.latches import FaultBudget
 from services.safety.runaway import Axis
 from services.safety.standstill import Phase, Standstill
@@ -137,7 +137,10 @@ def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: 
     """Give the fixture a memory, all samples good and new, and one request or none."""
     channels = {}
     if requested is not None:
-        channels["teleop"] = Channel(99, fixture.driver_seq, requested, fixture.now_ns, None, armed)
+        channels["teleop"] = DriveChannel(
+            boot=99, seq=fixture.driver_seq, received_ns=fixture.now_ns, requested=requested,
+            neutral=armed,
+        )  # fmt: skip
     arbiter = replace(state.arbiter, channels=channels)
     fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)
     fixture.estop_session_up = True

@@ -12,6 +12,7 @@ from common.messages import (
     Direction,
     Drive,
     Driver,
+    Limit,
     Link,
     Message,
     Mileage,
@@ -23,7 +24,7 @@ from common.messages import (
 )
 from common.settings import Vehicle
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, LimitRequest, Reset
 from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.report import state_message
@@ -67,6 +68,7 @@ class PolicyFixture:
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
+        self.limit_boot, self.limit_seq = 55, 0
         self.pressed, self.lost = False, 0
         self.ranges, self.status = FREE, NO_ECHO
         self.linear: float | None = None  # measured; None follows the command
@@ -133,6 +135,21 @@ class PolicyFixture:
             boot=self.driver_boot,
         )
         return self.decide(DriveRequest(source, drive, self.now_ns))
+
+    def limit(
+        self,
+        linear: float | None = None,
+        angular: float | None = None,
+        reason: str = "",
+        source: str = "lidar",
+    ) -> Verdict:
+        """Put one speed limit."""
+        self.limit_seq += 1
+        limit = Limit(
+            linear=linear, angular=angular, reason=reason,
+            echo=self.echo, seq=self.limit_seq, boot=self.limit_boot,
+        )  # fmt: skip
+        return self.decide(LimitRequest(source, limit, self.now_ns))
 
     def drive(
         self,

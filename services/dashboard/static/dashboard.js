@@ -156,8 +156,7 @@ function showState() {
 function sentence(safety, worst) {
   if (language === "en") return safety.text;
   if (!worst) return t("text.run");
-  const key = `cause.${worst.name}`;
-  return (t(key) === key ? worst.text : t(key)) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
+  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
 }
 
 function showHead() {
