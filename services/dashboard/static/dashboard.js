@@ -156,7 +156,7 @@ function showState() {
 function sentence(safety, worst) {
   if (language === "en") return safety.text;
   if (!worst) return t("text.run");
-  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
+  return panels.causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
 }
 
 function showHead() {
