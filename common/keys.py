@@ -126,6 +126,14 @@ LIMIT = Topic(
     "a lidar, a fleet manager, ...",
     "a speed limit or a protective stop",
 )
+ESTOP_KEEPALIVE = Topic(
+    "@cmd/estop_keepalive/{source}",
+    m.EstopKeepalive,
+    10,
+    COMMAND,
+    "a pendant, a dashboard, ...",
+    "a sign of life of an emergency stop",
+)
 MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
 # Any PUT or DELETE on it, with any payload or none, stops the robot and latches.
@@ -147,7 +155,7 @@ SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, MOTION,
+    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, ESTOP_KEEPALIVE, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
     SET_SWITCHES, SET_LED, RESET, RELEASE, SET_POSE,

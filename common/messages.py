@@ -13,6 +13,7 @@ from common.motion import Command
 from common.verdict import Action as Action
 from common.verdict import Cause as Cause
 from common.verdict import Direction as Direction
+from common.verdict import KeepaliveState as KeepaliveState
 from common.verdict import Limits as Limits
 from common.verdict import LimitState as LimitState
 from common.verdict import Release as Release
@@ -144,6 +145,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     text: str  # one sentence: why the vehicle may or may not move
     release: Release | None = None  # None while there is no contact
     limit_sources: tuple[LimitState, ...] = ()  # those in the settings
+    estop_keepalives: tuple[KeepaliveState, ...] = ()  # likewise
 
 
 # --- @cmd -----------------------------------------------------------------------------------
@@ -168,6 +170,10 @@ class Limit(SourceMessage, frozen=True, kw_only=True):
     linear: Cap | None = None  # m/s, either way; None: no cap
     angular: Cap | None = None  # rad/s, likewise
     reason: Reason = ""  # for the operator, such as "person at 2 m"
+
+
+class EstopKeepalive(SourceMessage, frozen=True, kw_only=True):
+    """A sign of life of an emergency stop; without it safety brakes and latches."""
 
 
 class Motion(Message, frozen=True, kw_only=True):

@@ -8,7 +8,15 @@ from msgspec.structs import replace
 from common import codec, keys
 from common.bus.bus import Arrival, Bus
 from common.keys import Topic
-from common.messages import MAX_REASON, Direction, Drive, Limit, SafetyState, SourceMessage
+from common.messages import (
+    MAX_REASON,
+    Direction,
+    Drive,
+    EstopKeepalive,
+    Limit,
+    SafetyState,
+    SourceMessage,
+)
 from common.operator import ReleaseCalls
 
 M = TypeVar("M", bound=SourceMessage)
@@ -41,10 +49,10 @@ class Source(Generic[M]):
         """Whether safety's state arrives but our messages do not: watching only."""
         return self._echo != 0 and self._dropped >= DENIED_AFTER
 
-    def _put(self, message: M) -> M:
+    def _put(self, message: M, echo: int | None = None) -> M:
         was_denied = self.denied
         self._dropped = self._dropped + 1 if self._publisher.passed_on is False else 0
-        sent = self._publisher.put(replace(message, echo=self._echo))
+        sent = self._publisher.put(replace(message, echo=self._echo if echo is None else echo))
         if self.denied and not was_denied:
             self._on_denied()
         return sent
@@ -84,6 +92,17 @@ class LimitPublisher(Source[Limit]):
                 raise ValueError(f"a cap must be finite and not negative, not {cap}")
         reason = reason[:MAX_REASON]
         return self._put(Limit(linear=linear, angular=angular, reason=reason, echo=0))
+
+
+class KeepalivePublisher(Source[EstopKeepalive]):
+    """A source of signs of life of an emergency stop."""
+
+    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
+        super().__init__(bus, keys.ESTOP_KEEPALIVE, source, on_denied)
+
+    def beat(self, echo: int | None = None) -> EstopKeepalive:
+        """Send one, with the heartbeat that an operator's screen showed; the newest by default."""
+        return self._put(EstopKeepalive(echo=0), echo)
 
 
 def call_release(

@@ -1,4 +1,4 @@
-"""Parts of safety's state: causes, limits, release, and the sources of limits."""
+"""Parts of safety's state: causes, limits, release, and its sources."""
 
 from typing import Literal
 
@@ -47,3 +47,12 @@ class LimitState(Struct, frozen=True, kw_only=True):
     age: float | None  # s since its last limit; None: none was received
     silent: bool  # whether its lease is over, or it was never received
     effect: LimitEffect  # on the vehicle now
+
+
+class KeepaliveState(Struct, frozen=True, kw_only=True):
+    """State of an emergency stop that must be kept alive, see ``EstopKeepalive``."""
+
+    source: str
+    age: float | None  # s since safety sent the newest heartbeat that it echoed; None: not received
+    alive: bool
+    timeout: float  # s; older, and safety brakes and latches

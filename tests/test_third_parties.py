@@ -1,4 +1,4 @@
-"""Third parties as processes: the silence of a killed limit source stops the vehicle."""
+"""Third parties as processes: a killed limit source stops the vehicle, a killed pendant latches."""
 
 from pathlib import Path
 
@@ -24,4 +24,23 @@ def test_a_limit_source_that_is_killed_stops_the_vehicle(tmp_path: Path) -> None
         fixture.running.start("limiter")
         wait_until(lambda: "neutral" in causes(fixture), "a neutral request that is due")
         assert not fixture.moving()
+        assert fixture.rearm(10.0)
+
+
+def test_a_pendant_that_is_killed_latches(tmp_path: Path) -> None:
+    with stack_fixture(tmp_path, shipped=False, need="third parties") as fixture:
+        fixture.ready()
+        fixture.running.kill("pendant")
+        wait_until(lambda: not fixture.moving(), "BRAKE")
+        wait_until(lambda: "estop_keepalive" in causes(fixture), "the cause")
+        fixture.request(0.0)
+        fixture.reset()
+        assert fixture.latched()  # the pendant is still gone
+        fixture.running.start("pendant")
+
+        def is_reset() -> bool:
+            fixture.reset()
+            return not fixture.latched()
+
+        wait_until(is_reset, "a reset")
         assert fixture.rearm(10.0)

@@ -31,6 +31,8 @@ CLASSES: Mapping[str, str] = {
     "speed limits": keys.LIMIT.on(MINE, source="lidar"),
     "speed limits as a source that is not hers": keys.LIMIT.on(MINE, source="person"),
     "speed limits of another robot": keys.LIMIT.on(OTHER, source="lidar"),
+    "signs of life of an emergency stop": keys.ESTOP_KEEPALIVE.on(MINE, source="teleop"),
+    "signs of life of a device's emergency stop": keys.ESTOP_KEEPALIVE.on(MINE, source="lidar"),
     "what safety lets through": keys.MOTION.on(MINE),
     "emergency stop": keys.estop_key(MINE),
     "emergency stop of another robot": keys.estop_key(OTHER),

@@ -43,6 +43,7 @@ CAUSES = {
     "contact": BUMPER,
     "estop": RESET,
     "estop_reader": f"safety had lost the router; {RESET}",
+    "estop_keepalive": f"start its pendant, page or `t2 estop --keepalive NAME`; {RESET}",
     "predecessor": RESET,
     "runaway": f"check the wheels and the ground; {RESET}",
     "uncommanded_motion": f"check for a push or a slope; {RESET}",

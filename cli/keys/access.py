@@ -126,11 +126,16 @@ def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
 
 
 def device(robots: Iterable[str], sources: Sequence[str]) -> Rights:
-    """Return the rights to see everything, and to stop and limit the given robots."""
+    """Return the rights to see everything, to stop and limit, and to keep a stop alive."""
     own_robots, viewing = tuple(robots), viewer()
-    limits = (keys.LIMIT.on(each, source=source) for each in own_robots for source in sources)
+    given = (
+        topic.on(each, source=source)
+        for topic in (keys.LIMIT, keys.ESTOP_KEEPALIVE)
+        for each in own_robots
+        for source in sources
+    )
     stops = (keys.estop_key(each) for each in own_robots)
-    return {**viewing, "write": (*viewing["write"], *limits, *stops)}
+    return {**viewing, "write": (*viewing["write"], *given, *stops)}
 
 
 def fleet() -> Rights:
@@ -166,7 +171,11 @@ def robot(name: str) -> Rights:
 
 def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
     """Return the keys that move and stop a robot, without those reserved for safety."""
-    driven = (keys.DRIVE.on(robot, source=source) for source in sources)
+    driven = (
+        topic.on(robot, source=source)
+        for topic in (keys.DRIVE, keys.ESTOP_KEEPALIVE)
+        for source in sources
+    )
     return (*driven, keys.estop_key(robot))
 
 

@@ -57,6 +57,7 @@ class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     link: str | None
     safety: State | None
     driver: DriverState
+    keeper: str | None  # the viewer whose page keeps the emergency stop alive
 
 
 class Service(Struct, frozen=True):
@@ -103,6 +104,7 @@ def fast_snapshot(
     connected: bool,
     vehicle: Vehicle,
     protection: Protection,
+    keeper: str | None = None,
 ) -> FastSnapshot:
     """Return the fast snapshot at this time."""
     velocity = telemetry.newest(keys.VELOCITY, now_ns)
@@ -134,6 +136,7 @@ def fast_snapshot(
         link=link.state if link else None,
         safety=state,
         driver=_driver(driver_lock, names),
+        keeper=keeper,
     )
 
 

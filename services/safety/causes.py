@@ -49,6 +49,9 @@ RULES = (
     Rule("contact", "brake", Clears.RESET, "The bumper was hit."),
     Rule("estop", "brake", Clears.RESET, "Emergency stop."),
     Rule("estop_reader", "brake", Clears.RESET, "The emergency stop cannot be received."),
+    Rule(
+        "estop_keepalive", "brake", Clears.RESET, "The emergency stop is no longer kept alive.",
+    ),
     Rule("predecessor", "brake", Clears.RESET, "Safety restarted while a reset was due."),
     Rule("runaway", "brake", Clears.RESET, "The vehicle did not move as commanded."),
     Rule(

@@ -85,3 +85,7 @@ class Admission(Struct, frozen=True):
             return "not_finite"
         late = self.heartbeat.is_late(message.echo, self.now_ns, self.max_age_ns)
         return "late" if late else ""
+
+    def sent_ns(self, message: SourceMessage) -> int:
+        """Return when safety sent the heartbeat that an admitted message echoes."""
+        return self.now_ns - (self.heartbeat.age_ns(message.echo, self.now_ns) or 0)

@@ -41,6 +41,7 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "hysteresis": (0.02, 10.0),
     "stuck_travel": (0.0, 1.0),
     "creep_speed": (0.0, 0.25),
+    "estop_keepalive_timeout": (0.0, 2.0),
     "require_switches": (True, True),
 }
 # Programs that stop requesting when the operator releases the controls. For any other source,
@@ -83,6 +84,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
     sources: dict[str, Source] = msgspec.field(default_factory=_sources)
+    estop_keepalive: tuple[SourceName, ...] = ()  # names that must be received
+    estop_keepalive_timeout: Seconds = 1.0
     limits: dict[SourceName, LimitSource] = msgspec.field(default_factory=dict)
 
     max_linear: Positive = 1.0  # m/s
@@ -138,6 +141,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
             given[f"limits.{name}.lease"] = limits.lease
             allowed[f"limits.{name}.lease"] = (0.0, MAX_LIMIT_LEASE_S)
         settings.check_protections(given, allowed, self.unsafe_overrides)
+        if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
+            raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
         priorities = [source.priority for source in self.sources.values()]
         if len(set(priorities)) < len(priorities):
             raise ValueError(f"sources must have different priorities, not {sorted(priorities)}")

@@ -9,6 +9,7 @@ from common.messages import (
     Direction,
     Drive,
     Driver,
+    EstopKeepalive,
     Limit,
     Link,
     Mileage,
@@ -38,6 +39,14 @@ class LimitRequest(Struct, frozen=True):
     received_ns: int = 0
 
 
+class KeepaliveRequest(Struct, frozen=True):
+    """A sign of life of an emergency stop; ``message`` is None for an invalid payload."""
+
+    source: str
+    message: EstopKeepalive | None
+    received_ns: int = 0
+
+
 class Estop(Struct, frozen=True):
     """A PUT or DELETE on the estop key."""
 
@@ -57,7 +66,8 @@ class Hold(Struct, frozen=True):
     echo: int | None = None
 
 
-Event = DriveRequest | LimitRequest | Estop | Reset | Hold
+SourceEvent = DriveRequest | LimitRequest | KeepaliveRequest
+Event = SourceEvent | Estop | Reset | Hold
 
 
 class Inputs(Struct, frozen=True):

@@ -3,7 +3,8 @@
 Each decision takes these steps, always in this order, so that a trip wins over an event that
 arrives with it:
 
-1. accept    accept or refuse a drive request (``arbiter.py``) or a limit (``limits.py``)
+1. accept    accept or refuse a message of a source (``arbiter.py``, ``limits.py``,
+             ``keepalive.py``)
 2. sense     update sonars, runaway, standstill, trajectory and the travel of a release
 3. observe   observe every cause that does not depend on a request (``conditions.py``)
 4. handle    carry out a reset or a held release (``operator_requests.py``)
@@ -29,7 +30,14 @@ from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_n
 from services.safety.channel import Admission
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest, Inputs, LimitRequest
+from services.safety.inputs import (
+    DriveRequest,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+    SourceEvent,
+)
+from services.safety.keepalive import Keepalives
 from services.safety.latches import Latches, Observation, latched, observe, ordered
 from services.safety.limits import SpeedLimits
 from services.safety.motion import Plan, Planner, observations
@@ -73,7 +81,12 @@ class Policy:
 
     def start(self) -> State:
         """Return the state of a service that has just started."""
-        return State(Arbiter(self.settings.sources), SpeedLimits(self.settings.limits))
+        settings = self.settings
+        return State(
+            Arbiter(settings.sources),
+            SpeedLimits(settings.limits),
+            Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
+        )
 
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, Verdict]:
         """Return the new state and the verdict; the event in the inputs is handled once."""
@@ -89,16 +102,22 @@ class Policy:
         return replace(state, decided_ns=now_ns, verdict=verdict), verdict
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
-        event = inputs.event
-        if not isinstance(event, DriveRequest | LimitRequest):
+        event, settings = inputs.event, self.settings
+        if not isinstance(event, SourceEvent):
             return state, ""
-        max_age_ns = round(self.settings.max_echo_age * NS_PER_S)
-        admission = Admission(state.heartbeat, max_age_ns, now_ns)
-        if isinstance(event, DriveRequest):
-            arbiter, refused = state.arbiter.accept(event, admission)
-            return replace(state, arbiter=arbiter), refused
-        limits, refused = state.speed_limits.accept(event, admission)
-        return replace(state, speed_limits=limits), refused and f"limit_{refused}"
+        is_keepalive = isinstance(event, KeepaliveRequest)
+        max_age_s = settings.estop_keepalive_timeout if is_keepalive else settings.max_echo_age
+        admission = Admission(state.heartbeat, round(max_age_s * NS_PER_S), now_ns)
+        match event:
+            case DriveRequest():
+                arbiter, refused = state.arbiter.accept(event, admission)
+                return replace(state, arbiter=arbiter), refused
+            case LimitRequest():
+                limits, refused = state.speed_limits.accept(event, admission)
+                return replace(state, speed_limits=limits), refused and f"limit_{refused}"
+            case KeepaliveRequest():
+                keepalives, refused = state.keepalives.accept(event, admission)
+                return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         settings, sent = self.settings, state.verdict

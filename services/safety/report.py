@@ -86,6 +86,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         heartbeat=state.heartbeat.number,
         text=sentence(state),
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
+        estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
     )
 

@@ -20,6 +20,7 @@ from common.messages import (
     Bumper,
     Done,
     Drive,
+    EstopKeepalive,
     Limit,
     Message,
     ReleaseRequest,
@@ -29,7 +30,16 @@ from common.messages import (
 from common.service import Node
 from services.safety.conditions import LOST_SAMPLES
 from services.safety.config import SafetyConfig
-from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, LimitRequest, Reset
+from services.safety.inputs import (
+    DriveRequest,
+    Estop,
+    Event,
+    Hold,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+    Reset,
+)
 from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import motion_message, signature, state_message, transitions, with_times
 from services.safety.state import Reply
@@ -83,6 +93,16 @@ class SafetyService:
         )
         self._announce(keys.DRIVE, self._node.config.safety.sources)
         self._announce(keys.LIMIT, self._node.config.safety.limits)
+        keepalives = self._node.config.safety.estop_keepalive
+        bus.subscribe(
+            keys.ESTOP_KEEPALIVE,
+            self._on_keepalive,
+            depth=DRIVE_DEPTH,
+            refused=self._on_bad_keepalive,
+            known=keepalives,
+            source="*",
+        )
+        self._announce(keys.ESTOP_KEEPALIVE, keepalives)
         bus.serve(keys.RESET, self._on_reset)
         bus.serve(keys.RELEASE, self._on_release)
         self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
@@ -149,6 +169,13 @@ class SafetyService:
     def _on_bad_limit(self, key: str, _: MessageError) -> None:
         self._decide(LimitRequest(source_of(key), None))
 
+    def _on_keepalive(self, arrival: Arrival[EstopKeepalive]) -> None:
+        source = source_of(arrival.key)
+        self._decide(KeepaliveRequest(source, arrival.message, arrival.received_ns))
+
+    def _on_bad_keepalive(self, key: str, _: MessageError) -> None:
+        self._decide(KeepaliveRequest(source_of(key), None))
+
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         def answer(reply: Reply) -> None:
             if not reply.done:
@@ -214,5 +241,5 @@ def differs(bumper: Bumper, before: Bumper) -> bool:
 
 
 def source_of(key: str) -> str:
-    """Return the source in a key ``.../@cmd/drive/{source}`` or ``.../@cmd/limit/{source}``."""
+    """Return the source in a key such as ``.../@cmd/drive/{source}``."""
     return key.rsplit("/", 1)[-1]

@@ -6,6 +6,7 @@ from common.heartbeat import Heartbeat
 from common.messages import Verdict as VerdictName
 from common.motion import STILL, STOP, Command, Twist
 from services.safety.arbiter import Arbiter
+from services.safety.keepalive import Keepalives
 from services.safety.latches import FaultBudget, Latches, Token
 from services.safety.limits import SpeedLimits
 from services.safety.release import Release
@@ -43,6 +44,7 @@ class State(Struct, frozen=True):
 
     arbiter: Arbiter
     speed_limits: SpeedLimits
+    keepalives: Keepalives
     heartbeat: Heartbeat = Heartbeat()
     latches: Latches = {}
     sonar_array: SonarArray = SonarArray()

@@ -10,6 +10,7 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("contact", "brake", RESET),
     ("estop", "brake", RESET),
     ("estop_reader", "brake", RESET),
+    ("estop_keepalive", "brake", RESET),
     ("predecessor", "brake", RESET),
     ("runaway", "brake", RESET),
     ("uncommanded_motion", "brake", RESET),

@@ -53,5 +53,6 @@ VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
 ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
 REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
 LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
+KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
 # Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
 ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
