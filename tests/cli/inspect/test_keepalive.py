@@ -9,7 +9,7 @@ import pytest
 
 from cli.inspect.keepalive import described, refusal, timeout_s
 from common import keys
-from common.bus.bus import Arrival
+from common.bus.bus import Arrival, Bus
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
@@ -26,12 +26,11 @@ class Safety:
         self.received: list[Arrival[EstopKeepalive]] = []
         self.stops: list[int] = []
         pretend(buses, "safety", {keys.SAFETY: self.state})
-        buses.bus(
-            lambda bus: (
-                bus.subscribe(keys.ESTOP_KEEPALIVE, self.received.append, source="*"),
-                bus.on_any(keys.estop_key(bus.robot), self.stops.append),
-            )
-        )
+        buses.bus(self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        bus.subscribe(keys.ESTOP_KEEPALIVE, self.received.append, source="*")
+        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
 
     def state(self) -> SafetyState:
         latched = ("estop",) if self.stops else ()
