@@ -29,7 +29,8 @@ def observe_inputs(
     acked = state.verdict.acked if state.verdict.acked != (0, 0) else None
     yield _contact(inputs, tick)
     yield Observation("estop", isinstance(inputs.event, Estop), tick)
-    yield state.keepalives.observation(now_ns)
+    if state.keepalives.names:
+        yield state.keepalives.observation(now_ns)
     yield Observation(
         "estop_reader", state.estop_session_was_up and not inputs.estop_session_up, tick
     )

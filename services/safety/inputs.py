@@ -66,8 +66,7 @@ class Hold(Struct, frozen=True):
     echo: int | None = None
 
 
-SourceEvent = DriveRequest | LimitRequest | KeepaliveRequest
-Event = SourceEvent | Estop | Reset | Hold
+Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | Reset | Hold
 
 
 class Inputs(Struct, frozen=True):

@@ -79,7 +79,9 @@ class SpeedLimits(Struct, frozen=True):
         return twist, tightest
 
     def observations(self, now_ns: int) -> Iterator[Observation]:
-        """Yield the causes that forbid motion, present or not."""
+        """Yield the causes that forbid motion, present or not; none without sources."""
+        if not self.sources:
+            return
         tick = (0, now_ns)
         stopping = [f"{name}{_because(one)}" for name, one in self._valid(now_ns) if one.stops]
         silent = ", ".join(self._silent(now_ns))
@@ -97,6 +99,8 @@ class SpeedLimits(Struct, frozen=True):
 
     def states(self, slowing: str | None, now_ns: int) -> tuple[LimitState, ...]:
         """Return the published states; ``slowing`` is the source that slows the vehicle."""
+        if not self.sources:
+            return ()
         valid = dict(self._valid(now_ns))
         stopping = {name for name, one in valid.items() if one.stops}.union(self._silent(now_ns))
         return tuple(

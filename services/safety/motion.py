@@ -53,8 +53,7 @@ class Planner:
             twist = state.release.away(settings.release_speed)
         else:
             twist = self.limited(state.arbiter.channels[source].requested, state.latches)
-        twist, limited_by = state.speed_limits.limited(twist, now_ns)
-        return RequestedTwist(source, twist, limited_by)
+        return RequestedTwist(source, *state.speed_limits.limited(twist, now_ns))
 
     def limited(self, asked: Twist, held: Latches) -> Twist:
         """Return the twist within the limits; at creep speed while bumper polls are lost."""
@@ -139,9 +138,10 @@ def observations(
     yield Observation("release", creeping, tick)
     blocked, slowed = plan.blocked_by, plan.slowed_by
     yield Observation("blocked", blocked is not None, tick, _blocked_text(state, blocked, creeping))
-    limited_by = requested.limited_by if requested else None
-    slowed_text = state.speed_limits.slowed_text(limited_by)
-    yield Observation("limit", limited_by is not None, tick, slowed_text)
+    if state.speed_limits.sources:
+        limited_by = requested.limited_by if requested else None
+        slowed_text = state.speed_limits.slowed_text(limited_by)
+        yield Observation("limit", limited_by is not None, tick, slowed_text)
     yield Observation("obstacle", slowed is not None, tick, _slowed_text(state, slowed))
     yield Observation("sonar", bool(faults), tick, f"Sonar not trusted: {faults}.")
 

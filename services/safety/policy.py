@@ -35,7 +35,6 @@ from services.safety.inputs import (
     Inputs,
     KeepaliveRequest,
     LimitRequest,
-    SourceEvent,
 )
 from services.safety.keepalive import Keepalives
 from services.safety.latches import Latches, Observation, latched, observe, ordered
@@ -103,7 +102,7 @@ class Policy:
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         event, settings = inputs.event, self.settings
-        if not isinstance(event, SourceEvent):
+        if event is None:
             return state, ""
         is_keepalive = isinstance(event, KeepaliveRequest)
         max_age_s = settings.estop_keepalive_timeout if is_keepalive else settings.max_echo_age
@@ -118,6 +117,8 @@ class Policy:
             case KeepaliveRequest():
                 keepalives, refused = state.keepalives.accept(event, admission)
                 return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
+            case _:
+                return state, ""
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         settings, sent = self.settings, state.verdict

@@ -217,6 +217,13 @@ def test_no_limit_raises_any_speed_or_bends_the_curve(
 # --- silence --------------------------------------------------------------------------------
 
 
+def test_without_sources_nothing_is_limited_or_observed() -> None:
+    nothing = SpeedLimits({})
+    assert list(nothing.observations(0)) == []
+    assert nothing.states(None, 0) == ()
+    assert nothing.limited(Twist(1.0), 0) == (Twist(1.0), None)
+
+
 def test_silence_stops_from_the_start_and_after_each_lease() -> None:
     _, silent = EMPTY.observations(0)
     assert (silent.name, silent.present, silent.token) == ("limit_silent", True, (0, 0))
