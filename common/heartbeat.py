@@ -29,7 +29,7 @@ class Heartbeat(Struct, frozen=True):
 
     def is_late(self, echo: int, now_ns: int, max_age_ns: int) -> bool:
         """Return whether an echo is unknown or older than the limit."""
-        age_ns = self._age_ns(echo, now_ns)
+        age_ns = self.age_ns(echo, now_ns)
         return age_ns is None or age_ns > max_age_ns
 
     def refusal(self, echo: int | None, now_ns: int, max_age_ns: int) -> str:
@@ -39,7 +39,7 @@ class Heartbeat(Struct, frozen=True):
                 "The call carries no echo of safety's heartbeat: send the newest "
                 "SafetyState.heartbeat as `echo`."
             )
-        age_ns = self._age_ns(echo, now_ns)
+        age_ns = self.age_ns(echo, now_ns)
         if age_ns is None:
             return "The call echoes an unknown heartbeat of safety: look again, then repeat it."
         if age_ns > max_age_ns:
@@ -47,7 +47,8 @@ class Heartbeat(Struct, frozen=True):
             return f"The call is {age_s:.1f} s old, allowed is {limit_s:g} s: repeat it."
         return ""
 
-    def _age_ns(self, echo: int, now_ns: int) -> int | None:
+    def age_ns(self, echo: int, now_ns: int) -> int | None:
+        """Return the time since a number was sent or received; None for an unknown one."""
         for number, sent_ns in reversed(self.sent):
             if number == echo:
                 return now_ns - sent_ns

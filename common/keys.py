@@ -118,6 +118,22 @@ EVENTS = Topic("evt/{service}", m.Event, 0, EVENT, "every service", "transitions
 DRIVE = Topic(
     "@cmd/drive/{source}", m.Drive, 20, COMMAND, "teleop, web, nav, ...", "a request to move"
 )
+LIMIT = Topic(
+    "@cmd/limit/{source}",
+    m.Limit,
+    10,
+    COMMAND,
+    "a lidar, a fleet manager, ...",
+    "a speed limit or a protective stop",
+)
+ESTOP_KEEPALIVE = Topic(
+    "@cmd/estop_keepalive/{source}",
+    m.EstopKeepalive,
+    10,
+    COMMAND,
+    "a pendant, a dashboard, ...",
+    "a sign of life of an emergency stop",
+)
 MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
 # Any PUT or DELETE on it, with any payload or none, stops the robot and latches.
@@ -139,7 +155,7 @@ SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, MOTION,
+    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, ESTOP_KEEPALIVE, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
     SET_SWITCHES, SET_LED, RESET, RELEASE, SET_POSE,

@@ -13,10 +13,10 @@ from msgspec import Meta, Struct
 
 from common.errors import ConfigError
 
-Role = Literal["robot", "driver", "viewer", "fleet", "site"]
-ROLES: tuple[Role, ...] = ("robot", "driver", "viewer", "fleet", "site")
+Role = Literal["robot", "driver", "device", "viewer", "fleet", "site"]
+ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site")
 
-# The name of a source of motion requests, as in ``safety.sources``.
+# The name of a source, as in ``safety.sources`` and ``safety.limits``.
 SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
 # A robot's id, and other parts of a certificate's name: one chunk of a key.
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
@@ -28,8 +28,8 @@ class Member(Struct, frozen=True, kw_only=True):
     common_name: str
     role: Role
     name: Name
-    robots: tuple[str, ...] = ()  # that a driver may move, or that a robot is
-    sources: tuple[SourceName, ...] = ()  # that a driver may use; empty means any
+    robots: tuple[str, ...] = ()  # that a driver or device may use, or that a robot is
+    sources: tuple[SourceName, ...] = ()  # that a driver or device may use; empty: any of a driver
     addresses: tuple[str, ...] = ()  # addresses of a router; empty in older lists
     expires: datetime  # UTC
     revoked: bool = False

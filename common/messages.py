@@ -10,6 +10,13 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from common.motion import Command
+from common.verdict import Action as Action
+from common.verdict import Cause as Cause
+from common.verdict import Direction as Direction
+from common.verdict import KeepaliveState as KeepaliveState
+from common.verdict import Limits as Limits
+from common.verdict import LimitState as LimitState
+from common.verdict import Release as Release
 
 # In the manual's order: counted clockwise from the left.
 SONAR_NAMES = (
@@ -20,14 +27,16 @@ RangeStatus = Literal["ok", "fault", "too_near", "no_echo"]
 FaultName = Literal["over_current", "over_voltage", "encoder", "under_voltage", "overload"]
 LinkState = Literal["up", "lost", "never"]
 Verdict = Literal["run", "slow", "stop", "brake", "inhibited"]
-Action = Literal["slow", "stop", "brake"]
 Level = Literal["info", "warning", "error"]
-Direction = Literal["forward", "backward"]
 
 Ranges = Annotated[tuple[float | None, ...], Meta(min_length=8, max_length=8)]
 Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
 Covariance3 = Annotated[tuple[float, ...], Meta(min_length=9, max_length=9)]
 Covariance2 = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+
+Cap = Annotated[float, Meta(ge=0.0)]
+MAX_REASON = 80  # characters
+Reason = Annotated[str, Meta(max_length=MAX_REASON)]
 
 
 class Message(Struct, frozen=True, kw_only=True):
@@ -124,34 +133,6 @@ class Odometry(Message, frozen=True, kw_only=True):
     child_frame_id: str = "base_link"
 
 
-class Cause(Struct, frozen=True, kw_only=True):
-    """One reason why the vehicle may not move as asked."""
-
-    name: str
-    action: Action
-    age: float  # s since it became active
-    text: str  # text for the operator
-    id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
-
-
-class Limits(Struct, frozen=True, kw_only=True):
-    """Velocity limits that safety allows now."""
-
-    forward: float  # m/s
-    backward: float  # m/s, as a positive number
-    angular: float  # rad/s, either way
-
-
-class Release(Struct, frozen=True, kw_only=True):
-    """State of moving off a pressed bumper; the operator chooses the direction."""
-
-    believed_free: Direction | None  # opposite of the last motion; None when none is known
-    travelled: float  # m, net travel by the counters over the last metre before the contact
-    age: float | None  # s since that motion; None when none is known
-    forbidden: tuple[Direction, ...]  # refused until a reset: the bumper was pressed that way
-    left: float  # m that may still be travelled until a reset
-
-
 class SafetyState(Message, frozen=True, kw_only=True):
     """Safety's decision and its causes."""
 
@@ -163,17 +144,36 @@ class SafetyState(Message, frozen=True, kw_only=True):
     heartbeat: int  # echoed by sources, see ``Drive.echo``
     text: str  # one sentence: why the vehicle may or may not move
     release: Release | None = None  # None while there is no contact
+    limit_sources: tuple[LimitState, ...] = ()  # those in the settings
+    estop_keepalives: tuple[KeepaliveState, ...] = ()  # likewise
 
 
 # --- @cmd -----------------------------------------------------------------------------------
 
 
-class Drive(Message, frozen=True, kw_only=True):
+class SourceMessage(Message, frozen=True, kw_only=True):
+    """A message to safety that counts only while its echo is young."""
+
+    echo: int  # the newest ``SafetyState.heartbeat`` that the source saw
+
+
+class Drive(SourceMessage, frozen=True, kw_only=True):
     """A drive request; valid for its source's lease."""
 
     linear: float  # m/s
     angular: float  # rad/s
-    echo: int  # the newest ``SafetyState.heartbeat`` that the source saw
+
+
+class Limit(SourceMessage, frozen=True, kw_only=True):
+    """A speed limit by a third party; valid for its source's lease. Zero is a protective stop."""
+
+    linear: Cap | None = None  # m/s, either way; None: no cap
+    angular: Cap | None = None  # rad/s, likewise
+    reason: Reason = ""  # for the operator, such as "person at 2 m"
+
+
+class EstopKeepalive(SourceMessage, frozen=True, kw_only=True):
+    """A sign of life of an emergency stop; without it safety brakes and latches."""
 
 
 class Motion(Message, frozen=True, kw_only=True):

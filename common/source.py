@@ -1,51 +1,108 @@
-"""A source of drive requests: the publisher that every driving program uses."""
+"""Sources of drive requests and of speed limits: the publishers that their programs use."""
 
 from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from msgspec.structs import replace
 
 from common import codec, keys
 from common.bus.bus import Arrival, Bus
-from common.messages import Direction, Drive, SafetyState
+from common.keys import Topic
+from common.messages import (
+    MAX_REASON,
+    Direction,
+    Drive,
+    EstopKeepalive,
+    Limit,
+    SafetyState,
+    SourceMessage,
+)
 from common.operator import ReleaseCalls
+
+M = TypeVar("M", bound=SourceMessage)
 
 DENIED_AFTER = 10  # requests; a router needs a moment to announce its subscribers
 RELEASE_TIMEOUT_S = 0.3
 HELD = "held"  # the first answer of a release, with any distance left
 
 
-class DriveSource:
-    """Publisher of drive requests under a source's name, with the echo of safety's heartbeat.
+class Source(Generic[M]):
+    """Publisher of a source's messages to safety, with the echo of safety's heartbeat.
 
-    The echo bounds the age of a request without synchronized clocks. No method blocks: without a
-    bus a request is dropped. A router whose access rules forbid driving drops requests without an
+    The echo bounds the age of a message without synchronized clocks. No method blocks: without a
+    bus a message is dropped. A router whose access rules forbid it drops messages without an
     error, and does not announce safety's subscription either.
     """
 
-    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, bus: Bus, topic: Topic[M], source: str, on_denied: Callable[[], None] = lambda: None
+    ) -> None:
         self.name = source
-        self._publisher = bus.publisher(keys.DRIVE, source=source)
+        self._publisher = bus.publisher(topic, source=source)
         self._echo = 0  # before the first state of safety; safety refuses 0
-        self._dropped = 0  # requests in a row
+        self._dropped = 0  # messages in a row
         self._on_denied = on_denied
         bus.subscribe(keys.SAFETY, self._on_safety)
+
+    @property
+    def denied(self) -> bool:
+        """Whether safety's state arrives but our messages do not: watching only."""
+        return self._echo != 0 and self._dropped >= DENIED_AFTER
+
+    def _put(self, message: M, echo: int | None = None) -> M:
+        was_denied = self.denied
+        self._dropped = self._dropped + 1 if self._publisher.passed_on is False else 0
+        sent = self._publisher.put(replace(message, echo=self._echo if echo is None else echo))
+        if self.denied and not was_denied:
+            self._on_denied()
+        return sent
+
+    def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
+        self._echo = arrival.message.heartbeat
+
+
+class DriveSource(Source[Drive]):
+    """A source of drive requests."""
+
+    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
+        super().__init__(bus, keys.DRIVE, source, on_denied)
 
     def request(self, linear: float, angular: float) -> Drive:
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
         if not codec.finite(linear, angular):
             raise ValueError(f"non-finite request: {linear} m/s, {angular} rad/s")
-        was_denied = self.denied
-        self._dropped = self._dropped + 1 if self._publisher.passed_on is False else 0
-        sent = self._publisher.put(Drive(linear=linear, angular=angular, echo=self._echo))
-        if self.denied and not was_denied:
-            self._on_denied()
-        return sent
+        return self._put(Drive(linear=linear, angular=angular, echo=0))
 
-    @property
-    def denied(self) -> bool:
-        """Whether safety's state arrives but our requests do not: watching only."""
-        return self._echo != 0 and self._dropped >= DENIED_AFTER
 
-    def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
-        self._echo = arrival.message.heartbeat
+class LimitPublisher(Source[Limit]):
+    """A source of speed limits."""
+
+    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
+        super().__init__(bus, keys.LIMIT, source, on_denied)
+
+    def limit(
+        self, linear: float | None = None, angular: float | None = None, reason: str = ""
+    ) -> Limit:
+        """Cap the speed (m/s, rad/s) until the source's lease expires.
+
+        Zero is a protective stop, None no cap. Repeat it several times within the lease.
+        """
+        for cap in (linear, angular):
+            if cap is not None and not (codec.finite(cap) and cap >= 0):
+                raise ValueError(f"a cap must be finite and not negative, not {cap}")
+        reason = reason[:MAX_REASON]
+        return self._put(Limit(linear=linear, angular=angular, reason=reason, echo=0))
+
+
+class KeepalivePublisher(Source[EstopKeepalive]):
+    """A source of signs of life of an emergency stop."""
+
+    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
+        super().__init__(bus, keys.ESTOP_KEEPALIVE, source, on_denied)
+
+    def beat(self, echo: int | None = None) -> EstopKeepalive:
+        """Send one, with the heartbeat that an operator's screen showed; the newest by default."""
+        return self._put(EstopKeepalive(echo=0), echo)
 
 
 def call_release(

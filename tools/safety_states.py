@@ -135,6 +135,7 @@ def causes() -> Iterator[tuple[str, str, str, str, str]]:
     how = {
         Clears.RESET: "reset",
         Clears.SETTLED: "by itself after 0.5 s, then a neutral request",
+        Clears.NEUTRAL: "by itself, then a neutral request",
         Clears.AT_ONCE: "by itself",
     }
     for rule in sorted(RULES, key=lambda rule: -SEVERITY[rule.action]):

@@ -13,7 +13,7 @@ from cli.inspect.addressing import chunks
 from cli.inspect.session import add_options, decoded, open_session
 from common import codec, keys
 from common.bus.probe import Probe
-from common.errors import LinkError
+from common.errors import LinkError, RobotError
 from common.messages import SafetyState
 
 TIMEOUT_S = 3.0
@@ -24,11 +24,17 @@ MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
+    parser.add_argument(
+        "--keepalive", metavar="NAME",
+        help="do not stop now: keep the emergency stop NAME of safety.estop_keepalive alive",
+    )  # fmt: skip
     add_options(parser)
 
 
 def run(options: argparse.Namespace, robot: str | None = None) -> int:
     """Stop the robot of the options, or another one; retry while no router is reachable."""
+    if getattr(options, "keepalive", None):
+        return keep_alive(options)
     end_s = time.monotonic() + TIMEOUT_S
     while True:
         try:
@@ -37,6 +43,16 @@ def run(options: argparse.Namespace, robot: str | None = None) -> int:
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
+
+
+def keep_alive(options: argparse.Namespace) -> int:
+    """Keep the emergency stop of one robot alive."""
+    from cli.inspect import keepalive  # it uses this module
+
+    with open_session(options) as session:
+        if "*" in session.robot:
+            raise RobotError("--keepalive works on one robot at a time; name it")
+        return keepalive.hold(session, options.keepalive)
 
 
 def stop(probe: Probe, robot: str) -> int:

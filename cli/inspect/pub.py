@@ -29,7 +29,8 @@ from cli.inspect.session import (
 from common import cli_codec, codec, keys
 from common.bus.probe import Probe
 from common.errors import MessageError, RobotError
-from common.messages import Drive, Link, SafetyState
+from common.keys import Topic
+from common.messages import Link, Message, SafetyState, SourceMessage
 from common.sample import Sample
 
 FIRST_S = 2.0  # wait for safety's first heartbeat, which has 20 Hz
@@ -97,24 +98,29 @@ def check_message(key: str, message: dict[str, Any]) -> None:
     """Raise ``MessageError`` if the message does not match the type of its key."""
     topic = topic_of(key)
     if topic:
-        whole = {"echo": 0} | message if topic.message is Drive else message
+        whole = {"echo": 0} | message if echoes(topic) else message
         try:
             msgspec.convert(whole, topic.message)
         except msgspec.ValidationError as error:
             raise MessageError(f"not a {topic.message.__name__}: {error}") from None
 
 
+def echoes(topic: Topic[Message]) -> bool:
+    """Return whether the topic's messages echo safety's heartbeat."""
+    return issubclass(topic.message, SourceMessage)
+
+
 def publish(session: BusSession, key: str, options: argparse.Namespace) -> None:
-    """Publish the message at the rate; a drive request echoes safety's newest heartbeat."""
+    """Publish the message at the rate; a message of a source echoes safety's newest heartbeat."""
     probe, message, topic = session.probe, options.message, topic_of(key)
     encoding = codec.encoding(topic.message) if topic else codec.ENCODING
     service = topic.service if topic else keys.SLOW
     safety = keys.SAFETY.on(chunks(key)[0])
-    echoes = topic is not None and topic.message is Drive and "echo" not in message
-    if echoes:
+    wants_echo = topic is not None and echoes(topic) and "echo" not in message
+    if wants_echo:
         probe.listen(safety)
     for number in publish_times(options):
-        echo = {"echo": newest_heartbeat(probe, safety)} if echoes else {}
+        echo = {"echo": newest_heartbeat(probe, safety)} if wants_echo else {}
         probe.put(key, cli_codec.encode(key, json.dumps(echo | message)), encoding, service)
         if wants_json(options):
             output.line({"key": short(key, session.robot), "published": number})

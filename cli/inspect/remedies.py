@@ -38,6 +38,8 @@ LONG_STOPS = (
     "drive slowly; record stops with `t2 record`, then `t2 checkout stop RECORDING` proposes "
     "settings; the event long_stop has the distances"
 )
+LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
+LIMIT_SILENT = "start its program, check its network and certificate; see safety.limits"
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
 
 # By the names of the causes in safety's state.
@@ -45,6 +47,7 @@ CAUSES = {
     "contact": BUMPER,
     "estop": RESET,
     "estop_reader": f"safety had lost the router; {RESET}",
+    "estop_keepalive": f"start its pendant, page or `t2 estop --keepalive NAME`; {RESET}",
     "predecessor": RESET,
     "runaway": f"check the wheels and the ground; {RESET}",
     "uncommanded_motion": f"check for a push or a slope; {RESET}",
@@ -60,16 +63,19 @@ CAUSES = {
     "bumper_lossy": "check the cable and the board's load: t2 echo tel/bridge/bumper",
     "silent": SILENT,
     "unarmed": "see the link above: the bridge reports what it waits for",
+    "limit_stop": f"clear the area; then release the controls and drive; {LIMIT}",
+    "limit_silent": LIMIT_SILENT,
     "two_publishers": ONE_DRIVER,
     "neutral": "release the controls, then drive",
     "blocked": "drive another way, or remove the obstacle",
     "no_request": "",
     "release": "",
+    "limit": LIMIT,
     "obstacle": "drive another way, or remove the obstacle",
     "sonar": SONAR_FAULT,
 }
 # Causes of normal operation, with or without a driver.
-NORMAL = ("no_request", "release", "neutral", "obstacle", "blocked")
+NORMAL = ("no_request", "release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
 
 FAULTS = {
     "over_current": "over-current: a wheel is blocked",

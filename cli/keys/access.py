@@ -96,6 +96,8 @@ def rights(member: Member) -> Rights:
         return site()
     if member.role == "driver":
         return driver(member.robots, member.sources or (ANY,))
+    if member.role == "device":
+        return device(member.robots, member.sources)
     return fleet() if member.role == "fleet" else viewer()
 
 
@@ -123,6 +125,19 @@ def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
     }
 
 
+def device(robots: Iterable[str], sources: Sequence[str]) -> Rights:
+    """Return the rights to see everything, to stop and limit, and to keep a stop alive."""
+    own_robots, viewing = tuple(robots), viewer()
+    given = (
+        topic.on(each, source=source)
+        for topic in (keys.LIMIT, keys.ESTOP_KEEPALIVE)
+        for each in own_robots
+        for source in sources
+    )
+    stops = (keys.estop_key(each) for each in own_robots)
+    return {**viewing, "write": (*viewing["write"], *given, *stops)}
+
+
 def fleet() -> Rights:
     """Return the rights to see everything, and to stop any robot."""
     viewing = viewer()
@@ -136,7 +151,7 @@ def site() -> Rights:
         "know": EVERYTHING,
         "recall": RECALLED,
         "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
-        "write": actuation_keys(ANY),
+        "write": (*actuation_keys(ANY), keys.LIMIT.on(ANY, source=ANY)),
     }
 
 
@@ -156,7 +171,11 @@ def robot(name: str) -> Rights:
 
 def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
     """Return the keys that move and stop a robot, without those reserved for safety."""
-    driven = (keys.DRIVE.on(robot, source=source) for source in sources)
+    driven = (
+        topic.on(robot, source=source)
+        for topic in (keys.DRIVE, keys.ESTOP_KEEPALIVE)
+        for source in sources
+    )
     return (*driven, keys.estop_key(robot))
 
 

@@ -69,13 +69,16 @@ def _verb(
 def _add_rights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", action="append", default=[], metavar="ID",
-        help="for a driver: allow this robot; may be repeated",
+        help="for a driver or device: allow this robot; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--every", action="store_true", help="for a driver: allow every robot")
+    parser.add_argument(
+        "--every", action="store_true", help="for a driver or device: allow every robot"
+    )
     parser.add_argument(
         "--source", action="append", default=[], metavar="NAME",
-        help="for a driver: allow only this source name, as in safety.sources; may be repeated; "
-        f" {', '.join(OPERATORS_SOURCES)} by default",
+        help="for a driver or device: allow only this source, as in safety.sources or "
+        f"safety.limits; may be repeated; by default {', '.join(OPERATORS_SOURCES)} for a driver, "
+        "NAME for a device",
     )  # fmt: skip
 
 

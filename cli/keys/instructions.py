@@ -14,6 +14,7 @@ USED_BY: dict[Role, str] = {
     "robot": "router",
     "site": "router",
     "driver": "drive",
+    "device": "doctor",
     "viewer": "dashboard",
     "fleet": "robots",
 }
@@ -40,7 +41,8 @@ def certificate_issued(
     if profile.role == "driver":
         yield f"  may move {_robots(profile)}"
     if profile.sources:
-        yield f"  drives as {' or '.join(profile.sources)}; no other source is allowed"
+        verb = "drives" if profile.role == "driver" else f"limits {_robots(profile)}"
+        yield f"  {verb} as {' or '.join(profile.sources)}; no other source is allowed"
     yield ""
     if profile.listens:
         yield f"1. Copy the folder to the {profile.role}'s computer only:"

@@ -46,7 +46,7 @@ def endpoints(routers: Sequence[Profile]) -> list[str]:
 
 def _sources(profile: Profile) -> list[str]:
     """Return the source setting of each screen whose default source is not allowed."""
-    if not profile.sources:
+    if profile.role != "driver" or not profile.sources:
         return []
     defaults = {"teleop": "teleop", "dashboard": "web"}
     return [

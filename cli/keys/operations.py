@@ -12,13 +12,14 @@ from cli.inspect import output
 from cli.keys import instructions, member_list
 from cli.keys.ca import CertificateAuthority, certificate_from
 from cli.keys.profile import (
+    BOUND,
     CA_DAYS,
     DAY_S,
     EARLY_S,
     EVERY_ROBOT,
-    OPERATORS_SOURCES,
     Profile,
     Span,
+    default_sources,
     profile,
     span,
 )
@@ -43,7 +44,7 @@ def init(options: argparse.Namespace) -> int:
 def issue(options: argparse.Namespace) -> int:
     """Create the first certificate of a member."""
     robots = (*options.robot, *([EVERY_ROBOT] if options.every else []))
-    sources = options.source or (OPERATORS_SOURCES if options.role == "driver" else ())
+    sources = options.source or default_sources(options.role, options.name)
     wanted = profile(options.role, options.name, robots, options.address, sources)
     with locked(options.folder) as folder:
         member_list.check_free(folder.read(), wanted.role, wanted.name, time.time())
@@ -55,7 +56,7 @@ def renew(options: argparse.Namespace) -> int:
     """Create another certificate with the same rights."""
     with locked(options.folder) as folder:
         old = member_list.newest(folder.read(), options.role, options.name)
-        robots = old.robots if old.role == "driver" else ()
+        robots = old.robots if old.role in BOUND else ()
         addresses = options.address or member_list.addresses_of(old)
         wanted = profile(old.role, old.name, robots, addresses, old.sources)
         _create_certificate(folder, wanted, options, settings=False)

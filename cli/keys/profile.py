@@ -21,6 +21,7 @@ CA_DAYS = 3650
 DAYS = 365
 EARLY_S = DAY_S  # valid from a day ago: clocks differ, and a wrong time zone is up to 14 h
 
+BOUND: tuple[Role, ...] = ("driver", "device")  # to robots and sources
 LISTENERS: tuple[Role, ...] = ("robot", "site")
 LOCAL = ("localhost", "127.0.0.1")  # for clients on the same host, or through a tunnel
 VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (manual 1 and 1.1)
@@ -30,7 +31,7 @@ LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role
 NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
 SOURCE_NAMES = (
     "a lowercase letter, then up to 31 lowercase letters, digits, hyphens and underscores, as in "
-    "safety.sources"
+    "safety.sources and safety.limits"
 )
 
 LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
@@ -43,9 +44,9 @@ class Profile:
 
     role: Role
     name: str
-    robots: tuple[str, ...] = ()  # ids: a driver's robots, or the robot itself
+    robots: tuple[str, ...] = ()  # ids: of a driver or device, or the robot itself
     addresses: tuple[str, ...] = ()  # IP addresses and host names of a router
-    sources: tuple[str, ...] = ()  # of a driver; empty means any
+    sources: tuple[str, ...] = ()  # of a driver or device; empty: any of a driver
 
     @property
     def label(self) -> str:
@@ -82,7 +83,7 @@ def profile(
         _check(each, Annotated[Name, Meta(max_length=LONGEST)], f"{each!r} is not a name: {NAMES}")
     for address in addresses:
         _check_address(address)
-    _check_driver(role, robots, sources)
+    _check_sources(role, robots, sources)
     if role not in LISTENERS and addresses:
         raise ConfigError(f"--address is for routers; a {role} only connects")
     if role == "site" and not addresses:
@@ -91,6 +92,11 @@ def profile(
         robots, addresses = (name,), addresses or VEHICLE
     all_addresses = unique(addresses and (*addresses, *LOCAL))
     return Profile(role, name, unique(robots), all_addresses, unique(sources))
+
+
+def default_sources(role: Role, name: str) -> tuple[str, ...]:
+    """Return the sources of a member for which none are given."""
+    return {"driver": OPERATORS_SOURCES, "device": (name,)}.get(role, ())
 
 
 def span(now_s: float, days: int, authority_ends_s: float) -> Span:
@@ -127,16 +133,16 @@ def _check(text: str, kind: object, problem: str) -> None:
         raise ConfigError(problem) from None
 
 
-def _check_driver(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
-    """Reject driver options for other roles, and a driver without robots."""
+def _check_sources(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
+    """Reject sources and robots for other roles, and a member without robots that needs one."""
     for source in sources:
         _check(source, SourceName, f"--source {source!r} is not a source name: {SOURCE_NAMES}")
-    if role == "driver" and not robots:
-        raise ConfigError("a driver needs --robot ID for each of its robots, or --every")
-    if role != "driver" and robots:
-        raise ConfigError(f"--robot and --every are for drivers, not for a {role}")
-    if role != "driver" and sources:
-        raise ConfigError(f"--source is for drivers; a {role} does not request motion")
+    if role in BOUND and not robots:
+        raise ConfigError(f"a {role} needs --robot ID for each of its robots, or --every")
+    if role not in BOUND and robots:
+        raise ConfigError(f"--robot and --every are for drivers and devices, not for a {role}")
+    if role not in BOUND and sources:
+        raise ConfigError(f"--source is for drivers and devices; a {role} uses no source")
 
 
 def _check_address(address: str) -> None:

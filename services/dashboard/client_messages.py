@@ -58,6 +58,12 @@ class Gear(ClientMessage, frozen=True):
     gear: Annotated[int, Meta(ge=1, le=GEARS)]
 
 
+class Alive(ClientMessage, frozen=True):
+    """The page is visible, in answer to snapshot ``n``: it keeps the emergency stop alive."""
+
+    n: int
+
+
 class Estop(ClientMessage, frozen=True):
     """Emergency stop, latched, from any viewer; without a robot: the selected one."""
 
@@ -83,4 +89,4 @@ class Lamp(ClientMessage, frozen=True):
     to: LedRequest
 
 
-AnyMessage = Look | Take | Leave | Hold | Free | Gear | Estop | Reset | Switch | Lamp
+AnyMessage = Look | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch | Lamp

@@ -26,6 +26,8 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     certificate: str = ""  # PEM files for https; both or none
     private_key: str = ""
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "web"
+    # A name in safety.estop_keepalive that an open and visible page keeps alive; empty: none.
+    estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a hold with a longer one lapses

@@ -75,6 +75,7 @@ class Fleet:
         gone = self._viewers.pop(viewer, None)
         if gone and gone.robot in self._robots:
             self._robots[gone.robot].driver_lock.leave(viewer)
+            self._robots[gone.robot].keepalive.left(viewer)
 
     def handle(self, viewer: str, message: client.AnyMessage) -> None:
         """Handle a viewer's message."""
@@ -87,7 +88,9 @@ class Fleet:
             self._estop(viewer, message.robot or self._viewers[viewer].robot)
             return
         robot = self._robot_of(viewer)
-        if isinstance(message, client.Take):
+        if isinstance(message, client.Alive):
+            robot.keep_alive(viewer, message.n, time.monotonic_ns())
+        elif isinstance(message, client.Take):
             self._take(viewer, robot, message.force)
         elif robot.driver_lock.driver == viewer:
             self._drive(viewer, robot, message)
@@ -135,6 +138,7 @@ class Fleet:
             connected=robot.bus.connected,
             vehicle=self._vehicle,
             protection=robot.protection,
+            keeper=robot.keepalive.holder,
         )
         state = robot.telemetry.newest(keys.SAFETY, now_ns)
         robot.driver_lock.sent(self._number, now_ns, state)
@@ -179,6 +183,7 @@ class Fleet:
             self._notify(viewer, "warning", "too_many_robots")
         elif one.robot != message.robot:
             self._robot_of(viewer).driver_lock.leave(viewer)
+            self._robot_of(viewer).keepalive.left(viewer)
             one.robot, one.has_trail = message.robot, False
         one.name = message.name.strip() or one.name
         robot = self._robot_of(viewer)
@@ -189,6 +194,7 @@ class Fleet:
             "robot": one.robot,
             "vehicle": self._vehicle,
             "gears": self._settings.gears_linear,
+            "keepalive": bool(self._settings.estop_keepalive),
         }
         self._send([viewer], hello)
         if not one.has_trail:  # a new name alone restores no trail that the viewer has cleared

@@ -24,9 +24,10 @@ from common.operator import (
     ResetCheck,
     reset_request,
 )
-from common.source import DriveSource, call_release
+from common.source import DriveSource, KeepalivePublisher, call_release
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock
+from services.dashboard.keepalive import PageKeepalive
 from services.dashboard.sectors import Protection
 from services.dashboard.telemetry_cache import TelemetryCache, Trail, path_of
 
@@ -67,6 +68,10 @@ class Robot:
             bus, settings.source, lambda: self._broadcast("error", "barred", "")
         )
         self._estop = EstopRepetition()
+        self.keepalive = PageKeepalive(settings.estop_keepalive)
+        self._keepalives: KeepalivePublisher | None = None
+        if settings.estop_keepalive:
+            self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
         self._release = ReleaseCalls()
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._is_queried = False
@@ -116,6 +121,14 @@ class Robot:
         if not self._estop.is_pending:
             self._log.warning("emergency stop", requested_by=requested_by)
         self._estop.start()
+
+    def keep_alive(self, viewer: str, number: int, now_ns: int) -> None:
+        """Keep the emergency stop alive for a page that answers a snapshot."""
+        shown = self.driver_lock.seen(number, now_ns, self._settings.call_round_trip)
+        newest = self.telemetry.newest(keys.SAFETY, now_ns)
+        echo = self.keepalive.answer(viewer, shown, newest, now_ns)
+        if echo is not None and self._keepalives:
+            self._keepalives.beat(echo)
 
     def reset(self, seen: m.SafetyState, notify: Notify) -> None:
         """Clear the causes that were latched in this state; report the confirmation later."""

@@ -11,7 +11,7 @@ from msgspec import Struct, convert
 
 from common import keys
 from common.codec import finite
-from common.messages import Cause, Driver, Limits, Link, Release, Switches
+from common.messages import Cause, Driver, Limits, LimitState, Link, Release, Switches
 from common.settings import Vehicle
 from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
@@ -28,6 +28,7 @@ class State(Struct, frozen=True):
     causes: tuple[Cause, ...]
     limits: Limits
     release: Release | None
+    limit_sources: tuple[LimitState, ...]
 
 
 class DriverState(Struct, frozen=True):
@@ -56,6 +57,7 @@ class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     link: str | None
     safety: State | None
     driver: DriverState
+    keeper: str | None  # the viewer whose page keeps the emergency stop alive
 
 
 class Service(Struct, frozen=True):
@@ -102,6 +104,7 @@ def fast_snapshot(
     connected: bool,
     vehicle: Vehicle,
     protection: Protection,
+    keeper: str | None = None,
 ) -> FastSnapshot:
     """Return the fast snapshot at this time."""
     velocity = telemetry.newest(keys.VELOCITY, now_ns)
@@ -133,6 +136,7 @@ def fast_snapshot(
         link=link.state if link else None,
         safety=state,
         driver=_driver(driver_lock, names),
+        keeper=keeper,
     )
 
 

@@ -9,6 +9,7 @@ clears     when
 RESET      an operator's reset, once 3 samples do not show the cause, the vehicle stands and no
            source requests motion; then a neutral request (one exception: ``operator_requests.py``)
 SETTLED    by itself 0.5 s after the last observation; then a neutral request
+NEUTRAL    by itself with the first observation without it; then a neutral request
 AT_ONCE    by itself with the first observation without it (the observer has the hysteresis)
 ========== ===================================================================================
 
@@ -30,6 +31,7 @@ class Clears(Enum):
 
     RESET = "reset"
     SETTLED = "settled"
+    NEUTRAL = "neutral"
     AT_ONCE = "at once"
 
 
@@ -47,6 +49,9 @@ RULES = (
     Rule("contact", "brake", Clears.RESET, "The bumper was hit."),
     Rule("estop", "brake", Clears.RESET, "Emergency stop."),
     Rule("estop_reader", "brake", Clears.RESET, "The emergency stop cannot be received."),
+    Rule(
+        "estop_keepalive", "brake", Clears.RESET, "The emergency stop is no longer kept alive.",
+    ),
     Rule("predecessor", "brake", Clears.RESET, "Safety restarted while a reset was due."),
     Rule("runaway", "brake", Clears.RESET, "The vehicle did not move as commanded."),
     Rule(
@@ -67,6 +72,9 @@ RULES = (
     Rule("bumper", "stop", Clears.SETTLED, "The bumper is not being read."),
     Rule("silent", "stop", Clears.SETTLED, "An input is too old."),
     Rule("unarmed", "stop", Clears.SETTLED, "The bridge is not armed yet."),
+    # by third parties
+    Rule("limit_stop", "stop", Clears.NEUTRAL, "A limit source stops the vehicle."),
+    Rule("limit_silent", "stop", Clears.NEUTRAL, "A limit source is silent."),
     # transient
     Rule("two_publishers", "stop", Clears.AT_ONCE, "Two publishers use one source."),
     Rule(
@@ -77,6 +85,7 @@ RULES = (
     Rule("no_request", "stop", Clears.AT_ONCE, "No source requests motion."),
     Rule("release", "slow", Clears.AT_ONCE, "Creeping off the bumper."),
     Rule("bumper_lossy", "slow", Clears.AT_ONCE, "Creeping: bumper polls were lost."),
+    Rule("limit", "slow", Clears.AT_ONCE, "Slowed by a limit source."),
     Rule("obstacle", "slow", Clears.AT_ONCE, "Slowed by an obstacle."),
     Rule("sonar", "slow", Clears.AT_ONCE, "A sonar cannot be trusted."),
 )  # fmt: skip

@@ -29,13 +29,15 @@ def observe_inputs(
     acked = state.verdict.acked if state.verdict.acked != (0, 0) else None
     yield _contact(inputs, tick)
     yield Observation("estop", isinstance(inputs.event, Estop), tick)
+    if state.keepalives.names:
+        yield state.keepalives.observation(now_ns)
     yield Observation(
         "estop_reader", state.estop_session_was_up and not inputs.estop_session_up, tick
     )
     yield _driver("left", inputs.left, tick)
     yield _driver("right", inputs.right, tick)
     yield Observation("leaving", inputs.leaving, tick)
-    yield _starting(inputs, settings, tick)
+    yield _starting(inputs, settings, state.keepalives.missing, tick)
     yield from _link(inputs, tick)
     yield _switches(inputs, settings, tick)
     yield _bumper(inputs, settings, acked, now_ns)
@@ -61,7 +63,7 @@ def _driver(side: str, latest: Latest[Driver] | None, tick: Token) -> Observatio
     return Observation(f"driver_{side}", faulty, (sample.boot, sample.seq), text)
 
 
-def _starting(inputs: Inputs, settings: Safety, tick: Token) -> Observation:
+def _starting(inputs: Inputs, settings: Safety, keepalives: list[str], tick: Token) -> Observation:
     needed: dict[str, Latest[Any] | None] = {
         "velocity": inputs.velocity,
         "ultrasonic": inputs.ultrasonic,
@@ -75,6 +77,7 @@ def _starting(inputs: Inputs, settings: Safety, tick: Token) -> Observation:
     missing = [name for name, latest in needed.items() if latest is None]
     if not inputs.estop_session_up:
         missing.append("emergency stop")
+    missing += [f"emergency stop keepalive of {name}" for name in keepalives]
     text = f"Waiting for the first sample of: {', '.join(missing)}."
     return Observation("starting", bool(missing), tick, text)
 

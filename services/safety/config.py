@@ -1,11 +1,12 @@
 """Settings of the safety service; unsafe values need an explicit override."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from common import settings
+from common.members import SourceName
 
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
@@ -40,12 +41,14 @@ PROTECTIVE: dict[str, tuple[float, float]] = {
     "hysteresis": (0.02, 10.0),
     "stuck_travel": (0.0, 1.0),
     "creep_speed": (0.0, 0.25),
+    "estop_keepalive_timeout": (0.0, 2.0),
     "require_switches": (True, True),
 }
 # Programs that stop requesting when the operator releases the controls. For any other source,
 # ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
 MAX_LEASE_S = 0.5  # a longer ``sources.NAME.lease`` needs an override
+MAX_LIMIT_LEASE_S = 1.0  # a longer ``limits.NAME.lease`` likewise
 
 
 class Source(settings.Section, frozen=True, kw_only=True):
@@ -54,6 +57,16 @@ class Source(settings.Section, frozen=True, kw_only=True):
     priority: Annotated[int, Meta(ge=0, le=1000)]
     lease: Seconds  # s that a request holds
     operator: bool = False  # a person holds it, and may creep past a faulty sonar
+
+
+Silence = Literal["ignore", "stop"]
+
+
+class LimitSource(settings.Section, frozen=True, kw_only=True):
+    """A source of speed limits; every field is required, because no default fits all."""
+
+    lease: Seconds  # s that a limit holds
+    silence: Silence  # what the end of the lease does, and a start without any limit
 
 
 def _sources() -> dict[str, Source]:
@@ -71,6 +84,9 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
     sources: dict[str, Source] = msgspec.field(default_factory=_sources)
+    estop_keepalive: tuple[SourceName, ...] = ()  # names that must be received
+    estop_keepalive_timeout: Seconds = 1.0
+    limits: dict[SourceName, LimitSource] = msgspec.field(default_factory=dict)
 
     max_linear: Positive = 1.0  # m/s
     max_angular: Positive = 1.0  # rad/s
@@ -121,7 +137,12 @@ class Safety(settings.Section, frozen=True, kw_only=True):
             allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
             given[f"sources.{name}.operator"] = source.operator
             allowed[f"sources.{name}.operator"] = (False, name in HELD)
+        for name, limits in self.limits.items():
+            given[f"limits.{name}.lease"] = limits.lease
+            allowed[f"limits.{name}.lease"] = (0.0, MAX_LIMIT_LEASE_S)
         settings.check_protections(given, allowed, self.unsafe_overrides)
+        if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
+            raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
         priorities = [source.priority for source in self.sources.values()]
         if len(set(priorities)) < len(priorities):
             raise ValueError(f"sources must have different priorities, not {sorted(priorities)}")

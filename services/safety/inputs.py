@@ -9,6 +9,8 @@ from common.messages import (
     Direction,
     Drive,
     Driver,
+    EstopKeepalive,
+    Limit,
     Link,
     Mileage,
     SafetyState,
@@ -27,6 +29,22 @@ class DriveRequest(Struct, frozen=True):
     drive: Drive | None
     received_ns: int = 0
     shares_clock: bool = False  # whether its timestamp is of this host's clock
+
+
+class LimitRequest(Struct, frozen=True):
+    """A speed limit of a source; ``limit`` is None for an invalid payload."""
+
+    source: str
+    limit: Limit | None
+    received_ns: int = 0
+
+
+class KeepaliveRequest(Struct, frozen=True):
+    """A sign of life of an emergency stop; ``message`` is None for an invalid payload."""
+
+    source: str
+    message: EstopKeepalive | None
+    received_ns: int = 0
 
 
 class Estop(Struct, frozen=True):
@@ -48,7 +66,7 @@ class Hold(Struct, frozen=True):
     echo: int | None = None
 
 
-Event = DriveRequest | Estop | Reset | Hold
+Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | Reset | Hold
 
 
 class Inputs(Struct, frozen=True):

@@ -77,7 +77,9 @@ def observe(
 
 def _is_over(name: str, old: Held, now_ns: int, settle_ns: int) -> bool:
     how = clears(name)
-    return how is Clears.AT_ONCE or (how is Clears.SETTLED and now_ns - old.bad_ns >= settle_ns)
+    if how is Clears.SETTLED:
+        return now_ns - old.bad_ns >= settle_ns
+    return how is not Clears.RESET
 
 
 def latched(held: Latches) -> tuple[str, ...]:

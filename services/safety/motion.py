@@ -21,6 +21,7 @@ class RequestedTwist(Struct, frozen=True):
 
     source: str
     twist: Twist
+    limited_by: str | None = None  # the limit source that slows it
 
 
 class Plan(Struct, frozen=True):
@@ -45,13 +46,14 @@ class Planner:
     def requested(self, state: State, creeping: bool, now_ns: int) -> RequestedTwist | None:
         """Return the requested motion; a held release has priority over all sources."""
         settings = self._settings
-        if creeping:
-            return RequestedTwist(RELEASE, state.release.away(settings.release_speed))
-        source = state.arbiter.in_control(now_ns)
+        source = RELEASE if creeping else state.arbiter.in_control(now_ns)
         if source is None:
             return None
-        asked = state.arbiter.channels[source].requested
-        return RequestedTwist(source, self.limited(asked, state.latches))
+        if creeping:
+            twist = state.release.away(settings.release_speed)
+        else:
+            twist = self.limited(state.arbiter.channels[source].requested, state.latches)
+        return RequestedTwist(source, *state.speed_limits.limited(twist, now_ns))
 
     def limited(self, asked: Twist, held: Latches) -> Twist:
         """Return the twist within the limits; at creep speed while bumper polls are lost."""
@@ -136,6 +138,10 @@ def observations(
     yield Observation("release", creeping, tick)
     blocked, slowed = plan.blocked_by, plan.slowed_by
     yield Observation("blocked", blocked is not None, tick, _blocked_text(state, blocked, creeping))
+    if state.speed_limits.sources:
+        limited_by = requested.limited_by if requested else None
+        slowed_text = state.speed_limits.slowed_text(limited_by)
+        yield Observation("limit", limited_by is not None, tick, slowed_text)
     yield Observation("obstacle", slowed is not None, tick, _slowed_text(state, slowed))
     yield Observation("sonar", bool(faults), tick, f"Sonar not trusted: {faults}.")
 

@@ -3,7 +3,8 @@
 Each decision takes these steps, always in this order, so that a trip wins over an event that
 arrives with it:
 
-1. accept    accept or refuse a drive request, if that is the event (``arbiter.py``)
+1. accept    accept or refuse a message of a source (``arbiter.py``, ``limits.py``,
+             ``keepalive.py``)
 2. sense     update sonars, runaway, standstill, trajectory and the travel of a release
 3. observe   observe every cause that does not depend on a request (``conditions.py``)
 4. handle    carry out a reset or a held release (``operator_requests.py``)
@@ -26,10 +27,18 @@ from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
 from services.safety.arbiter import Arbiter
 from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
+from services.safety.channel import Admission
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest, Inputs
+from services.safety.inputs import (
+    DriveRequest,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+)
+from services.safety.keepalive import Keepalives
 from services.safety.latches import Latches, Observation, latched, observe, ordered
+from services.safety.limits import SpeedLimits
 from services.safety.motion import Plan, Planner, observations
 from services.safety.operator_requests import handle, is_creeping
 from services.safety.runaway import Bounds
@@ -73,7 +82,12 @@ class Policy:
 
     def start(self) -> State:
         """Return the state of a service that has just started."""
-        return State(arbiter=Arbiter(self.settings.sources))
+        settings = self.settings
+        return State(
+            Arbiter(settings.sources),
+            SpeedLimits(settings.limits),
+            Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
+        )
 
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, Verdict]:
         """Return the new state and the verdict; the event in the inputs is handled once."""
@@ -93,11 +107,24 @@ class Policy:
         )
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
-        if not isinstance(inputs.event, DriveRequest):
+        event, settings = inputs.event, self.settings
+        if event is None:
             return state, ""
-        max_age_ns = round(self.settings.max_echo_age * NS_PER_S)
-        arbiter, refused = state.arbiter.accept(inputs.event, state.heartbeat, max_age_ns, now_ns)
-        return replace(state, arbiter=arbiter), refused
+        is_keepalive = isinstance(event, KeepaliveRequest)
+        max_age_s = settings.estop_keepalive_timeout if is_keepalive else settings.max_echo_age
+        admission = Admission(state.heartbeat, round(max_age_s * NS_PER_S), now_ns)
+        match event:
+            case DriveRequest():
+                arbiter, refused = state.arbiter.accept(event, admission)
+                return replace(state, arbiter=arbiter), refused
+            case LimitRequest():
+                limits, refused = state.speed_limits.accept(event, admission)
+                return replace(state, speed_limits=limits), refused and f"limit_{refused}"
+            case KeepaliveRequest():
+                keepalives, refused = state.keepalives.accept(event, admission)
+                return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
+            case _:
+                return state, ""
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         settings, sent = self.settings, state.verdict
@@ -145,9 +172,11 @@ class Policy:
         settle_ns = round(self.settings.settle * NS_PER_S)
         tick = (0, now_ns)
         bad_s = max(state.linear.bad_s, state.angular.bad_s)
-        conflicts = state.arbiter.conflicts(now_ns)
+        names = state.arbiter.conflicts(now_ns) + state.speed_limits.conflicts(now_ns)
+        conflicts = ", ".join(names)
         seen = [
             *observe_inputs(inputs, self.settings, state, now_ns),
+            *state.speed_limits.observations(now_ns),
             Observation("runaway", bad_s >= self.settings.runaway_time, tick),
             Observation("uncommanded_motion", state.standstill.left, tick),
             Observation(
@@ -203,6 +232,7 @@ class Policy:
             twist=plan.twist if command is RUN else STILL,
             source=requested.source if requested else None,
             acked=_acked(inputs),
+            limited_by=requested.limited_by if requested else None,
         )
         return state, verdict
 

@@ -82,10 +82,12 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         latched=latched(state.latches),
         causes=causes,
         source=state.verdict.source,
-        limits=_limits(policy, state),
+        limits=_limits(policy, state, now_ns),
         heartbeat=state.heartbeat.number,
         text=sentence(state),
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
+        estop_keepalives=state.keepalives.states(now_ns),
+        limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
     )
 
 
@@ -170,12 +172,13 @@ def _release(policy: Policy, state: State, now_ns: int) -> Release:
     )
 
 
-def _limits(policy: Policy, state: State) -> Limits:
+def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
     planner, settings = policy.planner, policy.settings
     distances = planner.with_overrides(state.sonar_array.cautious, state, state.verdict.source)
 
     def most(asked: Twist) -> Twist:
         twist = planner.limited(asked, state.latches)
+        twist, _ = state.speed_limits.limited(twist, now_ns)
         return twist.scaled(planner.zones.limit(twist, distances).factor)
 
     return Limits(

@@ -4,7 +4,7 @@ All decisions are made by ``Policy``.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -15,10 +15,13 @@ from common.bus.calls import Caller
 from common.errors import MessageError
 from common.freshness import Latest
 from common.heartbeat import Heartbeat
+from common.keys import Topic
 from common.messages import (
     Bumper,
     Done,
     Drive,
+    EstopKeepalive,
+    Limit,
     Message,
     ReleaseRequest,
     ResetDone,
@@ -27,7 +30,16 @@ from common.messages import (
 from common.service import Node
 from services.safety.conditions import LOST_SAMPLES
 from services.safety.config import SafetyConfig
-from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import (
+    DriveRequest,
+    Estop,
+    Event,
+    Hold,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+    Reset,
+)
 from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import motion_message, signature, state_message, transitions, with_times
 from services.safety.state import Reply
@@ -71,14 +83,39 @@ class SafetyService:
             known=self._node.config.safety.sources,
             source="*",
         )
-        for source in self._node.config.safety.sources:
-            # For a client whose rights cover only this source, the router announces only
-            # subscribers of exactly this key.
-            bus.announce(keys.DRIVE.on(robot, source=source))
+        bus.subscribe(
+            keys.LIMIT,
+            self._on_limit,
+            depth=DRIVE_DEPTH,
+            refused=self._on_bad_limit,
+            known=self._node.config.safety.limits,
+            source="*",
+        )
+        self._announce(keys.DRIVE, self._node.config.safety.sources)
+        self._announce(keys.LIMIT, self._node.config.safety.limits)
+        keepalives = self._node.config.safety.estop_keepalive
+        bus.subscribe(
+            keys.ESTOP_KEEPALIVE,
+            self._on_keepalive,
+            depth=DRIVE_DEPTH,
+            refused=self._on_bad_keepalive,
+            known=keepalives,
+            source="*",
+        )
+        self._announce(keys.ESTOP_KEEPALIVE, keepalives)
         bus.serve(keys.RESET, self._on_reset)
         bus.serve(keys.RELEASE, self._on_release)
         self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
         self._estop_bus.subscribe(keys.SAFETY, self._store("estop_path"))
+
+    def _announce(self, topic: Topic[M], sources: Iterable[str]) -> None:
+        """Announce the key of each source.
+
+        To a client whose rights cover only one source, the router announces only subscribers of
+        exactly its key.
+        """
+        for source in sources:
+            self._node.bus.announce(topic.on(self._node.config.robot.id, source=source))
 
     def _subscribe_measurements(self) -> None:
         """Subscribe to the bridge's measurements, on the drive link only."""
@@ -124,6 +161,20 @@ class SafetyService:
 
     def _on_bad_drive(self, key: str, _: MessageError) -> None:
         self._decide(DriveRequest(source_of(key), None))
+
+    def _on_limit(self, arrival: Arrival[Limit]) -> None:
+        source = source_of(arrival.key)
+        self._decide(LimitRequest(source, arrival.message, arrival.received_ns))
+
+    def _on_bad_limit(self, key: str, _: MessageError) -> None:
+        self._decide(LimitRequest(source_of(key), None))
+
+    def _on_keepalive(self, arrival: Arrival[EstopKeepalive]) -> None:
+        source = source_of(arrival.key)
+        self._decide(KeepaliveRequest(source, arrival.message, arrival.received_ns))
+
+    def _on_bad_keepalive(self, key: str, _: MessageError) -> None:
+        self._decide(KeepaliveRequest(source_of(key), None))
 
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         def answer(reply: Reply) -> None:
@@ -191,5 +242,5 @@ def differs(bumper: Bumper, before: Bumper) -> bool:
 
 
 def source_of(key: str) -> str:
-    """Return the source in a key ``.../@cmd/drive/{source}``."""
+    """Return the source in a key such as ``.../@cmd/drive/{source}``."""
     return key.rsplit("/", 1)[-1]

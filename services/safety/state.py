@@ -6,7 +6,9 @@ from common.heartbeat import Heartbeat
 from common.messages import Verdict as VerdictName
 from common.motion import STILL, STOP, Command, Twist
 from services.safety.arbiter import Arbiter
+from services.safety.keepalive import Keepalives
 from services.safety.latches import FaultBudget, Latches, Token
+from services.safety.limits import SpeedLimits
 from services.safety.release import Release
 from services.safety.runaway import Axis
 from services.safety.sonar_array import SonarArray, SonarOverrides
@@ -34,13 +36,16 @@ class Verdict(Struct, frozen=True):
     source: str | None = None  # the source in control, also while safety stops it
     acked: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
     reply: Reply | None = None  # to a reset or a hold
-    refused: str = ""  # reason of a refused request, by the names in ``arbiter.py``
+    refused: str = ""  # reason of a refused message, by the names in ``channel.py``
+    limited_by: str | None = None  # the limit source that slows the requested twist
 
 
 class State(Struct, frozen=True):
     """Everything besides the inputs that a decision depends on."""
 
     arbiter: Arbiter
+    speed_limits: SpeedLimits
+    keepalives: Keepalives
     heartbeat: Heartbeat = Heartbeat()
     latches: Latches = {}
     sonar_array: SonarArray = SonarArray()

@@ -8,8 +8,8 @@ from common import keys
 from common.bus.bus import Arrival
 from common.bus.publisher import Publisher
 from common.loop import Loop
-from common.messages import Drive
-from common.source import DENIED_AFTER, DriveSource
+from common.messages import MAX_REASON, Drive
+from common.source import DENIED_AFTER, DriveSource, LimitPublisher
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 from verification.harness.bus import bus_on, running
@@ -85,3 +85,21 @@ def test_who_may_only_watch_is_barred(
     monkeypatch.setattr(Publisher, "passed_on", True)
     source.request(0.1, 0.0)
     assert not source.denied
+
+
+def test_a_limit_carries_the_newest_heartbeat_and_a_bounded_reason(bus: FakeBus) -> None:
+    source = LimitPublisher(bus, "lidar")
+    bus.deliver(keys.SAFETY, safety_state(heartbeat=8))
+    sent = source.limit(0.3, None, "x" * 100)
+    assert (sent.linear, sent.angular, sent.echo, sent.reason) == (0.3, None, 8, "x" * MAX_REASON)
+    assert (source.limit().linear, source.limit().reason) == (None, "")
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -0.1])
+def test_a_cap_that_safety_would_refuse_is_an_error(bus: FakeBus, wrong: float) -> None:
+    source = LimitPublisher(bus, "lidar")
+    with pytest.raises(ValueError, match="a cap must be finite and not negative"):
+        source.limit(wrong)
+    with pytest.raises(ValueError, match="a cap must be finite and not negative"):
+        source.limit(0.1, wrong)
+    assert source.limit(0.0, 0.0).linear == 0.0

@@ -1,4 +1,4 @@
-"""Both examples as documented, with a real router and a fake robot."""
+"""The examples as documented, with a real router and a fake robot."""
 
 import signal
 import subprocess
@@ -10,11 +10,12 @@ import pytest
 from common import keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from common.messages import Odometry, Ultrasonic
+from common.messages import Limit, Odometry, Ultrasonic
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.ports import free_port
-from verification.harness.waiting import PATIENCE_S
+from verification.harness.waiting import PATIENCE_S, wait_until
 
+LIMITS: list[Limit] = []
 RANGES = (2.0, 1.5, 0.62, None, 3.0, None, None, 4.0)
 
 
@@ -38,6 +39,7 @@ def robot() -> Iterator[str]:
             )  # fmt: skip
 
         loop.every(0.05, publish)
+        bus.subscribe(keys.LIMIT, lambda it: LIMITS.append(it.message), source="lidar")
 
     with router_process(where), running(Loop()) as loop, bus_on(where, loop, declare):
         yield where
@@ -65,3 +67,14 @@ def test_the_consumer_with_t2_prints_the_nearest_obstacle(robot: str) -> None:
 def test_the_plain_consumer_prints_the_pose(robot: str) -> None:
     line, _ = first_line("examples/watch_plain.py", robot)
     assert line == "x   1.25 m  y  -0.50 m   0.30 m/s\n"
+
+
+def test_a_limit_slows_before_the_nearest_obstacle(robot: str) -> None:
+    words = [sys.executable, "-m", "examples.limit_speed", "--set", f"bus.connect={robot}"]
+    with subprocess.Popen(words) as process:
+        try:
+            wait_until(lambda: LIMITS, "a limit")
+        finally:
+            process.kill()
+    limit = LIMITS[-1]
+    assert (limit.linear, limit.angular, limit.reason) == (0.2, None, "something at 0.62 m")

@@ -13,8 +13,11 @@ from common.wire.frame import Side
 from tests.invariants.strategies import (
     BUS,
     CABLE,
+    CAPS,
     FORGED,
     HOSTILE,
+    HOSTILE_LIMITS,
+    LIMITERS,
     LONG,
     ON_BUS,
     ON_CABLE,
@@ -78,6 +81,20 @@ class FaultRules(RuleBasedStateMachine):
         """Switch one of the board's own brakes by the bridge's call."""
         self.stack.switches(on=on)
         self.stack.run(60)
+
+    @rule(source=LIMITERS, linear=CAPS, angular=CAPS, ms=SHORT | LONG)
+    def limit(self, source: str, linear: float | None, angular: float | None, ms: int) -> None:
+        """Limit the speed from now on."""
+        self.stack.limiters[source].caps = linear, angular
+        self.stack.run(ms)
+
+    @rule(source=LIMITERS, ms=SHORT | LONG)
+    def silence_limit(self, source: str, ms: int) -> None:
+        """Silence a source of limits for a while."""
+        limiter = self.stack.limiters[source]
+        before, limiter.caps = limiter.caps, None
+        self.stack.run(ms)
+        limiter.caps = before
 
     def trip(self, kind: str) -> None:
         """Trip a latch whose cause ends at once."""
@@ -182,6 +199,13 @@ class FaultRules(RuleBasedStateMachine):
         stick.seq += step
         echo = stick.echo + bad.echo
         stick.put(replace(bad, echo=echo, seq=stick.seq), source)
+        self.stack.run(5)
+
+    @rule(source=LIMITERS, kind=st.sampled_from([*HOSTILE_LIMITS]))
+    def hostile_limit(self, source: str, kind: str) -> None:
+        """Send a limit that safety must refuse."""
+        limiter, bad = self.stack.limiters[source], HOSTILE_LIMITS[kind]
+        limiter.put(replace(bad, echo=limiter.echo + bad.echo))
         self.stack.run(5)
 
     @rule(forged=st.sampled_from(FORGED), seq=st.integers(1, 2**62), copies=st.booleans())

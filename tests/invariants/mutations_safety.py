@@ -2,16 +2,19 @@
 
 from typing import Any
 
+from common import messages as m
 from common.motion import Twist
 from common.wire.frame import Side
-from services.safety import conditions, latches
+from services.safety import causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
 from services.safety.inputs import Inputs
+from services.safety.limits import SpeedLimits
 from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
 from services.safety.zones import Zones
 from tests.invariants.mutations import Mutation
+from verification.invariants.limits import IGNORED, NEEDED
 from verification.invariants.stack import Stack
 
 FAULT_MM = 0xFFFF
@@ -109,6 +112,26 @@ def however_old(inputs: Inputs, *_: object) -> Twist | None:
     return inputs.measured
 
 
+def limit(stack: Stack) -> None:
+    stack.limiters[IGNORED].caps = (0.2, None)
+
+
+def protective_stop(stack: Stack) -> None:
+    """Stop the vehicle, and lift the stop while the stick is pushed."""
+    stack.limiters[IGNORED].caps = (0.0, None)
+    stack.run(1500)
+    stack.limiters[IGNORED].caps = (None, None)
+
+
+def limit_falls_silent(stack: Stack) -> None:
+    stack.limiters[NEEDED].caps = None
+
+
+def rival_limit(stack: Stack) -> None:
+    limiter = stack.limiters[NEEDED]
+    limiter.put(m.Limit(linear=9.0, echo=limiter.echo, boot=5))
+
+
 KEEP = SafetyService._store
 
 SAFETY_MUTATIONS: dict[str, Mutation] = {
@@ -138,6 +161,23 @@ SAFETY_MUTATIONS: dict[str, Mutation] = {
     ),
     "a standstill is not supervised": (
         Supervisor, "_stay", lambda self, standstill, *_: standstill, pushed, "no BRAKE while",
+    ),
+    "a limit does not slow": (
+        SpeedLimits, "limited", lambda _, twist, __: (twist, None), limit, "faster than a limit",
+    ),
+    "a protective stop does not stop": (
+        SpeedLimits, "observations", lambda *_: iter(()), protective_stop,
+        "protective stop of fleet",
+    ),
+    "a protective stop wants no neutral": (
+        policy, "wants_neutral", lambda name: name != "limit_stop" and causes.wants_neutral(name),
+        protective_stop, "was not neutral",
+    ),
+    "a silent limit source drives on": (
+        SpeedLimits, "_silent", lambda *_: [], limit_falls_silent, "no limit of lidar",
+    ),
+    "two publishers of a limit": (
+        SpeedLimits, "conflicts", lambda *_: [], rival_limit, "two publishers of one limit",
     ),
     "an override does not hold": (
         Arbiter, "overruled", lambda self, _: self, nav_goes_on, "nav was not neutral",

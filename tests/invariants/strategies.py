@@ -9,7 +9,7 @@ from common.motion import Command
 from verification.invariants.net import CLEAR, Disturbance
 from verification.invariants.vehicle import NO_ECHO_MM
 
-BUS = st.sampled_from(["drive", "motion", "state", "streams"])
+BUS = st.sampled_from(["drive", "limit", "motion", "state", "streams"])
 CABLE = st.sampled_from(["to_board", "from_board"])
 ON_BUS = st.sampled_from(
     [CLEAR, Disturbance(late_ms=30), Disturbance(late_ms=120), Disturbance(lose=2),
@@ -28,6 +28,8 @@ ON_CABLE = st.sampled_from(
 SPEEDS = st.sampled_from([0.0, 0.3, 1.0, -0.5, 5.0])
 FAST = st.sampled_from([1.0, 0.6, -1.0])
 TURNS = st.sampled_from([0.0, 0.0, 0.4, -1.0, 9.0])
+CAPS = st.sampled_from([None, 0.0, 0.1, 0.3, 0.6, 5.0])
+LIMITERS = st.sampled_from(["lidar", "fleet"])
 SOURCES = st.sampled_from(["teleop", "nav"])
 DIRECTIONS: st.SearchStrategy[m.Direction] = st.sampled_from(["backward", "forward"])
 KINDS = st.sampled_from(["estop", "bumper", "driver", "runaway", "router"])
@@ -45,6 +47,14 @@ HOSTILE = {
     "again": m.Drive(linear=0.5, angular=0.0, echo=0),
     "rival": m.Drive(linear=0.5, angular=0.0, echo=0, boot=5),
     "rival zero": m.Drive(linear=0.0, angular=0.0, echo=0, boot=6),
+}
+HOSTILE_LIMITS = {
+    "nan": m.Limit(linear=math.nan, echo=0),
+    "infinite": m.Limit(angular=math.inf, echo=0),
+    "unknown echo": m.Limit(echo=-7),
+    "old echo": m.Limit(echo=-12),
+    "rival": m.Limit(linear=9.0, echo=0, boot=5),
+    "rival stop": m.Limit(linear=0.0, echo=0, boot=6),
 }
 FORGED = [
     [m.Motion(command=Command.STOP, boot=666), m.Motion(command=Command.RUN, linear=0.7, boot=666)],

@@ -17,10 +17,12 @@ from common.wire.frame import Side
 from tests.invariants.fault_rules import FaultRules
 from tests.invariants.strategies import (
     BUS,
+    CAPS,
     DIRECTIONS,
     FAST,
     HASTY,
     KINDS,
+    LIMITERS,
     LONG,
     NEAR_MM,
     ON_BUS,
@@ -29,6 +31,7 @@ from tests.invariants.strategies import (
     SPEEDS,
     TURNS,
 )
+from verification.invariants.limits import IGNORED, NEEDED
 from verification.invariants.net import ECHO_MS, HOLD_MS, MS, Disturbance
 from verification.invariants.oracle import STEP_NS
 from verification.invariants.vehicle import NO_ECHO_MM
@@ -75,6 +78,7 @@ class StackMachine(FaultRules):
         for side in Side:
             vehicle.fault(side, 0)
         self.stack.net.disturbances.clear()
+        self.stack.limiters[NEEDED].caps, self.stack.limiters[IGNORED].caps = (None, None), None
         self.wait(1000)
         self.brakes(on=True)
         self.reset(lets_go=True)
@@ -168,6 +172,13 @@ class StackMachine(FaultRules):
             stick.seq += 1
             stick.put(m.Drive(linear=speed, angular=0.0, echo=echo, seq=stick.seq))
             self.stack.run(10)
+
+    @rule(source=LIMITERS, linear=FAST, cap=CAPS, ms=LONG)
+    def limited(self, source: str, linear: float, cap: float | None, ms: int) -> None:
+        """Drive fast, then limit the speed, and end the limit while the stick is pushed."""
+        self.off_we_go("teleop", linear, 0.4, 700)
+        self.limit(source, cap, None, ms)
+        self.limit(source, None, None, 400)
 
     @rule(source=SOURCES, linear=FAST, mm=NEAR_MM, ms=LONG)
     def approach(self, source: str, linear: float, mm: int, ms: int) -> None:

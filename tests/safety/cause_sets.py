@@ -12,7 +12,9 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
-from services.safety.arbiter import Channel
+from services.safety.arbiter import DriveChannel
+from services.safety.channel import Channel
+from services.safety.keepalive import Keepalives
 from services.safety.latches import FaultBudget
 from services.safety.runaway import Axis
 from services.safety.standstill import Phase, Standstill
@@ -20,15 +22,15 @@ from services.safety.state import State
 from tests.safety.policy_fixture import PolicyFixture
 
 BRAKING = {
-    "contact", "estop", "estop_reader", "predecessor", "runaway", "uncommanded_motion",
-    "not_stopping",
+    "contact", "estop", "estop_reader", "estop_keepalive", "predecessor", "runaway",
+    "uncommanded_motion", "not_stopping",
 }  # fmt: skip
 LATCHING = (BRAKING - {"not_stopping"}) | {"driver_left", "driver_right", "flapping"}
 INHIBITING = {
     "leaving", "starting", "link", "switches", "bumper", "silent", "unarmed", "not_stopping",
 }  # fmt: skip
 # Each one alone, with up to so many others: all sets of all causes would take four times as long.
-STANDSTILL, OTHERS = {"uncommanded_motion", "not_stopping"}, 3
+RARE, OTHERS = {"uncommanded_motion", "not_stopping", "estop_keepalive"}, 3
 AHEAD = Twist(0.3, 0.0)
 STEP_NS = NS_PER_S // 50
 
@@ -93,10 +95,17 @@ def nobody_hears(fixture: PolicyFixture) -> None:
     fixture.estop_session_up = False
 
 
+def not_kept_alive(fixture: PolicyFixture) -> None:
+    channels = {"pendant": Channel(boot=1, received_ns=fixture.now_ns - 2 * NS_PER_S)}
+    keepalives = Keepalives(("pendant",), 1.0, channels)
+    fixture.state = replace(fixture.state, keepalives=keepalives)
+
+
 RAISE: dict[str, Change] = {
     "contact": sample("bumper", pressed=True),
     "estop": lambda fixture: None,  # an event, not a sample
     "estop_reader": nobody_hears,
+    "estop_keepalive": not_kept_alive,
     "predecessor": sample("link", latched_by=4711),
     "runaway": ran_away,
     "uncommanded_motion": left_its_place,
@@ -126,18 +135,21 @@ def subsets(names: set[str]) -> Iterator[set[str]]:
 
 
 def crossed(names: set[str]) -> Iterator[set[str]]:
-    """Yield all subsets; those with a cause of STANDSTILL only with few others, and with one."""
-    for others in subsets(names - STANDSTILL):
+    """Yield all subsets; those with a cause of RARE only with few others, and with one."""
+    for others in subsets(names - RARE):
         yield others
         if len(others) <= OTHERS:
-            yield from (others | {name} for name in sorted(names & STANDSTILL))
+            yield from (others | {name} for name in sorted(names & RARE))
 
 
 def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: bool) -> None:
     """Give the fixture a memory, all samples good and new, and one request or none."""
     channels = {}
     if requested is not None:
-        channels["teleop"] = Channel(99, fixture.driver_seq, requested, fixture.now_ns, None, armed)
+        channels["teleop"] = DriveChannel(
+            boot=99, seq=fixture.driver_seq, received_ns=fixture.now_ns, requested=requested,
+            neutral=armed,
+        )  # fmt: skip
     arbiter = replace(state.arbiter, channels=channels)
     fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)
     fixture.estop_session_up = True

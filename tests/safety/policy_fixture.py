@@ -12,6 +12,8 @@ from common.messages import (
     Direction,
     Drive,
     Driver,
+    EstopKeepalive,
+    Limit,
     Link,
     Message,
     Mileage,
@@ -23,7 +25,16 @@ from common.messages import (
 )
 from common.settings import Vehicle
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest, Estop, Event, Hold, Inputs, Reset
+from services.safety.inputs import (
+    DriveRequest,
+    Estop,
+    Event,
+    Hold,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+    Reset,
+)
 from services.safety.latches import latched
 from services.safety.policy import Policy
 from services.safety.report import state_message
@@ -67,6 +78,8 @@ class PolicyFixture:
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
+        self.keepalive_boot, self.keepalive_seq = 66, 0
+        self.limit_boot, self.limit_seq = 55, 0
         self.pressed, self.lost = False, 0
         self.ranges, self.status = FREE, NO_ECHO
         self.linear: float | None = None  # measured; None follows the command
@@ -133,6 +146,31 @@ class PolicyFixture:
             boot=self.driver_boot,
         )
         return self.decide(DriveRequest(source, drive, self.now_ns))
+
+    def limit(
+        self,
+        linear: float | None = None,
+        angular: float | None = None,
+        reason: str = "",
+        source: str = "lidar",
+    ) -> Verdict:
+        """Put one speed limit."""
+        self.limit_seq += 1
+        limit = Limit(
+            linear=linear, angular=angular, reason=reason,
+            echo=self.echo, seq=self.limit_seq, boot=self.limit_boot,
+        )  # fmt: skip
+        return self.decide(LimitRequest(source, limit, self.now_ns))
+
+    def keepalive(self, source: str = "pendant", echo: int | None = None) -> Verdict:
+        """Put one keepalive."""
+        self.keepalive_seq += 1
+        message = EstopKeepalive(
+            echo=self.echo if echo is None else echo,
+            seq=self.keepalive_seq,
+            boot=self.keepalive_boot,
+        )
+        return self.decide(KeepaliveRequest(source, message, self.now_ns))
 
     def drive(
         self,

@@ -11,7 +11,8 @@ from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
 from common.motion import Twist
-from services.safety.arbiter import CONFLICT_NS, Arbiter, Channel
+from services.safety.arbiter import Arbiter, DriveChannel
+from services.safety.channel import CONFLICT_NS, Admission
 from services.safety.config import Safety
 from services.safety.inputs import DriveRequest
 
@@ -31,7 +32,7 @@ def request(
     echo: int = 41,
 ) -> tuple[Arbiter, str]:
     drive = Drive(linear=linear, angular=0.0, echo=echo, seq=seq, boot=boot)
-    return arbiter.accept(DriveRequest(source, drive, now_ns), BEAT, AGE_NS, now_ns)
+    return arbiter.accept(DriveRequest(source, drive, now_ns), Admission(BEAT, AGE_NS, now_ns))
 
 
 def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: float = 0.0) -> Arbiter:
@@ -44,7 +45,10 @@ def accepted(arbiter: Arbiter, now_ns: int, source: str = "teleop", linear: floa
 def test_a_non_finite_request_is_refused(linear: float) -> None:
     assert request(Arbiter(SOURCES), 0, linear=linear)[1] == "not_finite"
     wrong = Drive(linear=0.0, angular=linear, echo=41)
-    assert Arbiter(SOURCES).accept(DriveRequest("web", wrong), BEAT, AGE_NS, 0)[1] == "not_finite"
+    assert (
+        Arbiter(SOURCES).accept(DriveRequest("web", wrong), Admission(BEAT, AGE_NS, 0))[1]
+        == "not_finite"
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,7 +73,10 @@ def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
 
 def test_unknown_sources_and_nonsense_are_refused() -> None:
     assert request(Arbiter(SOURCES), 0, source="nobody") == (Arbiter(SOURCES), "unknown_source")
-    assert Arbiter(SOURCES).accept(DriveRequest("web", None), BEAT, AGE_NS, 0)[1] == "not_a_request"
+    assert (
+        Arbiter(SOURCES).accept(DriveRequest("web", None), Admission(BEAT, AGE_NS, 0))[1]
+        == "not_a_request"
+    )
 
 
 def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
@@ -77,14 +84,14 @@ def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
     arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
     refused, reason = request(arbiter, lease_ns, boot=2)
     assert reason == "second_publisher"
-    assert refused.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"
-    assert refused.conflicts(lease_ns + CONFLICT_NS) == ""
+    assert refused.conflicts(lease_ns + CONFLICT_NS - 1) == ["teleop"]
+    assert refused.conflicts(lease_ns + CONFLICT_NS) == []
     taken, reason = request(arbiter, lease_ns + 1, boot=2)
     assert reason == ""
     assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
     taken, reason = request(refused, lease_ns + 1, boot=2)
     assert reason == ""
-    assert taken.conflicts(lease_ns + CONFLICT_NS - 1) == "teleop"  # the first may still be there
+    assert taken.conflicts(lease_ns + CONFLICT_NS - 1) == ["teleop"]  # the first may still be there
 
 
 @pytest.mark.parametrize("seq", [0, 1, 9])
@@ -103,7 +110,7 @@ def test_the_wish_is_what_was_asked_for() -> None:
         drive = Drive(
             linear=linear, angular=angular, echo=41, boot=1, seq=arbiter.channels["teleop"].seq + 1
         )
-        arbiter, refused = arbiter.accept(DriveRequest("teleop", drive), BEAT, AGE_NS, 0)
+        arbiter, refused = arbiter.accept(DriveRequest("teleop", drive), Admission(BEAT, AGE_NS, 0))
         assert (arbiter.channels["teleop"].requested, refused) == (Twist(linear, angular), "")
         assert arbiter.requests_motion(0)
 
@@ -113,17 +120,20 @@ def test_all_rivals_are_named() -> None:
     for source in ("teleop", "web"):
         arbiter = accepted(arbiter, 0, source)
         arbiter, _ = request(arbiter, 0, source=source, boot=2)
-    assert arbiter.conflicts(0) == "teleop, web"
+    assert arbiter.conflicts(0) == ["teleop", "web"]
 
 
 def test_a_source_starts_without_requests() -> None:
-    assert Channel() == Channel(None, 0, Twist(0.0, 0.0), None, None, False, "")
+    assert DriveChannel() == DriveChannel(
+        boot=None, seq=0, received_ns=None, conflict_ns=None, requested=Twist(0.0, 0.0),
+        neutral=False, overruled_by="",
+    )  # fmt: skip
     assert CONFLICT_NS == 500_000_000
 
 
 def test_an_absent_driver_is_none() -> None:
     assert Arbiter(SOURCES).in_control(0) is None
-    assert Arbiter(SOURCES).conflicts(0) == ""
+    assert Arbiter(SOURCES).conflicts(0) == []
 
 
 def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
@@ -141,15 +151,21 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
 def test_a_lease_counts_from_the_reception() -> None:
     drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
     lease_ns, late_ns = round(SOURCES["teleop"].lease * NS_PER_S), 100_000_000
-    arbiter, _ = Arbiter(SOURCES).accept(DriveRequest("teleop", drive, 5), BEAT, AGE_NS, late_ns)
+    arbiter, _ = Arbiter(SOURCES).accept(
+        DriveRequest("teleop", drive, 5), Admission(BEAT, AGE_NS, late_ns)
+    )
     assert arbiter.in_control(5 + lease_ns) == "teleop"
     assert arbiter.in_control(5 + lease_ns + 1) is None
     assert not arbiter.armed(5 + lease_ns + 1).channels["teleop"].neutral
     # As does the time of a second publisher.
     other = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=2)
-    arbiter, refused = arbiter.accept(DriveRequest("teleop", other, 6), BEAT, AGE_NS, late_ns)
-    assert (refused, arbiter.conflicts(6 + CONFLICT_NS)) == ("second_publisher", "")
-    _, refused = arbiter.accept(DriveRequest("teleop", other, 6 + lease_ns), BEAT, AGE_NS, 7)
+    arbiter, refused = arbiter.accept(
+        DriveRequest("teleop", other, 6), Admission(BEAT, AGE_NS, late_ns)
+    )
+    assert (refused, arbiter.conflicts(6 + CONFLICT_NS)) == ("second_publisher", [])
+    _, refused = arbiter.accept(
+        DriveRequest("teleop", other, 6 + lease_ns), Admission(BEAT, AGE_NS, 7)
+    )
     assert refused == ""
 
 
@@ -192,7 +208,9 @@ def test_the_best_fresh_source_drives_whatever_comes(
         now_ns += pause_ms * 1_000_000
         beat = beat.beat(now_ns)
         drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
-        arbiter, refused = arbiter.accept(DriveRequest(source, drive, now_ns), beat, AGE_NS, now_ns)
+        arbiter, refused = arbiter.accept(
+            DriveRequest(source, drive, now_ns), Admission(beat, AGE_NS, now_ns)
+        )
         assert refused == ("" if source in SOURCES else "unknown_source")
         if not refused:
             last[source] = (now_ns, linear)

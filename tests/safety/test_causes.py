@@ -5,11 +5,12 @@ import pytest
 from common.messages import Action
 from services.safety.causes import RULES, Clears, bars_motion, severity, wants_neutral
 
-RESET, SETTLED, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.AT_ONCE
+RESET, SETTLED, NEUTRAL, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.NEUTRAL, Clears.AT_ONCE
 TABLE: list[tuple[str, Action, Clears]] = [
     ("contact", "brake", RESET),
     ("estop", "brake", RESET),
     ("estop_reader", "brake", RESET),
+    ("estop_keepalive", "brake", RESET),
     ("predecessor", "brake", RESET),
     ("runaway", "brake", RESET),
     ("uncommanded_motion", "brake", RESET),
@@ -24,12 +25,15 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("bumper", "stop", SETTLED),
     ("silent", "stop", SETTLED),
     ("unarmed", "stop", SETTLED),
+    ("limit_stop", "stop", NEUTRAL),
+    ("limit_silent", "stop", NEUTRAL),
     ("two_publishers", "stop", AT_ONCE),
     ("neutral", "stop", AT_ONCE),
     ("blocked", "stop", AT_ONCE),
     ("no_request", "stop", AT_ONCE),
     ("release", "slow", AT_ONCE),
     ("bumper_lossy", "slow", AT_ONCE),
+    ("limit", "slow", AT_ONCE),
     ("obstacle", "slow", AT_ONCE),
     ("sonar", "slow", AT_ONCE),
 ]

@@ -5,7 +5,7 @@ import pytest
 
 from common.config import Sources, load
 from common.errors import ConfigError
-from services.safety.config import PROTECTIVE, Safety, SafetyConfig, Source
+from services.safety.config import PROTECTIVE, LimitSource, Safety, SafetyConfig, Source
 
 
 def read(*sets: str) -> Safety:
@@ -80,3 +80,17 @@ def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
 def test_every_protection_is_a_setting_and_its_default_is_allowed() -> None:
     defaults = msgspec.structs.asdict(Safety())
     assert all(low <= defaults[name] <= high for name, (low, high) in PROTECTIVE.items())
+
+
+def test_a_limit_source_has_both_settings_and_a_short_lease() -> None:
+    given = 'safety.limits.lidar={lease = 0.5, silence = "stop"}'
+    assert read(given).limits == {"lidar": LimitSource(lease=0.5, silence="stop")}
+    for wrong, message in (
+        ("safety.limits.lidar={lease = 0.5}", "silence"),
+        ('safety.limits.lidar={silence = "stop"}', "lease"),
+        ('safety.limits.lidar={lease = 0.5, silence = "drive"}', "silence"),
+        ('safety.limits.lidar={lease = 1.1, silence = "stop"}', "limits.lidar.lease"),
+        ('safety.limits."a/b"={lease = 0.5, silence = "stop"}', "limits"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            read(wrong)

@@ -33,7 +33,7 @@ STACKS: Sequence[Sequence[Sequence[Requirement]]] = [
     [
         ["remote driver", "none"],
         ["remote driver", "none"],
-        ["small disk", "none"],
+        ["small disk", "third parties", "none"],
         ["teleop", "none"],
         *[NONE] * 2 * (CORES - 2),
     ],

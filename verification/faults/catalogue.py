@@ -24,6 +24,8 @@ from verification.faults import browser, forgery, injectors
 from verification.faults.fault import (
     BUMPER_AGE,
     HEARTBEAT,
+    KEEPALIVE,
+    LIMIT_LEASE,
     MOTION_LEASE,
     REQUEST_LEASE,
     SILENCE,
@@ -122,6 +124,11 @@ PROCESSES = [
     # The real teleop in a terminal with W held; ``driver`` above only sends its requests.
     *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, terminated=ZEROS, needs="teleop"),
     *signals("odom", ON, None),
+    # Its silence stops the vehicle, by the settings of this stack.
+    Fault("limit source SIGKILL, silence = stop", kill("limiter", signal.SIGKILL), NEUTRAL,
+          LIMIT_LEASE, needs="third parties"),
+    Fault("pendant SIGKILL", kill("pendant", signal.SIGKILL), RESET, KEEPALIVE, hold_s=1.5,
+          needs="third parties"),
     Fault("a second bridge", second("bridge"), ON, None, injectors.end_others, hold_s=HOLD_S),
     # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect.
     Fault("a second safety", second("safety"), (*ON, *ITSELF), None,

@@ -11,6 +11,7 @@ from typing import Literal
 from cli.settings import Everything
 from verification.faults.namespaces import Requirement
 from verification.faults.stack_fixture import StackFixture
+from verification.faults.third_party import LIMIT_LEASE_S
 
 # How the vehicle drives again, by rising effort.
 Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
@@ -51,5 +52,7 @@ BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
 VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
 ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
 REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
+LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
+KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
 # Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
 ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)

@@ -19,7 +19,13 @@ from typing import Literal
 from common.freshness import NS_PER_S
 
 Requirement = Literal[
-    "none", "teleop", "remote driver", "small disk", "separate clocks", "memory cgroup"
+    "none",
+    "teleop",
+    "remote driver",
+    "third parties",
+    "small disk",
+    "separate clocks",
+    "memory cgroup",
 ]
 
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h

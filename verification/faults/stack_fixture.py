@@ -18,6 +18,7 @@ from common.messages import Done, SafetyState
 from common.operator import reset_request
 from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Wire
 from verification.faults.namespaces import Requirement, clock, small_disk
+from verification.faults.third_party import PARTIES, SETS
 from verification.harness.bus import bus_on, running
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
@@ -174,20 +175,25 @@ def stack_fixture(
     folder: Path, *, shipped: bool = True, need: Requirement = "none"
 ) -> Iterator[StackFixture]:
     """Run a stack fixture that meets the requirement of a fault."""
-    remote, clocks, disk = (
-        need == one for one in ("remote driver", "separate clocks", "small disk")
+    remote, others, clocks, disk = (
+        need == one for one in ("remote driver", "third parties", "separate clocks", "small disk")
     )
     with contextlib.ExitStack() as stack:
         if disk:
             stack.enter_context(small_disk(folder / "disk"))
         made = stack.enter_context(
             running_stack(
-                folder, sets=[*QUICK, *OPEN] if remote else QUICK, shipped=shipped,
+                folder, sets=[*QUICK, *OPEN * remote, *SETS * others], shipped=shipped,
                 log="disk/log.jsonl" if disk else "log.jsonl",
                 listen=f"tcp/{'0.0.0.0' if remote else '127.0.0.1'}:{{port}}",
                 env=clock(folder / "robot") if clocks else None,
             )
         )  # fmt: skip
+        for name in PARTIES if others else ():
+            made.commands[name] = [
+                sys.executable, "-m", "verification.faults.third_party", name, made.endpoint,
+            ]  # fmt: skip
+            made.start(name)
         driver = {
             "remote driver": ["verification.faults.remote_host", made.endpoint, DRIVER],
             "teleop": ["verification.faults.keyboard", made.endpoint],

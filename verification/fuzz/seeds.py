@@ -49,6 +49,8 @@ EXAMPLES: tuple[Struct, ...] = (
              lateness=0.001, rss=2**26),
     m.Event(name="contact", level="error", text="hit", about={"a": 1, "b": None, "c": 0.5}),
     m.Drive(linear=math.nan, angular=math.inf, echo=7),
+    m.EstopKeepalive(echo=7),
+    m.Limit(linear=math.nan, angular=0.0, echo=7, reason="\x1b[2J"),
     m.Motion(
         command=Command.RUN, linear=0.5, angular=-0.5, source="teleop", judged=9, judged_boot=5
     ),

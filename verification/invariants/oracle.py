@@ -91,6 +91,9 @@ class Oracle(Watch):
         message, name = envelope.message, envelope.key.rsplit("/", 1)[-1]
         if isinstance(message, m.Drive):
             book.on_drive(name, message, self.now_ns)
+        elif isinstance(message, m.Limit):
+            sent_ns = book.operators.beats.get(message.echo)
+            book.limits.on_limit(name, message, sent_ns, self.now_ns)
         elif name == "estop":
             self.trip("estop", book.boot)
         else:

@@ -21,6 +21,7 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
+from verification.invariants.limits import LimitBook
 from verification.invariants.operator_book import OperatorBook
 from verification.invariants.sonars import SONARS, approach, shown
 from verification.invariants.standstill_book import StandstillBook
@@ -76,6 +77,7 @@ class SafetyBook:
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
     standstill: StandstillBook = field(default_factory=StandstillBook)
+    limits: LimitBook = field(default_factory=LimitBook)
     well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
 
     def on_drive(self, source: str, drive: Drive, now_ns: int) -> None:
@@ -156,6 +158,8 @@ class SafetyBook:
 
     def look(self, now_ns: int, reader: bool, tripped: bool) -> None:
         """Note, at the time of a decision, whether anything wants a neutral request."""
+        self.limits.look(now_ns)
+        tripped = tripped or any(self.limits.stops(now_ns))
         if "old velocity" in self._what_is_bad(now_ns):
             self.fast_ns = None  # what is not measured is no runaway
         if self._what_is_bad(now_ns) or not reader:
@@ -190,6 +194,7 @@ class SafetyBook:
         else:
             yield from self._of_source(motion.source or "", now_ns)
         yield from self._of_zones(motion, now_ns)
+        yield from self.limits.complaints(motion, now_ns)
 
     def may_reset(self, now_ns: int) -> bool:
         """Return whether a reset may be granted: at standstill, without a drive request."""

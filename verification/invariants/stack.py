@@ -18,8 +18,9 @@ from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.safety.config import SafetyConfig
+from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from verification.invariants.limits import IGNORED, LEASE_S, NEEDED, Limiter
 from verification.invariants.net import MS, Envelope, Net
 from verification.invariants.oracle import STEP_NS, Oracle
 from verification.invariants.process import ROBOT, Process
@@ -36,6 +37,12 @@ TIMED = [
     for name, module in sys.modules.items()
     if name.startswith("services.") and getattr(module, "time", None) is real_time
 ]
+
+
+LIMITS = {
+    NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
+    IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
+}
 
 
 class Stick:
@@ -105,6 +112,10 @@ class Chain(Generic[V]):
         self.sticks = {
             name: Stick(name, self._process("stick", None)) for name in ("teleop", "nav")
         }
+        self.limiters = {
+            name: Limiter(name, self._process("limiter", None)) for name in (NEEDED, IGNORED)
+        }
+        self.limiters[NEEDED].caps = (None, None)
         self.hand = self._process("hand", None)
         self.seen: m.SafetyState | None = None  # the newest state that operators see
         self.hand.subscribe(keys.SAFETY, self._look)
@@ -132,6 +143,8 @@ class Chain(Generic[V]):
         if self.net.now_ns % ASK_NS == 0:
             for stick in self.sticks.values():
                 stick.request()
+            for limiter in self.limiters.values():
+                limiter.publish()
             self.net.turn()
         self.oracle.on_step(self.vehicle.silent)
 
@@ -153,7 +166,7 @@ class Chain(Generic[V]):
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
-        config = SafetyConfig() if name == "safety" else BridgeConfig()
+        config = SafetyConfig(safety=Safety(limits=LIMITS)) if name == "safety" else BridgeConfig()
         process = self._process(name, config)
         self.oracle.on_start(process)
         with self.time():

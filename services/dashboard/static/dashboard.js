@@ -94,6 +94,8 @@ const HANDLERS = {
     if (!hello) return;
     fast = message;
     fastAt = performance.now();
+    // Every second snapshot, 10 a second. A hidden page, or one without a socket, is not alive.
+    if (hello.keepalive && !document.hidden && message.n % 2 === 0) send({ k: "alive", n: message.n });
     driving.answer(message.n, isDriver(), message.driver.hold, message.safety);
     estop.update(message.safety);
     charts.add(message, fastAt);
@@ -156,8 +158,7 @@ function showState() {
 function sentence(safety, worst) {
   if (language === "en") return safety.text;
   if (!worst) return t("text.run");
-  const key = `cause.${worst.name}`;
-  return (t(key) === key ? worst.text : t(key)) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
+  return panels.causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
 }
 
 function showHead() {
@@ -165,6 +166,8 @@ function showHead() {
   chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
   chip("driver", off ? "" : driver(), isDriver() ? "clear" : "slow");
+  const keeper = off || !hello?.keepalive ? "" : fast.keeper === hello.id ? "keeps_alive" : "keeps_not_alive";
+  chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
   const count = Object.keys(slow?.viewers ?? {}).length;
   chip("watching", off || !count ? "" : `${count} ${t("watching")}`);
 }

@@ -24,6 +24,21 @@ export function duration(seconds) {
   return `${Math.floor(seconds / 3600)} h ${Math.floor((seconds % 3600) / 60)} min`;
 }
 
+const LIMITS = {
+  limit: (it) => it.effect === "slow",
+  limit_stop: (it) => it.effect === "stop" && !it.silent,
+  limit_silent: (it) => it.effect === "stop" && it.silent,
+};
+
+/** Return the text of a cause; a limit with its sources and their own reasons. */
+export function causeText(cause, safety, t) {
+  const known = t(`cause.${cause.name}`) !== `cause.${cause.name}`; // a newer safety may have other causes
+  const by = (safety.limit_sources ?? []).filter(LIMITS[cause.name] ?? (() => false));
+  if (!by.length) return known ? t(`cause.${cause.name}`) : cause.text;
+  const each = by.map((it) => it.source + (it.reason ? `: ${it.reason}` : ""));
+  return `${t(`limited.${cause.name}`)} ${each.join(", ")}`;
+}
+
 export function showCauses(safety, t) {
   const causes = safety?.causes ?? [];
   const shown = causes.map((it) => [it, it.age < 10 ? it.age?.toFixed(1) : Math.floor(it.age)]);
@@ -31,10 +46,11 @@ export function showCauses(safety, t) {
   if (!causes.length) {
     fill($("causes"), stamp, () => [create("li", t(safety ? "no_causes" : "unknown"))]);
   } else fill($("causes"), stamp, () => shown.map(([it]) => {
-    const known = t(`cause.${it.name}`) !== `cause.${it.name}`; // a newer safety may have other causes
-    const line = create("li", known ? t(`cause.${it.name}`) : it.text, { "data-action": it.action, "data-cause": it.name });
+    const text = causeText(it, safety, t);
+    const line = create("li", text, { "data-action": it.action, "data-cause": it.name });
     const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
-    const more = !known || it.text === t(`cause.${it.name}`) ? "" : `${it.text} · `;
+    const same = LIMITS[it.name] || it.text === text;
+    const more = same ? "" : `${it.text} · `;
     line.append(create("small", `${more}${t("since")} ${duration(it.age)}${latched}`));
     return line;
   }));

@@ -60,7 +60,24 @@ def test_a_driver_is_limited_to_its_sources() -> None:
         assert may(rights(bo), "write", keys.estop_key(MINE)), "a driver can stop"
 
 
-@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> None:
+    given = rights(replace(member("device", "lidar", (MINE,)), sources=("lidar",)))
+    assert given == ROLES["device lidar of 001"]
+    assert may(given, "write", keys.LIMIT.on(MINE, source="lidar"))
+    for key in (
+        keys.LIMIT.on(MINE, source="person"),
+        keys.LIMIT.on(OTHER, source="lidar"),
+        keys.LIMIT.on(MINE, source="*"),
+        keys.DRIVE.on(MINE, source="lidar"),
+        keys.estop_key(OTHER),
+    ):
+        assert not may(given, "write", key), key
+    assert not any(may(given, "ask", call.on(MINE)) for call in keys.CALLS)
+    assert not may(ROLES["driver of 001"], "write", keys.LIMIT.on(MINE, source="teleop"))
+    assert may(ROLES["site's router"], "write", keys.LIMIT.on(OTHER, source="person"))
+
+
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
 @pytest.mark.parametrize("service", ON_BOARD)
 def test_a_member_cannot_publish_as_an_on_board_service(role: str, service: str) -> None:
     given = ROLES[role]
@@ -70,7 +87,7 @@ def test_a_member_cannot_publish_as_an_on_board_service(role: str, service: str)
     assert not may(given, "live", keys.live_key(MINE, service, "1"))
 
 
-@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
 @pytest.mark.parametrize("verb", ["write", "serve", "live"])
 def test_members_write_only_keys_of_fixed_length(role: str, verb: Verb) -> None:
     printed = ROLES[role].get(verb, ())
@@ -78,7 +95,7 @@ def test_members_write_only_keys_of_fixed_length(role: str, verb: Verb) -> None:
     assert not [expression for expression in printed if "**" in expression]
 
 
-@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
 def test_caches_of_advanced_publishers(role: str) -> None:
     given, kept = ROLES[role], f"{keys.EVENTS.on(MINE, service='dashboard')}/@adv"
     assert may(given, "read", f"{kept}/pub/**")  # as zenoh-ext subscribes
@@ -89,7 +106,7 @@ def test_caches_of_advanced_publishers(role: str) -> None:
     assert not may(given, "read", f"{keys.VELOCITY.on(MINE)}/@adv/**"), "events alone are kept"
 
 
-@pytest.mark.parametrize("role", ["viewer", "driver of 001", "fleet"])
+@pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
 def test_members_can_read_every_published_key(role: str) -> None:
     for topic in keys.TOPICS:
         key = topic.on(MINE, service="x", side="left", source="x")

@@ -85,12 +85,16 @@ def test_screens_use_an_allowed_source(
     load(Shared, Sources(files=(file,)))  # other programs accept it
 
 
+def test_a_device_drives_no_screen() -> None:
+    assert "source" not in bus_toml(Profile("device", "x", ("001",), (), ("lidar",)), [ROBOT])
+
+
 def test_a_local_router_is_reached_on_localhost() -> None:
     assert endpoints([profile("site", "x", (), ("127.0.0.1",))]) == ["tls/localhost:7447"]
 
 
 @pytest.mark.parametrize("role", ROLES)
 def test_the_first_line_names_the_member(role: str) -> None:
-    who = next(each for each in (ROBOT, SITE, ANNA, Profile("viewer", "v"), Profile("fleet", "f"))
-               if each.role == role)  # fmt: skip
+    others = (Profile(name, "x") for name in ("device", "viewer", "fleet"))
+    who = next(each for each in (ROBOT, SITE, ANNA, *others) if each.role == role)
     assert bus_toml(who, []).startswith(f"# Bus settings of {role} {who.name}")

@@ -57,7 +57,7 @@ def test_the_longest_source() -> None:
 
 
 def test_sources_are_for_drivers() -> None:
-    with pytest.raises(ConfigError, match="--source is for drivers; a viewer does not"):
+    with pytest.raises(ConfigError, match="--source is for drivers and devices; a viewer"):
         profile("viewer", "hall", (), (), ("nav",))
 
 
@@ -70,8 +70,8 @@ def test_routers_listen(role: Role) -> None:
     ("role", "name", "robots", "addresses", "message"),
     [
         ("driver", "anna", (), (), "a driver needs --robot ID"),
-        ("viewer", "guest", ("001",), (), "are for drivers, not for a viewer"),
-        ("robot", "001", ("002",), (), "are for drivers, not for a robot"),
+        ("viewer", "guest", ("001",), (), "are for drivers and devices, not for a viewer"),
+        ("robot", "001", ("002",), (), "are for drivers and devices, not for a robot"),
         ("fleet", "control", (), ("10.0.0.1",), "a fleet only connects"),
         ("site", "berlin", (), (), "a site's router needs --address"),
         ("driver", "../anna", ("001",), (), "'../anna' is not a name"),

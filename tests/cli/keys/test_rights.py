@@ -36,6 +36,7 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, 
     certified = {
         "viewer": site.member("viewer", "hall"),
         "driver of 001": site.member("driver", "anna", "--robot", MINE),
+        "device lidar of 001": site.member("device", "lidar", "--robot", MINE),
         "fleet": site.member("fleet", "room"),
         "site's router": site.member("site", "berlin", "--address", "127.0.0.1"),
         "router of 001": site.member("robot", MINE, "--address", "127.0.0.1"),

@@ -1,0 +1,103 @@
+"""``t2 estop --keepalive``: a pendant in a terminal, with a real router and a fake safety."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from cli.inspect.keepalive import described, refusal, timeout_s
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.messages import EstopKeepalive, KeepaliveState, SafetyState
+from tests.cli.inspect.tool import Tool, pretend
+from tests.common.bus_fixture import BusFixture
+from tests.factories import safety_state
+from verification.harness.waiting import PATIENCE_S, wait_until
+
+KNOWN = KeepaliveState(source="pendant", age=0.1, alive=True, timeout=1.0)
+
+
+class Safety:
+    """A safety that expects a pendant, and latches an emergency stop."""
+
+    def __init__(self, buses: BusFixture) -> None:
+        self.received: list[Arrival[EstopKeepalive]] = []
+        self.stops: list[int] = []
+        pretend(buses, "safety", {keys.SAFETY: self.state})
+        buses.bus(self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        bus.subscribe(keys.ESTOP_KEEPALIVE, self.received.append, source="*")
+        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
+
+    def state(self) -> SafetyState:
+        latched = ("estop",) if self.stops else ()
+        return safety_state(heartbeat=41, latched=latched, estop_keepalives=(KNOWN,))
+
+
+@pytest.fixture
+def safety(buses: BusFixture) -> Safety:
+    return Safety(buses)
+
+
+@pytest.fixture
+def pendant(buses: BusFixture, safety: Safety) -> Iterator["subprocess.Popen[str]"]:
+    command = [
+        sys.executable, "-m", "cli", "estop", "--keepalive", "pendant", "--robot", buses.robot,
+        "--set", f"bus.connect={buses.endpoint}",
+    ]  # fmt: skip
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            wait_until(lambda: len(safety.received) > 2, "signs of life")
+            yield process
+        finally:
+            process.kill()
+
+
+def test_it_echoes_the_heartbeat_and_ends_with_a_warning(
+    pendant: "subprocess.Popen[str]", safety: Safety
+) -> None:
+    newest = safety.received[-1]
+    assert newest.key.endswith("/@cmd/estop_keepalive/pendant")
+    assert newest.message.echo == 41
+    pendant.send_signal(signal.SIGINT)
+    out, _ = pendant.communicate(timeout=PATIENCE_S)
+    assert pendant.returncode == 0
+    assert "alive  RUN  Driving." in out
+    assert "within 1 s" in out.splitlines()[-1]
+    assert not safety.stops
+
+
+def test_enter_is_an_emergency_stop(pendant: "subprocess.Popen[str]", safety: Safety) -> None:
+    assert pendant.stdin is not None
+    pendant.stdin.write("\n")
+    pendant.stdin.flush()
+    wait_until(lambda: safety.stops, "the emergency stop")
+
+
+def test_the_end_of_its_input_is_no_key(pendant: "subprocess.Popen[str]", safety: Safety) -> None:
+    assert pendant.stdin is not None
+    pendant.stdin.close()
+    count = len(safety.received)
+    wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
+    assert not safety.stops
+
+
+def test_an_unexpected_name_ends_at_once(t2: Tool, safety: Safety) -> None:
+    result = t2("estop", "--keepalive", "phone")
+    assert result.code == 1
+    assert "safety does not expect 'phone': it expects pendant" in result.err
+
+
+def test_texts() -> None:
+    assert refusal(None, "pendant").startswith("safety publishes no state")
+    assert "it expects no keepalive" in refusal(safety_state(), "pendant")
+    known = safety_state(estop_keepalives=(KNOWN,))
+    assert refusal(known, "pendant") == ""
+    assert described(known, "pendant") == "alive  RUN  Driving."
+    assert described(safety_state(), "pendant").startswith("NOT ALIVE")
+    assert (timeout_s(known, "pendant"), timeout_s(safety_state(), "pendant")) == (1.0, 0.0)

@@ -1,0 +1,385 @@
+"""Speed limits by third parties: admission, caps, protective stops and silence."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common import codec
+from common.errors import MessageError
+from common.freshness import NS_PER_S
+from common.heartbeat import Heartbeat
+from common.messages import Limit, LimitState
+from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
+from services.safety.channel import CONFLICT_NS, Admission
+from services.safety.config import LimitSource, Safety
+from services.safety.inputs import LimitRequest
+from services.safety.limits import LimitChannel, SpeedLimits, printable
+from tests.safety.policy_fixture import PolicyFixture
+
+LEASE_S, LEASE_NS, AGE_NS = 0.5, 500_000_000, 400_000_000
+SOURCES = {
+    "lidar": LimitSource(lease=LEASE_S, silence="stop"),
+    "fleet": LimitSource(lease=LEASE_S, silence="ignore"),
+}
+BEAT = Heartbeat(40).beat(0)  # sent 41 at time 0
+EMPTY = SpeedLimits(SOURCES)
+IGNORED = Safety(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
+NEEDED = Safety(limits=SOURCES)
+
+
+def put(
+    limits: SpeedLimits,
+    now_ns: int = 0,
+    *,
+    source: str = "lidar",
+    linear: float | None = None,
+    angular: float | None = None,
+    reason: str = "",
+    seq: int = 1,
+    boot: int = 1,
+    echo: int = 41,
+) -> tuple[SpeedLimits, str]:
+    limit = Limit(linear=linear, angular=angular, reason=reason, echo=echo, seq=seq, boot=boot)
+    request = LimitRequest(source, limit, now_ns)
+    return limits.accept(request, Admission(BEAT, AGE_NS, min(now_ns, AGE_NS)))
+
+
+def with_limit(
+    linear: float | None = None,
+    angular: float | None = None,
+    reason: str = "",
+    source: str = "lidar",
+) -> SpeedLimits:
+    limits, refused = put(EMPTY, linear=linear, angular=angular, reason=reason, source=source)
+    assert refused == ""
+    return limits
+
+
+# --- admission ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_non_finite_cap_is_refused(value: float) -> None:
+    assert put(EMPTY, linear=value) == (EMPTY, "not_finite")
+    assert put(EMPTY, angular=value) == (EMPTY, "not_finite")
+
+
+def test_no_cap_is_a_limit_too() -> None:
+    limits = with_limit()
+    assert limits.limited(Twist(1.0, 1.0), 0) == (Twist(1.0, 1.0), None)
+    assert [one.present for one in limits.observations(0)] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("source", "limit", "reason"),
+    [
+        ("nobody", Limit(echo=41), "unknown_source"),
+        ("nobody", None, "unknown_source"),
+        ("lidar", None, "not_a_request"),
+        ("lidar", Limit(echo=40), "late"),
+        ("lidar", Limit(echo=42), "late"),
+        ("lidar", Limit(echo=41, seq=0, boot=1), ""),
+    ],
+)
+def test_reasons_of_refusal(source: str, limit: Limit | None, reason: str) -> None:
+    limits, refused = EMPTY.accept(LimitRequest(source, limit, 0), Admission(BEAT, AGE_NS, 0))
+    assert refused == reason
+    assert (limits == EMPTY) == bool(reason)
+
+
+@pytest.mark.parametrize(("now_ns", "reason"), [(AGE_NS, ""), (AGE_NS + 1, "late")])
+def test_a_late_echo_is_refused(now_ns: int, reason: str) -> None:
+    request = LimitRequest("lidar", Limit(echo=41), 0)
+    assert EMPTY.accept(request, Admission(BEAT, AGE_NS, now_ns))[1] == reason
+
+
+def test_a_repeated_or_older_limit_changes_nothing() -> None:
+    limits, _ = put(EMPTY, linear=0.2, seq=5)
+    for seq in (4, 5):
+        again, refused = put(limits, linear=0.9, seq=seq)
+        assert (again, refused) == (limits, "seq_not_rising")
+    assert put(limits, linear=0.9, seq=6)[0].channels["lidar"].linear == 0.9
+
+
+def test_a_second_publisher_is_refused_and_reported_while_the_first_lives() -> None:
+    limits, _ = put(EMPTY, linear=0.2)
+    other, refused = put(limits, LEASE_NS, linear=0.9, boot=2)
+    assert refused == "second_publisher"
+    assert other.channels["lidar"].linear == 0.2
+    assert other.conflicts(LEASE_NS + CONFLICT_NS - 1) == ["limit lidar"]
+    assert other.conflicts(LEASE_NS + CONFLICT_NS) == []
+    taken, refused = put(limits, LEASE_NS + 1, linear=0.9, boot=2)
+    assert (refused, taken.channels["lidar"].linear) == ("", 0.9)
+    assert taken.conflicts(LEASE_NS + 1) == []
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        {"echo": 1, "linear": -0.1},
+        {"echo": 1, "angular": -1},
+        {"echo": 1, "linear": "fast"},
+        {"echo": 1, "linear": True},
+        {"echo": 1, "reason": "x" * 81},
+        {"echo": 1, "reason": 5},
+        {"linear": 0.1},
+    ],
+)
+def test_a_wrong_type_is_no_limit(payload: dict[str, object]) -> None:
+    with pytest.raises(MessageError, match="not a Limit"):
+        codec.decode(codec._encoder.encode(payload), Limit)
+
+
+def test_a_reason_shows_no_control_characters() -> None:
+    assert printable("person\tat\x1b[2J 2 m\u202e\n") == "person at [2J 2 m"
+    limits = with_limit(0.2, reason="a\x07b.")
+    assert limits.channels["lidar"].reason == "a b."
+    assert limits.slowed_text("lidar") == "Slowed by lidar: a b."
+
+
+# --- caps -----------------------------------------------------------------------------------
+
+
+def test_a_cap_keeps_the_curve() -> None:
+    limits = with_limit(0.25)
+    assert limits.limited(Twist(-1.0, 0.4), 0) == (Twist(-0.25, 0.1), "lidar")
+    assert with_limit(None, 0.1).limited(Twist(1.0, 0.4), 0) == (Twist(0.25, 0.1), "lidar")
+    assert limits.limited(Twist(0.25, 2.0), 0) == (Twist(0.25, 2.0), None)
+    assert limits.slowed_text("lidar") == "Slowed by lidar."
+    assert limits.slowed_text(None) == ""
+
+
+def test_the_tightest_source_is_named() -> None:
+    limits, _ = put(with_limit(0.5), linear=0.2, source="fleet")
+    assert limits.limited(Twist(1.0), 0) == (Twist(0.2), "fleet")
+    limits, _ = put(with_limit(0.2), linear=0.5, source="fleet")
+    assert limits.limited(Twist(1.0), 0) == (Twist(0.2), "lidar")
+
+
+def test_a_cap_ends_with_its_lease() -> None:
+    limits = with_limit(0.25)
+    assert limits.limited(Twist(1.0), LEASE_NS)[0] == Twist(0.25)
+    assert limits.limited(Twist(1.0), LEASE_NS + 1) == (Twist(1.0), None)
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "stops"),
+    [
+        (0.0, None, True),
+        (None, 0.0, True),
+        (-0.0, 1.0, True),
+        (5e-324, None, True),
+        (ROUNDED_MPS, None, True),
+        (None, ROUNDED_RADPS, True),
+        (ROUNDED_MPS * 1.01, ROUNDED_RADPS * 1.01, False),
+        (None, None, False),
+    ],
+)
+def test_zero_is_a_protective_stop(
+    linear: float | None, angular: float | None, stops: bool
+) -> None:
+    limits = with_limit(linear, angular, "person at 1 m")
+    stop, silent = limits.observations(0)
+    assert (stop.name, stop.present, stop.token) == ("limit_stop", stops, (0, 0))
+    assert not silent.present
+    if stops:
+        assert stop.text == "Stopped by lidar: person at 1 m."
+        assert limits.limited(Twist(1.0, 1.0), 0) == (STILL, "lidar")
+    assert not next(limits.observations(LEASE_NS + 1)).present
+
+
+def test_all_sources_that_stop_are_named() -> None:
+    limits, _ = put(with_limit(0.0, reason="dog"), linear=0.0, source="fleet")
+    assert next(limits.observations(0)).text == "Stopped by lidar: dog, fleet."
+
+
+CAPS = st.none() | st.floats(0, 3)
+SPEEDS = st.floats(-2, 2)
+
+
+@given(st.lists(st.tuples(CAPS, CAPS), min_size=2, max_size=2), SPEEDS, SPEEDS)
+def test_no_limit_raises_any_speed_or_bends_the_curve(
+    caps: list[tuple[float | None, float | None]], linear: float, angular: float
+) -> None:
+    limits, asked = EMPTY, Twist(linear, angular)
+    for source, (cap, turn) in zip(SOURCES, caps, strict=True):
+        limits, _ = put(limits, linear=cap, angular=turn, source=source)
+    twist, by = limits.limited(asked, 0)
+    assert (by is None) == (twist == asked)
+    for cap, turn in caps:
+        assert abs(twist.linear) <= min(abs(linear), math.inf if cap is None else cap) + 1e-12
+        assert abs(twist.angular) <= min(abs(angular), math.inf if turn is None else turn) + 1e-12
+    assert twist.linear * angular == pytest.approx(twist.angular * linear, abs=1e-9)
+
+
+# --- silence --------------------------------------------------------------------------------
+
+
+def test_without_sources_nothing_is_limited_or_observed() -> None:
+    nothing = SpeedLimits({})
+    assert list(nothing.observations(0)) == []
+    assert nothing.states(None, 0) == ()
+    assert nothing.limited(Twist(1.0), 0) == (Twist(1.0), None)
+
+
+def test_silence_stops_from_the_start_and_after_each_lease() -> None:
+    _, silent = EMPTY.observations(0)
+    assert (silent.name, silent.present, silent.token) == ("limit_silent", True, (0, 0))
+    assert silent.text == "No speed limit arrives of lidar."
+    limits = with_limit()
+    assert [one.present for one in limits.observations(LEASE_NS)] == [False, False]
+    assert [one.present for one in limits.observations(LEASE_NS + 1)] == [False, True]
+
+
+def test_states_are_published() -> None:
+    never = LimitState(
+        source="lidar", linear=None, angular=None, reason="", age=None, silent=True, effect="stop"
+    )
+    assert EMPTY.states(None, 0)[0] == never
+    assert [one.effect for one in EMPTY.states(None, 0)] == ["stop", "none"]
+    limits, _ = put(with_limit(0.5, reason="person"), angular=0.3, source="fleet")
+    lidar, fleet = limits.states("lidar", LEASE_NS)
+    assert lidar == LimitState(
+        source="lidar", linear=0.5, angular=None, reason="person", age=LEASE_S, silent=False,
+        effect="slow",
+    )  # fmt: skip
+    assert (fleet.linear, fleet.angular, fleet.effect, fleet.silent) == (None, 0.3, "none", False)
+    lidar, fleet = limits.states("lidar", LEASE_NS + 1)
+    assert (lidar.linear, lidar.reason, lidar.silent, lidar.effect) == (None, "", True, "stop")
+    assert (fleet.angular, fleet.silent, fleet.effect) == (None, True, "none")
+    assert with_limit(0.0).states("lidar", 0)[0].effect == "stop"
+    assert LimitChannel() == LimitChannel(linear=math.inf, angular=math.inf, reason="")
+
+
+# --- the whole decision ---------------------------------------------------------------------
+
+
+def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:
+    fixture = PolicyFixture(IGNORED).running(1.0)
+    speeds = []
+    for _ in range(80):
+        fixture.tick()
+        fixture.limit(0.2, reason="person at 2 m")
+        speeds.append(fixture.request(1.0).twist.linear)
+    for n, speed in enumerate(speeds, start=1):
+        assert speed <= max(0.2, 1.0 - 0.6 * 0.02 * (n - 1)) + 1e-9
+    assert speeds[-1] == pytest.approx(0.2)
+    assert fixture.verdict.name == "slow"
+    assert fixture.state.latches["limit"].text == "Slowed by lidar: person at 2 m."
+    assert fixture.published().limits.forward == pytest.approx(0.2)
+    (source,) = fixture.published().limit_sources
+    assert (source.effect, source.linear, source.reason) == ("slow", 0.2, "person at 2 m")
+    assert fixture.published().text.startswith("Slowed by lidar: person at 2 m.")
+    fixture.drive(1.0, seconds=3.0)  # without limits: ignored
+    assert fixture.verdict.twist.linear == pytest.approx(1.0)
+    assert "limit" not in fixture.state.latches
+
+
+def test_a_protective_stop_ends_by_itself_and_then_needs_a_neutral_request() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    verdict = fixture.limit(0.0, reason="person at 1 m")
+    assert (verdict.command, verdict.name, verdict.twist) == ("stop", "stop", STILL)
+    assert fixture.published().latched == ()
+    for _ in range(20):
+        fixture.drive(0.5, seconds=0.1)
+        assert fixture.limit(0.0).command == "stop"
+    fixture.limit()
+    fixture.drive(0.5, seconds=1.0)
+    assert fixture.verdict.name == "inhibited"  # the stick is still pushed
+    fixture.drive()
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_needed_source_stops_from_the_start_until_its_first_limit() -> None:
+    fixture = PolicyFixture(NEEDED)
+    fixture.tick(40)
+    fixture.drive(0.0, seconds=1.0)
+    fixture.drive(0.5, seconds=1.0)
+    assert fixture.verdict.command == "stop"
+    assert fixture.state.latches["limit_silent"].text == "No speed limit arrives of lidar."
+    for _ in range(10):
+        fixture.limit()
+        fixture.drive(seconds=0.1)
+    assert fixture.drive(0.5, seconds=0.4).command == "run"
+    assert fixture.drive(0.5, seconds=0.2).command == "stop"
+
+
+def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    fixture.limit(0.4)
+    fixture.limit_boot = 56
+    assert fixture.limit(1.0).refused == "limit_second_publisher"
+    assert fixture.verdict.command == "stop"
+    text = "Two publishers use limit lidar."
+    assert fixture.state.latches["two_publishers"].text == text
+    assert fixture.drive(0.5, seconds=0.6).command == "run"
+
+
+def test_refused_limits_change_nothing() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    assert fixture.decide(LimitRequest("lidar", None, fixture.now_ns)).refused == (
+        "limit_not_a_request"
+    )
+    assert fixture.limit(0.0, source="stranger").refused == "limit_unknown_source"
+    assert fixture.verdict.command == "run"
+    assert fixture.limit(0.0).refused == ""
+
+
+def test_a_limit_delays_no_brake() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    fixture.limit(0.0)
+    assert fixture.estop().command == "brake"
+    fixture.limit(0.1)
+    assert fixture.verdict.command == "brake"
+
+
+def test_a_limit_holds_for_a_release_too() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    fixture.pressed = True
+    fixture.linear = 0.0
+    fixture.tick(60)
+    fixture.linear = None
+    for _ in range(10):
+        fixture.tick()
+        fixture.limit(0.05)
+        assert fixture.hold() == ""
+    assert fixture.verdict.twist.linear == pytest.approx(-0.05)
+    fixture.limit(0.0, reason="person")
+    assert fixture.hold() == "Stopped by lidar: person."
+    assert fixture.verdict.command == "brake"
+
+
+EVENTS = st.lists(
+    st.tuples(st.sampled_from(["limit", "drive", "wait"]), CAPS, SPEEDS, st.integers(1, 30)),
+    max_size=40,
+)
+
+
+@given(EVENTS)
+def test_no_run_is_faster_than_a_valid_cap_after_its_deceleration(
+    events: list[tuple[str, float | None, float, int]],
+) -> None:
+    fixture = PolicyFixture(NEEDED)
+    fixture.tick(40)
+    cap, since_ns, heard_ns, speed = math.inf, 0, -NS_PER_S, 0.0
+    for kind, value, linear, ticks in events:
+        for _ in range(ticks):
+            fixture.tick()
+            if kind == "limit":
+                fixture.limit(value)
+                heard_ns = fixture.now_ns
+                new = math.inf if value is None else value
+                if new < cap:
+                    since_ns = fixture.now_ns
+                cap = new
+            verdict = fixture.request(linear) if kind == "drive" else fixture.verdict
+            alive = fixture.now_ns - heard_ns <= LEASE_NS
+            if verdict.command == "run":
+                assert alive
+                assert cap > ROUNDED_MPS
+                slowing_s = (fixture.now_ns - since_ns) / NS_PER_S
+                assert abs(verdict.twist.linear) <= max(cap, 1.0 - 0.6 * slowing_s) + 1e-9
+            speed = abs(verdict.twist.linear)
+    assert speed <= 1.0
