@@ -22,6 +22,7 @@ from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from tests.invariants.keepalive import PENDANT, Pendant
 from tests.invariants.limits import IGNORED, LEASE_S, NEEDED, Limiter
 from tests.invariants.net import MS, Envelope, Net
 from tests.invariants.oracle import STEP_NS, Oracle
@@ -80,6 +81,8 @@ LIMITS = {
     IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
 }
 
+THIRD_PARTIES = Safety(limits=LIMITS, estop_keepalive=(PENDANT,))
+
 
 class Stick:
     """A source that publishes drive requests while ``requested`` is set."""
@@ -130,6 +133,7 @@ class Stack:
             name: Limiter(name, self._process("limiter", None)) for name in (NEEDED, IGNORED)
         }
         self.limiters[NEEDED].caps = (None, None)
+        self.pendant = Pendant(self._process("pendant", None))
         self.hand = self._process("hand", None)
         self.seen: m.SafetyState | None = None  # the newest state that operators see
         self.hand.subscribe(keys.SAFETY, self._look)
@@ -159,6 +163,7 @@ class Stack:
                 stick.request()
             for limiter in self.limiters.values():
                 limiter.publish()
+            self.pendant.publish()
             self.net.turn()
         self.oracle.on_step(self.vehicle.silent)
 
@@ -176,7 +181,7 @@ class Stack:
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
-        config = SafetyConfig(safety=Safety(limits=LIMITS)) if name == "safety" else BridgeConfig()
+        config = SafetyConfig(safety=THIRD_PARTIES) if name == "safety" else BridgeConfig()
         process = self._process(name, config)
         self.oracle.on_start(process)
         with self.time():
