@@ -23,7 +23,7 @@ from common.messages import (
     Switches,
     Ultrasonic,
     Velocity,
-)  # fmt: skip
+)
 from tests.invariants.keepalive import KeepaliveBook
 from tests.invariants.limits import LimitBook
 from tests.invariants.operator_book import OperatorBook
@@ -33,8 +33,7 @@ from tests.invariants.standstill_book import StandstillBook
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
-GOOD_SAMPLES = 3
-ECHO_AGE_S, SETTLE_S, RIVAL_S = 0.4, 0.5, 0.5
+GOOD_SAMPLES, ECHO_AGE_S, SETTLE_S, RIVAL_S = 3, 0.4, 0.5, 0.5
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
 OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
