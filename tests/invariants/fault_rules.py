@@ -96,6 +96,20 @@ class FaultRules(RuleBasedStateMachine):
         self.stack.run(ms)
         limiter.caps = before
 
+    @rule(ms=st.sampled_from([400, 900, 1000, 1005, 1100, 2000]))
+    def silence_pendant(self, ms: int) -> None:
+        """Silence the pendant for a while."""
+        self.stack.pendant.alive = False
+        self.stack.run(ms)
+        self.stack.pendant.alive = True
+
+    @rule(late=st.integers(0, 40), boot=st.sampled_from([0, 0, 7]))
+    def hostile_keepalive(self, late: int, boot: int) -> None:
+        """Send a sign of life with an old echo, or of another program."""
+        pendant = self.stack.pendant
+        pendant.put(m.EstopKeepalive(echo=pendant.echo - late, boot=boot))
+        self.stack.run(5)
+
     def trip(self, kind: str) -> None:
         """Trip a latch whose cause ends at once."""
         vehicle = self.stack.vehicle

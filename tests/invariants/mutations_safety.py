@@ -7,7 +7,10 @@ from common.motion import Twist
 from common.wire.frame import Side
 from services.safety import causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
+from services.safety.channel import Admission
 from services.safety.inputs import Inputs
+from services.safety.keepalive import Keepalives
+from services.safety.latches import Observation
 from services.safety.limits import SpeedLimits
 from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
@@ -132,6 +135,18 @@ def rival_limit(stack: Stack) -> None:
     limiter.put(m.Limit(linear=9.0, echo=limiter.echo, boot=5))
 
 
+def pendant_falls_silent(stack: Stack) -> None:
+    stack.pendant.alive = False
+
+
+def pendant_is_held(stack: Stack) -> None:
+    """Deliver a sign of life almost too late, then none."""
+    echo = stack.pendant.echo
+    stack.pendant.alive = False
+    stack.run(850)
+    stack.pendant.put(m.EstopKeepalive(echo=echo))
+
+
 KEEP = SafetyService._store
 
 SAFETY_MUTATIONS: dict[str, Mutation] = {
@@ -178,6 +193,14 @@ SAFETY_MUTATIONS: dict[str, Mutation] = {
     ),
     "two publishers of a limit": (
         SpeedLimits, "conflicts", lambda *_: [], rival_limit, "two publishers of one limit",
+    ),
+    "a pendant that fell silent does not latch": (
+        Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),
+        pendant_falls_silent, "safety knows of estop_keepalive",
+    ),
+    "a held sign of life counts from its reception": (
+        Admission, "sent_ns", lambda self, _: self.now_ns, pendant_is_held,
+        "safety knows of estop_keepalive",
     ),
     "an override does not hold": (
         Arbiter, "overruled", lambda self, _: self, nav_goes_on, "nav was not neutral",

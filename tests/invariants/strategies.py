@@ -9,7 +9,7 @@ from common.motion import Command
 from verification.invariants.net import CLEAR, Disturbance
 from verification.invariants.vehicle import NO_ECHO_MM
 
-BUS = st.sampled_from(["drive", "limit", "motion", "state", "streams"])
+BUS = st.sampled_from(["drive", "limit", "estop_keepalive", "motion", "state", "streams"])
 CABLE = st.sampled_from(["to_board", "from_board"])
 ON_BUS = st.sampled_from(
     [CLEAR, Disturbance(late_ms=30), Disturbance(late_ms=120), Disturbance(lose=2),

@@ -100,7 +100,7 @@ def matches(expression: str, key: str) -> bool:
 
 def route(key: str) -> str:
     """Return the route of a key, for its disturbance."""
-    for name in ("drive", "limit", "motion", "state"):
+    for name in ("drive", "limit", "estop_keepalive", "motion", "state"):
         if f"/{name}" in key:
             return name
     return "streams"

@@ -89,11 +89,9 @@ class Oracle(Watch):
 
     def _on_delivered(self, book: SafetyBook, envelope: Envelope) -> None:
         message, name = envelope.message, envelope.key.rsplit("/", 1)[-1]
-        if isinstance(message, m.Drive):
-            book.on_drive(name, message, self.now_ns)
-        elif isinstance(message, m.Limit):
-            sent_ns = book.operators.beats.get(message.echo)
-            book.limits.on_limit(name, message, sent_ns, self.now_ns)
+        if isinstance(message, m.SourceMessage):
+            if book.on_source(name, message, self.now_ns):
+                self.trip("estop_keepalive", book.boot)
         elif name == "estop":
             self.trip("estop", book.boot)
         else:
@@ -193,6 +191,8 @@ class Oracle(Watch):
         book.estop_session_was_up = book.estop_session_was_up or self.estop_session_up
         if book.fast_ns is not None and self.now_ns - book.fast_ns > FAST_S * NS_PER_S:
             self.trip("runaway", book.boot)
+        if book.keepalive.is_lost(self.now_ns):
+            self.trip("estop_keepalive", book.boot)
         known = frozenset(self._held_by(book.boot))
         book.look(self.now_ns, self.estop_session_up, bool(known))
         rolls = book.standstill.complaint(motion, moves(motion), self.now_ns)

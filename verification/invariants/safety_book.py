@@ -14,13 +14,17 @@ from common.messages import (
     Bumper,
     Drive,
     Driver,
+    EstopKeepalive,
+    Limit,
     Link,
     Message,
     Motion,
+    SourceMessage,
     Switches,
     Ultrasonic,
     Velocity,
 )
+from verification.invariants.keepalive import KeepaliveBook
 from verification.invariants.limits import LimitBook
 from verification.invariants.operator_book import OperatorBook
 from verification.invariants.sonars import SONARS, approach, shown
@@ -29,8 +33,7 @@ from verification.invariants.standstill_book import StandstillBook
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
-GOOD_SAMPLES = 3
-ECHO_AGE_S, SETTLE_S, RIVAL_S = 0.4, 0.5, 0.5
+GOOD_SAMPLES, ECHO_AGE_S, SETTLE_S, RIVAL_S = 3, 0.4, 0.5, 0.5
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
 OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
@@ -77,8 +80,19 @@ class SafetyBook:
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
     standstill: StandstillBook = field(default_factory=StandstillBook)
+    keepalive: KeepaliveBook = field(default_factory=KeepaliveBook)
     limits: LimitBook = field(default_factory=LimitBook)
     well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
+
+    def on_source(self, name: str, message: SourceMessage, now_ns: int) -> bool:
+        """Take a message of a source in; return whether an emergency stop was lost."""
+        sent_ns = self.operators.beats.get(message.echo)
+        if isinstance(message, Drive):
+            self.on_drive(name, message, now_ns)
+        elif isinstance(message, Limit):
+            self.limits.on_limit(name, message, sent_ns, now_ns)
+        pendant = isinstance(message, EstopKeepalive)
+        return pendant and self.keepalive.on_message(message, sent_ns, now_ns)
 
     def on_drive(self, source: str, drive: Drive, now_ns: int) -> None:
         """Take a request in, if it is a good one."""
@@ -159,7 +173,7 @@ class SafetyBook:
     def look(self, now_ns: int, reader: bool, tripped: bool) -> None:
         """Note, at the time of a decision, whether anything wants a neutral request."""
         self.limits.look(now_ns)
-        tripped = tripped or any(self.limits.stops(now_ns))
+        tripped = tripped or any(self.limits.stops(now_ns)) or any(self.keepalive.missing())
         if "old velocity" in self._what_is_bad(now_ns):
             self.fast_ns = None  # what is not measured is no runaway
         if self._what_is_bad(now_ns) or not reader:
@@ -195,6 +209,7 @@ class SafetyBook:
             yield from self._of_source(motion.source or "", now_ns)
         yield from self._of_zones(motion, now_ns)
         yield from self.limits.complaints(motion, now_ns)
+        yield from self.keepalive.missing()
 
     def may_reset(self, now_ns: int) -> bool:
         """Return whether a reset may be granted: at standstill, without a drive request."""

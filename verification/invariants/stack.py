@@ -20,6 +20,7 @@ from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from verification.invariants.keepalive import PENDANT, Pendant
 from verification.invariants.limits import IGNORED, LEASE_S, NEEDED, Limiter
 from verification.invariants.net import MS, Envelope, Net
 from verification.invariants.oracle import STEP_NS, Oracle
@@ -43,6 +44,8 @@ LIMITS = {
     NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
     IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
 }
+
+THIRD_PARTIES = Safety(limits=LIMITS, estop_keepalive=(PENDANT,))
 
 
 class Stick:
@@ -116,6 +119,7 @@ class Chain(Generic[V]):
             name: Limiter(name, self._process("limiter", None)) for name in (NEEDED, IGNORED)
         }
         self.limiters[NEEDED].caps = (None, None)
+        self.pendant = Pendant(self._process("pendant", None))
         self.hand = self._process("hand", None)
         self.seen: m.SafetyState | None = None  # the newest state that operators see
         self.hand.subscribe(keys.SAFETY, self._look)
@@ -145,6 +149,7 @@ class Chain(Generic[V]):
                 stick.request()
             for limiter in self.limiters.values():
                 limiter.publish()
+            self.pendant.publish()
             self.net.turn()
         self.oracle.on_step(self.vehicle.silent)
 
@@ -166,7 +171,7 @@ class Chain(Generic[V]):
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
-        config = SafetyConfig(safety=Safety(limits=LIMITS)) if name == "safety" else BridgeConfig()
+        config = SafetyConfig(safety=THIRD_PARTIES) if name == "safety" else BridgeConfig()
         process = self._process(name, config)
         self.oracle.on_start(process)
         with self.time():
