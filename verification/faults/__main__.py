@@ -35,6 +35,7 @@ STACKS: Sequence[Sequence[Sequence[Requirement]]] = [
         ["remote driver", "none"],
         ["small disk", "none"],
         ["teleop", "none"],
+        ["relay", "none"],
         *[NONE] * 2 * (CORES - 2),
     ],
 ]

@@ -19,7 +19,7 @@ from typing import Literal
 from common.freshness import NS_PER_S
 
 Requirement = Literal[
-    "none", "teleop", "remote driver", "small disk", "separate clocks", "memory cgroup"
+    "none", "teleop", "remote driver", "small disk", "separate clocks", "memory cgroup", "relay"
 ]
 
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
@@ -51,6 +51,7 @@ def missing(outside: str) -> Mapping[Requirement, str]:
     reasons: dict[Requirement, str] = {
         "remote driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
         "small disk": outside,
+        "relay": outside,
         "separate clocks": ""
         if shutil.which("cc")
         else "no C compiler (Debian: apt-get install gcc libc6-dev)",
