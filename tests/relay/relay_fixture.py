@@ -16,7 +16,6 @@ from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 PC, PC_SIDE, BOARD_SIDE, BOARD, STRANGER = (f"127.77.0.{number}" for number in range(1, 6))
-RUN = bytes.fromhex("47530d0026749d91" + "01e8030000")  # 1 m/s; its CRC is tested in test_wire
 
 
 class RunningRelay:

@@ -19,13 +19,10 @@ from services.relay.core import (
     Relay,
     Send,
 )
+from tests.relay.frames import CLEAR, HIT, QUERY, RUN, STOP, ZERO
 
 MS = 1_000_000
 NOW = 1_000_000 * MS
-RUN, ZERO = (wire.frame(wire.MOTION, bytes([1, speed, 0, 0, 0])) for speed in (100, 0))
-STOP = wire.frame(wire.MOTION, bytes(5))
-QUERY = wire.frame(wire.BUMPER, b"")
-HIT, CLEAR = wire.frame(wire.BUMPER, b"\1"), wire.frame(wire.BUMPER, b"\0")
 BRAKES = [(BOARD, 0, wire.BRAKE), (BOARD, 1, wire.BRAKE)]
 
 

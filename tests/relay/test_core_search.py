@@ -5,8 +5,10 @@ from hypothesis import strategies as st
 
 from services.relay import wire
 from services.relay.core import BOARD, BRAKE_PERIOD_NS, LEASE_NS, PC, Relay
-from tests.relay.test_core import CLEAR, HIT, MS, NOW, QUERY, RUN, STOP, ZERO
+from tests.relay.frames import CLEAR, HIT, QUERY, RUN, STOP, ZERO
 
+MS = 1_000_000
+NOW = 1_000_000 * MS
 TICK_NS = 5 * MS
 FROM_PC = [RUN, STOP, ZERO, wire.BRAKE, QUERY, RUN[:-1], STOP + RUN, b"", QUERY + STOP, RUN + STOP]
 MOVING = {RUN, STOP + RUN, RUN + STOP}

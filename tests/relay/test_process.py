@@ -9,6 +9,7 @@ import pytest
 
 from services.relay import wire
 from services.relay.__main__ import EXIT_CONFIG, EXIT_LINK, main
+from tests.relay.frames import CLEAR, HIT, QUERY, RUN, STOP
 from tests.relay.relay_fixture import (
     BOARD_SIDE,
     PC_SIDE,
@@ -20,7 +21,6 @@ from tests.relay.relay_fixture import (
     udp,
     wait_for,
 )
-from tests.relay.test_core import CLEAR, HIT, QUERY, RUN, STOP
 from verification.harness.waiting import wait_until
 
 

@@ -14,13 +14,14 @@ import pytest
 from common.freshness import NS_PER_S
 from services import relay
 from services.relay.wire import BRAKE
-from tests.relay.test_core import RUN, STOP
-from tests.test_dead_router_host import WHY, ip
+from tests.relay.frames import RUN, STOP
+from verification.harness.network_hosts import ip, missing
 from verification.harness.waiting import wait_until
 
+PC, RELAY, BOARD = (f"t2relay{os.getpid()}{end}" for end in ("p", "r", "b"))
+WHY = missing(PC)
 pytestmark = [pytest.mark.timed, pytest.mark.skipif(bool(WHY), reason=WHY or "-")]
 
-PC, RELAY, BOARD = (f"t2relay{os.getpid()}{end}" for end in ("p", "r", "b"))
 # Sends STOP for half a second, then RUN, whatever happens to its cable.
 DRIVER = f"""
 import socket, time
@@ -81,8 +82,9 @@ class Hosts:
 
     def frames(self, since_ns: int = 0) -> list[tuple[int, bytes]]:
         """Return times and datagrams at the board."""
-        lines = self.received.read_text().splitlines()
-        made = [(int(at), bytes.fromhex(text)) for at, text in (line.split() for line in lines)]
+        text, _, _ = self.received.read_text().rpartition("\n")  # whole lines
+        lines = text.splitlines()
+        made = [(int(at), bytes.fromhex(datagram)) for at, datagram in map(str.split, lines)]
         return [(at_ns, datagram) for at_ns, datagram in made if at_ns >= since_ns]
 
 

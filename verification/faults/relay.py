@@ -7,13 +7,13 @@ campaign's: each has its own address and cable there, and all their datagrams cr
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Literal
 
 from cli.settings import Everything
+from verification.harness.network_hosts import ip
 from verification.harness.process_stats import children
 
 if TYPE_CHECKING:
@@ -28,11 +28,6 @@ PC_SETS = ["board.address=10.7.6.1", "board.listen_address=10.7.6.2",
            f"board.relay_port={REPORT_PORT}"]  # fmt: skip
 SIM_SETS = ["board.address=10.7.5.224", "board.listen_address=10.7.5.220", "board.relay_port=0"]
 OTHERS = ("sim", "relay", "driver")  # processes that do not run on the PC
-
-
-def ip(*words: str) -> None:
-    """Run ``ip``."""
-    subprocess.run(["ip", *words], check=True)
 
 
 @contextlib.contextmanager

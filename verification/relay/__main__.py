@@ -8,6 +8,7 @@ Neither router nor safety runs: the reflex needs none.
 import argparse
 import contextlib
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -44,9 +45,8 @@ class Board:
     def drain(self) -> list[bytes]:
         """Return what waits."""
         found = []
-        with contextlib.suppress(OSError):
-            while True:
-                found.append(self.sock.recv(2048, socket.MSG_DONTWAIT))
+        while select.select([self.sock], [], [], 0.0)[0]:
+            found.append(self.sock.recv(2048))
         return found
 
     def reflex_s(self, brakes: int) -> list[float]:
