@@ -34,8 +34,7 @@ STACKS: Sequence[Sequence[Sequence[Requirement]]] = [
         ["remote driver", "none"],
         ["remote driver", "none"],
         ["small disk", "none"],
-        ["teleop", "none"],
-        ["relay", "none"],
+        ["teleop", "relay", "none"],
         *[NONE] * 2 * (CORES - 2),
     ],
 ]
