@@ -14,6 +14,7 @@ HEADER = struct.Struct("<2sHHH")  # magic, size of the whole frame, id, CRC of t
 MOTION, BUMPER = 0x7426, 0x7602
 RUN, HALT = 1, 2  # kinds of a motion command; 0 is STOP, HALT is BRAKE (manual 2.2)
 MOTION_SIZE = 5  # of the payload: u8 kind, u16 linear, u16 angular
+MOTION_OPENING = HEADER.pack(MAGIC, HEADER.size + MOTION_SIZE, MOTION, 0)[:6]  # without the CRC
 
 
 def crc16(payload: bytes) -> int:
@@ -34,13 +35,13 @@ def frame(command: int, payload: bytes) -> bytes:
 BRAKE = frame(MOTION, bytes([HALT, 0, 0, 0, 0]))
 SAMPLES = frozenset(frame(BUMPER, bytes([pressed])) for pressed in range(256))
 SAMPLE_SIZE = HEADER.size + 1
-SAMPLE_OPENING = HEADER.pack(MAGIC, SAMPLE_SIZE, BUMPER, 0)[:6]  # without the CRC
+SAMPLE_OPENING = HEADER.pack(MAGIC, SAMPLE_SIZE, BUMPER, 0)[:6]
 
 
 def motions(datagram: bytes) -> list[bytes] | None:
     """Return the payload of each motion command; None unless all is valid frames back to back.
 
-    A motion command of another size or kind is invalid: it is unknown what the board does with it.
+    A motion command of another size or kind, or inside another frame, is invalid, too.
     """
     found, start = [], 0
     while start < len(datagram):
@@ -56,7 +57,7 @@ def motions(datagram: bytes) -> list[bytes] | None:
                 return None
             found.append(payload)
         start += size
-    return found
+    return found if datagram.count(MOTION_OPENING) == len(found) else None  # none in a payload
 
 
 def is_neutral(motion: bytes) -> bool:
