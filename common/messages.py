@@ -95,6 +95,16 @@ class Switches(Message, frozen=True, kw_only=True):
     bumper_brake: bool | None = None
 
 
+class Relay(Struct, frozen=True, kw_only=True):
+    """The relay between PC and board, by its newest report."""
+
+    state: LinkState
+    version: str
+    braking: str  # why it sends BRAKE: start, silent, hit; empty while it passes commands
+    uptime: float  # s
+    counters: dict[str, int]  # datagrams since its start, by what became of them
+
+
 class Link(Message, frozen=True, kw_only=True):
     """State of the link to the board."""
 
@@ -111,6 +121,7 @@ class Link(Message, frozen=True, kw_only=True):
     )
     ports: dict[str, int] = {}  # our UDP port that each frame is taken from, by the frame's name
     send_errors: int = 0  # datagrams that the system refused to send, since start
+    relay: Relay | None = None  # None without ``board.relay_port``
 
 
 # --- tel/odom, tel/safety -------------------------------------------------------------------

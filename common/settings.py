@@ -184,6 +184,8 @@ class Board(Section, frozen=True, kw_only=True):
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
     listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
     any_source_port: bool = False  # accept frames from every port of the board's address
+    # UDP port at ``address`` that a relay reports from, 4010; 0: no relay (docs/relay.md).
+    relay_port: Annotated[int, Meta(ge=0, le=65535)] = 0
 
     def __post_init__(self) -> None:
         given = {"any_source_port": self.any_source_port}
@@ -192,6 +194,8 @@ class Board(Section, frozen=True, kw_only=True):
             _check_ipv4(name, getattr(self, name))
         if len(set(self.listen_ports)) < len(self.listen_ports):
             raise ValueError(f"listen_ports {self.listen_ports} names a port twice")
+        if self.relay_port == self.port:
+            raise ValueError(f"relay_port is {self.port}, as port: the relay reports from another")
         if self.address == self.listen_address and self.port in self.listen_ports:
             raise ValueError(
                 f"port {self.port} of {self.address} is both the board's and in listen_ports"

@@ -7,7 +7,6 @@ must not wait for it.
 import contextlib
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from common.bus.session import RUNTIME_ENV
+from verification.harness.network_hosts import ip, missing
 
 pytestmark = pytest.mark.timed
 
@@ -58,19 +58,7 @@ loop.close()
 """
 
 
-def ip(*words: str, check: bool = True) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(["ip", *words], check=check, capture_output=True, text=True)
-
-
-def missing() -> str:
-    if os.geteuid() != 0 or not shutil.which("ip"):
-        return "network namespaces need root and `ip` (Debian: iproute2)"
-    made = ip("netns", "add", HERE, check=False)
-    ip("netns", "del", HERE, check=False)
-    return made.stderr.strip()
-
-
-WHY = missing()
+WHY = missing(HERE)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from statistics import median
 
 from cli.commission.report import Verdict, judged
 from common.freshness import NS_PER_S
-from common.messages import Link, Switches
+from common.messages import Link, Relay, Switches
 
 ENOUGH = 0.7  # of the requested rate: the poll halves its rate when answers are missing
 VELOCITY_HZ = 10.0  # sent unrequested; safety stops when it is older than 0.2 s
@@ -47,6 +47,7 @@ def judge_link(
         *((f"{name}, Hz", _rate(rates[name], expected[name], name)) for name in expected),
         ("switches echoed on", _switches(switches)),
         ("ports", _ports(ports)),
+        ("relay", _relay(last.relay)),
         ("round trip", "unknown" if last.round_trip is None else f"{last.round_trip * 1e3:.1f} ms"),
         ("rejected since the bridge's start", _listed(last.rejected)),
         ("rejected in this step", _listed(rejected(links))),
@@ -89,6 +90,7 @@ def _link_problems(
             "the board's frames, `t2 wire identify-crc` finds their CRC."
         )
         return
+    yield from _relay_problems(links)
     if links[0].epoch != links[-1].epoch:
         yield "The board restarted during this step: check its power."
     for name, rate in rates.items():
@@ -127,6 +129,19 @@ def _switches(switches: Switches | None) -> str:
     if switches is None:
         return "not received"
     return f"ultrasonic {switches.ultrasonic_brake}, bumper {switches.bumper_brake}"
+
+
+def _relay_problems(links: Sequence[Link]) -> Iterator[str]:
+    if any(link.relay and (link.relay.state != "up" or link.relay.braking) for link in links):
+        yield f"The relay did not pass commands all the time; now: {_relay(links[-1].relay)}."
+
+
+def _relay(relay: Relay | None) -> str:
+    if relay is None:
+        return "not configured"
+    if relay.state != "up":
+        return "silent"
+    return f"{relay.version}, {f'braking: {relay.braking}' if relay.braking else 'passing'}"
 
 
 def _ports(ports: Ports) -> str:

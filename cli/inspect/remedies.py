@@ -27,6 +27,16 @@ BOARD_NEVER = (
 BOARD_LOST = "check the board's power and cable; the link recovers by itself"
 BOARD_REFUSED = "`t2 wire decode` shows the invalid frames; see wire.crc"
 SEND_ERRORS = "check the robot's network interface, its firewall and board.address"
+RELAY = (
+    "is the relay on, its service running, and its cable to the PC connected? board.address and "
+    "board.relay_port must be the relay's (docs/relay.md); without a relay set relay_port = 0"
+)
+RELAY_BRAKES = {
+    "start": "it waits for a neutral command: is the bridge running?",
+    "silent": "it lost the commands of the PC: check the cable and the load of both computers",
+    "hit": "it waits for the bridge's answer to a bumper hit: is the bridge running?",
+}
+RELAY_UPDATE = "copy services/relay of this version to the relay (docs/relay.md)"
 SWITCHES = """t2 call bridge/switches '{"ultrasonic_brake": true, "bumper_brake": true}'"""
 BUMPER = "free it; if that is impossible: `t2 drive`, hold F or B, away from it; then reset"
 SONAR_FAULT = "check its cable; the vehicle does not move into its sector until it measures"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from cli.inspect import remedies
 from cli.inspect.diagnosis import Finding, Level, Observation
 from common.keys import BUMPER, MILEAGE, ODOMETRY, ULTRASONIC, VELOCITY
-from common.messages import SONAR_NAMES, Driver, Link
+from common.messages import SONAR_NAMES, Driver, Link, Relay
 
 STREAMS = (VELOCITY, MILEAGE, BUMPER, ULTRASONIC, ODOMETRY)
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
@@ -22,6 +22,7 @@ def diagnose_vehicle(seen: Observation) -> Iterator[Finding]:
     elif seen.link is None:
         yield Finding("link", "unknown", "the bridge does not report the board")
     else:
+        yield from relay(seen.link.relay, seen.t2)
         yield from link(seen.link, seen.first_link)
         if seen.link.state == "up":
             yield from switches(seen)
@@ -31,6 +32,23 @@ def diagnose_vehicle(seen: Observation) -> Iterator[Finding]:
             yield Finding("sensors", "unknown", "no sensor data without the board")
     yield from driving(seen)
     yield from safety(seen)
+
+
+def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
+    """Report a configured relay; ``t2`` is the version of this laptop."""
+    if now is None:
+        return
+    if now.state != "up":
+        text = "the relay is silent" if now.state == "lost" else "no report of the relay received"
+        yield Finding("relay", "wrong", text, remedies.RELAY)
+    elif now.braking:
+        text = f"the relay sends BRAKE: {now.braking}"
+        yield Finding("relay", "wrong", text, remedies.RELAY_BRAKES.get(now.braking, ""))
+    else:
+        yield Finding("relay", "ok", f"the relay passes commands, up for {now.uptime:.0f} s")
+    if now.version not in ("", t2):
+        text = f"the relay is T2 {now.version}, this laptop {t2}"
+        yield Finding("relay", "note", text, remedies.RELAY_UPDATE)
 
 
 def link(now: Link, before: Link | None) -> Iterator[Finding]:

@@ -120,6 +120,9 @@ class Bridge:
             # counted, and the board would seem silent.
             self._read(now_ns, *range(len(self._sockets.sockets)))
         self._ticked_ns = now_ns
+        report = self._sockets.take_relay_report()
+        if report and not self._core.readiness.relay.take(report, now_ns):
+            self._core.report.rejected["relay_report"] += 1
         unsent = self._unsent
         out = self._core.tick(now_ns, self._sockets.send_errors)
         self._do(out)

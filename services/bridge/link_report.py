@@ -55,6 +55,7 @@ class LinkReport:
             latched_by=self._motions.lease.latched_by,
             ports={name: numbers[port] for name, port in self._ports.by_name().items()},
             send_errors=send_errors,
+            relay=self._readiness.relay.message(),
         )
         out.publish("link", message)
 

@@ -1,4 +1,4 @@
-"""Readiness of the board: it is connected, and both its emergency brakes are on. Pure.
+"""Readiness of the board: connected, both its emergency brakes on, and the relay passing. Pure.
 
 The link: ``never`` --frame--> ``up`` --silence--> ``lost`` --frame--> ``up``. On each return of the
 board the brakes are requested again; configuration is replayed, motion never is.
@@ -14,6 +14,7 @@ from common.wire.frame import Frame
 from services.bridge import switches as brakes
 from services.bridge.config import Bridge as Settings
 from services.bridge.output import Output
+from services.bridge.relay_status import RelayStatus
 
 
 class Link(Struct, frozen=True):
@@ -43,6 +44,7 @@ class Readiness:
     def __init__(self, settings: Settings, board: Board) -> None:
         self.link = Link()
         self.switches = brakes.Switches()
+        self.relay = RelayStatus(board.relay_port > 0)
         self.epoch = 0
         self.gap_ns = 0  # end of the last short silence (no lost link) of the board
         self._ports = ", ".join(map(str, board.listen_ports))
@@ -54,7 +56,7 @@ class Readiness:
     @property
     def ready(self) -> bool:
         """Whether a RUN may reach the board."""
-        return self.link.state == "up" and self._brakes_on
+        return self.link.state == "up" and self._brakes_on and not self.relay.waiting
 
     @property
     def _brakes_on(self) -> bool:
@@ -66,6 +68,8 @@ class Readiness:
             return f"nothing received from the board yet on UDP port {self._ports}"
         if self.link.state != "up":
             return "link lost"
+        if self.relay.waiting:
+            return self.relay.waiting
         if not self._brakes_on:
             text = "the board's emergency brakes are not both on and echoed"
             if self._required and self._inhibited and self.switches.unechoed:
@@ -102,6 +106,7 @@ class Readiness:
 
     def on_tick(self, now_ns: int, out: Output) -> list[Frame]:
         """Detect timeouts; return the frames that set the switches."""
+        self.relay.on_tick(now_ns, out)
         before = self.link
         self.link = link_on_tick(before, now_ns, self._silence_ns)
         if self.link.state != before.state:

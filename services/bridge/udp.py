@@ -40,6 +40,8 @@ class Sockets:
         self.last_foreign_source: tuple[str, int] | None = None
         self._board = (board.address, board.port)
         self._any_port = board.any_source_port
+        self._relay = (board.address, board.relay_port)  # no datagram comes from port 0
+        self._relay_report = b""  # the newest, not taken yet
         self.sockets = [socket.socket(fileno=descriptor) for descriptor in inherited] or [
             _bind(board.listen_address, port) for port in board.listen_ports
         ]
@@ -62,7 +64,9 @@ class Sockets:
                     break
                 except OSError:
                     continue  # ICMP error of an earlier send: no board, or no network
-                if source == self._board or (self._any_port and source[0] == self._board[0]):
+                if source == self._relay:
+                    self._relay_report = datagram
+                elif source == self._board or (self._any_port and source[0] == self._board[0]):
                     yield port, datagram, ancillary, time.monotonic_ns()
                 else:
                     self.refused += 1
@@ -77,6 +81,11 @@ class Sockets:
         stamp_ns = kernel_timestamp(ancillary)
         kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)
         return Receipt(kernel_ns, read_ns)
+
+    def take_relay_report(self) -> bytes:
+        """Return the newest report of a relay once; or empty."""
+        report, self._relay_report = self._relay_report, b""
+        return report
 
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
         """Send to the board from the port of this index; return whether that succeeded.

@@ -141,3 +141,20 @@ def test_a_strangers_datagram_is_not_yielded(peer: socket.socket) -> None:
         peer.sendto(b"board", where)
         assert received(sockets)[0] == b"board"
         assert (sockets.refused, sockets.last_foreign_source) == (1, foreign.getsockname())
+
+
+def test_a_relays_report_comes_from_its_own_port_and_is_taken_once(peer: socket.socket) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as relay:
+        relay.bind(("127.0.0.1", 0))
+        ports = (free_port(socket.SOCK_DGRAM),)
+        relay_port = relay.getsockname()[1]
+        board = Board(port=peer.getsockname()[1], listen_ports=ports, relay_port=relay_port)
+        sockets = Sockets(board)
+        where = sockets.sockets[0].getsockname()
+        relay.sendto(b"old", where)
+        relay.sendto(b"report", where)
+        peer.sendto(b"board", where)
+        assert received(sockets)[0] == b"board"
+        assert (sockets.take_relay_report(), sockets.take_relay_report()) == (b"report", b"")
+        assert sockets.refused == 0
+        sockets.close()

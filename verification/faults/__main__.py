@@ -34,7 +34,7 @@ STACKS: Sequence[Sequence[Sequence[Requirement]]] = [
         ["remote driver", "none"],
         ["remote driver", "none"],
         ["small disk", "third parties", "none"],
-        ["teleop", "none"],
+        ["teleop", "relay", "none"],
         *[NONE] * 2 * (CORES - 2),
     ],
 ]

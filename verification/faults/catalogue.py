@@ -20,7 +20,7 @@ from sim.requests import (
     SonarName,
     Wire,
 )
-from verification.faults import browser, forgery, injectors
+from verification.faults import browser, forgery, injectors, relay_faults
 from verification.faults.fault import (
     BUMPER_AGE,
     HEARTBEAT,
@@ -52,9 +52,7 @@ from verification.faults.surroundings import (
     step_time_of_day,
 )
 
-HOLD_S = 0.6
-FREEZE_S = 0.5
-OFF_S = 0.3
+HOLD_S, FREEZE_S, OFF_S = 0.6, 0.5, 0.3
 
 ON: tuple[Outcome, ...] = ("drives on",)
 ITSELF: tuple[Outcome, ...] = ("by itself",)
@@ -303,6 +301,7 @@ DRIVE_LINK = [
 GROUPS = [
     [*MILLISECONDS, *CLOCKS],
     [*GREEDY, *DASHBOARD],
-    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *TERMINAL, *DRIVE_LINK, *OPERATORS],
-]
+    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *TERMINAL, *DRIVE_LINK, *OPERATORS,
+     *relay_faults.RELAY],
+]  # fmt: skip
 FAULTS = [fault for group in GROUPS for fault in group]

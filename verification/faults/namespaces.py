@@ -26,6 +26,7 @@ Requirement = Literal[
     "small disk",
     "separate clocks",
     "memory cgroup",
+    "relay",
 ]
 
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
@@ -57,6 +58,7 @@ def missing(outside: str) -> Mapping[Requirement, str]:
     reasons: dict[Requirement, str] = {
         "remote driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
         "small disk": outside,
+        "relay": outside,
         "separate clocks": ""
         if shutil.which("cc")
         else "no C compiler (Debian: apt-get install gcc libc6-dev)",

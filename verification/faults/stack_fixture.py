@@ -17,6 +17,7 @@ from common.loop import Loop
 from common.messages import Done, SafetyState
 from common.operator import reset_request
 from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Wire
+from verification.faults import relay
 from verification.faults.namespaces import Requirement, clock, small_disk
 from verification.faults.third_party import PARTIES, SETS
 from verification.harness.bus import bus_on, running
@@ -175,15 +176,20 @@ def stack_fixture(
     folder: Path, *, shipped: bool = True, need: Requirement = "none"
 ) -> Iterator[StackFixture]:
     """Run a stack fixture that meets the requirement of a fault."""
-    remote, others, clocks, disk = (
-        need == one for one in ("remote driver", "third parties", "separate clocks", "small disk")
+    remote, others, clocks, disk, behind = (
+        need == one
+        for one in ("remote driver", "third parties", "separate clocks", "small disk", "relay")
     )
     with contextlib.ExitStack() as stack:
         if disk:
             stack.enter_context(small_disk(folder / "disk"))
+        if behind:
+            stack.enter_context(relay.cables())
         made = stack.enter_context(
             running_stack(
-                folder, sets=[*QUICK, *OPEN * remote, *SETS * others], shipped=shipped,
+                folder, shipped=shipped,
+                sets=[*QUICK, *OPEN * remote, *SETS * others, *relay.PC_SETS * behind],
+                sim_sets=relay.SIM_SETS if behind else (), beside=relay.command if behind else None,
                 log="disk/log.jsonl" if disk else "log.jsonl",
                 listen=f"tcp/{'0.0.0.0' if remote else '127.0.0.1'}:{{port}}",
                 env=clock(folder / "robot") if clocks else None,

@@ -18,6 +18,7 @@ from cli.run.up import commands
 from cli.settings import Everything
 from common.config import Sources, load
 from sim.sockets import Control
+from verification.harness.bus import set_options
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -86,12 +87,16 @@ def running_stack(
     log: str = "log.jsonl",
     env: Mapping[str, str] | None = None,
     route: Callable[[Sequence[str]], list[str]] | None = None,
+    sim_sets: Sequence[str] = (),
+    beside: Callable[[Everything], Mapping[str, list[str]]] | None = None,
 ) -> Iterator[RunningStack]:
     """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
     ``shipped`` keeps the shipped limits on any host; ``sets`` are additional settings. ``listen``
     is where the router listens, the endpoint of the services first; ``log`` is a file in the
     folder. ``route`` returns the command of another router, zenohd, for these settings.
+    ``sim_sets`` are settings of the simulator alone. ``beside`` returns the commands of further
+    processes that are not services.
     """
     beside_others = "PYTEST_XDIST_WORKER" in os.environ  # other tests may stall it later
     holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
@@ -114,8 +119,9 @@ def running_stack(
     if route:
         made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"
-    made["sim"] += ["--trace", str(trace_file)]
+    made["sim"] += ["--trace", str(trace_file), *set_options(*sim_sets)]
     endpoint = config.bus.endpoints[0]
+    made |= beside(config) if beside else {}
     it = RunningStack(endpoint, trace_file, Control(control), made, folder / log, config, env)
     for name in made:
         it.start(name)

@@ -16,7 +16,7 @@ from cli.commission.link import (
 )
 from cli.commission.report import Verdict
 from common.freshness import NS_PER_S
-from common.messages import Link, Switches
+from common.messages import Link, Relay, Switches
 from tests import factories
 
 SETTINGS = {
@@ -171,3 +171,21 @@ def test_a_bad_cable_and_another_firmware_differ(bad: int, frames: int, phrase: 
     assert verdict.outcome == "failed"
     assert phrase in verdict.text
     assert dict(verdict.data)["bad CRCs in this step"] == str(bad)
+
+
+@pytest.mark.parametrize(
+    ("state", "braking", "text", "passed"),
+    [
+        ("up", "", "0.1.0, passing", True),
+        ("up", "silent", "0.1.0, braking: silent", False),
+        ("lost", "", "silent", False),
+    ],
+)
+def test_a_configured_relay_must_pass_commands(
+    state: Any, braking: str, text: str, passed: bool
+) -> None:
+    relay = Relay(state=state, version="0.1.0", braking=braking, uptime=1.0, counters={})
+    verdict = judge(relay=relay)
+    assert ("relay", text) in verdict.data
+    assert (verdict.outcome == "passed") == passed
+    assert ("relay did not pass" in verdict.text) != passed

@@ -194,3 +194,29 @@ def test_stops_that_were_longer_than_reckoned(count: int, levels: list[str]) -> 
     assert [each.level for each in found] == levels
     assert all(each.text.endswith("longer than it reckons with: 3") for each in found)
     assert all("t2 checkout stop" in each.todo for each in found)
+
+
+def relay_of(state: Any = "up", **given: Any) -> m.Relay:
+    usual: dict[str, Any] = {"version": "1", "braking": "", "uptime": 60.0, "counters": {}}
+    return m.Relay(state=state, **(usual | given))
+
+
+@pytest.mark.parametrize(
+    ("relay", "found"),
+    [
+        (None, []),
+        (relay_of(), [("ok", "the relay passes commands, up for 60 s", "")]),
+        (relay_of("lost"), [("wrong", "the relay is silent", remedies.RELAY)]),
+        (relay_of("never", version=""),
+         [("wrong", "no report of the relay received", remedies.RELAY)]),
+        (relay_of(braking="silent"),
+         [("wrong", "the relay sends BRAKE: silent", remedies.RELAY_BRAKES["silent"])]),
+        (relay_of(braking="new"), [("wrong", "the relay sends BRAKE: new", "")]),
+        (relay_of(version="2"), [
+            ("ok", "the relay passes commands, up for 60 s", ""),
+            ("note", "the relay is T2 2, this laptop 1", remedies.RELAY_UPDATE)]),
+    ],
+)  # fmt: skip
+def test_a_configured_relay(relay: m.Relay | None, found: list[tuple[str, str, str]]) -> None:
+    all_findings = diagnose_vehicle(seen(link=link_of(relay=relay)))
+    assert [(f.level, f.text, f.todo) for f in all_findings if f.where == "relay"] == found
