@@ -73,6 +73,7 @@ def test_it_begins_with_brake_and_repeats_it_until_a_neutral_command() -> None:
     assert it.relay.braking == "start"
     assert it.pc(ZERO) == [ZERO]
     assert it.pc(RUN) == [RUN]
+    assert it.relay.counters["to_board"] == 2
     assert it.wait(LEASE_NS) == []
 
 
@@ -231,6 +232,13 @@ def test_a_report_ten_times_a_second_with_version_state_and_counters() -> None:
         "counters": {"repeats": 2, "to_board": 1, "hit": 1, "to_pc": 1},
     }  # fmt: skip
     assert VERSION == T2_VERSION
+
+
+def test_a_report_beside_a_brake_is_sent_once() -> None:
+    it = Bench()
+    it.now_ns += LEASE_NS + 1
+    assert [to for to, _, _ in it.relay.tick(it.now_ns)] == [BOARD, BOARD, REPORT]
+    assert it.relay.brake(it.now_ns) == BRAKES
 
 
 def test_one_port_is_enough() -> None:
