@@ -3,6 +3,7 @@
 import argparse
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -81,11 +82,8 @@ def read_streams(file: Path) -> Streams:
 
 def refused(config: Everything, proposal: Settings) -> str:
     """Return why safety refuses the proposed settings, or an empty string."""
-    one = proposal
     try:
-        safety = replace(
-            config.safety, react=one.react, deceleration=one.deceleration, margin=one.margin
-        )
+        safety = replace(config.safety, **asdict(proposal))
         SafetyConfig(vehicle=config.vehicle, safety=safety)
     except ValueError as error:
         return str(error)

@@ -64,9 +64,18 @@ class Settings:
     deceleration: float
     margin: float
 
+    def reckoned(self, speed: float) -> float:
+        """Return the stopping distance (m) from this speed."""
+        return stopping_distance(speed, self.react, self.deceleration)
+
     def room(self, speed: float) -> float:
         """Return the distance (m) at which this speed is allowed."""
-        return self.margin + stopping_distance(speed, self.react, self.deceleration)
+        return self.margin + self.reckoned(speed)
+
+
+def present_settings(safety: Safety) -> Settings:
+    """Return the settings that safety has."""
+    return Settings(safety.react, safety.deceleration, safety.margin)
 
 
 def student(confidence: float, freedom: int) -> float:
@@ -107,10 +116,9 @@ def missing(stops: Sequence[Stop], max_linear: float) -> Iterator[str]:
     groups = _groups(stops)
     for group in dict.fromkeys([*REQUIRED, *groups]):
         name, found = label(group), groups.get(group, [])
-        if group not in REQUIRED and len(found) < FEWEST:
-            continue
         if len(found) < FEWEST:
-            yield f"{FEWEST - len(found)} more {name}"
+            if group in REQUIRED:
+                yield f"{FEWEST - len(found)} more {name}"
             continue
         slowest, fastest = min(s.speed for s in found), max(s.speed for s in found)
         if fastest < FASTEST * max_linear:
@@ -123,11 +131,12 @@ def missing(stops: Sequence[Stop], max_linear: float) -> Iterator[str]:
 
 
 def propose(
-    found: Mapping[Group, Fit], stops: Sequence[Stop], present: Safety, sensing_s: float
+    found: Mapping[Group, Fit], stops: Sequence[Stop], margin: float, sensing_s: float
 ) -> Settings | str:
     """Return settings that fit all groups, rounded to the safe side, or why there are none.
 
-    ``sensing_s`` is the age of a reading at the command: safety's reaction time begins there.
+    ``margin`` (m) is the present one. ``sensing_s`` is the age of a reading at the command:
+    safety's reaction time begins there.
     """
     slowest_reaction = max(fit.reaction.next_high for fit in found.values())
     weakest = min(fit.deceleration.next_low for fit in found.values())
@@ -140,27 +149,22 @@ def propose(
         )
     react = max(PROTECTIVE["react"][0], _up(slowest_reaction + sensing_s))
     over = max(s.distance - stopping_distance(s.speed, react, deceleration) for s in stops)
-    return Settings(react, deceleration, _up(present.margin + max(0.0, over)))
+    return Settings(react, deceleration, _up(margin + max(0.0, over)))
 
 
-def too_long(stops: Sequence[Stop], present: Safety) -> list[int]:
+def too_long(stops: Sequence[Stop], present: Settings) -> list[int]:
     """Return the stops that were longer than these settings reckon with, by index."""
-    return [
-        index
-        for index, stop in enumerate(stops)
-        if stop.distance > stopping_distance(stop.speed, present.react, present.deceleration)
-    ]
+    return [n for n, stop in enumerate(stops) if stop.distance > present.reckoned(stop.speed)]
 
 
-def shortfall(present: Safety, proposed: Settings) -> tuple[float, float]:
+def shortfall(present: Settings, proposed: Settings, max_linear: float) -> tuple[float, float]:
     """Return the speed at which the present settings keep the least room, and by how much less.
 
     Speed in m/s, room in m; it is negative if they keep more than proposed at each speed.
     """
-    now = Settings(present.react, present.deceleration, present.margin)
-    speeds = [present.max_linear * step / SPEEDS for step in range(1, SPEEDS + 1)]
-    worst = max(speeds, key=lambda v: proposed.room(v) - now.room(v))
-    return worst, proposed.room(worst) - now.room(worst)
+    speeds = [max_linear * step / SPEEDS for step in range(1, SPEEDS + 1)]
+    lacking, speed = max((proposed.room(v) - present.room(v), v) for v in speeds)
+    return speed, lacking
 
 
 def label(group: Group) -> str:

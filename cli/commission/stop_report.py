@@ -13,6 +13,7 @@ from cli.commission.stop_fit import (
     fits,
     label,
     missing,
+    present_settings,
     propose,
     shortfall,
     too_long,
@@ -20,7 +21,6 @@ from cli.commission.stop_fit import (
 from cli.commission.stops import Stop
 from cli.inspect import output
 from services.safety.config import Safety
-from services.safety.stop_distance import stopping_distance
 
 STOPS = ("stop", "command", "speed m/s", "reaction s", "deceleration m/s2", "distance m",
          "reckoned m", "recording")  # fmt: skip
@@ -42,18 +42,14 @@ class Result:
     """What the stops show about the vehicle and about safety's present settings."""
 
     measured: Measured
-    present: Safety
+    present: Settings
     sensing_s: float
     fits: Mapping[Group, Fit]
     missing: Sequence[str]  # what must be recorded before settings can be proposed
     proposal: Settings | None
     problem: str  # why there is no proposal although nothing is missing
     too_long: Sequence[int]  # indices of stops
-
-    @property
-    def shortfall(self) -> tuple[float, float]:
-        """Speed, and the room that the present settings lack there; without a proposal 0."""
-        return shortfall(self.present, self.proposal) if self.proposal else (0.0, 0.0)
+    shortfall: tuple[float, float]  # m/s, and m that the present settings lack there
 
     @property
     def verdict(self) -> str:
@@ -70,20 +66,23 @@ class Result:
         return self.verdict == "safe"
 
 
-def evaluate(measured: Measured, present: Safety, sensing_s: float) -> Result:
+def evaluate(measured: Measured, safety: Safety, sensing_s: float) -> Result:
     """Return the result; ``sensing_s`` is the age of a sonar's reading at the command."""
+    present = present_settings(safety)
     found = fits(measured.stops, measured.period_s)
-    lacking = tuple(missing(measured.stops, present.max_linear))
-    proposed = "" if lacking else propose(found, measured.stops, present, sensing_s)
+    lacking = tuple(missing(measured.stops, safety.max_linear))
+    proposed = "" if lacking else propose(found, measured.stops, safety.margin, sensing_s)
+    proposal = proposed if isinstance(proposed, Settings) else None
     return Result(
         measured=measured,
         present=present,
         sensing_s=sensing_s,
         fits=found,
         missing=lacking,
-        proposal=proposed if isinstance(proposed, Settings) else None,
+        proposal=proposal,
         problem=proposed if isinstance(proposed, str) else "",
         too_long=too_long(measured.stops, present),
+        shortfall=shortfall(present, proposal, safety.max_linear) if proposal else (0.0, 0.0),
     )
 
 
@@ -111,7 +110,7 @@ def as_json(result: Result) -> dict[str, Any]:
     return {
         "stops": [
             asdict(stop)
-            | {"reckoned": reckoned(stop, result.present), "long": n in result.too_long}
+            | {"reckoned": result.present.reckoned(stop.speed), "long": n in result.too_long}
             for n, stop in enumerate(measured.stops)
         ],
         "left_out": dict(measured.left_out),
@@ -124,18 +123,8 @@ def as_json(result: Result) -> dict[str, Any]:
         "missing": list(result.missing),
         "problem": result.problem,
         "proposal": asdict(result.proposal) if result.proposal else None,
-        "present": {
-            "react": result.present.react,
-            "deceleration": result.present.deceleration,
-            "margin": result.present.margin,
-            "verdict": result.verdict,
-        },
+        "present": asdict(result.present) | {"verdict": result.verdict},
     }
-
-
-def reckoned(stop: Stop, present: Safety) -> float:
-    """Return the distance (m) that safety reckons with from this stop's speed."""
-    return stopping_distance(stop.speed, present.react, present.deceleration)
 
 
 def _stop_row(result: Result, index: int) -> Sequence[str]:
@@ -147,7 +136,7 @@ def _stop_row(result: Result, index: int) -> Sequence[str]:
         f"{stop.reaction:.3f}",
         f"{stop.deceleration:.2f}",
         f"{stop.distance:.3f}",
-        f"{reckoned(stop, result.present):.3f}",
+        f"{result.present.reckoned(stop.speed):.3f}",
         stop.file,
     )
 
@@ -198,7 +187,7 @@ def _present(result: Result) -> Iterator[str]:
         stop = result.measured.stops[index]
         yield (
             f"NOT safe: stop {index + 1} took {stop.distance:.2f} m, "
-            f"reckoned {reckoned(stop, now):.2f} m."
+            f"reckoned {now.reckoned(stop.speed):.2f} m."
         )
     speed, room = result.shortfall
     if room > 0:

@@ -16,17 +16,18 @@ that the deceleration is a lower bound. The distance comes from the board's coun
 in steps of 1 mm/s, counters of 1 mm.
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, takewhile
+from math import isclose
 from statistics import linear_regression, median
 from typing import Literal
 
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Direction, Message, Mileage, Motion, Velocity
-from common.motion import Command, Twist, is_standing
+from common.motion import STANDING_MPS, Command, Twist, is_standing
 
 SLOWEST_MPS = 0.1
 STEADY_S, STEADY_MPS, STEADY = 0.2, 0.03, 0.05  # before the command: time, deviation, relative one
@@ -40,6 +41,8 @@ NO_VELOCITIES, NO_COUNTERS = "velocities are missing", "counters are missing"
 
 Kind = Literal["stop", "brake"]
 Point = tuple[float, float]  # s since the command, m/s in the direction of the motion
+
+DIRECTIONS: dict[float, Direction] = {1: "forward", -1: "backward"}  # by the sign of the speed
 
 
 @dataclass(slots=True)
@@ -107,17 +110,6 @@ class Stop:
     command: tuple[int, int] = (0, 0)  # boot of safety and time; the same in two recordings of it
 
 
-@dataclass(frozen=True, slots=True)
-class Begin:
-    """The command of a stop, and what followed: BRAKE after STOP, and any other command."""
-
-    kind: Kind
-    at_ns: int
-    boot: int  # of safety
-    brake: Motion | None
-    other: Motion | None
-
-
 class UnsuitableError(Exception):
     """A stop that shows nothing about the vehicle; the text is the reason."""
 
@@ -126,113 +118,109 @@ def find_stops(streams: Streams, file: str = "") -> tuple[list[Stop], Counter[st
     """Return the measured stops, and how many were left out for which reason."""
     found: list[Stop] = []
     left_out: Counter[str] = Counter()
-    for begin in begins(streams.motions):
+    for motions in _begins(streams.motions):
         try:
-            found.append(measure(streams, begin, file))
+            found.append(_measure(streams, motions, file))
         except UnsuitableError as reason:
             left_out[str(reason)] += 1
     return found, left_out
 
 
-def begins(motions: Sequence[Motion]) -> Iterator[Begin]:
-    """Yield the commands that end a RUN with speed."""
-    for index, (before, now) in enumerate(pairwise(motions), 1):
-        if now.command is Command.RUN or not _runs(before):
-            continue
-        kind: Kind = "brake" if now.command is Command.BRAKE else "stop"
-        later = motions[index + 1 :]
-        brake = (m for m in later if kind == "stop" and m.command is Command.BRAKE)
-        other = (m for m in later if m.command not in (now.command, Command.BRAKE))
-        yield Begin(kind, now.mono_ns, now.boot, next(brake, None), next(other, None))
-
-
-def measure(streams: Streams, begin: Begin, file: str) -> Stop:
-    """Return a stop; raise ``UnsuitableError`` if it is left out."""
-    window = _until_standstill(streams.velocities, begin)
-    end_ns = window[-1].mono_ns
-    if any(b.pressed and begin.at_ns <= b.mono_ns <= end_ns for b in streams.bumpers):
-        raise UnsuitableError("the bumper was pressed")
-    distance = _distance(streams.mileages, begin.at_ns, end_ns)
-    sign = 1 if window[0].linear > 0 else -1
-    speed = abs(window[0].linear)
-    brake = begin.brake
-    braked = brake is not None and brake.mono_ns <= end_ns
-    part = window
-    if brake is not None:
-        part = [v for v in window if v.mono_ns <= brake.mono_ns]
-    reaction, deceleration = slope([(_s(v, begin), sign * v.linear) for v in part], speed)
-    direction: Direction = "forward" if sign > 0 else "backward"
-    return Stop(
-        begin.kind,
-        direction,
-        speed,
-        reaction,
-        deceleration,
-        distance,
-        braked,
-        file,
-        command=(begin.boot, begin.at_ns),
-    )
-
-
-def slope(points: Sequence[Point], speed: float) -> tuple[float, float]:
+def slope(points: Sequence[Point]) -> tuple[float, float]:
     """Return reaction time (s) and deceleration (m/s^2) from the first point to standstill."""
-    above = max(n for n, (_, v) in enumerate(points) if n == 0 or v > UPPER * speed)
-    slow = (n for n, (_, v) in enumerate(points) if n > above and v < LOWER * speed)
-    below = next(slow, len(points))
-    part = points[above + 1 : below]
-    if len(part) < SLOPE:
-        if below == len(points):
-            raise UnsuitableError("changed to BRAKE before it slowed down")
-        part = (points[above], points[below])
+    _, speed = points[0]
+    above = max(n for n, (_, v) in enumerate(points) if v > UPPER * speed)
+    falling = points[above:]
+    lowest = max(LOWER * speed, STANDING_MPS)
+    part = list(takewhile(lambda point: point[1] >= lowest, falling))
+    below = falling[len(part) :]
+    if len(part) > SLOPE:
+        part = part[1:]
+    elif below:
+        part = [falling[0], below[0]]
+    else:
+        raise UnsuitableError("changed to BRAKE before it slowed down")
     rate, at_zero = linear_regression([s for s, _ in part], [v for _, v in part])
     if rate >= 0:
         raise UnsuitableError("the speed does not fall steadily")
     return (speed - at_zero) / rate, -rate
 
 
-def _runs(motion: Motion) -> bool:
-    return motion.command is Command.RUN and not Twist(motion.linear, motion.angular).rounds_to_zero
+def _begins(motions: Sequence[Motion]) -> Iterator[Sequence[Motion]]:
+    """Yield the motions from each command on that ends a RUN with speed."""
+    for index, (before, now) in enumerate(pairwise(motions), 1):
+        ran = not Twist(before.linear, before.angular).rounds_to_zero
+        if before.command is Command.RUN and ran and now.command is not Command.RUN:
+            yield motions[index:]
 
 
-def _until_standstill(velocities: Sequence[Velocity], begin: Begin) -> Sequence[Velocity]:
-    """Return the velocities of a stop, from the newest one at its command."""
-    first = bisect_right(velocities, begin.at_ns, key=lambda v: v.mono_ns) - 1
-    if first < 0 or _s(velocities[first], begin) < -LONGEST_GAP_S:
-        raise UnsuitableError(NO_VELOCITIES)
-    _check_begin(velocities, velocities[first])
-    stand = (n for n in range(first + 2, len(velocities)) if _stands(velocities[n - 1 : n + 1]))
-    end = next(stand, len(velocities) - 1)
-    window = velocities[first : end + 1]
-    if begin.other is not None and begin.other.mono_ns <= window[-1].mono_ns:
-        raise UnsuitableError(f"changed to {begin.other.command.upper()} before standstill")
-    if not _stands(window[-2:]):
-        raise UnsuitableError("the recording ends before standstill")
-    if any(b.mono_ns - a.mono_ns > LONGEST_GAP_S * NS_PER_S for a, b in pairwise(window)):
-        raise UnsuitableError(NO_VELOCITIES)
-    return window
-
-
-def _s(message: Message, begin: Begin) -> float:
-    return (message.mono_ns - begin.at_ns) / NS_PER_S
-
-
-def _stands(velocities: Sequence[Velocity]) -> bool:
-    return all(is_standing(v.linear, v.angular) for v in velocities)
-
-
-def _check_begin(velocities: Sequence[Velocity], first: Velocity) -> None:
-    """Check the motion before the command."""
+def _measure(streams: Streams, motions: Sequence[Motion], file: str) -> Stop:
+    """Return the stop that the first of these motions commands."""
+    command = motions[0]
+    window = _until_standstill(streams.velocities, motions)
+    first, end_ns = window[0], window[-1].mono_ns
+    if any(b.pressed and command.mono_ns <= b.mono_ns <= end_ns for b in streams.bumpers):
+        raise UnsuitableError("the bumper was pressed")
+    distance = _distance(streams.mileages, command.mono_ns, end_ns)
+    kind: Kind = "brake" if command.command is Command.BRAKE else "stop"
+    brakes = [m.mono_ns for m in motions if m.command is Command.BRAKE and m.mono_ns <= end_ns]
+    braked = kind == "stop" and bool(brakes)
+    last_ns = brakes[0] if braked else end_ns
     speed = abs(first.linear)
-    if speed < SLOWEST_MPS:
+    sign = first.linear / speed
+    points = [
+        ((v.mono_ns - command.mono_ns) / NS_PER_S, sign * v.linear)
+        for v in window
+        if v.mono_ns <= last_ns
+    ]
+    reaction, deceleration = slope(points)
+    return Stop(
+        kind,
+        DIRECTIONS[sign],
+        speed,
+        reaction,
+        deceleration,
+        distance,
+        braked,
+        file,
+        command=(command.boot, command.mono_ns),
+    )
+
+
+def _until_standstill(
+    velocities: Sequence[Velocity], motions: Sequence[Motion]
+) -> Sequence[Velocity]:
+    """Return the velocities of a stop, from the newest one at its command."""
+    command = motions[0]
+    first = bisect_right(velocities, command.mono_ns, key=lambda v: v.mono_ns) - 1
+    if first < 0:
+        raise UnsuitableError(NO_VELOCITIES)
+    _check_begin(velocities[: first + 1])
+    other = next((m for m in motions if m.command not in (command.command, Command.BRAKE)), None)
+    window = [velocities[first]]
+    for before, now in pairwise(velocities[first:]):
+        if now.mono_ns - before.mono_ns > LONGEST_GAP_S * NS_PER_S:
+            raise UnsuitableError(NO_VELOCITIES)
+        if other is not None and other.mono_ns <= now.mono_ns:
+            raise UnsuitableError(f"changed to {other.command.upper()} before standstill")
+        window.append(now)
+        if all(is_standing(v.linear, v.angular) for v in (before, now)):
+            return window
+    raise UnsuitableError("the recording ends before standstill")
+
+
+def _check_begin(velocities: Sequence[Velocity]) -> None:
+    """Check the motion up to the command."""
+    newest = velocities[-1]
+    if abs(newest.linear) < SLOWEST_MPS:
         raise UnsuitableError(f"slower than {SLOWEST_MPS:g} m/s")
-    if abs(first.angular) > TURNING_RADPS:
+    if abs(newest.angular) > TURNING_RADPS:
         raise UnsuitableError("turning")
-    since_ns = first.mono_ns - round(STEADY_S * NS_PER_S)
-    before = [v.linear for v in velocities if since_ns <= v.mono_ns <= first.mono_ns]
-    most = max(STEADY_MPS, STEADY * speed)
-    if any(abs(v - first.linear) > most for v in before):
-        raise UnsuitableError("not at a steady speed")
+    since_ns = newest.mono_ns - round(STEADY_S * NS_PER_S)
+    since = bisect_left(velocities, since_ns, key=lambda v: v.mono_ns)
+    for before in velocities[since:]:
+        if not isclose(before.linear, newest.linear, rel_tol=STEADY, abs_tol=STEADY_MPS):
+            raise UnsuitableError("not at a steady speed")
 
 
 def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int) -> float:

@@ -208,6 +208,8 @@ def test_the_policy_measures_the_stops_that_it_commands(deceleration: float, eve
     fixture = PolicyFixture().ready()
     fixture.drive(0.8, seconds=2.5)
     fixture.linear = 0.8
+    fixture.drive(0.8)
+    assert fixture.state.stop_distance == StopDistance()
     fixture.tick(30)  # without requests
     assert fixture.state.stop_distance.stop is not None
     found = coasting(fixture, deceleration)

@@ -50,6 +50,10 @@ def test_a_vehicle_that_rolled_on_is_held_by_brake_until_it_drives_again() -> No
     until(fixture, "stop")  # as before it rolled
 
 
+def test_a_vehicle_that_has_not_driven_is_not_held_by_brake() -> None:
+    until(PolicyFixture(), "stop")
+
+
 def test_a_vehicle_whose_velocity_was_unknown_is_not_held_by_brake() -> None:
     fixture = PolicyFixture().running(0.28)
     fixture.muted = {"velocity"}

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from statistics import NormalDist, mean
 
 import pytest
-from msgspec.structs import replace as changed
 
 from cli.commission.stop_fit import (
     Settings,
@@ -13,6 +12,7 @@ from cli.commission.stop_fit import (
     fits,
     label,
     missing,
+    present_settings,
     propose,
     shortfall,
     student,
@@ -111,8 +111,8 @@ def test_the_speeds_that_are_missing() -> None:
     assert text.startswith("BRAKE forward from at least 0.96 m/s (the fastest is 0.50 m/s)")
 
 
-def proposed(found: Sequence[Stop], present: Safety | None = None) -> Settings:
-    settings = propose(fits(found, 0.02), found, present or Safety(), 0.1)
+def proposed(found: Sequence[Stop], margin: float = 0.2) -> Settings:
+    settings = propose(fits(found, 0.02), found, margin, 0.1)
     assert isinstance(settings, Settings)
     return settings
 
@@ -149,7 +149,7 @@ def test_the_limits_of_the_settings() -> None:
     assert fast.deceleration == 1.0
     assert proposed([stop(speed, -0.05, 4.0) for speed in SPEEDS]).react == 0.1
     slow = [stop(speed, 0.1, 0.08) for speed in SPEEDS]
-    refused = propose(fits(slow, 0.02), slow, Safety(), 0.1)
+    refused = propose(fits(slow, 0.02), slow, 0.2, 0.1)
     assert isinstance(refused, str)
     assert refused.startswith("the next stop may decelerate with 0.08 m/s2 only")
     enough = proposed([stop(speed, 0.1, 0.102) for speed in SPEEDS])
@@ -163,7 +163,7 @@ def test_the_margin_covers_every_recorded_stop() -> None:
         assert each.distance <= one.room(each.speed)
     reckoned = 0.5 * one.react + 0.125 / one.deceleration
     assert 0 <= one.margin - (0.2 + 0.9 - reckoned) < 0.01
-    assert proposed(stops(), changed(Safety(), margin=0.3)).margin == 0.3
+    assert proposed(stops(), 0.3).margin == 0.3
 
 
 def test_room_is_what_safety_keeps() -> None:
@@ -171,7 +171,7 @@ def test_room_is_what_safety_keeps() -> None:
 
 
 def test_stops_that_were_too_long() -> None:
-    present = Safety()
+    present = present_settings(Safety())
     reckoned = 0.5 * 0.25 + 0.25 / 1.2
     exact = stopping_distance(0.5, 0.25, 0.6)
     assert too_long([stop(0.5, distance=exact)], present) == []
@@ -180,14 +180,14 @@ def test_stops_that_were_too_long() -> None:
 
 
 def test_the_largest_shortfall() -> None:
-    present = Safety()
-    same = Settings(present.react, present.deceleration, present.margin)
-    assert shortfall(present, same)[1] == 0.0
-    speed, room = shortfall(present, Settings(0.35, 0.6, 0.2))
+    present = present_settings(Safety())
+    assert present == Settings(0.25, 0.6, 0.2)
+    assert shortfall(present, present, 1.0)[1] == 0.0
+    speed, room = shortfall(present, Settings(0.35, 0.6, 0.2), 1.0)
     assert speed == 1.0
     assert room == pytest.approx(0.1)
-    speed, room = shortfall(present, Settings(0.3, 1.0, 0.2))
+    speed, room = shortfall(present, Settings(0.3, 1.0, 0.2), 1.0)
     assert speed == 0.1
     assert room == pytest.approx(0.05 * 0.1 - 0.01 / 2 * (1 / 0.6 - 1))
-    assert shortfall(present, Settings(0.2, 0.7, 0.2))[1] < 0
-    assert shortfall(changed(present, max_linear=0.5), Settings(0.35, 0.6, 0.2))[0] == 0.5
+    assert shortfall(present, Settings(0.2, 0.7, 0.2), 1.0)[1] < 0
+    assert shortfall(present, Settings(0.35, 0.6, 0.2), 0.5)[0] == 0.5
