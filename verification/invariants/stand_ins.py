@@ -42,6 +42,10 @@ class Sockets:
         """Return when a datagram was read; nobody has stamped it."""
         return Receipt(None, read_ns)
 
+    def take_relay_report(self) -> bytes:
+        """Return nothing: there is no relay."""
+        return b""
+
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
         """Send to the board, with the oracle's complaints."""
         complaints = self._stack.oracle.on_leaving(self._process, datagram)

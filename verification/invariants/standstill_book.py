@@ -23,6 +23,7 @@ FRESH_S = 0.2
 class StandstillBook:
     """The velocities that one safety service received, and when it last commanded motion."""
 
+    stop_ns: int = 0  # when standstill was commanded
     due_ns: int | None = None  # when the vehicle must stand; None while motion is commanded
     newest: Velocity | None = None
     newest_ns: int = 0
@@ -44,7 +45,10 @@ class StandstillBook:
             self.due_ns = None
             return ""
         if self.due_ns is None:
-            self.due_ns = now_ns + round(stopping_s(self.newest) * NS_PER_S)
+            self.stop_ns = self.due_ns = now_ns
+        if now_ns - self.stop_ns <= GAP_S * NS_PER_S:  # the speed at STOP may be measured later
+            by_ns = self.stop_ns + round(stopping_s(self.newest) * NS_PER_S)
+            self.due_ns = max(self.due_ns, by_ns)
         late_s = (now_ns - self.due_ns) / NS_PER_S
         known = now_ns - self.newest_ns <= FRESH_S * NS_PER_S
         if motion.command == "brake" or late_s < SLACK_S or not known:
