@@ -144,6 +144,8 @@ class Core:
             return
         self.report.frames[kind.__name__] += 1
         self.readiness.on_frame(now_ns, out)
+        if not self.readiness.ready:
+            self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
         changed = self._ports.take(kind, port, now_ns)
         self.motions.port = self._ports.main
         if changed and kind in POLLED:
@@ -206,7 +208,6 @@ class Core:
         ):
             self.readiness.on_restart(now_ns, out)
             self._bumper = BumperFilter()
-            self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)
         self.motions.on_mileage(after, now_ns)

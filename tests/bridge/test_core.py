@@ -10,7 +10,7 @@ from common.freshness import NS_PER_S
 from common.motion import Command
 from common.wire import commands, reports
 from common.wire.commands import MotionKind
-from common.wire.frame import Side
+from common.wire.frame import Frame, Side
 from common.wire.reports import DistanceReport, DriverReport, VelocityReport
 from services.bridge.output import Output
 from tests.bridge.core_fixture import (
@@ -112,6 +112,16 @@ def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench
         reported += published(bench.tick(NS_PER_S // 5), "switches")
     assert not bench.core.readiness.ready
     assert reported == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
+
+
+@pytest.mark.parametrize(
+    "off", [reports.UltrasonicBrakeReport(False), reports.BumperBrakeReport(False)]
+)
+def test_a_brake_that_is_off_disarms_at_once(bench: Bench, off: Frame) -> None:
+    bench.arm()
+    assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
+    bench.receive(FRAMING.pack(off))
+    assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
 
 
 def test_a_gap_of_some_velocity_periods_sends_the_brakes_again_at_once(bench: Bench) -> None:

@@ -87,8 +87,8 @@ def test_the_end_of_its_input_is_no_key(pendant: "subprocess.Popen[str]", safety
     assert not safety.stops
 
 
-def test_an_unexpected_name_ends_at_once(t2: Tool, safety: Safety) -> None:
-    result = t2("estop", "--keepalive", "phone")
+def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
+    result = tool("estop", "--keepalive", "phone")
     assert result.code == 1
     assert "safety does not expect 'phone': it expects pendant" in result.err
 
