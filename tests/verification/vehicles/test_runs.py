@@ -8,21 +8,23 @@ from msgspec.structs import replace
 
 from services.safety.zones import Limit, Zones
 from verification.vehicles.campaign import read
-from verification.vehicles.draw import draw
+from verification.vehicles.draw import Draw, draw
 from verification.vehicles.judge import Stop
 from verification.vehicles.page import page
 from verification.vehicles.run import Result, fails_as, run
 
 BATCHES, BATCH = 25, 4
 
-# Runs that once broke an invariant or stopped without need.
-FOUND: list[int] = []
+# Runs that once broke an invariant (279, 414: a RUN after the board's echo that a brake is off) or
+# stopped without need (24: on a slope).
+FOUND = (24, 279, 414)
+SHORT = {"operator.manoeuvres": 2}
 
 
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_no_vehicle_breaks_an_invariant(batch: int) -> None:
     for seed in range(batch * BATCH, (batch + 1) * BATCH):
-        result = run(draw(seed))
+        result = run(Draw(seed, draw(seed).values | SHORT))
         assert not result.violations, seed
         assert not result.stops, seed
 
@@ -31,11 +33,12 @@ def test_no_vehicle_breaks_an_invariant(batch: int) -> None:
 def test_what_was_found_stays_fixed(seed: int) -> None:
     result = run(draw(seed))
     assert not result.violations
-    assert result.completed
+    assert not result.stops
 
 
 def test_a_run_is_the_same_each_time() -> None:
-    assert replace(run(draw(3)), cpu_s=0.0) == replace(run(draw(3)), cpu_s=0.0)
+    first, second = (run(Draw(3, draw(3).values | SHORT)) for _ in range(2))
+    assert replace(first, cpu_s=0.0) == replace(second, cpu_s=0.0)
 
 
 def test_a_safety_that_ignores_walls_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
