@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from common.motion import Command
+from common.timing import Durations as Durations
+from common.timing import Timing as Timing
 from common.verdict import Action as Action
 from common.verdict import Cause as Cause
 from common.verdict import Direction as Direction
@@ -214,21 +216,6 @@ class Event(Message, frozen=True, kw_only=True):
     level: Level
     text: str
     about: dict[str, str | int | float | bool | None] = {}
-
-
-class Durations(Struct, frozen=True, kw_only=True):
-    """Histogram of durations since the service's start."""
-
-    counts: tuple[int, ...]  # one for each of ``Timing.bounds``, and one above the last
-    worst: float  # s, 0 without any
-
-
-class Timing(Struct, frozen=True, kw_only=True):
-    """Reaction times of a service; a name with a dot is a hop of the name before the dot."""
-
-    bounds: tuple[float, ...]  # s, rising; upper bounds of the counts
-    durations: dict[str, Durations]  # by name
-    not_counted: dict[str, int]  # number of unmeasured durations, by reason
 
 
 class Health(Message, frozen=True, kw_only=True):

@@ -8,15 +8,13 @@ from hypothesis import strategies as st
 
 from common import codec
 from common.errors import MessageError
-from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Limit, LimitState
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from services.safety.channel import CONFLICT_NS, Admission
-from services.safety.config import LimitSource, Safety
+from services.safety.config import LimitSource
 from services.safety.inputs import LimitRequest
 from services.safety.limits import LimitChannel, SpeedLimits, printable
-from tests.safety.policy_fixture import PolicyFixture
 
 LEASE_S, LEASE_NS, AGE_NS = 0.5, 500_000_000, 400_000_000
 SOURCES = {
@@ -25,8 +23,6 @@ SOURCES = {
 }
 BEAT = Heartbeat(40).beat(0)  # sent 41 at time 0
 EMPTY = SpeedLimits(SOURCES)
-IGNORED = Safety(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
-NEEDED = Safety(limits=SOURCES)
 
 
 def put(
@@ -251,135 +247,3 @@ def test_states_are_published() -> None:
     assert (fleet.angular, fleet.silent, fleet.effect) == (None, True, "none")
     assert with_limit(0.0).states("lidar", 0)[0].effect == "stop"
     assert LimitChannel() == LimitChannel(linear=math.inf, angular=math.inf, reason="")
-
-
-# --- the whole decision ---------------------------------------------------------------------
-
-
-def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:
-    fixture = PolicyFixture(IGNORED).running(1.0)
-    speeds = []
-    for _ in range(80):
-        fixture.tick()
-        fixture.limit(0.2, reason="person at 2 m")
-        speeds.append(fixture.request(1.0).twist.linear)
-    for n, speed in enumerate(speeds, start=1):
-        assert speed <= max(0.2, 1.0 - 0.6 * 0.02 * (n - 1)) + 1e-9
-    assert speeds[-1] == pytest.approx(0.2)
-    assert fixture.verdict.name == "slow"
-    assert fixture.state.latches["limit"].text == "Slowed by lidar: person at 2 m."
-    assert fixture.published().limits.forward == pytest.approx(0.2)
-    (source,) = fixture.published().limit_sources
-    assert (source.effect, source.linear, source.reason) == ("slow", 0.2, "person at 2 m")
-    assert fixture.published().text.startswith("Slowed by lidar: person at 2 m.")
-    fixture.drive(1.0, seconds=3.0)  # without limits: ignored
-    assert fixture.verdict.twist.linear == pytest.approx(1.0)
-    assert "limit" not in fixture.state.latches
-
-
-def test_a_protective_stop_ends_by_itself_and_then_needs_a_neutral_request() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    verdict = fixture.limit(0.0, reason="person at 1 m")
-    assert (verdict.command, verdict.name, verdict.twist) == ("stop", "stop", STILL)
-    assert fixture.published().latched == ()
-    for _ in range(20):
-        fixture.drive(0.5, seconds=0.1)
-        assert fixture.limit(0.0).command == "stop"
-    fixture.limit()
-    fixture.drive(0.5, seconds=1.0)
-    assert fixture.verdict.name == "inhibited"  # the stick is still pushed
-    fixture.drive()
-    assert fixture.drive(0.5).command == "run"
-
-
-def test_a_needed_source_stops_from_the_start_until_its_first_limit() -> None:
-    fixture = PolicyFixture(NEEDED)
-    fixture.tick(40)
-    fixture.drive(0.0, seconds=1.0)
-    fixture.drive(0.5, seconds=1.0)
-    assert fixture.verdict.command == "stop"
-    assert fixture.state.latches["limit_silent"].text == "No speed limit arrives of lidar."
-    for _ in range(10):
-        fixture.limit()
-        fixture.drive(seconds=0.1)
-    assert fixture.drive(0.5, seconds=0.4).command == "run"
-    assert fixture.drive(0.5, seconds=0.2).command == "stop"
-
-
-def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    fixture.limit(0.4)
-    fixture.limit_boot = 56
-    assert fixture.limit(1.0).refused == "limit_second_publisher"
-    assert fixture.verdict.command == "stop"
-    text = "Two publishers use limit lidar."
-    assert fixture.state.latches["two_publishers"].text == text
-    assert fixture.drive(0.5, seconds=0.6).command == "run"
-
-
-def test_refused_limits_change_nothing() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    assert fixture.decide(LimitRequest("lidar", None, fixture.now_ns)).refused == (
-        "limit_not_a_request"
-    )
-    assert fixture.limit(0.0, source="stranger").refused == "limit_unknown_source"
-    assert fixture.verdict.command == "run"
-    assert fixture.limit(0.0).refused == ""
-
-
-def test_a_limit_delays_no_brake() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    fixture.limit(0.0)
-    assert fixture.estop().command == "brake"
-    fixture.limit(0.1)
-    assert fixture.verdict.command == "brake"
-
-
-def test_a_limit_holds_for_a_release_too() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    fixture.pressed = True
-    fixture.linear = 0.0
-    fixture.tick(60)
-    fixture.linear = None
-    for _ in range(10):
-        fixture.tick()
-        fixture.limit(0.05)
-        assert fixture.hold() == ""
-    assert fixture.verdict.twist.linear == pytest.approx(-0.05)
-    fixture.limit(0.0, reason="person")
-    assert fixture.hold() == "Stopped by lidar: person."
-    assert fixture.verdict.command == "brake"
-
-
-EVENTS = st.lists(
-    st.tuples(st.sampled_from(["limit", "drive", "wait"]), CAPS, SPEEDS, st.integers(1, 30)),
-    max_size=40,
-)
-
-
-@given(EVENTS)
-def test_no_run_is_faster_than_a_valid_cap_after_its_deceleration(
-    events: list[tuple[str, float | None, float, int]],
-) -> None:
-    fixture = PolicyFixture(NEEDED)
-    fixture.tick(40)
-    cap, since_ns, heard_ns, speed = math.inf, 0, -NS_PER_S, 0.0
-    for kind, value, linear, ticks in events:
-        for _ in range(ticks):
-            fixture.tick()
-            if kind == "limit":
-                fixture.limit(value)
-                heard_ns = fixture.now_ns
-                new = math.inf if value is None else value
-                if new < cap:
-                    since_ns = fixture.now_ns
-                cap = new
-            verdict = fixture.request(linear) if kind == "drive" else fixture.verdict
-            alive = fixture.now_ns - heard_ns <= LEASE_NS
-            if verdict.command == "run":
-                assert alive
-                assert cap > ROUNDED_MPS
-                slowing_s = (fixture.now_ns - since_ns) / NS_PER_S
-                assert abs(verdict.twist.linear) <= max(cap, 1.0 - 0.6 * slowing_s) + 1e-9
-            speed = abs(verdict.twist.linear)
-    assert speed <= 1.0

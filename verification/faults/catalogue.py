@@ -20,7 +20,7 @@ from sim.requests import (
     SonarName,
     Wire,
 )
-from verification.faults import browser, forgery, injectors, relay_faults
+from verification.faults import browser, forgery, injectors, operator_faults, relay_faults
 from verification.faults.fault import (
     BUMPER_AGE,
     HEARTBEAT,
@@ -268,22 +268,6 @@ DASHBOARD = [
           browser.estop_while(browser.unfinished), RESET, within(0.3)),
 ]  # fmt: skip
 
-# Delayed calls have no effect: no frame moves the vehicle, and the latch stays.
-OPERATORS = [
-    Fault("contact, then 20 resets 1.3 s late", injectors.late_resets, RESET, within(0.02)),
-    Fault("contact, then 20 releases 1.3 s late", injectors.late_releases, RESET, within(0.02)),
-]
-
-# Late keys move nothing: the hold of the last key in time ends, also when it is a first press.
-TERMINAL = [
-    Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
-          injectors.stall_terminal(seconds), NEUTRAL,
-          by_limit(lambda config: config.teleop.hold_first + 0.15
-                   + config.safety.sources["teleop"].lease),
-          hold_s=seconds + 1.0, needs="teleop")
-    for seconds in (0.8, 3.0)
-]  # fmt: skip
-
 DRIVE_LINK = [
     Fault("safety hangs, then contact", forgery.hit_while_safety_hangs, RESET, within(0.02),
           injectors.go_on("safety")),
@@ -301,7 +285,7 @@ DRIVE_LINK = [
 GROUPS = [
     [*MILLISECONDS, *CLOCKS],
     [*GREEDY, *DASHBOARD],
-    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *TERMINAL, *DRIVE_LINK, *OPERATORS,
-     *relay_faults.RELAY],
+    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *operator_faults.TERMINAL, *DRIVE_LINK,
+     *operator_faults.CALLS, *relay_faults.RELAY],
 ]  # fmt: skip
 FAULTS = [fault for group in GROUPS for fault in group]

@@ -1,12 +1,14 @@
 """Stops of the simulated vehicle in simulated time, as recorded messages; and exact stops."""
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from cli.commission.stops import Stop, Streams
+import msgspec
+
+from cli.commission.stops import Stop, Streams, find_stops
 from common.freshness import NS_PER_S
-from common.messages import Mileage, Motion, Velocity
+from common.messages import Message, Mileage, Motion, Velocity
 from common.motion import Command
 from common.wire.commands import DistanceQuery, MotionCommand, MotionKind
 from common.wire.frame import Frame
@@ -92,3 +94,49 @@ def stops(speeds: Sequence[float] = SPEEDS, **given: object) -> list[Stop]:
         for direction in ("forward", "backward")
         for n, speed in enumerate(speeds)
     ]
+
+
+RUN = Motion(command=Command.RUN, linear=0.8)
+
+
+def at(message: Message, seconds: float) -> Message:
+    """Return a message sent so many seconds after the command."""
+    return msgspec.structs.replace(message, mono_ns=NS_PER_S * 10 + round(seconds * NS_PER_S))
+
+
+def speed_at(seconds: float, speed: float = 0.8) -> float:
+    """Return a speed that falls by 0.5 m/s^2, 0.1 s after the command at 0 s."""
+    return round(max(0.0, speed - 0.5 * max(0.0, seconds - 0.1)), 3)
+
+
+def streams(*extra: Message, sign: int = 1, speed: float = 0.8, until_s: float = 2.5) -> Streams:
+    """Return a drive with a STOP at 0 s: 50 velocities and 25 counters a second."""
+    made = Streams()
+    made.add(at(msgspec.structs.replace(RUN, linear=sign * speed), -0.02))
+    made.add(at(Motion(command=Command.STOP, boot=6), 0.0))
+    distance = 7.0
+    for number in range(-15, round(until_s * 50)):
+        now = number / 50 + 0.005
+        linear = sign * speed_at(now, speed)
+        distance += linear / 50
+        made.add(at(Velocity(linear=linear, angular=0.0), now))
+        if number % 2 == 0:
+            made.add(at(Mileage(distance=round(distance, 3), heading=0.0, epoch=0, boot=3), now))
+    for message in extra:
+        made.add(message)
+    return made
+
+
+def changed(made: Streams, change: Callable[[Velocity, float], Velocity | None]) -> Streams:
+    """Return streams with other velocities; None removes one."""
+    all_of = [(v, v.mono_ns / NS_PER_S - 10) for v in made.velocities]
+    made.velocities = [new for v, now in all_of if (new := change(v, now)) is not None]
+    return made
+
+
+def left(made: Streams) -> str:
+    """Return why the only stop is left out."""
+    found, reasons = find_stops(made)
+    assert not found
+    assert list(reasons.values()) == [1]
+    return next(iter(reasons))
