@@ -106,9 +106,13 @@ lint: $(STAMP)
 search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
+# They run little of what ships in their own process, or thousands of times the same.
+UNTRACED = tests/verification tests/tools tests/deploy tests/bench tests/cli/commission/test_stop_coverage.py
+
 cover: $(STAMP) ## all tests except the search, with coverage
 	$(BIN)/coverage erase
-	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(MANY) -m "not timed"
+	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(addprefix --ignore=,$(UNTRACED)) $(MANY) -m "not timed"
+	$(TESTS) $(WITHOUT_SEARCH) $(UNTRACED) $(MANY) -m "not timed"
 	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m timed
 	$(BIN)/coverage report --fail-under=85
 	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"

@@ -20,7 +20,7 @@ COAST = 0.45  # m/s^2; safety reckons with 0.6, and STOP does not become BRAKE y
 SPEEDS = (0.35, 0.5, 0.6, 0.7, 0.7)
 STEADY_S = 0.5
 
-pytestmark = pytest.mark.campaign
+pytestmark = [pytest.mark.campaign, pytest.mark.timed]
 
 
 @pytest.fixture
