@@ -35,7 +35,7 @@ def hold(session: BusSession, name: str) -> int:
 
 def follow(probe: Probe, robot: str, name: str, state: SafetyState) -> None:
     """Publish at 10 Hz, print each change of state, and stop the robot on Enter."""
-    shown, watched = "", [sys.stdin]
+    shown, watched = "", [sys.stdin] if sys.stdin else []  # closed in some supervisors
     while True:
         put(probe, robot, name, state.heartbeat)
         if (line := described(state, name)) != shown:

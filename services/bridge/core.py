@@ -195,8 +195,7 @@ class Core:
     def _on_distance(
         self, frame: reports.DistanceReport, raw: bytes, now_ns: int, out: Output
     ) -> None:
-        # Measured no earlier than the query, even if the answer was read late.
-        asked_ns = self._poll.answered("mileage", now_ns)
+        asked_ns = self._poll.answered("mileage", now_ns)  # the answer may be read late
         after = self._translator.mileage(frame, self.readiness.epoch)
         before = self._mileage
         if before is not None and restarted(
@@ -208,6 +207,7 @@ class Core:
         ):
             self.readiness.on_restart(now_ns, out)
             self._bumper = BumperFilter()
+            self.motions.on_ready(False)  # also where a firmware without echoes stays ready
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)
         self.motions.on_mileage(after, now_ns)

@@ -9,7 +9,7 @@ condition    lost by                         regained by
 ============ =============================== =================================================
 ready        link lost, switches unverified, both emergency switches on and echoed
              board restarted, stopping
-neutral      start, not ready, lease over,   a STOP or a RUN of zero from the authority, while
+neutral      start, not ready, lease over,   a STOP, BRAKE or RUN of 0 from the authority, while
              a new authority                 ready: no motion on reconnect alone
 acked        a bumper hit (the reflex: BRAKE a motion message whose ``judged`` covers that hit:
              at once)                        a RUN that was already sent must not undo the BRAKE

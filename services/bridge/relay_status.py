@@ -6,6 +6,8 @@ configured must be there, and the STOP that the bridge sends meanwhile is the ne
 ends the relay's BRAKE.
 """
 
+from typing import Annotated
+
 import msgspec
 
 from common import messages as m
@@ -21,7 +23,7 @@ class Report(msgspec.Struct, frozen=True):
     version: str
     braking: str
     uptime: float
-    counters: dict[str, int]
+    counters: dict[str, Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]]
 
 
 class RelayStatus:
@@ -40,7 +42,7 @@ class RelayStatus:
         """Process a report; return whether it is valid."""
         try:
             self._report = msgspec.json.decode(datagram, type=Report)
-        except msgspec.DecodeError:
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return False
         self._state, self._received_ns = "up", now_ns
         return True

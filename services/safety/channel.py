@@ -47,9 +47,10 @@ class Channel(Struct, frozen=True, kw_only=True):
         """Return the age of the last message in seconds; None without one."""
         return None if self.received_ns is None else (now_ns - self.received_ns) / NS_PER_S
 
-    def in_conflict(self, now_ns: int) -> bool:
-        """Return whether two publishers were active within ``CONFLICT_NS``."""
-        return self.conflict_ns is not None and now_ns - self.conflict_ns < CONFLICT_NS
+    def in_conflict(self, now_ns: int, lease_s: float = 0.0) -> bool:
+        """Return whether two publishers were active within ``CONFLICT_NS``, or a longer lease."""
+        window_ns = max(CONFLICT_NS, lease_s * NS_PER_S)
+        return self.conflict_ns is not None and now_ns - self.conflict_ns < window_ns
 
     def accept(self: C, message: SourceMessage, received_ns: int, lease_s: float) -> tuple[C, str]:
         """Return the channel after a message, and the reason of its refusal; empty if accepted.

@@ -84,6 +84,7 @@ class SpeedLimits(Struct, frozen=True):
             return
         tick = (0, now_ns)
         stopping = [f"{name}{_because(one)}" for name, one in self._valid(now_ns) if one.stops]
+        stopping += [f"{name}: two publishers" for name in self._in_conflict(now_ns)]
         silent = ", ".join(self._silent(now_ns))
         silent_text = f"No speed limit arrives of {silent}."
         yield Observation("limit_stop", bool(stopping), tick, f"Stopped by {', '.join(stopping)}.")
@@ -95,7 +96,7 @@ class SpeedLimits(Struct, frozen=True):
 
     def conflicts(self, now_ns: int) -> list[str]:
         """Return the names of sources with two publishers."""
-        return [f"limit {name}" for name, one in self.channels.items() if one.in_conflict(now_ns)]
+        return [f"limit {name}" for name in self._in_conflict(now_ns)]
 
     def states(self, slowing: str | None, now_ns: int) -> tuple[LimitState, ...]:
         """Return the published states; ``slowing`` is the source that slows the vehicle."""
@@ -121,6 +122,14 @@ class SpeedLimits(Struct, frozen=True):
         for name, one in self.channels.items():
             if one.is_fresh(now_ns, self.sources[name].lease):
                 yield name, one
+
+    def _in_conflict(self, now_ns: int) -> list[str]:
+        """Return the sources with two publishers within a lease: the other one may be slow."""
+        return [
+            name
+            for name, one in self.channels.items()
+            if one.in_conflict(now_ns, self.sources[name].lease)
+        ]
 
     def _silent(self, now_ns: int) -> list[str]:
         """Return the sources whose silence stops the vehicle, and that are silent."""

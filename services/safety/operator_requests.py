@@ -152,6 +152,9 @@ def _hold(
     reason = _no_release(state, inputs, settings) or _direction_refusal(state, call.direction)
     reason = reason or _no_start(state, inputs, call, settings, now_ns)
     direction = call.direction
+    if not reason and state.release.is_interrupted(now_ns, settings.release_lease):
+        state = replace(state, release=state.release.interrupted(now_ns))
+        reason = "A limit source has stopped the release: release the key first."
     if reason or direction is None:
         return replace(state, release=replace(state.release, held_ns=None)), Reply(False, reason)
     state = replace(state, release=state.release.hold(direction, now_ns))

@@ -206,6 +206,8 @@ class Policy:
             state = replace(state, overrides=overrides)
         disarm = any(wants_neutral(name) for name in state.latches)
         arbiter = arbiter.disarmed() if disarm else arbiter.armed(now_ns)
+        if any(clears(name) is Clears.NEUTRAL for name in state.latches):
+            state = replace(state, release=state.release.interrupted(now_ns))
         return replace(state, arbiter=arbiter.overruled(now_ns))
 
     def _conclude(
@@ -224,8 +226,9 @@ class Policy:
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command = COMMANDS[worst]
-        if command is STOP and state.standstill.rolls:
-            command = BRAKE
+        still = command is STOP or (requested is not None and requested.twist.rounds_to_zero)
+        if still and state.standstill.rolls:
+            command = BRAKE  # a RUN of zero may let go of the wheels as STOP does
         verdict = Verdict(
             name=_name(worst, held),
             command=command,

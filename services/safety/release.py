@@ -39,12 +39,22 @@ class Release(Struct, frozen=True):
     forbidden: frozenset[Direction] = frozenset()
     unknown: bool = False  # whether releases before a restart of safety may have moved the vehicle
     held_ns: int | None = None  # newest call of the operator; None when ended
+    interrupted_ns: int | None = None  # when a limit source stopped it; the key was held since
     ended_echo: int = 0  # heartbeat that a later hold must exceed
 
     @property
     def travelled(self) -> float:
         """Travel of all releases of this contact, in metres."""
         return max(self.integrated, self.counted)
+
+    def interrupted(self, now_ns: int) -> "Release":
+        """Return the release that a third party stops: the operator must let go first."""
+        return replace(self, held_ns=None, interrupted_ns=now_ns)
+
+    def is_interrupted(self, now_ns: int, lease_s: float) -> bool:
+        """Return whether the key was held without a pause since an interruption."""
+        since_ns = self.interrupted_ns
+        return since_ns is not None and now_ns - since_ns <= lease_s * NS_PER_S
 
     def is_held(self, now_ns: int, lease_s: float) -> bool:
         """Return whether the operator's lease still lives."""

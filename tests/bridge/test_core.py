@@ -86,7 +86,11 @@ def test_a_row_of_clear_samples_begins_anew_after_a_gap(
     assert bench.receive(HIT).hit is not None
 
 
-def test_a_board_that_restarts_disarms_at_once(bench: Bench) -> None:
+@pytest.mark.parametrize("echoes", [True, False])
+def test_a_board_that_restarts_disarms_at_once(bench: Bench, echoes: bool) -> None:
+    if not echoes:
+        sets = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
+        bench = Bench(*sets)
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     board_restarted(bench)

@@ -90,7 +90,19 @@ def test_the_link_message_has_the_newest_report() -> None:
 
 
 @pytest.mark.parametrize(
-    "datagram", [b"x", b"{}", b"[]", b"\xff", report(counters=1), report(version=None)]
+    "datagram",
+    [
+        b"x",
+        b"{}",
+        b"[]",
+        b"\xff",
+        report(counters=1),
+        report(version=None),
+        report(version="?").replace(b"?", b"\xff"),
+        b'{"x":' + b"[" * 2000,
+        report(counters={"hit": 2**64}),
+        report(counters={"hit": -1}),
+    ],
 )
 def test_an_invalid_report_is_refused(datagram: bytes) -> None:
     status = Bench(CONFIGURED).core.readiness.relay

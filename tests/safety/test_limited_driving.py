@@ -81,7 +81,20 @@ def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
     assert fixture.verdict.command == "stop"
     text = "Two publishers use limit lidar."
     assert fixture.state.latches["two_publishers"].text == text
-    assert fixture.drive(0.5, seconds=0.6).command == "run"
+    fixture.drive(0.5, seconds=0.6)
+    assert fixture.verdict.name == "inhibited"  # the stick is still pushed
+    fixture.drive()
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_second_publisher_that_is_slow_stops_for_its_lease() -> None:
+    slow = Safety(limits={"lidar": LimitSource(lease=1.0, silence="ignore")})
+    fixture = PolicyFixture(slow).running()
+    fixture.limit()
+    fixture.limit_boot = 56
+    fixture.limit(0.0)
+    for _ in range(3):
+        assert fixture.drive(0.5, seconds=0.3).command == "stop"
 
 
 def test_refused_limits_change_nothing() -> None:
@@ -116,6 +129,12 @@ def test_a_limit_holds_for_a_release_too() -> None:
     fixture.limit(0.0, reason="person")
     assert fixture.hold() == "Stopped by lidar: person."
     assert fixture.verdict.command == "brake"
+    fixture.limit()
+    for _ in range(30):  # the key is still held
+        fixture.tick()
+        assert "release the key first" in fixture.hold()
+    fixture.tick(16)
+    assert fixture.hold() == ""
 
 
 EVENTS = st.lists(

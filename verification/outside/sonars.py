@@ -4,6 +4,7 @@ import random
 from dataclasses import dataclass, field
 
 NO_ECHO_MM = 20_000
+FAULTY = 0xFFFF
 FRONT_CORNERS, FRONT = (1, 3), 2
 CORNER = 1.414  # a wall straight ahead is so much farther at 45 degrees
 
@@ -28,13 +29,15 @@ class Ring:
 
     def _reading(self, index: int, true: list[int]) -> int:
         value = self._echo(index, true[index])
+        if value == FAULTY:
+            return value
         if random.random() < self.crossed:
             value = min(value, true[(index + random.choice((1, 7))) % 8])
         value = min(value, self.longest_mm)
         return value // self.resolution_mm * self.resolution_mm
 
     def _echo(self, index: int, value: int) -> int:
-        if value == 0xFFFF:
+        if value == FAULTY:
             return value
         if self._missing[index] == 0 and random.random() < self.absorbed:
             self._missing[index] = self.absorbed_readings

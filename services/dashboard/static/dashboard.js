@@ -20,6 +20,7 @@ let language = stored("language", navigator.language.startsWith("zh") ? "zh" : "
 let socket = null;
 let fast = null; // the newest snapshots
 let fastAt = -Infinity;
+let aliveN = -2; // the snapshot that was last answered with a sign of life
 let slow = null;
 let events = [];
 let hello = null;
@@ -94,8 +95,11 @@ const HANDLERS = {
     if (!hello) return;
     fast = message;
     fastAt = performance.now();
-    // Every second snapshot, 10 a second. A hidden page, or one without a socket, is not alive.
-    if (hello.keepalive && !document.hidden && message.n % 2 === 0) send({ k: "alive", n: message.n });
+    // At most 10 a second. A hidden page, or one without a socket, is not alive.
+    if (hello.keepalive && !document.hidden && Math.abs(message.n - aliveN) >= 2) {
+      aliveN = message.n;
+      send({ k: "alive", n: aliveN });
+    }
     driving.answer(message.n, isDriver(), message.driver.hold, message.safety);
     estop.update(message.safety);
     charts.add(message, fastAt);
