@@ -226,9 +226,8 @@ class Policy:
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command = COMMANDS[worst]
-        still = command is STOP or (requested is not None and requested.twist.rounds_to_zero)
-        if still and state.standstill.rolls:
-            command = BRAKE  # a RUN of zero may let go of the wheels as STOP does
+        if command is STOP and state.standstill.rolls:
+            command = BRAKE
         verdict = Verdict(
             name=_name(worst, held),
             command=command,

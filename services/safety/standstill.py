@@ -18,8 +18,8 @@ unknown velocity is not standstill. A motion of less than 0.5 s adds its duratio
 and does not renew the limit, unless the vehicle stood meanwhile. Otherwise repeated short motions
 would postpone the limit without end.
 
-A vehicle that rolled on, for example down a slope, is held by BRAKE until the next motion: STOP
-would release its wheels again.
+A vehicle that rolled on, for example down a slope, is held by BRAKE until a source requests again:
+STOP would release its wheels.
 
 The distance from that place is measured twice. The board's counters show a slow creep. The
 velocities show a fast motion, even while the counters are not answered. Neither may trip by noise,

@@ -192,7 +192,7 @@ SAFETY_MUTATIONS: dict[str, Mutation] = {
         SpeedLimits, "_silent", lambda *_: [], limit_falls_silent, "no limit of lidar",
     ),
     "two publishers of a limit": (
-        SpeedLimits, "conflicts", lambda *_: [], rival_limit, "two publishers of one limit",
+        SpeedLimits, "_in_conflict", lambda *_: [], rival_limit, "two publishers of one limit",
     ),
     "a pendant that fell silent does not latch": (
         Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),

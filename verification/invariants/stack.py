@@ -32,13 +32,6 @@ START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
 
-# The modules of the services that look at the clock.
-TIMED = [
-    module
-    for name, module in sys.modules.items()
-    if name.startswith("services.") and getattr(module, "time", None) is real_time
-]
-
 
 LIMITS = {
     NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
@@ -107,6 +100,12 @@ class Chain(Generic[V]):
         self.oracle = Oracle(START_NS)
         self.vehicle = make_vehicle(self.net, self.oracle.on_board)
         self._step_ns = step_ns
+        # The modules of the services that look at the clock.
+        self._timed = [
+            module
+            for name, module in sys.modules.items()
+            if name.startswith("services.") and getattr(module, "time", None) is real_time
+        ]
         self._boots = 1000
         self._brake_ns: int | None = None  # when the guard brakes next
         self._starts: dict[str, int] = {}
@@ -263,10 +262,10 @@ class Chain(Generic[V]):
     @contextmanager
     def time(self) -> Iterator[None]:
         """Replace the services' clock by the simulated time; contexts may be nested."""
-        before = [(module, module.time) for module in TIMED]
+        before = [(module, module.time) for module in self._timed]
         clock = Clock(self.net)
         try:
-            for module in TIMED:
+            for module in self._timed:
                 module.time = clock  # type: ignore[attr-defined]
             yield
         finally:
