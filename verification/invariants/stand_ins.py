@@ -40,8 +40,10 @@ class Sockets:
                 datagram = inbox.popleft()
                 parts = self._framing.read(datagram, FROM_BOARD)
                 frames = [part.frame for part in parts if isinstance(part, Received)]
-                if port != self._asked:  # an echo counts where its command left
-                    frames = [frame for frame in frames if not isinstance(frame, ECHOES)]
+                if port != self._asked:  # the bridge may take an "off" for a damaged copy there
+                    frames = [
+                        frame for frame in frames if not isinstance(frame, ECHOES) or frame.on
+                    ]
                 self._stack.oracle.on_report(self._process, frames)
                 yield port, datagram, [], self._stack.net.now_ns
 
