@@ -24,11 +24,14 @@ def test_fails_once():
         assert False
 """
 
+HANGS_ONCE = FIRST_TIME_ONLY.replace("assert False", "import time; time.sleep(60)")
+INI = "[pytest]\naddopts = -q -rs\nfaulthandler_timeout = 3\nfaulthandler_exit_on_timeout = true\n"
+
 
 def run(folder: Path, tests: str, *words: str) -> "subprocess.CompletedProcess[str]":
     """Run a suite of one file in an empty folder."""
     (folder / "test_it.py").write_text(tests, encoding="utf-8")
-    (folder / "pytest.ini").write_text("[pytest]\naddopts = -q -rs\n", encoding="utf-8")
+    (folder / "pytest.ini").write_text(INI, encoding="utf-8")
     command = [sys.executable, str(ROOT / "tools/run_tests.py"), *words]
     # Other plugins take longer to load than these tests to run.
     only_xdist = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_PLUGINS": "xdist.plugin"}
@@ -48,6 +51,18 @@ def test_a_test_that_fails_once_is_named(tmp_path: Path, words: tuple[str, ...])
     assert done.returncode == 0, done.stdout
     assert "1 failed, 1 passed" in done.stdout
     assert done.stdout.endswith("passed the second time only:\n  test_it.py::test_fails_once\n")
+
+
+def test_a_test_that_hangs_is_named_with_its_stack(tmp_path: Path) -> None:
+    done = run(tmp_path, HANGS_ONCE, "-n", "2")
+    assert done.returncode == 0, done.stdout
+    assert "crashed while running 'test_it.py::test_fails_once'" in done.stdout
+    assert "in test_fails_once" in done.stderr
+    assert done.stdout.endswith("passed the second time only:\n  test_it.py::test_fails_once\n")
+
+
+def test_a_test_that_hangs_without_workers_fails_the_run(tmp_path: Path) -> None:
+    assert run(tmp_path, HANGS_ONCE).returncode == 1
 
 
 def test_the_failures_of_other_runs_do_not_count(tmp_path: Path) -> None:
