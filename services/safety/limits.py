@@ -8,8 +8,9 @@ a program may start the vehicle, never a stick that is still pushed.
 
 The silence of a source is a setting: ``stop`` stops the vehicle (``limit_silent``) from the start
 of safety until the first limit, and after each lease; ``ignore`` has no effect. Two publishers on
-one source stop the vehicle (``two_publishers``), as for drive requests: nobody knows which of both
-is right. The reasons of refusals are those of ``channel.py``.
+one source stop the vehicle (``two_publishers`` and ``limit_stop``), for the lease of the source and
+0.5 s at least: nobody knows which of both is right, and the other one may be slow. The source of
+motion then needs a neutral request. The reasons of refusals are those of ``channel.py``.
 """
 
 import math

@@ -18,8 +18,9 @@ unknown velocity is not standstill. A motion of less than 0.5 s adds its duratio
 and does not renew the limit, unless the vehicle stood meanwhile. Otherwise repeated short motions
 would postpone the limit without end.
 
-A vehicle that rolled on, for example down a slope, is held by BRAKE until a source requests again:
-STOP would release its wheels.
+A vehicle that rolled on or away, for example down a slope, is held by BRAKE until a source commands
+motion, also after a reset: STOP would release its wheels, and it would leave its place again before
+the operator can drive off.
 
 The distance from that place is measured twice. The board's counters show a slow creep. The
 velocities show a fast motion, even while the counters are not answered. Neither may trip by noise,
@@ -100,7 +101,7 @@ class Standstill(Struct, frozen=True):
     integrated: Twist = STILL  # m and rad, from the velocities
     counted: Twist = STILL  # m and rad, from the counters
     left: bool = False  # whether the vehicle has just left the place of its standstill
-    rolls: bool = False  # STOP did not make it stand since the last motion: BRAKE holds it
+    rolls: bool = False  # STOP did not hold it since the last motion: BRAKE does
 
     def is_late(self, now_ns: int) -> bool:
         """Return whether the time limit has passed without a known standstill."""
@@ -153,7 +154,7 @@ class Supervisor(Struct, frozen=True):
         ways = (standstill.integrated, standstill.counted)
         if all(abs(way.linear) <= AWAY_M and abs(way.angular) <= AWAY_RAD for way in ways):
             return standstill
-        left = replace(standstill, left=True)
+        left = replace(standstill, left=True, rolls=True)
         return _begin(left, Phase.STOPPING, self._due_ns(known, now_ns))
 
     def _due_ns(self, known: Latest[Twist] | None, now_ns: int) -> int:

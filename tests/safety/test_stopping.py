@@ -107,9 +107,12 @@ def test_a_pushed_vehicle_latches_until_a_reset() -> None:
     fixture.linear = 0.0
     assert fixture.tick(100).command == "brake"
     assert fixture.reset() == ""
+    assert fixture.tick(100).command == "brake"  # STOP would let it roll again
+    assert fixture.verdict.name == "stop"
     fixture.linear = None
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
+    until(fixture, "stop")
 
 
 def test_a_board_that_starts_anew_latches_nothing() -> None:
