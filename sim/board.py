@@ -47,6 +47,7 @@ class Board:
         self._feedback_unit = RADIANS[wire.feedback_angular_unit]
         self._settings = settings
         self._random = random.Random(f"velocity {settings.seed}")
+        self._slips = random.Random(f"counters {settings.seed}")
         self._twist = Twist()
         self._ranges = ranges
         self.pressed = False
@@ -71,9 +72,15 @@ class Board:
         self._last_way = _sign(twist.linear) or self._last_way
 
     def count(self, distance: float, turn: float) -> None:
-        """Add distance (m) and turn (rad) to the counters."""
-        self._distance += distance
-        self._turn += turn
+        """Add a true distance (m) and turn (rad) to the counters, with their errors."""
+        error = self._settings.counters
+        self._distance += distance * (1 + error.scale)
+        self._turn += turn * (1 + error.turn_scale) + distance * error.pull
+        # A random walk: the deviation of a step is that of a unit times the root of its length.
+        if error.noise:
+            self._distance += self._slips.gauss(0.0, error.noise * math.sqrt(abs(distance)))
+        if error.turn_noise:
+            self._turn += self._slips.gauss(0.0, error.turn_noise * math.sqrt(abs(turn)))
 
     def target(self, command: c.MotionCommand) -> Twist:
         """Return the velocity of a command, in SI."""

@@ -76,12 +76,22 @@ class Drive(Section, frozen=True, kw_only=True):
 
 
 class Velocity(Section, frozen=True, kw_only=True):
-    """Errors of the reported velocity; the counters have none."""
+    """Errors of the reported velocity."""
 
     noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # m/s, standard deviation
     angular_noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # rad/s
     bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # m/s
     angular_bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # rad/s
+
+
+class Counters(Section, frozen=True, kw_only=True):
+    """Errors of the counted distance and turn: systematic shares, and random walks."""
+
+    scale: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # share of the distance
+    turn_scale: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # share of the turn
+    pull: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # rad counted per m, on a straight line
+    noise: Annotated[float, Meta(ge=0.0, le=0.2)] = 0.0  # m per sqrt(m)
+    turn_noise: Annotated[float, Meta(ge=0.0, le=0.2)] = 0.0  # rad per sqrt(rad)
 
 
 class Firmware(Section, frozen=True, kw_only=True):
@@ -134,6 +144,7 @@ class Sim(Section, frozen=True, kw_only=True):
     body: Body = Body()
     drive: Drive = Drive()
     velocity: Velocity = Velocity()
+    counters: Counters = Counters()
     firmware: Firmware = Firmware()
     cable: Cable = Cable()
 

@@ -11,7 +11,7 @@ from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from sim.board import BREAK, STOP, Board
-from sim.config import Sim, Velocity
+from sim.config import Counters, Sim, Velocity
 from sim.sonar import Ranges
 
 CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
@@ -116,6 +116,28 @@ def test_the_distance_wraps_at_32_bits(metres: float, reported: int) -> None:
     some = board()
     some.count(metres, 0.0)
     assert some.answer(c.DistanceQuery()) == r.DistanceReport(reported, 0)
+
+
+def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
+    some = board(counters=Counters(scale=0.01, turn_scale=-0.02, pull=0.05))
+    some.count(2.0, math.radians(90))
+    some.count(-1.0, 0.0)
+    heading = round(math.degrees(math.radians(90) * 0.98 + 0.05) * 10)
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(1010, heading)
+
+
+def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
+    found = []
+    for seed in range(200):
+        some = board(seed=seed, counters=Counters(noise=0.1, turn_noise=0.1))
+        for _ in range(100):
+            some.count(0.04, 0.01)
+        report = some.answer(c.DistanceQuery())
+        assert isinstance(report, r.DistanceReport)
+        found.append((report.distance_mm / 1000 - 4.0, math.radians(report.heading_ddeg / 10) - 1))
+    for errors, deviation in zip(zip(*found, strict=True), (0.2, 0.1), strict=True):
+        assert abs(statistics.mean(errors)) < 0.3 * deviation
+        assert 0.8 < statistics.stdev(errors) / deviation < 1.2
 
 
 def test_power_on_forgets_all() -> None:
