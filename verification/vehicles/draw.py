@@ -87,20 +87,22 @@ def ranges() -> tuple[Range, ...]:
 
 
 def draw(seed: int, *, faulty: bool | None = None) -> Draw:
-    """Draw the parameters of a run; every second one has faults by default."""
+    """Draw the parameters of a run; every second one has faults by default.
+
+    Each parameter has its own random numbers: a new range changes no other parameter of a seed.
+    """
     chance = random.Random(seed)
     if faulty is None:
         faulty = chance.random() < FAULTY
-    values = {}
-    for one in ranges():
-        drawn, value = chance.random() < one.chance, one.draw(chance)
-        if drawn and not one.fault:
-            values[one.name] = value
-    if faulty:
-        faults = [one for one in ranges() if one.fault]
-        for one in chance.sample(faults, chance.randint(1, MOST_FAULTS)):
-            values[one.name] = one.draw(chance)
-    return Draw(seed, values)
+    usual = [one for one in ranges() if not one.fault and _own(seed, one).random() < one.chance]
+    faults = [one for one in ranges() if one.fault]
+    faults = chance.sample(faults, chance.randint(1, MOST_FAULTS)) if faulty else []
+    return Draw(seed, {one.name: one.draw(_own(seed, one, "value")) for one in (*usual, *faults)})
+
+
+def _own(seed: int, one: Range, of: str = "chance") -> random.Random:
+    """Return the random numbers of one parameter."""
+    return random.Random(f"{seed} {one.name} {of}")
 
 
 def _set(tables: dict[str, object], path: Iterable[str], value: Value) -> None:

@@ -39,7 +39,7 @@ class Judge:
         self.stops: list[Stop] = []
         self._start_ns = start_ns
         self._judged: set[int] = set()  # occurrences of causes
-        self._near_ns = self._contact_ns = -NS_PER_S * 10
+        self._near_ns = self._contact_ns = self._moved_ns = -NS_PER_S * 10
         self._stood_m: float | None = None  # the way driven when it came to stand
 
     def look(self, operator: Operator, truth: Truth, now_ns: int) -> None:
@@ -65,8 +65,10 @@ class Judge:
             self._contact_ns = now_ns
         if truth.clearance is not None and truth.clearance < NEAR_M:
             self._near_ns = now_ns
-        if truth.command.kind == "run":
-            self._stood_m = None
+        if _moves(truth):
+            self._moved_ns = now_ns
+        if truth.command.linear or truth.command.angular:
+            self._stood_m = None  # a neutral RUN is a standstill command, too
         elif self._stood_m is None and not _moves(truth):
             self._stood_m = truth.distance
 
@@ -78,7 +80,7 @@ class Judge:
         if cause.name == "contact":
             return now_ns - self._contact_ns < AGO_S * NS_PER_S
         if cause.name == "not_stopping":
-            return _moves(truth)
+            return now_ns - self._moved_ns < AGO_S * NS_PER_S  # BRAKE may have stopped it since
         if cause.name == "uncommanded_motion":
             return self._stood_m is not None and truth.distance - self._stood_m > ROLLED_M
         return False

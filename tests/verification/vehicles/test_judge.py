@@ -63,6 +63,18 @@ def test_a_wall_does_not_justify_other_causes(truth: Truth) -> None:
     assert [stop.cause for stop in judge.stops] == ["silent"]
 
 
+def test_a_slope_justifies_the_brake_for_a_roll(truth: Truth) -> None:
+    judge = Judge(START_NS)
+    judge.look(operator(), truth, NOW_NS)
+    neutral = replace(truth.command, kind="run")
+    rolling = replace(truth, linear=0.2, distance=truth.distance + 0.04, command=neutral)
+    judge.look(operator(), rolling, NOW_NS + 1)
+    stands = replace(rolling, linear=0.0)
+    seen = cause("not_stopping"), cause("uncommanded_motion", "brake", 2)
+    judge.look(operator(*seen), stands, NOW_NS + 2)
+    assert judge.stops == []
+
+
 def test_nobody_is_blocked_who_asks_for_nothing(truth: Truth) -> None:
     judge = Judge(START_NS)
     judge.look(operator(cause("blocked"), cause("no_request"), asks=False), truth, NOW_NS)

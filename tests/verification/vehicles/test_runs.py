@@ -1,6 +1,7 @@
 """A hundred random vehicles; ``make vehicles N=1000`` drives more of them."""
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -15,9 +16,7 @@ from verification.vehicles.run import Result, fails_as, run
 
 BATCHES, BATCH = 25, 4
 
-# Runs that once broke an invariant (279: a RUN after the board's echo that a brake is off) or
-# stopped without need (24: on a slope).
-FOUND = (24, 279)
+FOUND = msgspec.toml.decode(Path(__file__).with_name("found.toml").read_bytes())["run"]
 SHORT = {"operator.manoeuvres": 2}
 
 
@@ -29,11 +28,12 @@ def test_no_vehicle_breaks_an_invariant(batch: int) -> None:
         assert not result.stops, seed
 
 
-@pytest.mark.parametrize("seed", FOUND)
-def test_what_was_found_stays_fixed(seed: int) -> None:
-    result = run(draw(seed))
+@pytest.mark.parametrize("found", FOUND, ids=[found["found"] for found in FOUND])
+def test_what_was_found_stays_fixed(found: dict[str, Any]) -> None:
+    result = run(msgspec.convert(found, Draw))
     assert not result.violations
     assert not result.stops
+    assert result.finished
 
 
 def test_a_run_is_the_same_each_time() -> None:
