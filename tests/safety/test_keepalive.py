@@ -1,7 +1,7 @@
 """Emergency stops that must be kept alive."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
@@ -203,12 +203,13 @@ def test_without_names_nothing_is_expected() -> None:
     assert fixture.drive(0.5, seconds=3.0).command == "run"
 
 
+@settings(max_examples=50)
 @given(
     st.lists(
         st.tuples(
             st.sampled_from(["beat", "old echo", "again", "rival", "silent"]), st.integers(1, 30)
         ),
-        max_size=25,
+        max_size=8,
     )
 )
 def test_no_run_later_than_the_timeout_after_the_heartbeat_that_was_echoed(

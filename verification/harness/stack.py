@@ -92,7 +92,8 @@ def running_stack(
 ) -> Iterator[RunningStack]:
     """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
-    ``shipped`` keeps the shipped limits on any host; ``sets`` are additional settings. ``listen``
+    ``shipped`` keeps the shipped limits on any host; ``sets`` are additional settings, and stay as
+    they are on such a host. ``listen``
     is where the router listens, the endpoint of the services first; ``log`` is a file in the
     folder. ``route`` returns the command of another router, zenohd, for these settings.
     ``sim_sets`` are settings of the simulator alone. ``beside`` returns the commands of further
@@ -102,6 +103,8 @@ def running_stack(
     holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
     board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
     port = free_port()
+    own = {one.partition("=")[0] for one in sets if ".unsafe_overrides" not in one}
+    relaxed = [one for one in host_stalls.settings(holdup_s) if one.partition("=")[0] not in own]
     sets = host_stalls.with_accepted_joined(
         [
             *sets,
@@ -109,7 +112,7 @@ def running_stack(
             f"board.listen_ports=[{first}, {second}]",
             f"bus.listen={listen.format(port=port)}",
             f"sim.control_port={control}",
-            *host_stalls.settings(holdup_s),
+            *relaxed,
         ]
     )
     config = load(Everything, Sources(sets=sets)).config
