@@ -16,6 +16,8 @@ from verification.vehicles.run import Result
 TEMPLATE = Path(__file__).with_name("page.md")
 WORST = 10
 
+_FAULTS = [one for one in ranges() if one.fault]
+
 
 def page(results: Sequence[Result]) -> str:
     """Return the page of these results."""
@@ -30,6 +32,7 @@ def page(results: Sequence[Result]) -> str:
         results=summary(results),
         stops=stops(sound),
         worst=worst(results),
+        faults=by_fault(results),
         odometry=odometry(sound),
         ranges=drawn(),
     )
@@ -91,7 +94,7 @@ def stops(sound: Sequence[Result]) -> str:
 def worst(results: Sequence[Result]) -> str:
     """Return the table of the worst runs: violations first, then unfinished scripts."""
     rows = [
-        (str(result.seed), "yes" if result.faulty else "no", _why(result))
+        (str(result.seed), _faults(result), _why(result))
         for result in sorted(results, key=_badness, reverse=True)[:WORST]
         if _badness(result) > (0, 0, 0)
     ]
@@ -107,7 +110,26 @@ def _why(result: Result) -> str:
         return result.violations[0]
     if result.stops:
         return "; ".join(f"{stop.at_s:.1f} s: {stop.text}" for stop in result.stops[:2])
-    return "the script was not finished"
+    longest = [f"`{name}` for {seconds:.0f} s" for name, seconds in result.held.items()][:3]
+    return ", ".join(["the script was not finished", *longest])
+
+
+def _faults(result: Result) -> str:
+    """Return the faults that were drawn."""
+    drawn = [(one.name, result.values[one.name]) for one in _FAULTS if one.name in result.values]
+    return ", ".join(f"`{name}` {value}" for name, value in drawn) or "none"
+
+
+def by_fault(results: Sequence[Result]) -> str:
+    """Return the table of runs by the fault that they have, alone or beside others."""
+    rows = []
+    for one in _FAULTS:
+        with_it = [result for result in results if one.name in result.values]
+        if with_it:
+            unfinished = [result.seed for result in with_it if not result.finished]
+            seeds = ", ".join(map(str, unfinished[:5]))
+            rows.append((f"`{one.name}`", str(len(with_it)), str(len(unfinished)), seeds))
+    return table(("fault", "runs", "not finished", "the first seeds"), rows)
 
 
 def odometry(sound: Sequence[Result]) -> str:

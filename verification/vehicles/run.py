@@ -3,6 +3,7 @@
 import math
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable
 
 from msgspec import Struct
@@ -33,6 +34,7 @@ class Result(Struct, frozen=True, kw_only=True):
     metres: float  # driven
     contacts: int
     errors: list[PoseError]  # once a second
+    held: dict[str, float] = {}  # of an unfinished run: causes that held the vehicle, in seconds
 
     @property
     def completed(self) -> bool:
@@ -52,18 +54,20 @@ def run(draw: Draw) -> Result:
         where = traceback.extract_tb(error.__traceback__)[-1]
         violations.append(f"{type(error).__name__} in {where.name}: {error}")
     violations += dict.fromkeys(chain.oracle.violations)
+    finished = not chain.operator.gave_up and chain.operator.done
     return Result(
         seed=draw.seed,
         values=draw.values,
         faulty=draw.faulty,
         violations=violations,
         stops=[] if draw.faulty else trial.judge.stops,
-        finished=not chain.operator.gave_up and chain.operator.done,
+        finished=finished,
         seconds=round((chain.net.now_ns - trial.start_ns) / NS_PER_S, 2),
         cpu_s=round(time.process_time() - began_s, 3),
         metres=round(chain.vehicle.truth.distance, 3),
         contacts=trial.contacts,
         errors=chain.errors,
+        held={} if finished else trial.held(),
     )
 
 
@@ -76,6 +80,7 @@ class Trial:
         self.judge = Judge(self.start_ns)
         self.contacts = 0
         self._faults = FaultSchedule(draw, self.start_ns)
+        self._held: Counter[str] = Counter()  # looks at each cause
 
     def drive(self) -> None:
         """Run until the script is finished, then let the vehicle stand."""
@@ -96,6 +101,12 @@ class Trial:
         truth = chain.vehicle.truth
         self.contacts += truth.contact and not before.contact
         self.judge.look(chain.operator, truth, chain.net.now_ns)
+        seen = chain.operator.seen
+        self._held.update(cause.name for cause in (seen.causes if seen else ()))
+
+    def held(self) -> dict[str, float]:
+        """Return the causes that operators saw, and for how many seconds; the longest first."""
+        return {name: count * ACT_MS / 1000 for name, count in self._held.most_common()}
 
 
 def fails_as(result: Result) -> Callable[[Result], bool]:

@@ -70,13 +70,16 @@ def test_the_page_names_what_happened(tmp_path: Path) -> None:
         run(draw(0, faulty=False)),
         result(5, stops=[stop]),
         result(6, violations=["safety: too fast"], faulty=True),
-        result(7, finished=False),
+        result(7, finished=False, held={"bumper": 80.0}),
+        result(8, finished=False, faulty=True, values={"sim.cable.to_pc.drop": 0.3}),
     ]
     file = tmp_path / "runs.jsonl"
     file.write_bytes(b"".join(msgspec.json.encode(one) + b"\n" for one in found))
     assert list(read(file).values()) == found
     text = page(found)
     assert "| `silent` | 1 | 1 | 5 |" in text
-    assert "| 6 | yes | safety: too fast |" in text
-    assert "| 7 | no | the script was not finished |" in text
+    assert "| 6 | none | safety: too fast |" in text
+    assert "| 7 | none | the script was not finished, `bumper` for 80 s |" in text
+    assert "| 8 | `sim.cable.to_pc.drop` 0.3 | the script was not finished |" in text
+    assert "| `sim.cable.to_pc.drop` | 1 | 1 | 8 |" in text
     assert "`sim.drive.slope`" in text
