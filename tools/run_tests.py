@@ -4,17 +4,23 @@ Most tests start real processes with real time limits, and several run at once. 
 processes fails a few of them. So the tests that failed run a second time, one by one, with the
 machine to themselves. A test that fails again fails the run; the others are listed at the end.
 
-Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run.
+Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run. A run that
+takes longer than ``LONGEST_S`` hangs; all its processes are ended, with their stacks.
 """
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 FAILED = 1  # pytest's exit code for failed tests, as opposed to usage errors and interrupts
 RETRIED_MAX = 30
+LONGEST_S = float(os.environ.get("T2_TESTS_LONGEST", "1500"))
+DUMP_S = 5.0  # for the stacks
 CACHE = Path(".pytest_cache/v/cache/lastfailed")
 
 
@@ -37,8 +43,20 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def pytest(arguments: Sequence[str]) -> int:
-    """Run pytest in its own process; return its exit code."""
-    return subprocess.run([sys.executable, "-m", "pytest", *arguments], check=False).returncode
+    """Run pytest in its own process group; return its exit code."""
+    command = [sys.executable, "-m", "pytest", *arguments]
+    with subprocess.Popen(command, process_group=0) as process:
+        try:
+            return process.wait(LONGEST_S)
+        except KeyboardInterrupt:
+            os.killpg(process.pid, signal.SIGINT)  # the terminal's Ctrl-C reaches this group only
+            return process.wait()
+        except subprocess.TimeoutExpired:
+            print(f"\nrun_tests: not finished after {LONGEST_S:.0f} s", flush=True)
+            os.killpg(process.pid, signal.SIGABRT)  # pytest's faulthandler prints all stacks
+            time.sleep(DUMP_S)
+            os.killpg(process.pid, signal.SIGKILL)
+            return process.wait()
 
 
 if __name__ == "__main__":

@@ -65,6 +65,17 @@ def test_a_test_that_hangs_without_workers_fails_the_run(tmp_path: Path) -> None
     assert run(tmp_path, HANGS_ONCE).returncode == 1
 
 
+def test_a_run_without_an_end_is_ended_with_all_stacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("T2_TESTS_LONGEST", "8")
+    hangs = "import time\ndef test_hangs():\n    time.sleep(60)\n"
+    done = run(tmp_path, hangs, "-n", "2", "-o", "faulthandler_timeout=0")
+    assert done.returncode != 0
+    assert "not finished after 8 s" in done.stdout
+    assert "in test_hangs" in done.stderr
+
+
 def test_the_failures_of_other_runs_do_not_count(tmp_path: Path) -> None:
     cache = tmp_path / ".pytest_cache/v/cache"
     cache.mkdir(parents=True)
