@@ -107,7 +107,8 @@ search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
 # They run little of what ships in their own process, or thousands of times the same.
-UNTRACED = tests/verification tests/tools tests/deploy tests/bench tests/cli/commission/test_stop_coverage.py
+UNTRACED = tests/verification tests/tools tests/deploy tests/bench tests/cli/commission/test_stop_coverage.py \
+  tests/test_lap.py
 
 cover: $(STAMP) ## all tests except the search, with coverage
 	$(BIN)/coverage erase

@@ -203,7 +203,7 @@ def test_without_names_nothing_is_expected() -> None:
     assert fixture.drive(0.5, seconds=3.0).command == "run"
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.tuples(

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
@@ -143,6 +143,7 @@ EVENTS = st.lists(
 )
 
 
+@settings(max_examples=30)
 @given(EVENTS)
 def test_no_run_is_faster_than_a_valid_cap_after_its_deceleration(
     events: list[tuple[str, float | None, float, int]],

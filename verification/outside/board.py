@@ -37,6 +37,7 @@ class Faults:
     bias: tuple[float, float] = (0.0, 0.0)  # m/s and rad/s that the velocity is off
     silent: bool = False  # nothing is sent, nothing is received
     noise: tuple[float, float] = (0.0, 0.0)  # m/s and rad/s, standard deviation of velocities
+    counts: tuple[float, float] = (1.0, 1.0)  # distance and turn that a true unit counts
     bounce: float = 0.0  # s that the bumper's switch chatters after each change
     watchdog: float = 0.0  # s without a command until the board stops by itself; 0: never
     ports: tuple[Port, Port] = GOOD
@@ -196,7 +197,8 @@ class Board:
     def _answer(self, command: int, payload: bytes, index: int) -> bytes:
         if command == wire.DISTANCE:
             step = random.randint(0, 1) if self.faults.dither else 0
-            distance, heading = self.vehicle.distance, self.vehicle.heading
+            distance = self.vehicle.distance * self.faults.counts[0]
+            heading = self.vehicle.heading * self.faults.counts[1]
             return wire.distance(distance + step * 0.001, heading + step * 0.00175)[8:]
         if command == wire.SONAR:
             return struct.pack("<8H", *self._echoes)

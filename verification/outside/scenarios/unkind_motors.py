@@ -122,6 +122,22 @@ def profile_noisy_velocity(bed: Testbed) -> Result:
 
 @scenario(
     21,
+    "counters with 0.8 % of the distance and 1 % of the turn too much, as of worn wheels",
+    COURSE + "; odometry is off by no more than three of its standard deviations",
+    faults=lambda: Faults(counts=(1.008, 1.01)),
+)
+def profile_worn_wheels(bed: Testbed) -> Result:
+    found = course(bed)
+    estimate = bed.observer.last("tel/odom/odometry")
+    error = math.hypot(estimate["x"], estimate["y"]) - bed.board.vehicle.distance
+    deviation = math.sqrt(estimate["pose_covariance"][0])
+    found.add(f"odometry is off by {error * 100:.1f} cm, {deviation * 100:.1f} cm is its deviation",
+              abs(error) < 3 * deviation)  # fmt: skip
+    return found.result()
+
+
+@scenario(
+    21,
     "commands turn by 0.001 rad/s, feedback counts 0.1 deg/s, and the stack knows",
     COURSE + "; 0.4 rad/s turns at 0.4 rad/s",
     sets=("wire.command_angular_unit=milliradian",),
