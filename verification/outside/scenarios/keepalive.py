@@ -43,9 +43,11 @@ class Pendant:
     "0.4 m/s is requested without the pendant; it comes and goes; 14 forgeries, a replay",
     "no RUN without it; BRAKE latched at most 1.1 s after it ended; no forgery keeps it alive",
     sets=[PENDANT],
+    armed=False,  # without the pendant safety inhibits
 )
 def lost_pendant(bed: Testbed) -> Result:
     pendant, at = Pendant(bed), time.monotonic()
+    bed.wait(lambda: bed.observer.last(STATE).get("verdict"), 5.0, "no safety")
     with bed.source() as source:
         source.request(0.4)
         time.sleep(1.0)
@@ -78,9 +80,11 @@ def lost_pendant(bed: Testbed) -> Result:
     "a proxy holds all messages of the pendant for 3 s; then a second program uses its name",
     "BRAKE latched each time",
     sets=[PENDANT],
+    armed=False,  # without the pendant safety inhibits
 )
 def held_pendant(bed: Testbed) -> Result:
     pendant = Pendant(bed)
+    bed.wait(lambda: bed.observer.last(STATE).get("verdict"), 5.0, "no safety")
     with bed.source() as source:
         source.request(0.0)
         pendant.repeat(1.5)
