@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
 from common.motion import RUN, Twist
-from services.safety.causes import BY_NAME
+from services.safety.causes import BY_NAME, bars_motion
 from services.safety.inputs import DriveRequest, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
@@ -173,6 +173,9 @@ def _release(policy: Policy, state: State, now_ns: int) -> Release:
 
 
 def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
+    """Return what a drive request may reach now: nothing while a cause forbids every motion."""
+    if any(bars_motion(name) for name in state.latches):
+        return Limits(forward=0.0, backward=0.0, angular=0.0)
     planner, settings = policy.planner, policy.settings
     distances = planner.with_overrides(state.sonar_array.cautious, state, state.verdict.source)
 

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from common.messages import Direction, Drive
+from common.messages import Direction, Drive, Limits
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
 from services.safety.report import (
     motion_message,
@@ -40,6 +40,16 @@ def test_the_state_tells_verdict_causes_and_limits() -> None:
     assert state.limits.forward == pytest.approx(fixture.policy.planner.zones.allowed(1.0))
     assert (state.limits.backward, state.limits.angular) == (1.0, 1.0)
     assert state.heartbeat == fixture.state.heartbeat.number
+
+
+def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
+    fixture = PolicyFixture().running()
+    fixture.estop()
+    assert fixture.published().limits == Limits(forward=0.0, backward=0.0, angular=0.0)
+    fixture.tick(50)
+    assert fixture.reset() == ""
+    fixture.tick()
+    assert fixture.published().limits.forward > 0.5  # a request is missing, nothing else
 
 
 def test_the_motion_tells_what_was_judged() -> None:
