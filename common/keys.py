@@ -34,10 +34,15 @@ class ClassOfService(Struct, frozen=True):
     reason: str
     express: bool = False  # sent immediately, never batched
     history: int = 0  # samples kept for late and recovering subscribers
+    # For other sessions only: otherwise a subscriber of the same session matches, and a publisher
+    # seems to be heard although the router drops its messages.
+    remote: bool = False
 
 
 ESTOP_CLASS = ClassOfService("estop", "REAL_TIME", "has the highest priority", express=True)
-COMMAND = ClassOfService("command", "INTERACTIVE_HIGH", "moves or stops the wheels", express=True)
+COMMAND = ClassOfService(
+    "command", "INTERACTIVE_HIGH", "moves or stops the wheels", express=True, remote=True
+)
 STATE = ClassOfService(
     "state", "INTERACTIVE_LOW", "sources echo it: a late one stops the vehicle", express=True
 )

@@ -21,7 +21,7 @@ from common.operator import ReleaseCalls
 
 M = TypeVar("M", bound=SourceMessage)
 
-DENIED_AFTER = 10  # requests; a router needs a moment to announce its subscribers
+DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
 RELEASE_TIMEOUT_S = 0.3
 HELD = "held"  # the first answer of a release, with any distance left
 
@@ -40,25 +40,23 @@ class Source(Generic[M]):
         self.name = source
         self._publisher = bus.publisher(topic, source=source)
         self._echo = 0  # before the first state of safety; safety refuses 0
-        self._dropped = 0  # messages in a row
+        self._unmatched = 0  # states of safety in a row without a subscriber for our messages
         self._on_denied = on_denied
         bus.subscribe(keys.SAFETY, self._on_safety)
 
     @property
     def denied(self) -> bool:
-        """Whether safety's state arrives but our messages do not: watching only."""
-        return self._echo != 0 and self._dropped >= DENIED_AFTER
+        """Whether safety's state arrives but our messages would not: watching only."""
+        return self._unmatched >= DENIED_AFTER
 
     def _put(self, message: M, echo: int | None = None) -> M:
-        was_denied = self.denied
-        self._dropped = self._dropped + 1 if self._publisher.passed_on is False else 0
-        sent = self._publisher.put(replace(message, echo=self._echo if echo is None else echo))
-        if self.denied and not was_denied:
-            self._on_denied()
-        return sent
+        return self._publisher.put(replace(message, echo=self._echo if echo is None else echo))
 
     def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
         self._echo = arrival.message.heartbeat
+        self._unmatched = self._unmatched + 1 if self._publisher.passed_on is False else 0
+        if self._unmatched == DENIED_AFTER:
+            self._on_denied()
 
 
 class DriveSource(Source[Drive]):

@@ -90,7 +90,8 @@ class Publisher(Generic[M]):
                 session, self.key, cache=cache, publisher_detection=True, **options
             )
         else:
-            declared = session.declare_publisher(self.key, **options)
+            locality = zenoh.Locality.REMOTE if service.remote else zenoh.Locality.DEFAULT
+            declared = session.declare_publisher(self.key, allowed_destination=locality, **options)
         self._declared.insert(0 if first else len(self._declared), declared)
         while self._waiting:
             self._send(*self._waiting.popleft())

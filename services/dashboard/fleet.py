@@ -131,10 +131,9 @@ class Fleet:
         names = {key: viewer.name for key, viewer in here.items()}
         fast = fast_snapshot(
             robot.telemetry,
-            robot.driver_lock,
+            robot.driver_state(names),
             now_ns,
             number=self._number,
-            names=names,
             connected=robot.bus.connected,
             vehicle=self._vehicle,
             protection=robot.protection,
@@ -203,7 +202,9 @@ class Fleet:
 
     def _take(self, viewer: str, robot: Robot, force: bool) -> None:
         before = robot.driver_lock.driver
-        if not robot.driver_lock.take(viewer, force):
+        if not robot.may_drive:
+            self._notify(viewer, "error", "barred")
+        elif not robot.driver_lock.take(viewer, force):
             name = self._viewers[before].name if before in self._viewers else ""
             self._send([viewer], {"k": "taken", "by": name})
         elif before not in (None, viewer):

@@ -3,7 +3,7 @@
 Each robot has a bus session of its own, which opens when the first viewer selects the robot.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import msgspec
@@ -26,9 +26,10 @@ from common.operator import (
 )
 from common.source import DriveSource, KeepalivePublisher, call_release
 from services.dashboard.config import Dashboard
-from services.dashboard.driver_lock import DriverLock
+from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.keepalive import PageKeepalive
 from services.dashboard.sectors import Protection
+from services.dashboard.snapshot import DriverState
 from services.dashboard.telemetry_cache import TelemetryCache, Trail, path_of
 
 R = TypeVar("R", bound=msgspec.Struct)
@@ -40,6 +41,7 @@ FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
+OVERRULED_TICKS = 10  # 0.5 s: our own requests may be on their way
 PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
 
 
@@ -64,14 +66,15 @@ class Robot:
         self._broadcast = broadcast  # to all viewers of this robot
         self._notify = notify  # to one viewer
         self._requests = DriveRequests()
-        self._source = DriveSource(
-            bus, settings.source, lambda: self._broadcast("error", "barred", "")
-        )
+        self._source = DriveSource(bus, settings.source, self._on_denied)
+        self._overruled_by: str | None = None  # the source that drives instead of our driver
+        self._overruled_ticks = 0  # in a row, during a hold
         self._estop = EstopRepetition()
         self.keepalive = PageKeepalive(settings.estop_keepalive)
         self._keepalives: KeepalivePublisher | None = None
         if settings.estop_keepalive:
             self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
+        self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
         self._release = ReleaseCalls()
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._is_queried = False
@@ -95,13 +98,32 @@ class Robot:
         elif not self._is_queried:
             self._query_services()
         self._repeat_estop(safety)
+        self._yield(safety)
         push = self.driver_lock.held(now_ns)
         request = self._requests.tick(None if push is None or push.release else self._twist())
         if request is not None:
-            self._source.request(request.linear, request.angular)
+            sent = self._source.request(request.linear, request.angular)
+            self.telemetry.update(self._requests_path, sent, now_ns)
         self._call_release(push.release if push else None, safety, now_ns)
         self._check_resets(safety, now_ns)
         self._update_trail(now_ns)
+
+    @property
+    def may_drive(self) -> bool:
+        """Whether the router passes our requests on, as far as is known."""
+        return not self._source.denied
+
+    def driver_state(self, names: Mapping[str, str]) -> DriverState:
+        """Return who drives; ``names`` are those of the viewers."""
+        lock = self.driver_lock
+        return DriverState(
+            id=lock.driver,
+            name=names.get(lock.driver or "", ""),
+            hold=lock.state,
+            gear=lock.gear,
+            overruled_by=self._overruled_by,
+            may=self.may_drive,
+        )
 
     @property
     def silent(self) -> bool:
@@ -159,6 +181,20 @@ class Robot:
         )
 
     # --- requests -----------------------------------------------------------------------------
+
+    def _on_denied(self) -> None:
+        self.release_driver()
+        self._broadcast("error", "barred", "")
+
+    def _yield(self, safety: m.SafetyState | None) -> None:
+        """End a hold while another source drives: its end must not resume our motion."""
+        source = safety.source if safety else None
+        is_other = source not in (None, self._settings.source)
+        self._overruled_by = source if is_other and self.driver_lock.driver else None
+        is_held = self.driver_lock.state is HoldState.HELD
+        self._overruled_ticks = self._overruled_ticks + 1 if self._overruled_by and is_held else 0
+        if self._overruled_ticks >= OVERRULED_TICKS:
+            self.driver_lock.lapse()
 
     def _twist(self) -> Twist:
         push, gear = self.driver_lock.push, self.driver_lock.gear - 1

@@ -13,7 +13,7 @@ from common import keys
 from common.codec import finite
 from common.messages import Cause, Driver, Limits, LimitState, Link, Release, Switches
 from common.settings import Vehicle
-from services.dashboard.driver_lock import DriverLock, HoldState
+from services.dashboard.driver_lock import HoldState
 from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
 from services.dashboard.telemetry_cache import TelemetryCache
 
@@ -32,12 +32,14 @@ class State(Struct, frozen=True):
 
 
 class DriverState(Struct, frozen=True):
-    """The viewer with the driver lock, and its hold."""
+    """The viewer with the driver lock, its hold, and whether this dashboard may drive at all."""
 
     id: str | None
     name: str
     hold: HoldState
     gear: int
+    overruled_by: str | None  # another source that drives instead
+    may: bool  # false: the router drops the requests of this certificate
 
 
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
@@ -96,11 +98,10 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
 
 def fast_snapshot(
     telemetry: TelemetryCache,
-    driver_lock: DriverLock,
+    driver: DriverState,
     now_ns: int,
     *,
     number: int,
-    names: Mapping[str, str],
     connected: bool,
     vehicle: Vehicle,
     protection: Protection,
@@ -135,7 +136,7 @@ def fast_snapshot(
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
         safety=state,
-        driver=_driver(driver_lock, names),
+        driver=driver,
         keeper=keeper,
     )
 
@@ -160,10 +161,6 @@ def slow_snapshot(
         link=telemetry.newest(keys.LINK, now_ns),
         protection=protection,
     )
-
-
-def _driver(lock: DriverLock, names: Mapping[str, str]) -> DriverState:
-    return DriverState(lock.driver, names.get(lock.driver or "", ""), lock.state, lock.gear)
 
 
 def _numbers(*values: float) -> tuple[float, ...] | None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from common import keys
-from common.bus.bus import Arrival
+from common.bus.bus import Arrival, Bus
 from common.bus.publisher import Publisher
 from common.loop import Loop
 from common.messages import MAX_REASON, Drive
@@ -65,26 +65,47 @@ def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
     assert received[-1].message.linear == 0.3
 
 
-@pytest.mark.parametrize(
-    ("passed_on", "has_heartbeat", "denied"),
-    [(False, True, True), (False, False, False), (True, True, False), (None, True, False)],
-)
-def test_who_may_only_watch_is_barred(
-    bus: FakeBus, monkeypatch: pytest.MonkeyPatch,
-    passed_on: bool | None, has_heartbeat: bool, denied: bool,
-) -> None:  # fmt: skip
+@pytest.mark.parametrize(("passed_on", "denied"), [(False, True), (True, False), (None, False)])
+def test_who_may_only_watch_is_denied(
+    bus: FakeBus, monkeypatch: pytest.MonkeyPatch, passed_on: bool | None, denied: bool
+) -> None:
     monkeypatch.setattr(Publisher, "passed_on", passed_on)
-    source = DriveSource(bus, "demo")
-    if has_heartbeat:
-        bus.deliver(keys.SAFETY, safety_state(heartbeat=7))
+    reported: list[str] = []
+    source = DriveSource(bus, "demo", lambda: reported.append("denied"))
     for _ in range(DENIED_AFTER - 1):
-        source.request(0.1, 0.0)
+        bus.deliver(keys.SAFETY, safety_state(heartbeat=7))
     assert not source.denied
-    source.request(0.1, 0.0)
+    for _ in range(DENIED_AFTER):
+        bus.deliver(keys.SAFETY, safety_state(heartbeat=8))
     assert source.denied is denied
+    assert reported == ["denied"] * denied
     monkeypatch.setattr(Publisher, "passed_on", True)
-    source.request(0.1, 0.0)
+    bus.deliver(keys.SAFETY, safety_state(heartbeat=9))
     assert not source.denied
+
+
+def test_a_subscriber_of_the_same_session_is_no_permission(endpoint: str) -> None:
+    sources: list[DriveSource] = []
+
+    def declare(bus: Bus) -> None:
+        sources.append(DriveSource(bus, "web"))
+        bus.subscribe(keys.DRIVE, lambda _: None, source="*")
+
+    loop = Loop()
+    with (
+        running(loop),
+        bus_on(endpoint, loop, lambda _: None) as safety,
+        bus_on(endpoint, loop, declare),
+    ):
+        state = safety.publisher(keys.SAFETY)
+
+        def published() -> bool:
+            state.put(safety_state(heartbeat=1))
+            return sources[0].denied
+
+        wait_until(published, "the missing subscriber is noticed")
+        safety.subscribe(keys.DRIVE, lambda _: None, source="*")
+        wait_until(lambda: not published(), "the subscriber of safety is noticed")
 
 
 def test_a_limit_carries_the_newest_heartbeat_and_a_bounded_reason(bus: FakeBus) -> None:

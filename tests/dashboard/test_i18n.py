@@ -37,7 +37,7 @@ def test_the_search_finds_known_keys() -> None:
     assert {
         "estop",
         "follow",
-        "text.lost",
+        "text.run",
         "take_first",
         "theme",
         "too_late",
@@ -53,7 +53,8 @@ def test_every_used_key_has_a_text() -> None:
     ("prefix", "names"),
     [
         ("cause", [rule.name for rule in RULES]),
-        ("verdict", [*get_args(Verdict), "none", "lost"]),
+        ("verdict", [*get_args(Verdict), "none", "lost", "no_router"]),
+        ("text", ["none", "lost", "no_router"]),
         ("link", [*get_args(LinkState), "none"]),
         ("fault", [*get_args(FaultName), "reserved"]),
         ("hold", list(HoldState)),

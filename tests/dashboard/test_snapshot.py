@@ -76,15 +76,15 @@ def full() -> TelemetryCache:
     return telemetry
 
 
-def fast(
-    telemetry: TelemetryCache, lock: DriverLock | None = None, at: int = AT
-) -> snapshot.FastSnapshot:
+NOBODY = snapshot.DriverState(None, "", HoldState.FREE, 1, None, may=True)
+
+
+def fast(telemetry: TelemetryCache, at: int = AT) -> snapshot.FastSnapshot:
     return snapshot.fast_snapshot(
         telemetry,
-        lock or DriverLock(0.3),
+        NOBODY,
         at,
         number=7,
-        names={"1": "Ada"},
         connected=True,
         vehicle=Vehicle(),
         protection=Protection(),
@@ -101,18 +101,11 @@ def test_the_fast_snapshot() -> None:
     assert seen.safety is not None
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
     assert seen.safety.release == RELEASE
-    assert seen.driver == snapshot.DriverState(None, "", HoldState.FREE, 1)
+    assert seen.driver == NOBODY
 
 
 def test_the_request_is_that_of_the_driving_source() -> None:
     assert fast(full()).requested == (0.7, 0.2)
-
-
-def test_who_drives() -> None:
-    lock = DriverLock(0.3)
-    lock.take("1", force=False)
-    lock.shift("1", 3)
-    assert fast(full(), lock).driver == snapshot.DriverState("1", "Ada", HoldState.FREE, 3)
 
 
 @pytest.mark.parametrize("telemetry", [TelemetryCache(), full()], ids=["never", "long ago"])

@@ -1,16 +1,20 @@
-// The page: WebSocket, messages from the server, state bar, language, notices and dialogs.
+// The page: WebSocket, messages from the server, state bar, and language.
 import * as charts from "./charts.js";
 import * as driving from "./driving.js";
 import * as estop from "./estop.js";
+import * as notices from "./notices.js";
 import * as panels from "./panels.js";
 import * as sonarView from "./sonar_view.js";
 import * as trail from "./trail.js";
+
+const { toast, confirm } = notices;
 
 const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
 const INVALID_MESSAGE = 1003; // close code of the server
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
+const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
 const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
@@ -29,7 +33,7 @@ let drawn = -1; // number of the drawn snapshot
 
 const t = (key) => texts[language][key] ?? key;
 const lost = () => performance.now() - fastAt > LOST_MS;
-const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && !lost();
+const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
 const shown = () => hello?.robot ?? robot ?? $("page").dataset.robot;
 // A hold is sent only while the socket is not congested: a burst of old answers is useless.
 const send = (message) => {
@@ -132,7 +136,7 @@ function draw() {
   document.body.classList.toggle("stale", lost());
   showState();
   showHead();
-  driving.show(isDriver(), lost() ? "free" : fast.driver.hold);
+  driving.show(isDriver(), lost() ? null : fast.driver, nextStep());
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
@@ -144,19 +148,34 @@ function draw() {
 function showState() {
   const safety = lost() ? null : fast.safety;
   const worst = safety?.causes[0];
-  const verdict = lost() ? "lost" : safety?.verdict ?? "none";
+  const verdict = lost() ? "lost" : !fast.connected ? "no_router" : safety?.verdict ?? "none";
   const quiet = verdict === "stop" && QUIET.includes(worst?.name);
   set("verdict", t(`verdict.${verdict}`));
   $("state").dataset.tone = quiet ? "idle" : TONES[verdict] ?? "stop";
   $("state").dataset.verdict = verdict;
-  set("sentence", lost() ? t("text.lost") : safety ? sentence(safety, worst)
-    : t(fast.connected ? "text.none" : "text.no_router"));
-  const details = safety && language !== "en" && worst ? worst.text : "";
-  const advice = safety?.latched.length && !isDriver() ? t("take_to_reset") : "";
-  set("detail", `${details} ${advice}`.trim());
+  document.title = `${t(`verdict.${verdict}`)} · ${shown()} · T2`;
+  const known = !WITHOUT_STATE.includes(verdict);
+  set("sentence", known ? sentence(safety, worst) : t(`text.${verdict}`));
+  set("detail", known ? detail(safety, worst) : "");
   set("speed", lost() || !fast.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", lost() || !fast.measured ? "–" : fast.measured[1].toFixed(2));
-  $("reset").classList.toggle("due", !!safety?.latched.length);
+}
+
+// The other latched causes, and what to do.
+function detail(safety, worst) {
+  const others = safety.causes.filter((it) => it !== worst && safety.latched.includes(it.name));
+  return [
+    language !== "en" && worst ? worst.text : "",
+    others.length ? `${t("also_latched")} ${others.map((it) => panels.causeText(it, safety, t)).join(" ")}` : "",
+    safety.latched.length && !isDriver() && fast.driver.may ? t("take_to_reset") : "",
+  ].filter(Boolean).join(" ");
+}
+
+// The next step that safety accepts: while only the contact is latched, first off the bumper.
+function nextStep() {
+  const safety = lost() ? null : fast.safety;
+  if (!safety?.latched.length) return "";
+  return fast.bumper === true && safety.release && safety.latched.every((it) => it === "contact") ? "release" : "reset";
 }
 
 function sentence(safety, worst) {
@@ -166,10 +185,10 @@ function sentence(safety, worst) {
 }
 
 function showHead() {
-  const off = lost();
+  const off = lost() || !fast.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
-  chip("driver", off ? "" : driver(), isDriver() ? "clear" : "slow");
+  chip("driver", off ? "" : driver(), isDriver() && !fast.driver.overruled_by ? "clear" : "slow");
   const keeper = off || !hello?.keepalive ? "" : fast.keeper === hello.id ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
   const count = Object.keys(slow?.viewers ?? {}).length;
@@ -180,8 +199,9 @@ function showHead() {
 const viewerName = (name) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
 
 function driver() {
-  if (isDriver()) return t("you_drive");
-  const { id, name } = fast.driver;
+  const { id, name, may, overruled_by: other } = fast.driver;
+  if (!may) return t("view_only");
+  if (isDriver()) return other ? `${t("overruled_by")} ${other}` : t("you_drive");
   if (id) return `${viewerName(name)} ${t("drives")}`;
   const source = fast.safety?.source;
   return source ? `${source} ${t("drives")}` : t("nobody_drives");
@@ -207,7 +227,7 @@ function showRobots() {
   if (hello && document.activeElement !== list) list.value = hello.robot;
 }
 
-// --- language, theme, notices, dialogs ----------------------------------------------------------
+// --- language, theme, commands ------------------------------------------------------------------
 
 function showTexts() {
   document.documentElement.lang = language;
@@ -225,33 +245,13 @@ function theme(name) {
   drawn = -1;
 }
 
-// A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
-function noticeText(text, about) {
-  if (t(text) !== text || language === "en" || !about) return t(text);
-  return `${t(`event.${about}`)} ${text}`;
-}
-
-function toast(text, level = "info", about = "") {
-  const it = document.createElement("div");
-  it.dataset.level = level;
-  it.textContent = noticeText(text, about);
-  for (const old of [...$("toasts").children]) if (old.textContent === it.textContent) old.remove();
-  $("toasts").append(it);
-  setTimeout(() => it.remove(), level === "error" ? 20000 : 5000);
-}
-
-// Not modal: the emergency stop must remain one tap away.
-function confirm(title, text, yes) {
-  set("question-title", t(title));
-  set("question-text", text);
-  $("question").show();
-  $("question-yes").onclick = () => { $("question").close(); yes(); };
-  $("question-no").onclick = () => $("question").close();
-}
-
 function stop() {
   driving.letGo();
   estop.request();
+}
+
+function reset() {
+  if (!$("reset").disabled) send({ k: "reset", n: seen() });
 }
 
 // The drawn snapshot: each command names the snapshot that the operator saw.
@@ -279,7 +279,7 @@ function begin() {
   on("lamp", lamp);
   on("take", () => send({ k: "take", force: false }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
-  on("reset", () => send({ k: "reset", n: seen() }));
+  on("reset", reset);
   const light = matchMedia("(prefers-color-scheme: light)").matches;
   theme(stored("theme", light ? "light" : "dark"));
   $("theme").onclick = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
@@ -292,7 +292,8 @@ function begin() {
   $("name").onchange = () => { localStorage.setItem("t2.name", $("name").value); look(); };
   $("robots").onchange = () => { localStorage.setItem("t2.robot", $("robots").value); $("robots").blur(); choose($("robots").value); };
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
-  driving.begin({ send, estop: stop, toast, t, gears: () => hello?.gears ?? [] });
+  notices.begin({ t, language: () => language });
+  driving.begin({ send, estop: stop, reset, toast, t, gears: () => hello?.gears ?? [] });
   estop.begin({ send, lost, toast, robot: shown });
   trail.begin([]);
   trail.listen();

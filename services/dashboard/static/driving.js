@@ -83,14 +83,21 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
-export function show(isDriver, hold) {
+/** Show who drives; `driver` is null without a connection, `next` the step that safety accepts. */
+export function show(isDriver, driver, next) {
   const panel = document.querySelector(".driving");
+  const hold = driver?.hold ?? "free";
   panel.classList.toggle("is-driver", isDriver);
+  panel.classList.toggle("view-only", driver?.may === false);
   panel.dataset.hold = hold;
-  $("hold").textContent = isDriver ? page.t(`hold.${hold}`) : "";
-  for (const name of ["leave", "reset", "lamp"]) disable($(name), !isDriver);
+  write("hold", !isDriver ? "" : driver.overruled_by ? page.t("hold.overruled") : page.t(`hold.${hold}`));
+  for (const name of ["leave", "lamp"]) disable($(name), !isDriver);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) disable($(name), !isDriver);
   disable($("take"), isDriver);
+  disable($("reset"), !isDriver || next === "release");
+  $("reset").title = next === "release" ? page.t("reset_pressed") : "";
+  $("reset").classList.toggle("due", next === "reset");
+  $("release").classList.toggle("due", next === "release");
   showRelease(isDriver);
 }
 
@@ -208,18 +215,20 @@ const MODIFIERS = ["Meta", "Control", "Alt"];
 const modified = (event) =>
   event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
 const typing = (event) => event.target.matches?.("input, select");
-// In input fields, too; but in an input method the space bar selects a word.
-const spacing = (event) => event.code === "Space" && !event.isComposing;
+const spacing = (event) => event.code === "Space" && !typing(event);
 
 function keyDown(event) {
   if (spacing(event)) {
     event.preventDefault(); // it would press the focused button, too
     event.stopPropagation();
-    if (!event.repeat) page.estop();
+    letGo();
+    if (!driving && !event.repeat) page.toast("estop_key");
   }
   if (modified(event)) letGo();
   if (typing(event) || modified(event)) return;
-  if (KEYS[event.code]) {
+  if (event.code === "KeyE" && !event.repeat) page.estop();
+  else if (event.code === "KeyR" && !event.repeat) page.reset();
+  else if (KEYS[event.code]) {
     event.preventDefault();
     // A repeat is no press: after a release the key must come up first.
     if (!event.repeat && ready()) down.add(event.code);

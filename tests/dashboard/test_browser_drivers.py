@@ -1,0 +1,123 @@
+"""Who may drive and who drives instead, shown in a real browser."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.source import DriveSource
+from tests.dashboard.bus_fixture import Peer
+from verification.harness.bus import at, bus_on, joined, running
+from verification.harness.certificates import Site
+from verification.harness.dashboard import Server, dashboard
+from verification.harness.dashboard_page import (
+    CHROMIUM,
+    drive_until_moving,
+    open_page,
+    take_control,
+    text,
+    wait_for_standstill,
+    wait_for_text,
+)
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
+
+pytestmark = [
+    pytest.mark.timed,
+    pytest.mark.campaign,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
+]
+
+
+@pytest.fixture
+def stack(tmp_path: Path) -> Iterator[RunningStack]:
+    with running_stack(tmp_path) as it:
+        yield it
+
+
+class OtherOperator:
+    """A source of the highest priority that requests the same motion until it is None."""
+
+    def __init__(self) -> None:
+        self.linear: float | None = None
+        self._loop = Loop()
+
+    def declare(self, bus: Bus) -> None:
+        source = DriveSource(bus, "teleop")
+
+        def publish(_: int) -> None:
+            if self.linear is not None:
+                source.request(self.linear, 0.0)
+
+        self._loop.post(lambda: self._loop.every(0.05, publish))
+
+    def on(self, stack: RunningStack) -> Iterator["OtherOperator"]:
+        with running(self._loop), bus_on(stack.endpoint, self._loop, self.declare):
+            yield self
+
+
+@pytest.fixture
+def other(stack: RunningStack) -> Iterator[OtherOperator]:
+    yield from OtherOperator().on(stack)
+
+
+def test_a_driver_who_is_overruled_is_told_and_must_let_go(
+    browser: Browser, stack: RunningStack, other: OtherOperator, tmp_path: Path
+) -> None:
+    with dashboard(stack.endpoint, tmp_path, "dashboard.round_trip=1.0") as server:
+        page = browser.new_page(locale="en-GB")
+        open_page(page, server)
+        take_control(page)
+        drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
+        wait_for_text(page, "#driver", "You drive")
+        other.linear = 0.0
+        wait_for_text(page, "#driver", "Overruled by teleop")
+        wait_for_text(page, "#hold", "Another source drives")
+        other.linear = -0.2
+        wait_until(lambda: stack.speed() < -0.1, "the other operator backs up")
+        other.linear = None
+        wait_for_text(page, "#driver", "You drive")
+        wait_for_standstill(stack)
+        page.wait_for_timeout(1500)  # the key is still down
+        assert abs(stack.speed()) < 0.005
+        assert "release, then hold again" in text(page, "#hold")
+        page.keyboard.up("w")
+        drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
+        page.keyboard.up("w")
+        page.close()
+
+
+@pytest.fixture
+def view_only(tmp_path: Path) -> Iterator[Server]:
+    """A dashboard with a viewer's certificate, at a router with a simulated safety on board."""
+    site = Site(tmp_path / "keys")
+    viewer = site.member("viewer", "hall")
+    robot = site.member("robot", "001", "--address", "127.0.0.1")
+    tls = [f"bus.{name}={getattr(viewer, name)}" for name in TLS]
+    with (
+        site.router(robot) as (secured, onboard),
+        running(Loop()) as loop,
+        joined(at(onboard), "001", loop, Peer(loop).declare),
+        dashboard(secured, tmp_path, *tls) as server,
+    ):
+        yield server
+
+
+TLS = ("ca", "certificate", "private_key")
+
+
+def test_a_viewer_is_offered_no_stick(browser: Browser, view_only: Server) -> None:
+    page = browser.new_page(locale="en-GB")
+    page.goto(view_only.url)
+    wait_for_text(page, "#driver", "View only: this certificate may not drive")
+    assert page.is_visible("#view-only")
+    for control in ("#take", "#stick", "#gears", "#reset"):
+        assert not page.is_visible(control), control
+    page.keyboard.down("w")
+    page.wait_for_timeout(500)
+    assert "You drive" not in text(page, "#driver")
+    assert page.title().endswith("001 · T2")
+    page.close()

@@ -1,0 +1,97 @@
+"""One robot's driver on the dashboard: who drives instead, and who may not drive."""
+
+import pytest
+
+from common import keys
+from common.bus.publisher import Publisher
+from common.source import DENIED_AFTER
+from services.dashboard.config import Dashboard
+from services.dashboard.driver_lock import HoldState, Push
+from services.dashboard.robot import OVERRULED_TICKS, Robot
+from tests.factories import safety_state
+from tests.fake_bus import FakeBus
+
+TICK_NS = 50_000_000
+
+
+class RobotFixture:
+    """A robot whose driver holds the stick forward, with a state of safety in each tick."""
+
+    def __init__(self) -> None:
+        self.bus = FakeBus()
+        self.notices: list[tuple[str, str, str]] = []
+        self.robot = Robot(
+            self.bus, Dashboard(), lambda *words: self.notices.append(words), lambda *_: None
+        )
+        self.now_ns = 0
+        assert self.robot.driver_lock.take("1", force=False)
+
+    def ticks(self, number: int, source: str | None, *, held: bool = True) -> None:
+        lock = self.robot.driver_lock
+        for count in range(number):
+            self.now_ns += TICK_NS
+            self.bus.deliver(keys.SAFETY, safety_state(heartbeat=count, source=source))
+            self.robot.telemetry.update(
+                "tel/safety/state", safety_state(source=source), self.now_ns
+            )
+            lock.sent(self.now_ns, self.now_ns)
+            if held:
+                lock.hold("1", self.now_ns, Push(1.0), self.now_ns)
+            else:
+                lock.let_go("1")
+            self.robot.tick(self.now_ns)
+
+    def is_held(self) -> bool:
+        """Whether the hold is valid; otherwise the driver must let go first."""
+        return self.robot.driver_lock.state is HoldState.HELD
+
+    def overruled_by(self) -> str | None:
+        return self.robot.driver_state({}).overruled_by
+
+
+@pytest.fixture
+def fixture() -> RobotFixture:
+    return RobotFixture()
+
+
+def test_who_drives(fixture: RobotFixture) -> None:
+    fixture.ticks(40, "web")
+    driver = fixture.robot.driver_state({"1": "Ada"})
+    assert (driver.id, driver.name, driver.overruled_by, driver.may) == ("1", "Ada", None, True)
+    assert driver.hold is HoldState.HELD
+
+
+def test_a_driver_who_is_overruled_must_let_go_first(fixture: RobotFixture) -> None:
+    fixture.ticks(5, "web")
+    fixture.ticks(OVERRULED_TICKS - 1, "teleop")
+    assert fixture.overruled_by() == "teleop"
+    assert fixture.is_held()
+    fixture.ticks(1, "teleop")
+    assert not fixture.is_held()
+    fixture.ticks(20, None)
+    assert fixture.overruled_by() is None
+    assert not fixture.is_held()
+    fixture.ticks(1, None, held=False)
+    fixture.ticks(5, "web")
+    assert fixture.is_held()
+
+
+def test_a_driver_who_takes_over_is_not_overruled(fixture: RobotFixture) -> None:
+    fixture.ticks(OVERRULED_TICKS - 1, "nav")  # until our first requests are decided
+    fixture.ticks(40, "web")
+    assert fixture.is_held()
+
+
+def test_nobody_is_overruled_who_does_not_drive(fixture: RobotFixture) -> None:
+    fixture.robot.driver_lock.leave("1")
+    fixture.ticks(20, "nav", held=False)
+    assert fixture.overruled_by() is None
+
+
+def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fixture.robot.may_drive
+    monkeypatch.setattr(Publisher, "passed_on", False)
+    fixture.ticks(DENIED_AFTER, None)
+    driver = fixture.robot.driver_state({})
+    assert (driver.may, driver.id) == (False, None)
+    assert fixture.notices == [("error", "barred", "")]
