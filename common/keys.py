@@ -34,8 +34,8 @@ class ClassOfService(Struct, frozen=True):
     reason: str
     express: bool = False  # sent immediately, never batched
     history: int = 0  # samples kept for late and recovering subscribers
-    # For other sessions only: otherwise a subscriber of the same session matches, and a publisher
-    # seems to be heard although the router drops its messages.
+    # For other sessions only: otherwise a subscriber of the same session matches, also while the
+    # router drops the messages.
     remote: bool = False
 
 
