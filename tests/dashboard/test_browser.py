@@ -244,10 +244,3 @@ def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: Ru
     wait_for_text(page, "#link", "Board: up")
     wait_for_standstill(stack)
     page.keyboard.up("w")
-
-
-@pytest.mark.campaign
-def test_nothing_is_wider_than_the_screen(page: Page) -> None:
-    for width in (360, 390, 768, 1440):
-        page.set_viewport_size({"width": width, "height": 844})
-        assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,138 @@
+"""The driving layout on eight screens: what a driver needs is visible, and nothing overlaps."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from sim.requests import Bumper
+from verification.harness.dashboard import Server, dashboard
+from verification.harness.dashboard_page import (
+    CHROMIUM,
+    open_page,
+    reset_all,
+    take_control,
+    wait_for_text,
+)
+from verification.harness.stack import RunningStack, running_stack
+
+pytestmark = [
+    pytest.mark.timed,
+    pytest.mark.campaign,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
+]
+
+SCREENS = (
+    (1920, 1080), (1440, 900), (1280, 720), (1024, 700), (820, 1180), (844, 390), (390, 844),
+    (360, 640),
+)  # fmt: skip
+NEEDED = ("#estop", "#verdict", "#sentence", "#speed", "#sonar-view", "#stick")
+BOX = """where => {
+  const it = document.querySelector(where).getBoundingClientRect();
+  return [it.left, it.top, it.right, it.bottom];
+}"""
+LONG_NAME = "The operator of the hall"
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("stack")) as it:
+        yield it
+
+
+@pytest.fixture(scope="module")
+def server(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("server")
+    with dashboard(stack.endpoint, folder, "dashboard.round_trip=1.0") as it:
+        yield it
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    page = browser.new_page(locale="en-GB")
+    open_page(page, server)
+    take_control(page)
+    yield page
+    page.close()
+
+
+def problems(page: Page, width: int, height: int) -> list[str]:
+    """Return what is wrong on a screen of this size."""
+    page.set_viewport_size({"width": width, "height": height})
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(100)
+    boxes = {where: page.evaluate(BOX, where) for where in NEEDED}
+    found = [
+        f"{where} is outside: {box}"
+        for where, box in boxes.items()
+        if box[0] < 0 or box[1] < 0 or box[2] > width or box[3] > height
+    ]
+    found += [
+        f"{one} and {other} overlap"
+        for one, other in combinations(NEEDED, 2)
+        if overlap(boxes[one], boxes[other])
+    ]
+    if page.evaluate("document.documentElement.scrollWidth") > width:
+        found.append("it scrolls sideways")
+    page.evaluate("scrollTo(0, 400)")
+    page.wait_for_timeout(100)
+    for where in ("#estop", "#verdict"):
+        if width <= 1100 and page.evaluate(BOX, where)[1] < 0:
+            found.append(f"{where} scrolls away")
+    if page.evaluate(BOX, "#estop") != boxes["#estop"]:
+        found.append("the emergency stop moves")
+    return found
+
+
+def overlap(one: list[float], other: list[float]) -> bool:
+    left, top = max(one[0], other[0]), max(one[1], other[1])
+    return left < min(one[2], other[2]) - 1 and top < min(one[3], other[3]) - 1
+
+
+def on_all_screens(page: Page, pictures: Path, name: str) -> dict[str, list[str]]:
+    found = {}
+    for width, height in SCREENS:
+        wrong = problems(page, width, height)
+        page.evaluate("scrollTo(0, 0)")
+        page.screenshot(path=pictures / f"{name}-{width}x{height}.png")
+        if wrong:
+            found[f"{name} {width}x{height}"] = wrong
+    return found
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_a_driver_sees_everything(
+    page: Page, stack: RunningStack, tmp_path: Path, language: str
+) -> None:
+    if language == "zh":
+        page.click("#language")
+    found = on_all_screens(page, tmp_path, f"free-{language}")
+    before = page.evaluate(BOX, "#estop")
+    page.evaluate("name => { document.querySelector('#driver').textContent = name; }", LONG_NAME)
+    stack.control.do(Bumper(pressed=True))
+    page.wait_for_selector("#release.due")
+    assert page.evaluate(BOX, "#estop") == before
+    page.click("#estop")
+    wait_for_text(page, "#detail", "Also latched" if language == "en" else "同时锁定")
+    found |= on_all_screens(page, tmp_path, f"contact-{language}")
+    stack.control.do(Bumper(pressed=False))
+    page.set_viewport_size({"width": 1440, "height": 900})
+    reset_all(page)
+    assert found == {}, f"{found}; see {tmp_path}"
+
+
+def test_the_next_step_is_the_one_that_is_accepted(page: Page, stack: RunningStack) -> None:
+    stack.control.do(Bumper(pressed=True))
+    page.wait_for_selector("#release.due")
+    assert page.is_disabled("#reset")
+    assert page.get_attribute("#reset", "title") == "The bumper is pressed: back off first."
+    stack.control.do(Bumper(pressed=False))
+    page.wait_for_selector("#reset.due")
+    assert not page.is_disabled("#reset")
+    assert page.title().startswith("BRAKE")
+    page.keyboard.press("r")
+    page.wait_for_selector("#reset:not(.due)")
+    page.wait_for_function("() => !document.title.startsWith('BRAKE')")
+    assert page.locator("#release").is_hidden()
