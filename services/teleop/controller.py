@@ -9,7 +9,7 @@ import time
 from common import keys
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.messages import Event
+from common.messages import Event, SafetyState
 from common.motion import Twist
 from common.operator import EstopRepetition, EstopStep
 from common.service import Node
@@ -26,7 +26,7 @@ from services.teleop.view import LatestTopic, View
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
 MAX_PRESS_AGE_S = 0.5  # an older press is ignored, except a stop
-LINES = 40
+LINES = 100  # of the event log, to scroll through
 UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
 ESTOP, RESET = "e", "r"
 BY_TERMINAL = {*DIRECTIONS, *RELEASE, RESET}  # the keys that need a fast terminal
@@ -54,6 +54,7 @@ class Controller:
         self._dropped_ns: int | None = None  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before the first state of safety
         self._estop = EstopRepetition()
+        self._unconfirmed = False  # whether safety never showed our emergency stop
         self._source = DriveSource(bus, self._settings.source, self._report_denied)
         self._safety = LatestTopic(bus, keys.SAFETY, FAST_S)
         self._velocity = LatestTopic(bus, keys.VELOCITY, FAST_S)
@@ -172,10 +173,14 @@ class Controller:
         self._node.event("estop", "warning", "emergency stop requested by the operator")
 
     def _repeat_estop(self, now_ns: int) -> None:
-        step = self._estop.tick(self._safety.at(now_ns))
+        state = self._safety.at(now_ns)
+        step = self._estop.tick(state)
         if step is not EstopStep.NONE:
             self._bus.estop()
+        if state is not None and "estop" in state.latched:
+            self._unconfirmed = False
         if step is EstopStep.LAST:
+            self._unconfirmed = True
             text = "EMERGENCY STOP NOT CONFIRMED by safety: use the vehicle's own switch"
             self._node.event("estop_unconfirmed", "error", text)
 
@@ -207,12 +212,24 @@ class Controller:
             service = arrival.key.rpartition("/")[2]
             self._event_log.add(service, event.level, event.text, event.t_ns)
 
+    def _alarm(self, state: SafetyState | None) -> str:
+        """Return what the operator must know before anything else; empty for nothing."""
+        if self._unconfirmed:
+            return "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch"
+        if self._source.denied:
+            return "VIEW ONLY: this certificate may not drive"
+        other = state.source if state else None
+        if self._requested is not None and other not in (None, self._source.name):
+            return f"OVERRULED by {other}: release the controls"
+        return ""
+
     def _make_view(self, now_ns: int) -> View:
-        controls = self._controls
+        controls, state = self._controls, self._safety.at(now_ns)
         return View(
             robot=self._bus.robot,
             source=self._settings.source,
             connected=self._bus.connected,
+            alarm=self._alarm(state),
             gear=controls.gear,
             turbo=controls.turbo,
             top=twist(Deflection(1, 1), controls.gear, controls.turbo, self._settings),
@@ -221,7 +238,7 @@ class Controller:
             keys_refused=self.terminal.refusal(now_ns),
             gamepad=self._gamepad.status,
             move_stick=controls.gamepad_is_due(now_ns),
-            safety=self._safety.at(now_ns),
+            safety=state,
             velocity=self._velocity.at(now_ns),
             odometry=self._odometry.at(now_ns),
             ultrasonic=self._ultrasonic.at(now_ns),

@@ -28,9 +28,23 @@ BADGES: dict[Verdict, str] = {
 PREFIX, MIN_TEXT = len("00:00:00 safety  "), 20  # columns of an event line
 LEVELS = {"info": "", "warning": WARN, "error": BAD}
 KEYS = (
-    ("WASD", "drive"), ("ZC", "arc"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"),
-    ("E", "ESTOP"), ("R", "reset"), ("FB", "release"), ("Q", "quit"),
+    ("WASD", "drive"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"), ("E", "ESTOP"),
+    ("R", "reset"), ("FB", "release"), ("Q", "quit"), ("?", "help"),
 )  # fmt: skip
+HELP = (
+    ("W A S D, arrows", "drive and turn on the spot, while held"),
+    ("Z C, keypad corners", "arcs: forward left, forward right"),
+    ("space", "release all controls and stop"),
+    ("E", "emergency stop, latched until R"),
+    ("R", "reset the latched causes on the screen"),
+    ("F B, held", "move forward or backward off a pressed bumper"),
+    ("1 to 5", "gear: 0.2 to 0.8 m/s"),
+    ("T", "turbo for the next hold; T, a gear or space cancels it"),
+    ("[ ], mouse wheel", "scroll the events to older and newer ones"),
+    ("Q, ctrl-c", "stop and quit"),
+    ("gamepad", "left shoulder held: sticks drive; right shoulder: turbo"),
+    ("?", "close this help; any other key closes it and counts"),
+)
 SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
 
 
@@ -61,7 +75,16 @@ def bumper(view: View) -> Part:
 
 def safety(view: View, rows: int) -> Text:
     """Return verdict, text and causes, latched ones first; causes by name if rows are short."""
+    if view.alarm:
+        alarm = Text(view.alarm, style=BAD)
+        return Text("\n").join([alarm, _safety(view, rows - 1)])
+    return _safety(view, rows)
+
+
+def _safety(view: View, rows: int) -> Text:
     state = view.safety
+    if state is None and not view.connected:
+        return Text.assemble((" NO ROUTER ", BADGES["inhibited"]), "  no connection to the router")
     if state is None:
         return Text.assemble(
             (" NO SAFETY ", BADGES["inhibited"]),
@@ -115,10 +138,17 @@ def _cause(cause: Cause, text: str, state: SafetyState) -> Text:
     return Text.assemble(tag, text, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
 
 
-def events(view: View, rows: int, width: int = 200) -> Text:
-    """Return the newest event lines, the newest last, wrapped to the width."""
+def help_text() -> Text:
+    """Return the keys and what they do."""
+    return Text("\n", no_wrap=True).join(
+        Text.assemble((f"{key:<21}", "bold cyan"), action) for key, action in HELP
+    )
+
+
+def events(view: View, rows: int, width: int = 200, skipped: int = 0) -> Text:
+    """Return event lines, the newest last, wrapped to the width, without the newest ``skipped``."""
     shown: list[Text] = []
-    for line in reversed(view.lines):
+    for line in reversed(view.lines[: len(view.lines) - skipped]):
         room = rows - len(shown)
         if room <= 0:
             break

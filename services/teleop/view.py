@@ -57,6 +57,7 @@ class View:
     robot: str
     source: str
     connected: bool  # to a router
+    alarm: str = ""  # what the operator must know first
     gear: int
     turbo: bool
     top: Twist  # of full deflection in this gear

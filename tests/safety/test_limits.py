@@ -247,3 +247,30 @@ def test_states_are_published() -> None:
     assert (fleet.angular, fleet.silent, fleet.effect) == (None, True, "none")
     assert with_limit(0.0).states("lidar", 0)[0].effect == "stop"
     assert LimitChannel() == LimitChannel(linear=math.inf, angular=math.inf, reason="")
+
+
+# --- conflicts, ages and texts of several sources ---------------------------------------------
+
+
+def test_a_conflict_lasts_for_the_lease_of_the_source() -> None:
+    longer = LimitSource(lease=1.0, silence="ignore")
+    limits, _ = put(SpeedLimits({"lidar": longer}), boot=1)
+    limits, refused = put(limits, boot=2)
+    assert refused == "second_publisher"
+    assert limits.conflicts(999_999_999) == ["limit lidar"]
+    assert limits.conflicts(1_000_000_000) == []
+
+
+def test_the_age_counts_from_the_reception() -> None:
+    assert LimitChannel(received_ns=3_000_000_000).age_s(4_500_000_000) == 1.5
+
+
+def test_all_silent_sources_are_named() -> None:
+    silent = LimitSource(lease=LEASE_S, silence="stop")
+    _, silence = SpeedLimits({"lidar": silent, "fleet": silent}).observations(0)
+    assert silence.text == "No speed limit arrives of lidar, fleet."
+
+
+def test_only_the_full_stop_of_a_reason_is_dropped() -> None:
+    stop, _ = with_limit(linear=0.0, reason="BOX.").observations(0)
+    assert stop.text == "Stopped by lidar: BOX."

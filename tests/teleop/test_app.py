@@ -201,6 +201,52 @@ def test_refused_keys_are_shown(screen: Screen) -> None:
     play(screen, act)
 
 
+def test_help_opens_and_any_other_key_closes_it(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("question_mark")
+        await until(lambda: screen.app.query_one("#help", Panel).display, "the help")
+        assert not screen.app.query_one("#events", Panel).display
+        assert fits(screen, "help")
+        await pilot.press("w")
+        await until(lambda: not screen.app.query_one("#help", Panel).display, "its end")
+        assert screen.speeds(5)  # the key counts
+
+    play(screen, act)
+
+
+def test_events_scroll(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        for number in range(30):
+            screen.node.event_log.add("safety", "info", f"event {number}.")
+        screen.controller.tick(screen.now_ns)
+        await until(lambda: "event 29." in screen.text_of("events"), "the newest")
+        for _ in range(20):
+            await pilot.press("left_square_bracket")
+        await until(lambda: "event 9." in screen.text_of("events"), "older ones")
+        assert "event 29." not in screen.text_of("events")
+        for _ in range(20):
+            await pilot.press("right_square_bracket")
+        await until(lambda: "event 29." in screen.text_of("events"), "the newest again")
+
+    play(screen, act)
+
+
+def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("e")
+        for _ in range(70):
+            screen.controller.tick(screen.now_ns)
+        await until(lambda: "EMERGENCY STOP NOT CONFIRMED" in screen.text_of("safety"), "it")
+        for name in ("safety", "motion", "around", "hints"):
+            await until(partial(fits, screen, name), f"{name} to fit")
+        state = safety_state(verdict="brake", latched=("estop",))
+        screen.node.fake.deliver(keys.SAFETY, state, received_ns=screen.now_ns)
+        screen.controller.tick(screen.now_ns)
+        await until(lambda: "NOT CONFIRMED" not in screen.text_of("safety"), "its end")
+
+    play(screen, act)
+
+
 def fits(screen: Screen, name: str) -> bool:
     """Return whether a panel is shown without clipping."""
     panel, lines = screen.app.query_one(f"#{name}", Panel), screen.text_of(name).split("\n")

@@ -180,3 +180,15 @@ def test_a_denied_operator_is_notified_once(
     assert [line for line in operator.lines if "NOT ALLOWED" in line] == [
         "NOT ALLOWED: the router drops our requests; this certificate may only watch"
     ]
+
+
+def test_an_overruled_operator_is_told_who_drives(operator: Operator) -> None:
+    operator.tell_safety(source="web")
+    operator.ticks(1)
+    assert operator.controller.view.alarm == ""
+    operator.press("w")
+    operator.ticks(2)
+    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    operator.tell_safety(source="teleop")
+    operator.ticks(1)
+    assert operator.controller.view.alarm == ""

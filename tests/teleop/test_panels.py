@@ -42,6 +42,23 @@ def test_a_missing_safety_is_shown() -> None:
     assert "NO SAFETY" in panels.safety(view(), 2).plain
 
 
+def test_without_a_router_the_connection_is_named() -> None:
+    assert "no connection to the router" in panels.safety(view(connected=False), 2).plain
+
+
+def test_an_alarm_comes_first() -> None:
+    words = panels.safety(view(alarm="NOT CONFIRMED", safety=safety_state(text="Stands.")), 3)
+    assert words.plain.split("\n")[0] == "NOT CONFIRMED"
+    assert "Stands." in words.plain
+
+
+def test_the_help_names_every_key_of_the_hints() -> None:
+    words = panels.help_text().plain
+    for key in ("W A S D", "Z C", "space", "E", "R", "F B", "1 to 5", "T", "[ ]", "Q"):
+        assert f"\n{key}" in f"\n{words}", key
+    assert max(map(len, words.split("\n"))) <= 76
+
+
 def test_the_text_of_safety_is_shown() -> None:
     words = panels.safety(view(safety=safety_state(verdict="slow", text="Slowed.")), 2).plain
     assert words == " SLOW   Slowed."
@@ -68,6 +85,8 @@ def test_the_newest_events_are_shown() -> None:
     shown = panels.events(view(lines=lines), 2).plain.split("\n")
     assert [line[9:] for line in shown] == ["bridge  event 3", "bridge  event 4"]
     assert panels.events(view(lines=lines), 0).plain == ""
+    older = panels.events(view(lines=lines), 2, skipped=2).plain.split("\n")
+    assert [line[9:] for line in older] == ["bridge  event 1", "bridge  event 2"]
     assert panels.events(view(lines=lines), 9).plain.count("event") == 5
 
 
