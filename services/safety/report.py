@@ -20,6 +20,7 @@ from services.safety.trajectory import OPPOSITE
 MOVING = ("run", "slow")
 # Event names that differ from the cause's name.
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
+REPEATED_NS = NS_PER_S  # a refusal that comes again within this time is no new event
 
 
 class Transition(Struct, frozen=True):
@@ -113,6 +114,19 @@ def signature(state: State) -> tuple[object, ...]:
     return state.verdict.name, ordered(state.latches), ids, state.verdict.source, forbidden
 
 
+class Repetition(Struct):
+    """Recognises a text that is repeated, as of a call that a held key repeats."""
+
+    text: str = ""
+    at_ns: int = 0
+
+    def continues(self, text: str, now_ns: int) -> bool:
+        """Return whether the same text came less than ``REPEATED_NS`` ago; note this one."""
+        continues = text == self.text and now_ns - self.at_ns < REPEATED_NS
+        self.text, self.at_ns = text, now_ns
+        return continues
+
+
 def transitions(before: State, after: State, trigger: Trigger | None) -> Iterator[Transition]:
     """Yield the transitions of one decision."""
     old, new = before.verdict, after.verdict
@@ -124,7 +138,8 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         worst = ordered(after.latches)[0]
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
-    if old.source != new.source:
+    barred = any(bars_motion(name) for name in after.latches)
+    if old.source != new.source and not (new.source and barred):
         yield Transition(
             "source", "info", _source_text(new.source), {"from": old.source, "to": new.source}
         )

@@ -41,7 +41,14 @@ from services.safety.inputs import (
     Reset,
 )
 from services.safety.policy import Policy, brake_for_contact
-from services.safety.report import motion_message, signature, state_message, transitions, with_times
+from services.safety.report import (
+    Repetition,
+    motion_message,
+    signature,
+    state_message,
+    transitions,
+    with_times,
+)
 from services.safety.state import Reply
 
 M = TypeVar("M", bound=Message)
@@ -69,6 +76,7 @@ class SafetyService:
         self._state_publisher = node.bus.publisher(keys.SAFETY)
         self._subscribe()
         node.is_stopped = self._is_stopped
+        self._refusal = Repetition()  # of a release
         self._decision_timer = node.loop.every(DECISION_PERIOD_S, lambda _: self._decide())
         node.loop.every(STATE_PERIOD_S, self._publish_state)
 
@@ -216,6 +224,9 @@ class SafetyService:
         if signature(before) != signature(self._state):
             self._publish_state(now_ns)
         for transition in transitions(before, self._state, event):
+            text = transition.text
+            if transition.name == "release_refused" and self._refusal.continues(text, now_ns):
+                continue
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
             self._node.counters["long_stops"] += transition.name == "long_stop"
 

@@ -3,9 +3,11 @@
 import pytest
 from msgspec.structs import replace
 
+from common.freshness import NS_PER_S
 from common.messages import Direction, Drive, Limits
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
 from services.safety.report import (
+    Repetition,
     motion_message,
     sentence,
     signature,
@@ -149,7 +151,7 @@ def test_a_change_of_source_is_reported() -> None:
 def test_a_release_is_reported_when_it_begins_and_ends() -> None:
     fixture = hit()
     held = Hold(True, "backward", fixture.echo)
-    assert noted(fixture, held) == ["source", "release"]
+    assert noted(fixture, held) == ["release"]
     assert noted(fixture, held) == []
     assert noted(fixture, Hold(False)) == ["stop", "source", "release_end"]
 
@@ -198,3 +200,21 @@ def test_the_release_is_reported_while_a_contact_is_latched() -> None:
     release = fixture.published().release
     assert release is not None
     assert (release.believed_free, release.forbidden) == (None, ("backward", "forward"))
+
+
+def test_zeros_after_an_emergency_stop_are_no_control() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.estop()
+    before = fixture.state
+    fixture.request(0.0)
+    assert fixture.state.verdict.source == "teleop"
+    assert list(transitions(before, fixture.state, None)) == []
+
+
+def test_a_text_that_comes_again_at_once_is_a_repetition() -> None:
+    refusal = Repetition()
+    times_s = (1.0, 1.05, 1.9, 2.8, 3.8)
+    assert [refusal.continues("no", round(at * NS_PER_S)) for at in times_s] == [
+        False, True, True, True, False,
+    ]  # fmt: skip
+    assert not refusal.continues("another", round(3.85 * NS_PER_S))
