@@ -7,8 +7,7 @@ reflex     each datagram, first               BRAKE, when it holds a new bumper 
 hit        that hit, once BRAKE is sent       the bumper message; an event
 datagram   the same datagram                  messages; answers of calls; events
 motion     each message on ``@cmd/motion``    the frame that the lease allows
-switches,  an operator's calls                frames; the board's echo answers them later
-led
+switches   an operator's call; likewise led   frames; the board's echo answers them later
 tick       every 20 ms                        queries; STOP or BRAKE if due; events
 second     once a second                      the switches' message; rates for the link message
 link       5 times a second, and on a change  the link message
@@ -35,13 +34,12 @@ from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
 from services.bridge.output import Output
 from services.bridge.poll import Poll
+from services.bridge.ports import BRAKE_REPORTS, URGENT_KINDS
 from services.bridge.readiness import Readiness
 from services.bridge.reflex import Hit, Reflex
 from services.bridge.restart_detection import restarted
 from services.bridge.translate import BumperFilter, Translator, driver
 
-# A new hit or fault in these frames counts from either port.
-URGENT_KINDS = (reports.BumperReport, reports.DriverReport)
 Handler = Callable[[Any, bytes, int, Output], None]  # frame, raw bytes, receive time
 # Continuous frames: a change of their port is an event.
 POLLED = frozenset((reports.VelocityReport, *ASKED.values(), reports.DriverReport))
@@ -154,7 +152,9 @@ class Core:
             out.event("port_changed", "warning", text, port=number, frame=kind.__name__)
 
     def _is_urgent(self, frame: Frame, out: Output) -> bool:
-        """Return whether a frame on either port reports a new hit or driver fault."""
+        """Return whether a frame on either port reports a new hit or fault, or a brake as off."""
+        if isinstance(frame, BRAKE_REPORTS):
+            return not frame.on
         if isinstance(frame, reports.DriverReport):
             return bool(frame.fault_bits & ~self._faults.get(frame.side, 0))
         if not isinstance(frame, reports.BumperReport) or not frame.on:

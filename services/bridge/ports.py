@@ -11,8 +11,8 @@ first of its kind
 on the other port                 dropped as a copy, unless the active port is silent: no such frame
                                   for the timeout of its kind, or no frame at all for the failover
                                   time; then it is taken, and its port becomes active
-on the other port, and is urgent  taken, and its port becomes active: a new bumper hit or driver
-                                  fault counts from either port
+on the other port, and is urgent  taken, and its port becomes active: a new bumper hit, a driver
+                                  fault and an emergency brake that is off count from either port
 ================================= =================================================================
 
 So no datagram is taken twice, and the link survives one dead port. Commands leave from the port
@@ -27,8 +27,16 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.wire.frame import Frame
-from common.wire.reports import BumperReport, VelocityReport
+from common.wire.reports import (
+    BumperBrakeReport,
+    BumperReport,
+    DriverReport,
+    UltrasonicBrakeReport,
+    VelocityReport,
+)
 
+BRAKE_REPORTS = (UltrasonicBrakeReport, BumperBrakeReport)
+URGENT_KINDS = (BumperReport, DriverReport, *BRAKE_REPORTS)
 UNANSWERED_NS = NS_PER_S // 2
 PERIODS = 2.5  # without a frame of its kind, until the other port is taken
 

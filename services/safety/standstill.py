@@ -14,7 +14,8 @@ STANDING 0.2 s of measured standstill                                  it stays 
 ======== ============================================================= ===========================
 
 A vehicle in a curve slows down on both axes together, so the longer of the two times counts. An
-unknown velocity is not standstill. A motion of less than 0.5 s adds its duration to the time limit
+unknown velocity is not standstill and counts as the highest; the first known one then shortens the
+time limit. A motion of less than 0.5 s adds its duration to the time limit
 and does not renew the limit, unless the vehicle stood meanwhile. Otherwise repeated short motions
 would postpone the limit without end.
 
@@ -138,8 +139,9 @@ class Supervisor(Struct, frozen=True):
             return self._stop(after, known, now_ns)
         if before.phase is Phase.STANDING:
             return self._stay(after, known, now_ns)
-        if after.due_ns is None and known is not None:
-            after = replace(after, due_ns=self._due_ns(known, now_ns))
+        if known is not None and before.velocities.newest is None:  # it was unknown until now
+            due_ns = self._due_ns(known, now_ns)
+            after = replace(after, due_ns=min(due_ns, after.due_ns or due_ns))
         if known is not None and after.is_late(now_ns):
             after = replace(after, rolls=True)
         return _settle(after, now_ns)

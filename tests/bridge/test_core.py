@@ -118,13 +118,14 @@ def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench
     assert reported == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
 
 
+@pytest.mark.parametrize("port", [0, 1])
 @pytest.mark.parametrize(
     "off", [reports.UltrasonicBrakeReport(False), reports.BumperBrakeReport(False)]
 )
-def test_a_brake_that_is_off_disarms_at_once(bench: Bench, off: Frame) -> None:
+def test_a_brake_that_is_off_disarms_at_once(bench: Bench, off: Frame, port: int) -> None:
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
-    bench.receive(FRAMING.pack(off))
+    bench.receive(FRAMING.pack(off), port=port)
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
 
 

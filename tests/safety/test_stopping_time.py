@@ -62,6 +62,27 @@ def test_an_unknown_velocity_is_no_standstill_and_counts_as_the_fastest() -> Non
     assert board.state.text == "Standstill is not confirmed: no velocity is received."
 
 
+def test_the_first_known_velocity_shortens_the_time_of_an_unknown_one() -> None:
+    board = Board()
+    board.step(0.3, commanded=False)
+    board.step(None, commanded=False)
+    board.run(0.5, None)
+    began_ns = board.now_ns
+    while not board.late():
+        board.step(0.12)
+    took_s = (board.now_ns - began_ns) / NS_PER_S
+    assert 0.12 / 0.6 + 0.5 < took_s <= 0.12 / 0.6 + 0.5 + 3 * TICK_S
+
+
+def test_a_later_gap_does_not_extend_the_time() -> None:
+    board = Board()
+    board.step(0.12, commanded=False)
+    board.run(0.5, 0.12)
+    board.run(0.1, None)
+    board.run(0.2, 0.12)
+    assert board.late()
+
+
 def dither(board: Board, run_s: float, seconds: float, linear: float | None = 0.3) -> float | None:
     """Alternate short motions and 0.4 s of standstill commanded; return when it is late."""
     began_ns = board.now_ns

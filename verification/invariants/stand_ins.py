@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from common.wire.commands import TO_BOARD, BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.framing import Framing, Received
-from common.wire.reports import FROM_BOARD, BumperBrakeReport, UltrasonicBrakeReport
+from common.wire.reports import FROM_BOARD
 from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
 from verification.invariants.net import Net
@@ -13,9 +12,6 @@ from verification.invariants.process import Process
 
 if TYPE_CHECKING:
     from verification.invariants.stack import Chain
-
-SETS = (UltrasonicBrakeSet, BumperBrakeSet)
-ECHOES = (UltrasonicBrakeReport, BumperBrakeReport)
 
 
 class Sockets:
@@ -30,7 +26,6 @@ class Sockets:
         self._stack = stack
         self._process = process
         self._framing = Framing()
-        self._asked = 0  # the port that the emergency brakes were last set from
 
     def read(self, first: int, *ports: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
         """Yield what waits at these ports, after the oracle has seen it."""
@@ -40,10 +35,6 @@ class Sockets:
                 datagram = inbox.popleft()
                 parts = self._framing.read(datagram, FROM_BOARD)
                 frames = [part.frame for part in parts if isinstance(part, Received)]
-                if port != self._asked:  # the bridge may take an "off" for a damaged copy there
-                    frames = [
-                        frame for frame in frames if not isinstance(frame, ECHOES) or frame.on
-                    ]
                 self._stack.oracle.on_report(self._process, frames)
                 yield port, datagram, [], self._stack.net.now_ns
 
@@ -57,9 +48,6 @@ class Sockets:
 
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
         """Send to the board, with the oracle's complaints."""
-        parts = self._framing.read(datagram, TO_BOARD)
-        if any(isinstance(part, Received) and isinstance(part.frame, SETS) for part in parts):
-            self._asked = port
         complaints = self._stack.oracle.on_leaving(self._process, datagram)
         self._stack.vehicle.receive(datagram, port, complaints)
         return True

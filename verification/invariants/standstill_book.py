@@ -37,7 +37,13 @@ class StandstillBook:
             self.rolled += max(abs(velocity.linear), abs(velocity.angular)) * gap_s * before
         else:
             self.rolled = 0.0
+        if self.due_ns is not None and not self._known(now_ns):  # the first one after a gap
+            self.due_ns = min(self.due_ns, now_ns + round(stopping_s(velocity) * NS_PER_S))
         self.newest, self.newest_ns = velocity, now_ns
+
+    def _known(self, now_ns: int) -> bool:
+        """Return whether the velocity is known; an unknown one counts as the highest."""
+        return now_ns - self.newest_ns <= FRESH_S * NS_PER_S
 
     def complaint(self, motion: Motion, moves: bool, now_ns: int) -> str:
         """Return what is wrong with a motion that does not brake; empty if nothing is."""
@@ -47,11 +53,11 @@ class StandstillBook:
         if self.due_ns is None:
             self.stop_ns = self.due_ns = now_ns
         if now_ns - self.stop_ns <= GAP_S * NS_PER_S:  # the speed at STOP may be measured later
-            by_ns = self.stop_ns + round(stopping_s(self.newest) * NS_PER_S)
+            speed = self.newest if self._known(now_ns) else None
+            by_ns = self.stop_ns + round(stopping_s(speed) * NS_PER_S)
             self.due_ns = max(self.due_ns, by_ns)
         late_s = (now_ns - self.due_ns) / NS_PER_S
-        known = now_ns - self.newest_ns <= FRESH_S * NS_PER_S
-        if motion.command == "brake" or late_s < SLACK_S or not known:
+        if motion.command == "brake" or late_s < SLACK_S or not self._known(now_ns):
             return ""
         rolled = self.rolled > AWAY + SLACK
         return f"safety: no BRAKE while the vehicle rolls {self.rolled:.2f}" if rolled else ""
