@@ -19,8 +19,14 @@ class Cause(Struct, frozen=True, kw_only=True):
     id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
 
 
+RELEASE_SOURCE = "release"  # in place of a source's name while a release moves the vehicle
+
+
 class Limits(Struct, frozen=True, kw_only=True):
-    """Velocity limits that safety allows now."""
+    """What a drive request may reach now; zero while a cause forbids every motion.
+
+    A release has its own speed, ``safety.release_speed``.
+    """
 
     forward: float  # m/s
     backward: float  # m/s, as a positive number

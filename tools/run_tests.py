@@ -5,7 +5,7 @@ processes fails a few of them. So the tests that failed run a second time, one b
 machine to themselves. A test that fails again fails the run; the others are listed at the end.
 
 Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run. A run that
-takes longer than ``LONGEST_S`` hangs; all its processes are ended, with their stacks.
+takes longer than ``LONGEST_S`` hangs; pytest and its workers are ended, with their stacks.
 """
 
 import json
@@ -20,12 +20,16 @@ from pathlib import Path
 FAILED = 1  # pytest's exit code for failed tests, as opposed to usage errors and interrupts
 RETRIED_MAX = 30
 LONGEST_S = float(os.environ.get("T2_TESTS_LONGEST", "1500"))
+FAILED_BY_TIME = 124  # as of timeout(1)
 DUMP_S = 5.0  # for the stacks
+END_S = 60.0  # for the fixtures, after Ctrl-C
 CACHE = Path(".pytest_cache/v/cache/lastfailed")
 
 
 def main(arguments: Sequence[str]) -> int:
     """Run the tests; return pytest's exit code."""
+    for one in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(one, signal.default_int_handler)  # as Ctrl-C
     CACHE.unlink(missing_ok=True)  # the failures of other runs
     code = pytest(arguments)
     if code != FAILED or not CACHE.exists():  # a test that hangs without xdist ends pytest at once
@@ -48,15 +52,17 @@ def pytest(arguments: Sequence[str]) -> int:
     with subprocess.Popen(command, process_group=0) as process:
         try:
             return process.wait(LONGEST_S)
-        except KeyboardInterrupt:
-            os.killpg(process.pid, signal.SIGINT)  # the terminal's Ctrl-C reaches this group only
-            return process.wait()
+        except KeyboardInterrupt:  # the terminal's Ctrl-C reaches this process's group only
+            os.killpg(process.pid, signal.SIGINT)
+            return process.wait(END_S)
         except subprocess.TimeoutExpired:
             print(f"\nrun_tests: not finished after {LONGEST_S:.0f} s", flush=True)
             os.killpg(process.pid, signal.SIGABRT)  # pytest's faulthandler prints all stacks
             time.sleep(DUMP_S)
-            os.killpg(process.pid, signal.SIGKILL)
-            return process.wait()
+            return FAILED_BY_TIME
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 if __name__ == "__main__":

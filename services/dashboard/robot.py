@@ -25,6 +25,7 @@ from common.operator import (
     reset_request,
 )
 from common.source import DriveSource, KeepalivePublisher, call_release
+from common.verdict import RELEASE_SOURCE
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.keepalive import PageKeepalive
@@ -67,8 +68,9 @@ class Robot:
         self._notify = notify  # to one viewer
         self._requests = DriveRequests()
         self._source = DriveSource(bus, settings.source, self._on_denied)
-        self._overruled_by: str | None = None  # the source that drives instead of our driver
-        self._overruled_ticks = 0  # in a row, during a hold
+        self._other: str | None = None  # another source that drives
+        self._contested_ticks = 0  # in a row, of a hold while another source drives
+        self._overruled = False  # our driver's hold has ended by that
         self._estop = EstopRepetition()
         self.keepalive = PageKeepalive(settings.estop_keepalive)
         self._keepalives: KeepalivePublisher | None = None
@@ -121,7 +123,8 @@ class Robot:
             name=names.get(lock.driver or "", ""),
             hold=lock.state,
             gear=lock.gear,
-            overruled_by=self._overruled_by,
+            other=self._other,
+            overruled=self._overruled,
             may=self.may_drive,
         )
 
@@ -188,13 +191,15 @@ class Robot:
 
     def _yield(self, safety: m.SafetyState | None) -> None:
         """End a hold while another source drives: its end must not resume our motion."""
-        source = safety.source if safety else None
-        is_other = source not in (None, self._settings.source)
-        self._overruled_by = source if is_other and self.driver_lock.driver else None
-        is_held = self.driver_lock.state is HoldState.HELD
-        self._overruled_ticks = self._overruled_ticks + 1 if self._overruled_by and is_held else 0
-        if self._overruled_ticks >= OVERRULED_TICKS:
-            self.driver_lock.lapse()
+        lock, source = self.driver_lock, safety.source if safety else None
+        ours = (None, RELEASE_SOURCE, self._settings.source)
+        self._other = None if source in ours else source
+        requests = lock.state is HoldState.HELD and lock.push.release is None
+        self._contested_ticks = self._contested_ticks + 1 if self._other and requests else 0
+        if self._contested_ticks >= OVERRULED_TICKS:
+            self._overruled = True
+            lock.lapse()
+        self._overruled = self._overruled and self._other is not None and lock.driver is not None
 
     def _twist(self) -> Twist:
         push, gear = self.driver_lock.push, self.driver_lock.gear - 1

@@ -38,7 +38,8 @@ class DriverState(Struct, frozen=True):
     name: str
     hold: HoldState
     gear: int
-    overruled_by: str | None  # another source that drives instead
+    other: str | None  # another source that drives
+    overruled: bool  # by that one, during a hold
     may: bool  # false: the router drops the requests of this certificate
 
 

@@ -8,11 +8,12 @@ from msgspec import Struct
 from common.messages import SONAR_NAMES
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
+from common.verdict import RELEASE_SOURCE
 from services.safety.causes import wants_neutral
 from services.safety.config import Safety
 from services.safety.latches import Latches, Observation
 from services.safety.release import sweep
-from services.safety.state import RELEASE, State
+from services.safety.state import State
 from services.safety.zones import zones
 
 
@@ -46,7 +47,7 @@ class Planner:
     def requested(self, state: State, creeping: bool, now_ns: int) -> RequestedTwist | None:
         """Return the requested motion; a held release has priority over all sources."""
         settings = self._settings
-        source = RELEASE if creeping else state.arbiter.in_control(now_ns)
+        source = RELEASE_SOURCE if creeping else state.arbiter.in_control(now_ns)
         if source is None:
             return None
         if creeping:
@@ -131,7 +132,7 @@ def observations(
     """Yield the causes that depend on a request, present or not."""
     tick = (0, now_ns)
     faults = state.sonar_array.faults
-    creeping = requested is not None and requested.source == RELEASE
+    creeping = requested is not None and requested.source == RELEASE_SOURCE
     overruled = _overruled_text(state, requested)
     yield Observation("no_request", requested is None, tick)
     yield Observation("neutral", _neutral_is_due(state, requested), tick, overruled)
@@ -148,7 +149,7 @@ def observations(
 
 def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
     """Return whether a neutral request is due; other causes must clear first."""
-    if requested is None or requested.source == RELEASE:
+    if requested is None or requested.source == RELEASE_SOURCE:
         return False
     if any(wants_neutral(name) for name in state.latches):
         return False

@@ -25,6 +25,7 @@ from common.messages import Motion
 from common.messages import Verdict as VerdictName
 from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
+from common.verdict import RELEASE_SOURCE
 from services.safety.arbiter import Arbiter
 from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
 from services.safety.channel import Admission
@@ -45,7 +46,7 @@ from services.safety.runaway import Bounds
 from services.safety.sonar import Rules
 from services.safety.sonar_array import SonarFilter
 from services.safety.standstill import Measured, Standstill, supervisor
-from services.safety.state import RELEASE, State, Verdict
+from services.safety.state import State, Verdict
 from services.safety.stop_distance import StopDistance, stop_gauge
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
@@ -136,7 +137,7 @@ class Policy:
             trajectory = trajectory.follow(counter, inputs.mileage.received_ns)
         release = state.release
         if "contact" in state.latches:
-            moved = sent.twist if sent.source == RELEASE and sent.command is RUN else None
+            moved = sent.twist if sent.source == RELEASE_SOURCE and sent.command is RUN else None
             reach = self.planner.reach
             release = release.moving(moved, known, counter, reach=reach, dt_s=step_s, now_ns=now_ns)
         return replace(

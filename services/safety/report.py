@@ -138,11 +138,9 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         worst = ordered(after.latches)[0]
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
-    barred = any(bars_motion(name) for name in after.latches)
-    if old.source != new.source and not (new.source and barred):
-        yield Transition(
-            "source", "info", _source_text(new.source), {"from": old.source, "to": new.source}
-        )
+    was, source = _in_control(before), _in_control(after)
+    if was != source:
+        yield Transition("source", "info", _source_text(source), {"from": was, "to": source})
     long_stop = after.stop_distance.long
     if long_stop is not None and long_stop is not before.stop_distance.long:
         yield Transition("long_stop", "warning", long_stop.text, {})
@@ -166,6 +164,12 @@ def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]
         )
     elif isinstance(trigger, Hold) and not reply.done:
         yield Transition("release_refused", "warning", reply.text, {})
+
+
+def _in_control(state: State) -> str | None:
+    """Return the source that drives; none while a cause forbids every motion."""
+    barred = any(bars_motion(name) for name in state.latches)
+    return None if barred else state.verdict.source
 
 
 def _source_text(source: str | None) -> str:

@@ -16,8 +16,6 @@ from services.safety.standstill import Standstill
 from services.safety.stop_distance import StopDistance
 from services.safety.trajectory import Trajectory
 
-RELEASE = "release"  # in place of the source's name while a release moves the vehicle
-
 
 class Reply(Struct, frozen=True):
     """Answer to a reset or a release call."""

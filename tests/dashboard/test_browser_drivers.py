@@ -64,7 +64,7 @@ def other(stack: RunningStack) -> Iterator[OtherOperator]:
     yield from OtherOperator().on(stack)
 
 
-def test_a_driver_who_is_overruled_is_told_and_must_let_go(
+def test_a_driver_who_is_overruled_sees_it_and_must_let_go(
     browser: Browser, stack: RunningStack, other: OtherOperator, tmp_path: Path
 ) -> None:
     with dashboard(stack.endpoint, tmp_path, "dashboard.round_trip=1.0") as server:
@@ -116,6 +116,7 @@ def test_a_viewer_is_offered_no_stick(browser: Browser, view_only: Server) -> No
     assert page.is_visible("#view-only")
     for control in ("#take", "#stick", "#gears", "#reset"):
         assert not page.is_visible(control), control
+    page.evaluate("document.querySelector('#take').click()")
     page.keyboard.down("w")
     page.wait_for_timeout(500)
     assert "You drive" not in text(page, "#driver")

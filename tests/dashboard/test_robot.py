@@ -4,6 +4,7 @@ import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
+from common.messages import Direction
 from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
@@ -24,6 +25,7 @@ class RobotFixture:
             self.bus, Dashboard(), lambda *words: self.notices.append(words), lambda *_: None
         )
         self.now_ns = 0
+        self.release: Direction | None = None
         assert self.robot.driver_lock.take("1", force=False)
 
     def ticks(self, number: int, source: str | None, *, held: bool = True) -> None:
@@ -36,7 +38,8 @@ class RobotFixture:
             )
             lock.sent(self.now_ns, self.now_ns)
             if held:
-                lock.hold("1", self.now_ns, Push(1.0), self.now_ns)
+                push = Push(release=self.release) if self.release else Push(1.0)
+                lock.hold("1", self.now_ns, push, self.now_ns)
             else:
                 lock.let_go("1")
             self.robot.tick(self.now_ns)
@@ -46,7 +49,8 @@ class RobotFixture:
         return self.robot.driver_lock.state is HoldState.HELD
 
     def overruled_by(self) -> str | None:
-        return self.robot.driver_state({}).overruled_by
+        driver = self.robot.driver_state({})
+        return driver.other if driver.overruled else None
 
 
 @pytest.fixture
@@ -57,17 +61,18 @@ def fixture() -> RobotFixture:
 def test_who_drives(fixture: RobotFixture) -> None:
     fixture.ticks(40, "web")
     driver = fixture.robot.driver_state({"1": "Ada"})
-    assert (driver.id, driver.name, driver.overruled_by, driver.may) == ("1", "Ada", None, True)
+    assert (driver.id, driver.name, driver.other, driver.may) == ("1", "Ada", None, True)
     assert driver.hold is HoldState.HELD
 
 
 def test_a_driver_who_is_overruled_must_let_go_first(fixture: RobotFixture) -> None:
     fixture.ticks(5, "web")
     fixture.ticks(OVERRULED_TICKS - 1, "teleop")
-    assert fixture.overruled_by() == "teleop"
+    assert fixture.overruled_by() is None  # our first requests may be on their way
     assert fixture.is_held()
     fixture.ticks(1, "teleop")
     assert not fixture.is_held()
+    assert fixture.overruled_by() == "teleop"
     fixture.ticks(20, None)
     assert fixture.overruled_by() is None
     assert not fixture.is_held()
@@ -82,10 +87,17 @@ def test_a_driver_who_takes_over_is_not_overruled(fixture: RobotFixture) -> None
     assert fixture.is_held()
 
 
-def test_nobody_is_overruled_who_does_not_drive(fixture: RobotFixture) -> None:
-    fixture.robot.driver_lock.leave("1")
+def test_nobody_is_overruled_who_holds_no_control(fixture: RobotFixture) -> None:
     fixture.ticks(20, "nav", held=False)
     assert fixture.overruled_by() is None
+    assert fixture.robot.driver_state({}).other == "nav"
+
+
+def test_a_release_overrules_nobody(fixture: RobotFixture) -> None:
+    fixture.release = "backward"
+    fixture.ticks(40, "release")
+    assert fixture.is_held()
+    assert fixture.robot.driver_state({}).other is None
 
 
 def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,7 +123,7 @@ def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
     assert ticked(fixture) == []
     fixture.pressed = True
-    assert ticked(fixture) == ["contact", "stop"]
+    assert ticked(fixture) == ["contact", "stop", "source"]
     fixture.linear = 0.0
     assert ticked(fixture) == []
     fixture.left_bits = 3
@@ -153,7 +153,7 @@ def test_a_release_is_reported_when_it_begins_and_ends() -> None:
     held = Hold(True, "backward", fixture.echo)
     assert noted(fixture, held) == ["release"]
     assert noted(fixture, held) == []
-    assert noted(fixture, Hold(False)) == ["stop", "source", "release_end"]
+    assert noted(fixture, Hold(False)) == ["stop", "release_end"]
 
 
 def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:
@@ -209,6 +209,16 @@ def test_zeros_after_an_emergency_stop_are_no_control() -> None:
     fixture.request(0.0)
     assert fixture.state.verdict.source == "teleop"
     assert list(transitions(before, fixture.state, None)) == []
+
+
+def test_a_source_that_waited_for_safety_is_reported_when_it_may_drive() -> None:
+    fixture = PolicyFixture()
+    found = []
+    for _ in range(100):
+        before = fixture.state
+        fixture.drive()
+        found += [note.about["to"] for note in transitions(before, fixture.state, None)]
+    assert found.count("teleop") == 1
 
 
 def test_a_text_that_comes_again_at_once_is_a_repetition() -> None:

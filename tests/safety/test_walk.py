@@ -13,12 +13,13 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Direction
 from common.motion import STILL, Command, Twist
+from common.verdict import RELEASE_SOURCE
 from services.safety.causes import RULES, Clears
 from services.safety.inputs import Estop, Event, Hold, Reset
 from services.safety.latches import FaultBudget, Held, latched, ordered
 from services.safety.release import Release
 from services.safety.runaway import Axis
-from services.safety.state import RELEASE, State, Verdict
+from services.safety.state import State, Verdict
 from tests.safety.cause_sets import (
     AHEAD,
     BRAKING,
@@ -218,7 +219,7 @@ def check_run(case: Case, verdict: Verdict) -> None:
         assert verdict.command == "run"
         assert verdict.twist.linear > 0
     elif case.creeps:
-        assert verdict.source == RELEASE
+        assert verdict.source == RELEASE_SOURCE
         assert 0 < verdict.twist.linear * case.creeps <= 0.1
     else:
         assert verdict.twist.is_zero, case

@@ -237,6 +237,8 @@ def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(screen: Scre
         for _ in range(70):
             screen.controller.tick(screen.now_ns)
         await until(lambda: "EMERGENCY STOP NOT CONFIRMED" in screen.text_of("safety"), "it")
+        safety = screen.app.query_one("#safety", Panel)
+        await until(lambda: safety.content_size.height == 3, "the new layout")
         for name in ("safety", "motion", "around", "hints"):
             await until(partial(fits, screen, name), f"{name} to fit")
         state = safety_state(verdict="brake", latched=("estop",))

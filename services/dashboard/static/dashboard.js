@@ -171,11 +171,12 @@ function detail(safety, worst) {
   ].filter(Boolean).join(" ");
 }
 
-// The next step that safety accepts: while only the contact is latched, first off the bumper.
+// The next step: while a pressed bumper is all that is latched, a reset would be refused.
 function nextStep() {
   const safety = lost() ? null : fast.safety;
   if (!safety?.latched.length) return "";
-  return fast.bumper === true && safety.release && safety.latched.every((it) => it === "contact") ? "release" : "reset";
+  const pressed = fast.bumper === true && safety.latched.every((it) => it === "contact");
+  return pressed && safety.release ? "release" : "reset";
 }
 
 function sentence(safety, worst) {
@@ -188,7 +189,7 @@ function showHead() {
   const off = lost() || !fast.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
-  chip("driver", off ? "" : driver(), isDriver() && !fast.driver.overruled_by ? "clear" : "slow");
+  chip("driver", off ? "" : driver(), isDriver() && !fast.driver.other ? "clear" : "slow");
   const keeper = off || !hello?.keepalive ? "" : fast.keeper === hello.id ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
   const count = Object.keys(slow?.viewers ?? {}).length;
@@ -199,9 +200,10 @@ function showHead() {
 const viewerName = (name) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
 
 function driver() {
-  const { id, name, may, overruled_by: other } = fast.driver;
+  const { id, name, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
-  if (isDriver()) return other ? `${t("overruled_by")} ${other}` : t("you_drive");
+  if (isDriver() && overruled) return `${t("overruled_by")} ${other}`;
+  if (isDriver()) return other ? `${other} ${t("drives")}` : t("you_drive");
   if (id) return `${viewerName(name)} ${t("drives")}`;
   const source = fast.safety?.source;
   return source ? `${source} ${t("drives")}` : t("nobody_drives");
@@ -251,7 +253,8 @@ function stop() {
 }
 
 function reset() {
-  if (!$("reset").disabled) send({ k: "reset", n: seen() });
+  if (!isDriver()) toast("take_first");
+  else if (!$("reset").disabled) send({ k: "reset", n: seen() });
 }
 
 // The drawn snapshot: each command names the snapshot that the operator saw.

@@ -17,6 +17,7 @@ let stick = null; // { pointer, push }
 let releasing = null; // "forward" or "backward": off a pressed bumper
 let release = null; // safety's report on it, during a contact
 let driving = false; // whether this viewer has the driver lock
+let another = null; // another source that drives
 let sent = false; // whether the server has a hold from here
 
 const shaped = (raw) => {
@@ -85,12 +86,13 @@ function knob(x, y) {
 
 /** Show who drives; `driver` is null without a connection, `next` the step that safety accepts. */
 export function show(isDriver, driver, next) {
+  another = driver?.other ?? null;
   const panel = document.querySelector(".driving");
   const hold = driver?.hold ?? "free";
   panel.classList.toggle("is-driver", isDriver);
   panel.classList.toggle("view-only", driver?.may === false);
   panel.dataset.hold = hold;
-  write("hold", !isDriver ? "" : driver.overruled_by ? page.t("hold.overruled") : page.t(`hold.${hold}`));
+  write("hold", !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
   for (const name of ["leave", "lamp"]) disable($(name), !isDriver);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) disable($(name), !isDriver);
   disable($("take"), isDriver);
@@ -214,7 +216,7 @@ function listenToRelease(direction) {
 const MODIFIERS = ["Meta", "Control", "Alt"];
 const modified = (event) =>
   event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
-const typing = (event) => event.target.matches?.("input, select");
+const typing = (event) => event.target.matches?.("input");
 const spacing = (event) => event.code === "Space" && !typing(event);
 
 function keyDown(event) {
@@ -222,8 +224,9 @@ function keyDown(event) {
     event.preventDefault(); // it would press the focused button, too
     event.stopPropagation();
     letGo();
-    if (!driving && !event.repeat) page.toast("estop_key");
+    if ((!driving || another) && !event.repeat) page.toast("estop_key", "warning");
   }
+  if (typing(event) && ["Enter", "Escape"].includes(event.code)) event.target.blur();
   if (modified(event)) letGo();
   if (typing(event) || modified(event)) return;
   if (event.code === "KeyE" && !event.repeat) page.estop();

@@ -6,7 +6,8 @@ from verification.outside.course import COURSE, Findings, course
 from verification.outside.scenarios.board import NO_SWITCHES
 from verification.outside.testbed import Prepare, Result, Testbed, scenario
 
-UNSAFE = ("e-stop", "contact", "wall")  # findings that are not about availability
+SAFETY = ("e-stop", "contact", "wall")  # findings that are not about availability
+NO_CONTACT = "wall: 0 contacts"  # but it stopped far from the wall
 
 
 def packing(what: Packing) -> Prepare:
@@ -52,8 +53,11 @@ def profile_no_switch_echo(bed: Testbed) -> Result:
 )
 def profile_lossy_port(bed: Testbed) -> Result:
     found = course(bed)
-    unsafe = [text for text in found.wrong if text.startswith(UNSAFE) and "0 contacts" not in text]
-    return Findings(found.texts, unsafe).result()
+    judged = [text for text in found.texts if text.startswith(SAFETY)]
+    wrong = [text for text in found.wrong if text in judged and not text.startswith(NO_CONTACT)]
+    if not any(text.startswith(("e-stop", "contact")) for text in judged):
+        wrong.append("neither an e-stop nor a contact was tried")
+    return Findings(found.texts, wrong).result()
 
 
 @scenario(
