@@ -49,6 +49,7 @@ class Peer:
                 state.put(
                     safety_state(
                         heartbeat=now_ns,
+                        source="web",
                         latched=self.latched,
                         causes=self.causes,
                         release=self.release,

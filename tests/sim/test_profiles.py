@@ -63,7 +63,7 @@ def test_several_add_up_and_the_same_seed_gives_the_same() -> None:
         sim.after(2.0)
         runs.append(sim.datagrams)
     assert runs[0] == runs[1]
-    assert 150 < len(runs[0]) < 195  # of 200, every fifth on one port
+    assert 170 < len(runs[0]) < 200  # of 200, one of twenty on one port is lost
 
 
 def test_what_is_set_by_hand_wins_over_a_profile() -> None:
