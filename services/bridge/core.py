@@ -131,7 +131,7 @@ class Core:
 
     def _on_frame(self, part: Received, port: int, now_ns: int, out: Output) -> None:
         frame, kind = part.frame, type(part.frame)
-        news = self._is_urgent(frame, out)
+        news = kind in URGENT_KINDS and self._is_urgent(frame, out)
         if not (self._ports.takes(kind, port, now_ns) or news):
             self._counters["other_port"] += 1
             return

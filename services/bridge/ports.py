@@ -36,7 +36,7 @@ from common.wire.reports import (
 )
 
 BRAKE_REPORTS = (UltrasonicBrakeReport, BumperBrakeReport)
-URGENT_KINDS = (BumperReport, DriverReport, *BRAKE_REPORTS)
+URGENT_KINDS = frozenset((BumperReport, DriverReport, *BRAKE_REPORTS))
 UNANSWERED_NS = NS_PER_S // 2
 PERIODS = 2.5  # without a frame of its kind, until the other port is taken
 

@@ -111,4 +111,9 @@ def wants_neutral(name: str) -> bool:
 
 def bars_motion(name: str) -> bool:
     """Return whether the cause forbids every motion."""
-    return wants_neutral(name) or name == "two_publishers"
+    return name in BARRING
+
+
+BARRING = frozenset(
+    rule.name for rule in RULES if wants_neutral(rule.name) or rule.name == "two_publishers"
+)

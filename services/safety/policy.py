@@ -27,7 +27,7 @@ from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
 from common.verdict import RELEASE_SOURCE
 from services.safety.arbiter import Arbiter
-from services.safety.causes import BY_NAME, Clears, bars_motion, clears, wants_neutral
+from services.safety.causes import BARRING, BY_NAME, Clears, bars_motion, clears, wants_neutral
 from services.safety.channel import Admission
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
@@ -229,11 +229,13 @@ class Policy:
         command = COMMANDS[worst]
         if command is STOP and state.standstill.rolls:
             command = BRAKE
+        source = requested.source if requested else None
         verdict = Verdict(
             name=_name(worst, held),
             command=command,
             twist=plan.twist if command is RUN else STILL,
-            source=requested.source if requested else None,
+            source=source,
+            control=source if source and BARRING.isdisjoint(held) else None,
             acked=_acked(inputs),
             limited_by=requested.limited_by if requested else None,
         )

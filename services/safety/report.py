@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
 from common.motion import RUN, Twist
-from services.safety.causes import BY_NAME, bars_motion
+from services.safety.causes import BARRING, BY_NAME
 from services.safety.inputs import DriveRequest, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
@@ -138,9 +138,10 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         worst = ordered(after.latches)[0]
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
-    was, source = _in_control(before), _in_control(after)
-    if was != source:
-        yield Transition("source", "info", _source_text(source), {"from": was, "to": source})
+    if old.control != new.control:
+        yield Transition(
+            "source", "info", _source_text(new.control), {"from": old.control, "to": new.control}
+        )
     long_stop = after.stop_distance.long
     if long_stop is not None and long_stop is not before.stop_distance.long:
         yield Transition("long_stop", "warning", long_stop.text, {})
@@ -166,12 +167,6 @@ def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]
         yield Transition("release_refused", "warning", reply.text, {})
 
 
-def _in_control(state: State) -> str | None:
-    """Return the source that drives; none while a cause forbids every motion."""
-    barred = any(bars_motion(name) for name in state.latches)
-    return None if barred else state.verdict.source
-
-
 def _source_text(source: str | None) -> str:
     return f"{source} is in control." if source else "No source is in control."
 
@@ -193,7 +188,7 @@ def _release(policy: Policy, state: State, now_ns: int) -> Release:
 
 def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
     """Return what a drive request may reach now: nothing while a cause forbids every motion."""
-    if any(bars_motion(name) for name in state.latches):
+    if not BARRING.isdisjoint(state.latches):
         return Limits(forward=0.0, backward=0.0, angular=0.0)
     planner, settings = policy.planner, policy.settings
     distances = planner.with_overrides(state.sonar_array.cautious, state, state.verdict.source)

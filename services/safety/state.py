@@ -32,6 +32,7 @@ class Verdict(Struct, frozen=True):
     command: Command = STOP
     twist: Twist = STILL  # zero unless the command is RUN
     source: str | None = None  # the source in control, also while safety stops it
+    control: str | None = None  # the source, unless a cause forbids every motion
     acked: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
     reply: Reply | None = None  # to a reset or a hold
     refused: str = ""  # reason of a refused message, by the names in ``channel.py``
