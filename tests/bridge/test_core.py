@@ -245,3 +245,11 @@ def test_a_lamp_that_the_board_does_not_echo_is_refused(bench: Bench) -> None:
 def test_a_lamps_echo_that_nobody_waits_for_answers_nobody(bench: Bench) -> None:
     bench.arm()
     assert bench.answer(reports.LedReport(True)).answers == []
+
+
+def test_ranges_are_published_in_metres(bench: Bench) -> None:
+    bench.arm()
+    (message,) = published(
+        bench.receive(FRAMING.pack(reports.UltrasonicReport((1000, *(2500,) * 7)))), "ultrasonic"
+    )
+    assert message.ranges == (1.0, *(2.5,) * 7)
