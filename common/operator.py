@@ -16,6 +16,9 @@ RELEASING with three zeros from any phase.
 **Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. After
 ``ESTOP_TICKS`` it counts as not confirmed.
 
+**Overruled.** An operator is overruled after ``OVERRULED_TICKS`` of requests while another source
+drives. A release is no other source.
+
 **Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
 
 ======== ================================ =====================================
@@ -40,11 +43,13 @@ from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Direction, ReleaseRequest, ResetDone, ResetRequest, SafetyState
 from common.motion import STILL, Twist
+from common.verdict import RELEASE_SOURCE
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
 MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 ZEROS = 3  # requests after a drive: one may be lost
+OVERRULED_TICKS = 10  # 0.5 s: the operator's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
 NO_ECHO = (0, -1)  # boot and heartbeat before any
 
@@ -114,6 +119,25 @@ class EstopRepetition(Struct):
             return EstopStep.NONE
         self.ticks -= 1
         return EstopStep.REPEAT if self.ticks else EstopStep.LAST
+
+
+class Contest(Struct):
+    """Counts the ticks in which an operator requests motion and another source drives."""
+
+    source: str  # the operator's own
+    other: str | None = None  # the source that drives instead
+    ticks: int = 0  # in a row, with requests
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the other source overrules the operator."""
+        return self.ticks >= OVERRULED_TICKS
+
+    def tick(self, state: SafetyState | None, *, requests: bool) -> None:
+        """Count a tick; ``requests``: whether the operator requests motion in it."""
+        driving = state.source if state else None
+        self.other = None if driving in (None, RELEASE_SOURCE, self.source) else driving
+        self.ticks = self.ticks + 1 if self.other and requests else 0
 
 
 class ResetCheck:

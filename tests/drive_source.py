@@ -21,17 +21,18 @@ def stack(tmp_path: Path) -> Iterator[RunningStack]:
 
 
 class ConstantSource:
-    """A source that asks without a pause: unlike a held key, it is never let go by mistake."""
+    """A source that requests ``linear`` without a pause, until it is None."""
 
     def __init__(self, loop: Loop) -> None:
-        self.linear = 0.0
+        self.linear: float | None = 0.0  # m/s; None: no request, and no zero before
         self._loop = loop
 
     def declare(self, bus: Bus) -> None:
         source = DriveSource(bus, "teleop")
 
         def publish(_: int) -> None:
-            source.request(self.linear, 0.0)
+            if self.linear is not None:
+                source.request(self.linear, 0.0)
 
         self._loop.post(lambda: self._loop.every(0.05, publish))
 

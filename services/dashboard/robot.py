@@ -16,6 +16,7 @@ from common.keys import Call, Topic
 from common.log import Logger
 from common.motion import Twist
 from common.operator import (
+    Contest,
     DriveRequests,
     EstopRepetition,
     EstopStep,
@@ -25,7 +26,6 @@ from common.operator import (
     reset_request,
 )
 from common.source import DriveSource, KeepalivePublisher, call_release
-from common.verdict import RELEASE_SOURCE
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState
 from services.dashboard.keepalive import PageKeepalive
@@ -42,7 +42,6 @@ FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
-OVERRULED_TICKS = 10  # 0.5 s: our own requests may be on their way
 PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
 
 
@@ -68,8 +67,7 @@ class Robot:
         self._notify = notify  # to one viewer
         self._requests = DriveRequests()
         self._source = DriveSource(bus, settings.source, self._on_denied)
-        self._other: str | None = None  # another source that drives
-        self._contested_ticks = 0  # in a row, of a hold while another source drives
+        self._contest = Contest(settings.source)
         self._overruled = False  # our driver's hold has ended by that
         self._estop = EstopRepetition()
         self.keepalive = PageKeepalive(settings.estop_keepalive)
@@ -116,14 +114,17 @@ class Robot:
         return not self._source.denied
 
     def driver_state(self, names: Mapping[str, str]) -> DriverState:
-        """Return who drives; ``names`` are those of the viewers."""
+        """Return the viewer with the driver lock and the state of its hold.
+
+        ``names`` maps the ids of viewers to their names.
+        """
         lock = self.driver_lock
         return DriverState(
             id=lock.driver,
             name=names.get(lock.driver or "", ""),
             hold=lock.state,
             gear=lock.gear,
-            other=self._other,
+            other=self._contest.other,
             overruled=self._overruled,
             may=self.may_drive,
         )
@@ -191,15 +192,12 @@ class Robot:
 
     def _yield(self, safety: m.SafetyState | None) -> None:
         """End a hold while another source drives: its end must not resume our motion."""
-        lock, source = self.driver_lock, safety.source if safety else None
-        ours = (None, RELEASE_SOURCE, self._settings.source)
-        self._other = None if source in ours else source
-        requests = lock.state is HoldState.HELD and lock.push.release is None
-        self._contested_ticks = self._contested_ticks + 1 if self._other and requests else 0
-        if self._contested_ticks >= OVERRULED_TICKS:
+        lock, contest = self.driver_lock, self._contest
+        contest.tick(safety, requests=lock.state is HoldState.HELD and lock.push.release is None)
+        if contest.is_lost:
             self._overruled = True
             lock.lapse()
-        self._overruled = self._overruled and self._other is not None and lock.driver is not None
+        self._overruled = self._overruled and bool(contest.other and lock.driver)
 
     def _twist(self) -> Twist:
         push, gear = self.driver_lock.push, self.driver_lock.gear - 1

@@ -11,10 +11,9 @@ from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.messages import Event, SafetyState
 from common.motion import Twist
-from common.operator import EstopRepetition, EstopStep
+from common.operator import Contest, EstopRepetition, EstopStep
 from common.service import Node
 from common.source import DriveSource
-from common.verdict import RELEASE_SOURCE
 from services.teleop.config import TeleopConfig
 from services.teleop.controls import DIRECTIONS, RELEASE, STOP, Controls, Deflection, Stick, twist
 from services.teleop.event_log import EventLog
@@ -27,7 +26,6 @@ from services.teleop.view import LatestTopic, View
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
 MAX_PRESS_AGE_S = 0.5  # an older press is ignored, except a stop
-OVERRULED_TICKS = 10  # 0.5 s: our own requests may be on their way
 LINES = 100  # of the event log, to scroll through
 UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
 ESTOP, RESET = "e", "r"
@@ -56,7 +54,7 @@ class Controller:
         self._dropped_ns: int | None = None  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before the first state of safety
         self._estop = EstopRepetition()
-        self._contested_ticks = 0  # in a row
+        self._contest = Contest(self._settings.source)
         self._unconfirmed = False  # whether safety never showed our emergency stop
         self._source = DriveSource(bus, self._settings.source, self._report_denied)
         self._safety = LatestTopic(bus, keys.SAFETY, FAST_S)
@@ -129,7 +127,7 @@ class Controller:
         self._check_terminal(now_ns)
         self._repeat_estop(now_ns)
         self._drive(now_ns)
-        self._check_overruled(self._safety.at(now_ns))
+        self._contest.tick(self._safety.at(now_ns), requests=self._requested is not None)
         self._calls.release(self._controls.released(now_ns), self._safety.at(now_ns))
         self._calls.check_reset(self._safety.at(now_ns), now_ns)
         self.view = self._make_view(now_ns)
@@ -222,16 +220,9 @@ class Controller:
             return "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch"
         if self._source.denied:
             return "VIEW ONLY: this certificate may not drive"
-        if self._contested_ticks >= OVERRULED_TICKS and state:
-            return f"OVERRULED by {state.source}: release the controls"
+        if self._contest.is_lost:
+            return f"OVERRULED by {self._contest.other}: release the controls"
         return ""
-
-    def _check_overruled(self, state: SafetyState | None) -> None:
-        """Count the ticks in which we request and another source drives."""
-        other = state.source if state else None
-        contested = other not in (None, RELEASE_SOURCE, self._source.name)
-        requests = self._requested is not None
-        self._contested_ticks = self._contested_ticks + 1 if contested and requests else 0
 
     def _make_view(self, now_ns: int) -> View:
         controls, state = self._controls, self._safety.at(now_ns)

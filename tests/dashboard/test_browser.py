@@ -8,7 +8,7 @@ from playwright.sync_api import Browser, Page
 from sim.requests import Driver
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_page import (
-    CHROMIUM,
+    BROWSER_MARKS,
     center_of,
     drive_until_moving,
     open_page,
@@ -21,11 +21,7 @@ from verification.harness.dashboard_page import (
 )
 from verification.harness.stack import RunningStack, running_stack
 
-# Alone: a browser on a busy host answers so late that the hold lapses.
-pytestmark = [
-    pytest.mark.timed,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
-]
+pytestmark = BROWSER_MARKS
 
 
 @pytest.fixture(scope="module")

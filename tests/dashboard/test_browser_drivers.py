@@ -1,4 +1,4 @@
-"""Who may drive and who drives instead, shown in a real browser."""
+"""A driver who is overruled and a viewer without permission, in a real browser."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,15 +6,14 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from common.bus.bus import Bus
 from common.loop import Loop
-from common.source import DriveSource
 from tests.dashboard.bus_fixture import Peer
+from tests.drive_source import ConstantSource
 from verification.harness.bus import at, bus_on, joined, running
 from verification.harness.certificates import Site
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_page import (
-    CHROMIUM,
+    BROWSER_MARKS,
     drive_until_moving,
     open_page,
     take_control,
@@ -25,11 +24,7 @@ from verification.harness.dashboard_page import (
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
-pytestmark = [
-    pytest.mark.timed,
-    pytest.mark.campaign,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
-]
+pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
 
 
 @pytest.fixture
@@ -38,34 +33,18 @@ def stack(tmp_path: Path) -> Iterator[RunningStack]:
         yield it
 
 
-class OtherOperator:
-    """A source of the highest priority that requests the same motion until it is None."""
-
-    def __init__(self) -> None:
-        self.linear: float | None = None
-        self._loop = Loop()
-
-    def declare(self, bus: Bus) -> None:
-        source = DriveSource(bus, "teleop")
-
-        def publish(_: int) -> None:
-            if self.linear is not None:
-                source.request(self.linear, 0.0)
-
-        self._loop.post(lambda: self._loop.every(0.05, publish))
-
-    def on(self, stack: RunningStack) -> Iterator["OtherOperator"]:
-        with running(self._loop), bus_on(stack.endpoint, self._loop, self.declare):
-            yield self
-
-
 @pytest.fixture
-def other(stack: RunningStack) -> Iterator[OtherOperator]:
-    yield from OtherOperator().on(stack)
+def other(stack: RunningStack) -> Iterator[ConstantSource]:
+    """A silent source of the highest priority."""
+    with running(Loop()) as loop:
+        source = ConstantSource(loop)
+        source.linear = None
+        with bus_on(stack.endpoint, loop, source.declare):
+            yield source
 
 
 def test_a_driver_who_is_overruled_sees_it_and_must_let_go(
-    browser: Browser, stack: RunningStack, other: OtherOperator, tmp_path: Path
+    browser: Browser, stack: RunningStack, other: ConstantSource, tmp_path: Path
 ) -> None:
     with dashboard(stack.endpoint, tmp_path, "dashboard.round_trip=1.0") as server:
         page = browser.new_page(locale="en-GB")

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 from sim.requests import Bumper
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_page import (
-    CHROMIUM,
+    BROWSER_MARKS,
     open_page,
     reset_all,
     take_control,
@@ -18,11 +18,7 @@ from verification.harness.dashboard_page import (
 )
 from verification.harness.stack import RunningStack, running_stack
 
-pytestmark = [
-    pytest.mark.timed,
-    pytest.mark.campaign,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
-]
+pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
 
 SCREENS = (
     (1920, 1080), (1440, 900), (1280, 720), (1024, 700), (820, 1180), (844, 390), (390, 844),

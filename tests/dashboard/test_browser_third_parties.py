@@ -12,18 +12,14 @@ from common.source import LimitPublisher
 from verification.harness.bus import bus_on, running
 from verification.harness.dashboard import dashboard
 from verification.harness.dashboard_page import (
-    CHROMIUM,
+    BROWSER_MARKS,
     reset_all,
     take_control,
     wait_for_text,
 )
 from verification.harness.stack import RunningStack, running_stack
 
-pytestmark = [
-    pytest.mark.timed,
-    pytest.mark.campaign,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
-]
+pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
 
 SETS = ('safety.limits.lidar={lease=1.0, silence="ignore"}', 'safety.estop_keepalive=["web"]')
 

@@ -1,14 +1,15 @@
-"""One robot's driver on the dashboard: who drives instead, and who may not drive."""
+"""The driver of one robot on the dashboard: overruled by another source, or without permission."""
 
 import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
 from common.messages import Direction
+from common.operator import OVERRULED_TICKS
 from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
-from services.dashboard.robot import OVERRULED_TICKS, Robot
+from services.dashboard.robot import Robot
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 

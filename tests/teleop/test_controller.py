@@ -6,8 +6,7 @@ from common import keys
 from common.bus.publisher import Publisher
 from common.messages import Bumper, Driver, Event, Velocity
 from common.motion import Twist
-from common.operator import ESTOP_TICKS
-from services.teleop.controller import OVERRULED_TICKS
+from common.operator import ESTOP_TICKS, OVERRULED_TICKS
 from services.teleop.controls import Deflection, Stick
 from tests.factories import link, safety_state
 from tests.teleop.support import FakeGamepad, Operator

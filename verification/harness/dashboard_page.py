@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, ViewportSize
 
 from verification.harness.dashboard import Server
@@ -10,6 +11,11 @@ from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+# Alone: a browser on a busy host answers so late that the hold lapses.
+BROWSER_MARKS = [
+    pytest.mark.timed,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed"),
+]
 PHONE: ViewportSize = {"width": 390, "height": 844}
 STILL_MPS = 0.005
 

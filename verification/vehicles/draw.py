@@ -89,7 +89,8 @@ def ranges() -> tuple[Range, ...]:
 def draw(seed: int, *, faulty: bool | None = None) -> Draw:
     """Draw the parameters of a run; every second one has faults by default.
 
-    Each parameter has its own random numbers: a new range changes no other parameter of a seed.
+    Each parameter has its own random numbers, so a new range without a fault changes no other
+    parameter of a seed.
     """
     chance = random.Random(seed)
     if faulty is None:

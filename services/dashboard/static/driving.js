@@ -84,7 +84,7 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
-/** Show who drives; `driver` is null without a connection, `next` the step that safety accepts. */
+/** Update the driving panel. `driver` is null without a connection; `next` is the next step after a stop. */
 export function show(isDriver, driver, next) {
   another = driver?.other ?? null;
   const panel = document.querySelector(".driving");

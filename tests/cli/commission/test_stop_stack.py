@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from common.bus.bus import Bus
 from common.loop import Loop
-from common.source import DriveSource
 from tests.cli.processes import ran, sets
+from tests.drive_source import ConstantSource
 from tests.recorder.make import recorder
 from verification.harness.bus import bus_on, running
 from verification.harness.stack import RunningStack, running_stack
@@ -30,24 +29,8 @@ def stack(tmp_path: Path) -> Iterator[RunningStack]:
         yield it
 
 
-class SilentSource:
-    """A source whose requests end without a zero: safety commands STOP from the full speed."""
-
-    def __init__(self, loop: Loop) -> None:
-        self.linear: float | None = None  # None: silent
-        self._loop = loop
-
-    def declare(self, bus: Bus) -> None:
-        source = DriveSource(bus, "teleop")
-
-        def publish(_: int) -> None:
-            if self.linear is not None:
-                source.request(self.linear, 0.0)
-
-        self._loop.post(lambda: self._loop.every(0.05, publish))
-
-
-def stop_from(stack: RunningStack, source: SilentSource, speed: float) -> None:
+def stop_from(stack: RunningStack, source: ConstantSource, speed: float) -> None:
+    """Drive at the speed, then end the requests without a zero: safety commands STOP."""
     source.linear = 0.0
     count = len(stack.trace().commands)
     wait_until(lambda: "run" in {c.kind for c in stack.trace().commands[count:]}, "a neutral")
@@ -62,7 +45,7 @@ def stop_from(stack: RunningStack, source: SilentSource, speed: float) -> None:
 def test_stops_that_are_longer_than_reckoned(stack: RunningStack, tmp_path: Path) -> None:
     folder = tmp_path / "recordings"
     with recorder(stack, folder) as process, running(Loop()) as loop:
-        source = SilentSource(loop)
+        source = ConstantSource(loop)
         with bus_on(stack.endpoint, loop, source.declare):
             for speed in SPEEDS:
                 for direction in (1, -1):

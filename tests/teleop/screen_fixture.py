@@ -1,0 +1,98 @@
+"""A screen with a real controller on a bus that never opens, and a clock of the test."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from textual.pilot import Pilot
+
+from common import keys
+from common.bus.subscriber import Post
+from common.freshness import NS_PER_S
+from services.teleop.app import Panel
+from services.teleop.config import Teleop
+from services.teleop.controller import Controller
+from tests.factories import contact_state
+from tests.teleop.support import FakeNode, answer
+from verification.harness.teleop_app import LocalTerminalApp
+from verification.harness.waiting import PATIENCE_S
+
+
+class Screen:
+    """A node with its controller and screen."""
+
+    def __init__(self) -> None:
+        self.node = FakeNode()
+        self.controller = Controller(self.node, self.node.event_log)
+        self.ended = False
+        self.now_ns = 100 * NS_PER_S
+        post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the controller's here
+        self.app = LocalTerminalApp(
+            self.controller, post, lambda: self.ended, Teleop(), lambda: self.now_ns
+        )
+        # Independent of the time that this host takes to deliver a key.
+        self.app._received_ns = lambda event: self.now_ns  # type: ignore[method-assign]
+
+    def speeds(self, count: int) -> list[float]:
+        """Run the controller's ticks and return the requested speeds in order."""
+        sent = []
+        for _ in range(count):
+            before, _ = self.node.requests
+            self.answer()
+            self.controller.tick(self.now_ns)
+            self.now_ns += NS_PER_S // 20
+            after, last = self.node.requests
+            if after > before and last is not None:
+                sent.append(last.linear)
+        return sent
+
+    def answer(self) -> None:
+        """Simulate a fast terminal, so that keys that the host delayed count."""
+        for ago in range(10, 0, -1):
+            answer(self.controller, self.now_ns - ago * NS_PER_S // 20)
+
+    def text_of(self, name: str) -> str:
+        """Return the text of a panel; empty before it exists."""
+        panels = self.app.query(Panel).filter(f"#{name}")
+        return "".join(panel.shown.plain for panel in panels if panel.shown)
+
+    @asynccontextmanager
+    async def shown(self, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[None]]:
+        async with self.app.run_test(size=size) as pilot:
+            self.answer()
+            yield pilot
+
+
+def play(screen: Screen, act: Callable[[Pilot[None]], Awaitable[None]], *size: int) -> None:
+    """Run the screen while ``act`` lasts."""
+
+    async def main() -> None:
+        async with screen.shown((size[0], size[1]) if size else (80, 24)) as pilot:
+            await act(pilot)
+
+    asyncio.run(main())
+
+
+async def until(true: Callable[[], object], what: str) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not true():
+        assert time.monotonic() < deadline, f"waited for: {what}"
+        await asyncio.sleep(0.01)
+
+
+def tell_contact(screen: Screen) -> None:
+    """Simulate a pressed bumper in safety's state."""
+    screen.node.fake.deliver(keys.SAFETY, contact_state(), screen.now_ns)
+    screen.controller.tick(screen.now_ns)
+
+
+def fits(screen: Screen, name: str) -> bool:
+    """Return whether a panel is shown without clipping."""
+    panel, lines = screen.app.query_one(f"#{name}", Panel), screen.text_of(name).split("\n")
+    room = panel.content_size
+    return (
+        screen.app.screen.region.contains_region(panel.region)
+        and len(lines) <= room.height
+        and max(map(len, lines)) <= room.width
+    )
