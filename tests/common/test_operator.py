@@ -13,9 +13,7 @@ from common.operator import (
     CONFIRM_S,
     ESTOP_TICKS,
     MAX_CALL_AGE_NS,
-    OVERRULED_TICKS,
     ZEROS,
-    Contest,
     DriveRequests,
     Echoes,
     EstopRepetition,
@@ -289,32 +287,3 @@ def test_an_echo_may_be_slightly_ahead_of_the_newest_state() -> None:
     assert echoes.refusal(7 + AHEAD, 100) == ""
     assert "unknown" in echoes.refusal(8 + AHEAD, 100)
     assert "allowed is 1 s" in echoes.refusal(8, 101 + MAX_CALL_AGE_NS)  # safety is silent now
-
-
-def driven_by(source: str | None) -> SafetyState:
-    return structs.replace(AFTER, source=source)
-
-
-def test_an_operator_is_overruled_after_half_a_second_of_requests() -> None:
-    contest = Contest("web")
-    for count in range(OVERRULED_TICKS):
-        assert (contest.ticks, contest.is_lost) == (count, False)
-        contest.tick(driven_by("teleop"), requests=True)
-    assert contest.is_lost
-    assert contest.other == "teleop"
-    contest.tick(driven_by("teleop"), requests=False)
-    assert (contest.other, contest.ticks) == ("teleop", 0)
-
-
-@pytest.mark.parametrize("source", [None, "web", "release"])
-def test_no_other_source_overrules(source: str | None) -> None:
-    contest = Contest("web")
-    contest.tick(driven_by("nav"), requests=True)
-    contest.tick(driven_by(source), requests=True)
-    assert (contest.other, contest.ticks) == (None, 0)
-
-
-def test_without_a_state_nobody_is_overruled() -> None:
-    contest = Contest("web", "nav", OVERRULED_TICKS)
-    contest.tick(None, requests=True)
-    assert (contest.other, contest.ticks) == (None, 0)

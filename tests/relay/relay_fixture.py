@@ -1,6 +1,7 @@
 """A copy of the relay as a process on a machine without T2, with plain sockets on both sides."""
 
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -33,8 +34,10 @@ class RunningRelay:
 
     def command(self) -> list[str]:
         """Return the command, without site packages and environment."""
+        # docs/relay.md: the tests with the oldest Python that the relay runs on.
+        python = os.environ.get("T2_RELAY_PYTHON", sys.executable)
         return [
-            sys.executable, "-S", "-E", "-s", "-m", "relay", "--pc", PC, "--pc-side", PC_SIDE,
+            python, "-S", "-E", "-s", "-m", "relay", "--pc", PC, "--pc-side", PC_SIDE,
             "--board", BOARD, "--board-side", BOARD_SIDE, "--board-port", str(self.board_port),
             "--ports", *map(str, self.ports), "--report-port", str(self.report_port),
         ]  # fmt: skip

@@ -22,6 +22,11 @@ def test_the_check_value_and_the_brake_are_those_of_the_wire() -> None:
     assert FRAMING.pack(MotionCommand(MotionKind.BREAK)) == wire.BRAKE
 
 
+def test_a_frame_is_that_of_the_bridge() -> None:
+    assert wire.frame(wire.BUMPER, b"\1") == HIT
+    assert wire.frame(wire.MOTION, STOP[8:]) == STOP
+
+
 @given(st.binary(max_size=40))
 def test_the_crc_is_that_of_the_bridge(payload: bytes) -> None:
     assert wire.crc16(payload) == Framing()._checksum(payload)
@@ -40,6 +45,8 @@ def test_the_crc_is_that_of_the_bridge(payload: bytes) -> None:
         (RUN + bytes(8), None),
         (QUERY[:7], None),
         (b"X" + RUN[1:], None),
+        (b"XS" + QUERY[2:], None),
+        (RUN + QUERY + STOP + QUERY + RUN, [RUN[8:], STOP[8:], RUN[8:]]),
         (RUN[:6] + b"\0\0" + RUN[8:], None),
         (wire.frame(wire.MOTION, b"\1\0\0\0"), None),
         (wire.frame(0x7503, RUN), None),
@@ -94,6 +101,7 @@ def test_what_is_neutral(motion: bytes, neutral: bool) -> None:
         (HIT, [True]),
         (wire.frame(wire.BUMPER, b"\xff"), [True]),
         (QUERY + CLEAR + b"junk" + HIT, [False, True]),
+        (HIT + CLEAR + HIT, [True, False, True]),
         (HIT[:6] + HIT, [True]),
         (HIT[:-1], []),
         (HIT[:-1] + b"\0", []),  # its CRC is of a hit

@@ -70,7 +70,7 @@ def test_a_run_without_an_end_is_ended_with_all_stacks(
 ) -> None:
     monkeypatch.setenv("T2_TESTS_LONGEST", "15")
     hangs = "import time\ndef test_hangs():\n    time.sleep(60)\n"
-    done = run(tmp_path, hangs, "-n", "2", "-o", "faulthandler_timeout=0")
+    done = run(tmp_path, hangs, "-n", "1", "-o", "faulthandler_timeout=0")
     assert done.returncode == FAILED_BY_TIME
     assert "not finished after 15 s" in done.stdout
     assert "in test_hangs" in done.stderr

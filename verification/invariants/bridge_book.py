@@ -1,7 +1,7 @@
 """Oracle's book on one bridge: messages delivered to it, and the RUN frames they permit."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
 from common.messages import Motion
@@ -25,11 +25,13 @@ class BridgeBook:
     seq: int = 0
     renewed_ns: int = 0
     neutral: bool = False
-    clear: int = CLEAR_SAMPLES  # samples in a row
+    # Clear samples in a row, and the time of the newest sample, by port: a board may answer on
+    # both, and a copy is no second sample.
+    clear: dict[int, tuple[int, int]] = field(default_factory=dict)
     published: int = 0  # bumper samples
     brake_due: bool = False  # whether a hit was delivered and no BRAKE has been sent yet
 
-    def on_report(self, frame: Frame, now_ns: int) -> bool:
+    def on_report(self, frame: Frame, port: int, now_ns: int) -> bool:
         """Record a frame of the board; return whether a hit begins with it."""
         if self.heard_ns is None or now_ns - self.heard_ns > SILENCE_NS + SLACK_NS:
             self.ultrasonic = self.bumper = None
@@ -40,14 +42,21 @@ class BridgeBook:
         elif isinstance(frame, r.BumperBrakeReport):
             self.bumper = frame.on
         elif isinstance(frame, r.BumperReport):
-            return self._on_bumper(frame.on)
+            return self._on_bumper(frame.on, port, now_ns)
         if not (self.ultrasonic and self.bumper):
             self.neutral = False
         return False
 
-    def _on_bumper(self, pressed: bool) -> bool:
-        hit = pressed and self.clear >= CLEAR_SAMPLES
-        self.clear = 0 if pressed else self.clear + 1
+    def _on_bumper(self, pressed: bool, port: int, now_ns: int) -> bool:
+        count, _ = self.clear.get(port, (0, now_ns))
+        if not pressed:
+            self.clear[port] = count + 1, now_ns
+            return False
+        counts = self.clear.values()
+        newest = [clear for clear, at_ns in counts if now_ns - at_ns <= SILENCE_NS]
+        hit = all(clear >= CLEAR_SAMPLES for clear in newest or [clear for clear, _ in counts])
+        self.clear = {each: (0, at_ns) for each, (_, at_ns) in self.clear.items()}
+        self.clear[port] = 0, now_ns
         self.brake_due = self.brake_due or hit
         return hit
 

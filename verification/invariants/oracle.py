@@ -113,11 +113,11 @@ class Oracle(Watch):
         if not any(trip.name == "contact" for trip in self._held_by(book.boot)):
             self.trip("contact", book.boot)
 
-    def on_report(self, process: Process, frames: Iterable[Frame]) -> None:
-        """Record frames of the board before the bridge handles them."""
+    def on_report(self, process: Process, frames: Iterable[Frame], port: int) -> None:
+        """Record frames of the board, on this port, before the bridge handles them."""
         bridge_book = self.bridge_books[process.boot]
         for frame in frames:
-            if bridge_book.on_report(frame, self.now_ns):
+            if bridge_book.on_report(frame, port, self.now_ns):
                 self.trip(
                     "contact", bridge_book.boot, (bridge_book.boot, bridge_book.published + 1)
                 )

@@ -35,7 +35,7 @@ class Sockets:
                 datagram = inbox.popleft()
                 parts = self._framing.read(datagram, FROM_BOARD)
                 frames = [part.frame for part in parts if isinstance(part, Received)]
-                self._stack.oracle.on_report(self._process, frames)
+                self._stack.oracle.on_report(self._process, frames, port)
                 yield port, datagram, [], self._stack.net.now_ns
 
     def receipt(self, _: Ancillary, read_ns: int) -> Receipt:

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from verification.systemd.checks import CHECKS
-from verification.systemd.machine import Machine, booted, lacking
+from verification.systemd.machine import Machine, booted, image, lacking
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = {"bookworm": "3.11", "trixie": "3.13"}  # what Debian has
@@ -26,7 +26,8 @@ def main() -> int:
         ["make", "--silent", "wheelhouse", f"WHEEL_PYTHON={PYTHONS[options.suite]}"],
         cwd=ROOT, check=True,
     )  # fmt: skip
-    with booted(options.suite, ROOT / "build" / "wheelhouse") as machine:
+    wheelhouse = f"{ROOT / 'build' / 'wheelhouse'}:/wheelhouse:ro"
+    with booted(image(options.suite), "--volume", wheelhouse) as machine:
         print(machine.run("systemctl", "--version").splitlines()[0], "on", options.suite)
         return run_checks(machine, options.stay)
 

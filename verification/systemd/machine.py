@@ -57,10 +57,16 @@ def image(suite: str) -> str:
             ["debootstrap", "--variant=minbase", f"--include={PACKAGES}", suite, root],
             check=True, stdout=subprocess.DEVNULL,
         )  # fmt: skip
-        archive = Path(folder) / "root.tar"
-        subprocess.run(["tar", "-C", root, "-cf", archive, "."], check=True)
-        subprocess.run(["docker", "import", archive, name], check=True, stdout=subprocess.DEVNULL)
+        import_root(root, name)
     return name
+
+
+def import_root(root: Path, name: str) -> None:
+    """Make an image of a root file system."""
+    archive = root.with_suffix(".tar")
+    subprocess.run(["tar", "-C", root, "-cf", archive, "."], check=True)
+    subprocess.run(["docker", "import", archive, name], check=True, stdout=subprocess.DEVNULL)
+    archive.unlink()
 
 
 class Machine:
@@ -93,6 +99,12 @@ class Machine:
         """Copy a folder to a path that does not exist yet."""
         subprocess.run(["docker", "cp", "--quiet", folder, f"{self.name}:{to}"], check=True)
 
+    def pid(self) -> str:
+        """Return the process id of its systemd on this host."""
+        words = ["docker", "inspect", "--format", "{{.State.Pid}}", self.name]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
     def unit(self, name: str) -> dict[str, str]:
         """Return the properties of a unit."""
         lines = self.run("systemctl", "show", name).splitlines()
@@ -116,14 +128,13 @@ class Machine:
 
 
 @contextmanager
-def booted(suite: str, wheelhouse: Path) -> Iterator[Machine]:
-    """Run a computer with the wheelhouse in /wheelhouse."""
+def booted(image: str, *options: str) -> Iterator[Machine]:
+    """Run a computer from an image, with further options of ``docker run``."""
     name = f"{IMAGE}-{os.getpid()}"
     command = [
         "docker", "run", "--detach", "--name", name, *RIGHTS, "--network", "none",
-        "--tmpfs", "/run", "--tmpfs", "/tmp",
-        "--volume", f"{wheelhouse}:/wheelhouse:ro",
-        image(suite), "/bin/sh", "-c", BOOT.replace("NAME", name),
+        "--tmpfs", "/run", "--tmpfs", "/tmp", *options,
+        image, "/bin/sh", "-c", BOOT.replace("NAME", name),
     ]  # fmt: skip
     try:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
