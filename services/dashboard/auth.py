@@ -1,7 +1,8 @@
 """Authentication middleware of the web server: valid credentials, or the token page.
 
 Every response carries the headers that exclude other pages and scripts. It also closes its
-connection: a connection serves one request within one deadline.
+connection: a connection serves one request within one deadline, or each part of a download within
+one.
 """
 
 import asyncio
@@ -11,7 +12,7 @@ import html
 from collections.abc import Callable
 from pathlib import Path
 from string import Template
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
@@ -19,6 +20,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, RedirectRespons
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from services.dashboard.admission import Place
+from services.dashboard.config import Dashboard
 from services.dashboard.credentials import COOKIE, Credentials
 from services.dashboard.i18n import TEXTS
 from services.dashboard.listener import Connection
@@ -32,9 +34,6 @@ TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encodin
 STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
-    f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self'; base-uri 'none'; "
-    "form-action 'self'; frame-ancestors 'none'",
     "x-frame-options": "DENY",
     "x-content-type-options": "nosniff",
     "referrer-policy": "same-origin",
@@ -44,6 +43,9 @@ HEADERS = {
     "connection": "close",
 }
 
+# Responses that may take longer than a request.
+LONG = "/recordings/"
+
 FindConnection = Callable[[tuple[str, int] | None], Connection | None]
 
 
@@ -51,18 +53,20 @@ class AuthMiddleware:
     """Passes requests with valid credentials to the application."""
 
     def __init__(
-        self, app: ASGIApp, credentials: Credentials, find: FindConnection, secure: bool
+        self, app: ASGIApp, credentials: Credentials, find: FindConnection, settings: Dashboard
     ) -> None:
         self.app = app
+        self._policy = content_policy(settings.camera, settings.embed)
         self._credentials = credentials
         self._find = find
-        self._secure = secure
+        self._secure = bool(settings.certificate)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or WebSocket."""
         connection = self._find(scope["client"])
         answer = await self._answer(connection, scope, receive)
-        await answer(scope, receive, _with_headers(connection, send))
+        is_long = answer is self.app and scope["path"].startswith(LONG)
+        await answer(scope, receive, self._with_headers(connection, send, is_long))
 
     async def _answer(
         self, connection: Connection | None, scope: Scope, receive: Receive
@@ -107,18 +111,40 @@ class AuthMiddleware:
                 return ""
         return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
 
+    def _with_headers(self, connection: Connection | None, send: Send, is_long: bool) -> Send:
+        """Return ``send`` with the response headers.
 
-def _with_headers(connection: Connection | None, send: Send) -> Send:
-    """Return ``send`` with the response headers; an accepted WebSocket has no deadline."""
+        A WebSocket has no deadline. A long response renews it with each part.
+        """
 
-    async def send_with_headers(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).update(HEADERS)
-        elif message["type"] == "websocket.accept" and connection is not None:
-            connection.lift_deadline()
-        await send(message)
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers.update(HEADERS)
+                headers.setdefault("content-security-policy", self._policy)
+            elif message["type"] == "websocket.accept" and connection is not None:
+                connection.lift_deadline()
+            await send(message)  # until the client has taken the part
+            if is_long and connection is not None and message.get("more_body"):
+                connection.renew_deadline()
 
-    return send_with_headers
+        return send_with_headers
+
+
+def content_policy(camera: str, embed: str) -> str:
+    """Return the policy of the page; only the origins of these two URLs may be shown in it."""
+    frames = _origin(embed) or "'none'"
+    return (
+        "default-src 'none'; script-src 'self'; connect-src 'self'; "
+        f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self' {_origin(camera)}; "
+        f"frame-src {frames}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+def _origin(url: str) -> str:
+    """Return scheme, host and port of a URL; empty for none."""
+    parts = urlsplit(url)
+    return f"{parts.scheme}://{parts.netloc}" if url else ""
 
 
 async def _close(_: Scope, __: Receive, send: Send) -> None:

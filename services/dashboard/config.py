@@ -8,6 +8,10 @@ from msgspec import Meta
 from common import settings
 
 Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
+# Its origin is part of a Content-Security-Policy: no separator of that may occur.
+Url = Annotated[
+    str, Meta(pattern=r"^(https?://[A-Za-z0-9._-]+(:[0-9]{1,5})?(/[^\s\"'<>;,\\]*)?)?\Z")
+]
 GEARS = 5
 
 
@@ -28,6 +32,11 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "web"
     # A name in safety.estop_keepalive that an open and visible page keeps alive; empty: none.
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
+    # The URL of an MJPEG stream, and of a page in a frame; ``{robot}`` in the path is the id
+    # of the robot that is shown. Empty: none.
+    camera: Url = ""
+    embed: Url = ""
+    recordings: str = "recordings"  # the recorder's folder on this host; empty: none
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a hold with a longer one lapses

@@ -6,6 +6,7 @@ stops the server, then the loop sends its final zeros; an exception in the loop 
 
 import signal
 import ssl
+import sys
 import threading
 import time
 from pathlib import Path
@@ -89,6 +90,8 @@ class Host:
         if self._credentials.token and not settings.token_file:
             url += f"?token={self._credentials.token}"
         self._node.log.info("started", robot=self._node.config.robot.id, open=url)
+        if sys.stderr.isatty():
+            sys.stderr.write(f"\n    {url}\n\n")  # alone, so that a terminal makes it a link
 
 
 def token(settings: Dashboard) -> str:

@@ -11,6 +11,7 @@ import socket
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from services.dashboard.admission import (
@@ -36,13 +37,17 @@ COUNTERS = (
 
 
 class Connection(socket.socket):
-    """An accepted connection, with a deadline until it becomes a WebSocket."""
+    """An accepted connection, with a deadline until it becomes a WebSocket.
+
+    A download renews its deadline with each part that the client takes.
+    """
 
     def __init__(
         self, fileno: int, place: Place, counters: Counter[str], on_close: Callable[[], None]
     ) -> None:
         super().__init__(fileno=fileno)
         self.place = place
+        self.start_deadline: Callable[[], asyncio.TimerHandle] | None = None
         self.deadline: asyncio.TimerHandle | None = None
         self._counters = counters
         self._on_close = on_close
@@ -65,6 +70,12 @@ class Connection(socket.socket):
         """Cancel the deadline: the connection has become a WebSocket."""
         if self.deadline is not None:
             self.deadline.cancel()
+
+    def renew_deadline(self) -> None:
+        """Start the deadline anew."""
+        self.lift_deadline()
+        if self.start_deadline is not None:
+            self.deadline = self.start_deadline()
 
     def disconnect(self) -> None:
         """Shut down the connection in any state."""
@@ -107,9 +118,11 @@ class Listener(socket.socket):
             accepted.detach(), place, self.counters, lambda: self._forget(number, peer)
         )
         self._open[number] = self._by_peer[peer] = connection
-        connection.deadline = asyncio.get_running_loop().call_later(
-            self._request_s, self._overdue, connection
+        loop = asyncio.get_running_loop()
+        connection.start_deadline = partial(
+            loop.call_later, self._request_s, self._overdue, connection
         )
+        connection.renew_deadline()
         return connection, address
 
     def connection(self, client: tuple[str, int] | None) -> Connection | None:

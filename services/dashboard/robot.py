@@ -209,7 +209,7 @@ class Robot:
         if step is not EstopStep.NONE:
             self.bus.estop()
         if step is EstopStep.LAST:
-            self._broadcast("error", "estop_unconfirmed", "")
+            self._broadcast("error", "estop_unconfirmed" if self.may_drive else "estop_denied", "")
 
     def _check_resets(self, state: m.SafetyState | None, now_ns: int) -> None:
         """Report the resets that safety's state confirms, or does not confirm in time."""
@@ -219,7 +219,10 @@ class Robot:
             if outcome is None:
                 self._resets.append((check, text, notify))
             elif outcome:
-                notify("info", text, "reset_done")
+                if state is not None and state.latched:
+                    notify("warning", text, "reset_partial")
+                else:
+                    notify("info", text, "reset_done")
             else:
                 notify("error", "reset_unconfirmed", "")
 

@@ -1,5 +1,6 @@
 """The web server: page, E-STOP and WebSocket, in the main thread."""
 
+import html
 import json
 import re
 import socket
@@ -15,6 +16,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
 from common.errors import LinkError
+from services.dashboard import recordings
 from services.dashboard.auth import AuthMiddleware
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
@@ -47,10 +49,11 @@ def serving(
     async def tick() -> None:
         alive()
 
-    secure = bool(settings.certificate)
     return uvicorn.Server(
         uvicorn.Config(
-            AuthMiddleware(_application(robot, hub), credentials, listener.connection, secure),
+            AuthMiddleware(
+                _application(settings, robot, hub), credentials, listener.connection, settings
+            ),
             loop="asyncio",  # the listener's limits need asyncio
             http="h11",
             h11_max_incomplete_event_size=HEADER_MAX,
@@ -76,12 +79,12 @@ def serving(
     )
 
 
-def _application(robot: str, hub: WebSocketHub) -> Starlette:
+def _application(settings: Dashboard, robot: str, hub: WebSocketHub) -> Starlette:
     """Return the application behind the authentication."""
-    html, files = page(robot), assets()
+    text, files = page(settings, robot), assets()
 
     async def index(_: Request) -> Response:
-        return HTMLResponse(html)
+        return HTMLResponse(text)
 
     async def file(request: Request) -> Response:
         if (found := files.get(request.path_params["name"])) is None:
@@ -103,16 +106,21 @@ def _application(robot: str, hub: WebSocketHub) -> Starlette:
             Route("/", index),
             Route("/t2/{name}", file),
             Route("/estop/{robot}", stop, methods=["POST"]),
+            *(recordings.routes(Path(settings.recordings)) if settings.recordings else ()),
             WebSocketRoute("/live", hub.serve),
         ]
     )
 
 
-def page(robot: str) -> str:
+def page(settings: Dashboard, robot: str) -> str:
     """Return the page, which opens with this robot."""
     texts = json.dumps(table(), ensure_ascii=False).replace("<", "\\u003c")
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
-    return template.substitute(robot=robot, texts=texts)
+    camera, embed = html.escape(settings.camera), html.escape(settings.embed)
+    return template.substitute(
+        robot=robot, texts=texts, camera=camera, embed=embed,
+        recordings="yes" if settings.recordings else "",
+    )  # fmt: skip
 
 
 def assets() -> dict[str, tuple[bytes, str]]:

@@ -55,6 +55,7 @@ class Controller:
         self._unheard: int | None = None  # ticks; None before the first state of safety
         self._estop = EstopRepetition()
         self._contest = Contest(self._settings.source)
+        self._overruled_by: str | None = None  # while that source drives
         self._unconfirmed = False  # whether safety never showed our emergency stop
         self._source = DriveSource(bus, self._settings.source, self._report_denied)
         self._safety = LatestTopic(bus, keys.SAFETY, FAST_S)
@@ -127,7 +128,7 @@ class Controller:
         self._check_terminal(now_ns)
         self._repeat_estop(now_ns)
         self._drive(now_ns)
-        self._contest.tick(self._safety.at(now_ns), requests=self._requested is not None)
+        self._yield(now_ns)
         self._calls.release(self._controls.released(now_ns), self._safety.at(now_ns))
         self._calls.check_reset(self._safety.at(now_ns), now_ns)
         self.view = self._make_view(now_ns)
@@ -143,6 +144,18 @@ class Controller:
                 "s; release the deadman, then press it again"
             )
             self._node.event("gamepad_silent", "warning", text)
+
+    def _yield(self, now_ns: int) -> None:
+        """End a hold while another source drives: its end must not resume our motion."""
+        contest = self._contest
+        contest.tick(self._safety.at(now_ns), requests=self._requested is not None)
+        if contest.is_lost and contest.other:
+            self._overruled_by = contest.other
+            self._controls.cut(now_ns)
+            text = f"overruled by {contest.other}: controls released"
+            self._node.event("overruled", "warning", text)
+        elif contest.other is None and not self._controls.is_muted(now_ns):
+            self._overruled_by = None
 
     def _report_denied(self) -> None:
         text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"
@@ -183,8 +196,17 @@ class Controller:
             self._unconfirmed = False
         if step is EstopStep.LAST:
             self._unconfirmed = True
-            text = "EMERGENCY STOP NOT CONFIRMED by safety: use the vehicle's own switch"
-            self._node.event("estop_unconfirmed", "error", text)
+            self._node.event(
+                "estop_denied" if self._source.denied else "estop_unconfirmed",
+                "error",
+                self._no_estop,
+            )
+
+    @property
+    def _no_estop(self) -> str:
+        # Who may not drive may rarely stop; the router does not tell.
+        denied = ", probably not allowed" if self._source.denied else ""
+        return f"EMERGENCY STOP NOT CONFIRMED{denied}: use the vehicle's own switch"
 
     def _check_terminal(self, now_ns: int) -> None:
         """Release the keys of a terminal that has become slow: buffered presses are old."""
@@ -217,11 +239,11 @@ class Controller:
     def _alarm(self, state: SafetyState | None) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
         if self._unconfirmed:
-            return "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch"
+            return self._no_estop
         if self._source.denied:
             return "VIEW ONLY: this certificate may not drive"
-        if self._contest.is_lost:
-            return f"OVERRULED by {self._contest.other}: release the controls"
+        if self._overruled_by:
+            return f"OVERRULED by {self._overruled_by}: release the controls"
         return ""
 
     def _make_view(self, now_ns: int) -> View:

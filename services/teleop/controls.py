@@ -100,6 +100,10 @@ class Controls:
         self.mute_keys(now_ns)
         self._deadman.drop()
 
+    def is_muted(self, now_ns: int) -> bool:
+        """Return whether keys are ignored until there was a pause."""
+        return self._keys.is_muted(now_ns)
+
     def mute_keys(self, now_ns: int) -> None:
         """Release the keys; they count again after a pause without keys."""
         self._keys.mute(now_ns)

@@ -14,6 +14,7 @@ from common.settings import Log, LogLevel
 from services.teleop.view import Line
 
 CAPACITY = 100
+ANSWER_NS = 1_000_000_000  # between the answer to a call and its event
 
 
 class EventLog:
@@ -24,11 +25,19 @@ class EventLog:
         self._lock = threading.Lock()
 
     def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
-        """Append a line with its wall clock time, by default now; a repeat replaces the last."""
+        """Append a line with its wall clock time, by default now; a repeat replaces the last.
+
+        An answer of safety comes twice, to the call ("reset refused: ...") and as an event.
+        """
         line = Line(time.time_ns() if t_ns is None else t_ns, service, level, text)
         with self._lock:
-            if self._lines and replace(self._lines[-1], t_ns=line.t_ns) == line:
-                self._lines.pop()
+            last = self._lines[-1] if self._lines else None
+            if last and (last.service, last.level) == (service, level):
+                longer, shorter = sorted((last.text, text), key=len, reverse=True)
+                is_answer = shorter and abs(line.t_ns - last.t_ns) < ANSWER_NS
+                if longer == shorter or (is_answer and longer.endswith(shorter)):
+                    self._lines.pop()
+                    line = replace(line, text=longer)
             self._lines.append(line)
 
     def last(self, count: int) -> tuple[Line, ...]:

@@ -59,7 +59,7 @@ class Keys:
 
     def press(self, key: str, now_ns: int) -> None:
         """Handle a key press or its repeat; a terminal does not distinguish them."""
-        if self._muted_until_ns is not None and now_ns < self._muted_until_ns:
+        if self.is_muted(now_ns):
             self.mute(now_ns)
             return
         hold_ns = self._repeat_ns if key in self.held(now_ns) else self._first_ns
@@ -77,6 +77,10 @@ class Keys:
     def clear(self) -> None:
         """Release all keys."""
         self._until_ns.clear()
+
+    def is_muted(self, now_ns: int) -> bool:
+        """Return whether key presses are still ignored."""
+        return self._muted_until_ns is not None and now_ns < self._muted_until_ns
 
     def mute(self, now_ns: int) -> None:
         """Release all keys and ignore further ones until there was a pause."""

@@ -91,7 +91,8 @@ TLS = ("ca", "certificate", "private_key")
 def test_a_viewer_is_offered_no_stick(browser: Browser, view_only: Server) -> None:
     page = browser.new_page(locale="en-GB")
     page.goto(view_only.url)
-    wait_for_text(page, "#driver", "View only: this certificate may not drive")
+    wait_for_text(page, "#driver", "View only")
+    wait_for_text(page, "#view-only", "View only: this certificate may not drive")
     assert page.is_visible("#view-only")
     for control in ("#take", "#stick", "#gears", "#reset"):
         assert not page.is_visible(control), control

@@ -82,9 +82,14 @@ def test_every_event_has_its_text(service: str, name: str) -> None:
 def test_every_result_of_a_call_has_its_text() -> None:
     robot = (CODE / "robot.py").read_text(encoding="utf-8")
     found = re.findall(r'(?:reason|text|done\.text), "(\w+)"\)', robot)
-    assert {"reset_refused", "reset_done", "release_held", "release_refused", "call_refused"} == {
-        name for name in found if name
-    }
+    assert {
+        "reset_refused",
+        "reset_done",
+        "reset_partial",
+        "release_held",
+        "release_refused",
+        "call_refused",
+    } == {name for name in found if name}
     assert {f"event.{name}" for name in found} <= set(TEXTS)
 
 

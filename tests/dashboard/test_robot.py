@@ -5,7 +5,7 @@ import pytest
 from common import keys
 from common.bus.publisher import Publisher
 from common.messages import Direction
-from common.operator import OVERRULED_TICKS
+from common.operator import ESTOP_TICKS, OVERRULED_TICKS
 from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
@@ -101,6 +101,12 @@ def test_a_release_overrules_nobody(fixture: RobotFixture) -> None:
     assert fixture.robot.driver_state({}).other is None
 
 
+def test_an_unconfirmed_estop_is_reported(fixture: RobotFixture) -> None:
+    fixture.robot.estop("a test")
+    fixture.ticks(ESTOP_TICKS, None)
+    assert fixture.notices == [("error", "estop_unconfirmed", "")]
+
+
 def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch) -> None:
     assert fixture.robot.may_drive
     monkeypatch.setattr(Publisher, "passed_on", False)
@@ -108,3 +114,6 @@ def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.Monke
     driver = fixture.robot.driver_state({})
     assert (driver.may, driver.id) == (False, None)
     assert fixture.notices == [("error", "barred", "")]
+    fixture.robot.estop("a test")
+    fixture.ticks(ESTOP_TICKS, None)
+    assert fixture.notices[1:] == [("error", "estop_denied", "")]

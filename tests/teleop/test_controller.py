@@ -53,6 +53,20 @@ def test_an_unconfirmed_estop_is_reported(operator: Operator) -> None:
     assert "NOT CONFIRMED" in operator.lines[-1]
 
 
+def test_an_estop_that_the_router_drops_is_reported(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Publisher, "passed_on", False)
+    operator.press("e")
+    for _ in range(ESTOP_TICKS + 2):
+        operator.tell_safety()
+        operator.ticks(1)
+    assert operator.lines[-1] == (
+        "EMERGENCY STOP NOT CONFIRMED, probably not allowed: use the vehicle's own switch"
+    )
+    assert operator.controller.view.alarm == operator.lines[-1]
+
+
 def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
     operator: Operator,
 ) -> None:
@@ -182,15 +196,25 @@ def test_a_denied_operator_is_notified_once(
     ]
 
 
-def test_an_overruled_operator_sees_who_drives(operator: Operator) -> None:
+def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:
+    def hold(ticks: int, source: str | None) -> list[float | None]:
+        speeds: list[float | None] = []
+        for _ in range(ticks):
+            operator.tell_safety(source=source)
+            operator.press("w")
+            speeds += operator.speeds(1)
+        return speeds
+
     operator.tell_safety(source="web")
     operator.ticks(1)
     assert operator.controller.view.alarm == ""
-    for _ in range(2 * OVERRULED_TICKS):
-        operator.tell_safety(source="web")
-        operator.press("w")
-        operator.ticks(1)
+    assert hold(2 * OVERRULED_TICKS, "web")[-1] is None
     assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
-    operator.tell_safety(source="teleop")
-    operator.ticks(1)
+    assert set(hold(20, None)) == {None}
+    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    for _ in range(20):
+        operator.tell_safety()
+        operator.ticks(1)
     assert operator.controller.view.alarm == ""
+    assert operator.lines == ["overruled by web: controls released"]
+    assert hold(3, "teleop")[-1] == 0.2

@@ -4,7 +4,7 @@ import pytest
 
 from common.log import Logger
 from common.settings import Log
-from services.teleop.event_log import CAPACITY, EventLog
+from services.teleop.event_log import ANSWER_NS, CAPACITY, EventLog
 from services.teleop.view import Line
 
 
@@ -47,3 +47,18 @@ def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
         (3, "refused"),
         (4, "stop"),
     ]
+
+
+def test_an_answer_that_also_comes_as_an_event_is_one_line() -> None:
+    event_log = EventLog()
+    for t_ns, text in (
+        (1, "reset refused: contact"),
+        (2, "contact"),
+        (3, "reset refused: contact"),
+    ):
+        event_log.add("safety", "warning", text, t_ns)
+        event_log.add("safety", "warning", "contact", t_ns)
+    (line,) = event_log.last(9)
+    assert (line.t_ns, line.text) == (3, "reset refused: contact")
+    event_log.add("safety", "warning", "contact", 2 * ANSWER_NS)  # of another operator
+    assert [line.text for line in event_log.last(9)] == ["reset refused: contact", "contact"]

@@ -4,7 +4,9 @@ import * as driving from "./driving.js";
 import * as estop from "./estop.js";
 import * as notices from "./notices.js";
 import * as panels from "./panels.js";
+import * as slots from "./slots.js";
 import * as sonarView from "./sonar_view.js";
+import * as theme from "./theme.js";
 import * as trail from "./trail.js";
 
 const { toast, confirm } = notices;
@@ -94,6 +96,7 @@ const HANDLERS = {
     hello = message;
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
+    slots.show();
   },
   fast(message) {
     if (!hello) return;
@@ -182,7 +185,8 @@ function nextStep() {
 function sentence(safety, worst) {
   if (language === "en") return safety.text;
   if (!worst) return t("text.run");
-  return panels.causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t("reset_due") : "");
+  const next = nextStep() === "release" ? t("release_due") : t("reset_due");
+  return panels.causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? next : "");
 }
 
 function showHead() {
@@ -229,7 +233,7 @@ function showRobots() {
   if (hello && document.activeElement !== list) list.value = hello.robot;
 }
 
-// --- language, theme, commands ------------------------------------------------------------------
+// --- language, commands ------------------------------------------------------------------
 
 function showTexts() {
   document.documentElement.lang = language;
@@ -241,19 +245,14 @@ function showTexts() {
   drawn = -1;
 }
 
-function theme(name) {
-  document.documentElement.dataset.theme = name;
-  localStorage.setItem("t2.theme", name);
-  drawn = -1;
-}
-
 function stop() {
   driving.letGo();
   estop.request();
 }
 
 function reset() {
-  if (!isDriver()) toast("take_first");
+  if (!isDriver()) toast(fast?.driver.may === false ? "view_only_why" : "take_first");
+  else if (nextStep() === "release") toast("release_due", "warning");
   else if (!$("reset").disabled) send({ k: "reset", n: seen() });
 }
 
@@ -283,9 +282,7 @@ function begin() {
   on("take", () => send({ k: "take", force: false }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
-  const light = matchMedia("(prefers-color-scheme: light)").matches;
-  theme(stored("theme", light ? "light" : "dark"));
-  $("theme").onclick = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  theme.begin(() => { drawn = -1; });
   $("language").onclick = () => {
     language = language === "en" ? "zh" : "en";
     localStorage.setItem("t2.language", language);
@@ -297,7 +294,8 @@ function begin() {
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, lost, toast, robot: shown });
+  estop.begin({ send, lost, toast, robot: shown, mayDrive: () => fast?.driver.may !== false });
+  slots.begin({ t, robot: shown, isDriver });
   trail.begin([]);
   trail.listen();
   showTexts();

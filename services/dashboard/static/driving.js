@@ -159,7 +159,7 @@ export function showGear(gear, isDriver) {
 // --- input events -----------------------------------------------------------------------------
 
 const ready = () => {
-  if (!driving) page.toast("take_first");
+  if (!driving) page.toast(document.querySelector(".driving.view-only") ? "view_only_why" : "take_first");
   return driving;
 };
 

@@ -5,7 +5,7 @@ const TIMEOUT_MS = 3000;
 const POST_MS = 1000;
 const MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
 let page = null;
-let pending = null; // { robot, since }
+let pending = null; // { robot, since, mayDrive }
 
 export function begin(given) {
   page = given;
@@ -14,7 +14,7 @@ export function begin(given) {
 
 export function request() {
   if (!pending) page.toast("estop_asked", "warning");
-  pending = { robot: page.robot(), since: performance.now() };
+  pending = { robot: page.robot(), since: performance.now(), mayDrive: page.mayDrive() };
   sendStop();
 }
 
@@ -27,8 +27,8 @@ function repeat() {
   if (!pending) return;
   if (performance.now() - pending.since < TIMEOUT_MS) sendStop();
   else {
+    page.toast(pending.mayDrive ? "estop_unconfirmed" : "estop_denied", "error");
     pending = null;
-    page.toast("estop_unconfirmed", "error");
   }
 }
 
