@@ -48,6 +48,7 @@ class Observation:
     t2: str
     routers: list[str] = field(default_factory=list)  # their versions, where readable
     instances: dict[str, int] = field(default_factory=dict)  # by service, from tokens
+    others: list[str] = field(default_factory=list)  # other robots at the same router
     may_drive: bool | None = None
     may_call: bool | None = None
     health: dict[str, m.Health] = field(default_factory=dict)
@@ -64,6 +65,12 @@ class Observation:
     safety: m.SafetyState | None = None
     requests: dict[str, set[int]] = field(default_factory=dict)  # boots by source of requests
     motion: set[int] = field(default_factory=set)  # boots on @cmd/motion
+
+    def sent_hz(self, path: str) -> float:
+        """Return the rate at which a stream is sent, by its publisher's health; 0 if unknown."""
+        publisher = self.health.get(path.split("/")[1])
+        rates = publisher.rates if publisher else {}
+        return next((hz for key, hz in rates.items() if key.endswith(f"/{path}")), 0.0)
 
     def add(self, message: m.Message, name: str) -> None:
         """Keep the newest message of each type; ``name`` is the last chunk of its key."""
@@ -109,6 +116,13 @@ def router(seen: Observation) -> Iterator[Finding]:
         else:
             text = f"Zenoh {version}, on this laptop {seen.zenoh}"
             yield Finding("router", "note", text, remedies.UPDATE)
+
+
+def robot(seen: Observation, name: str) -> Iterator[Finding]:
+    """Report a robot without any service, while other robots are at the same router."""
+    if not seen.instances and seen.others:
+        text = f"no service of robot {name} is here; the router knows {', '.join(seen.others)}"
+        yield Finding("robot", "wrong", text, remedies.NO_ROBOT)
 
 
 def services(seen: Observation) -> Iterator[Finding]:

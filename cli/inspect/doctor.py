@@ -14,7 +14,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from cli.inspect import output, remedies
+from cli.inspect import diagnosis, output, remedies
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
 from cli.inspect.diagnosis import Attempt, Finding, Observation, diagnose_bus, network
 from cli.inspect.services import discover, routers
@@ -34,6 +34,7 @@ CONNECT_S = 2.0
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
+TONES = {"ok": "good", "note": "note", "wrong": "bad"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,6 +68,11 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     except LinkError:
         text = "the endpoint accepts connections but is not a router"
         yield Finding("router", "wrong", text, remedies.NOT_A_ROUTER)
+        return
+    other = list(diagnosis.robot(seen, config.robot.id))
+    if other:
+        yield from diagnosis.router(seen)
+        yield from other
         return
     yield from diagnose_bus(seen)
     yield from diagnose_vehicle(seen)
@@ -136,6 +142,9 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     listen(opened, robot, seconds, seen)
     members = discover(opened, robot)
     seen.instances = Counter(member.name for member in members if member.instance)
+    present = [chunks(token) for token in opened.alive(keys.live_key("*", "*", "*"))]
+    on_board = {name for name, path in present if path.split("/")[1] in diagnosis.NEEDED}
+    seen.others = sorted(on_board - {robot})
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))
@@ -173,5 +182,6 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
 
 def as_text(finding: Finding) -> str:
     """Return a finding as text, with its remedy on a second line."""
-    text = f"{finding.where:9} {MARKS[finding.level]:6} {output.printable(finding.text)}"
+    mark = output.painted(f"{MARKS[finding.level]:6}", TONES.get(finding.level, ""))
+    text = f"{finding.where:9} {mark} {output.printable(finding.text)}"
     return f"{text}\n{'':17}-> {finding.todo}" if finding.todo else text

@@ -6,7 +6,9 @@ know at this moment cannot be listed.
 """
 
 import argparse
+import sys
 import time
+from collections.abc import Sequence
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks
@@ -69,8 +71,11 @@ def stop(probe: Probe, robot: str) -> int:
         for sample in probe.samples(REPEAT_S):
             if any("estop" in state.latched for state in decoded([sample], SafetyState)):
                 confirmed.add(chunks(sample.key)[0])
-    report(confirmed, expected)
-    return 0 if confirmed and confirmed >= expected else 1
+    missing = sorted(expected - confirmed)
+    report(confirmed, missing)
+    if missing == [robot] and (why := why_unconfirmed(probe, robot)):
+        output.warn(f"t2 estop: {why}")
+    return 0 if confirmed and not missing else 1
 
 
 def expected_robots(probe: Probe, robot: str) -> set[str]:
@@ -81,21 +86,41 @@ def expected_robots(probe: Probe, robot: str) -> set[str]:
     return {name for name, path in tokens if path.split("/")[1] in MOVES}
 
 
-def report(confirmed: set[str], expected: set[str]) -> None:
-    """Print each stopped robot, and a warning for each robot that does not confirm."""
+def report(confirmed: set[str], missing: Sequence[str]) -> None:
+    """Print each stopped robot, and a warning for each that does not confirm."""
     for each in sorted(confirmed):
         print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` releases it.")
-    missing = sorted(expected - confirmed)
+    sys.stdout.flush()
     for each in missing:
         output.warn(
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
             f"{SWITCH}, then `t2 doctor --robot {each}`."
         )
-    if missing and len(expected) > 1:
-        count = f"{len(missing)} of {len(expected)} robots"
+    robots = len(confirmed) + len(missing)
+    if missing and robots > 1:
+        count = f"{len(missing)} of {robots} robots"
         output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
-    if not confirmed | expected:
-        output.warn("t2 estop: sent, but no robot found")
+    if not robots:
+        output.warn(
+            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
+        )
+
+
+def why_unconfirmed(probe: Probe, robot: str) -> str:
+    """Return a likely reason why a robot does not confirm; empty if none is known.
+
+    It takes up to four seconds: after the warning.
+    """
+    present = {chunks(token)[0] for token in probe.alive(keys.live_key("*", "*", "*"))}
+    if present and robot not in present:
+        return f"no service of robot {robot} is at this router; seen: {', '.join(sorted(present))}"
+    serves = probe.alive(keys.live_key(robot, "safety", "*"))
+    # Each role that may stop may also do one of these, except fleet.
+    topics = (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
+    commands = (topic.on(robot, source="*") for topic in topics)
+    if serves and not any(map(probe.has_reader, commands)):
+        return f"not allowed, as it seems: this certificate may have no right to stop robot {robot}"
+    return ""
 
 
 def _order(probe: Probe, robot: str) -> None:

@@ -5,6 +5,9 @@ answer, so a container's health check can run it often.
 """
 
 import argparse
+import itertools
+import sys
+import time
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,7 +18,7 @@ from cli.inspect.services import discover
 from cli.inspect.session import BusSession, add_options, open_session, until_interrupt, wants_json
 from common import keys
 from common.bus.probe import Answer, Probe
-from common.errors import MessageError
+from common.errors import LinkError, MessageError
 from common.messages import Health
 
 NEEDED = ("bridge", "safety", "odom")
@@ -23,6 +26,8 @@ ROUTER = "router"  # not a service of ours; it is healthy if it accepts a sessio
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
 ANSWER_S = 2.0  # a loop with longer stalls is unhealthy
 LATE_S = 0.1  # loop lateness that is reported
+PAUSE_S = 0.5  # between two rounds of --watch
+CLEAR = "\x1b[H\x1b[J"  # a terminal's screen, by ECMA-48
 HEAD = ("robot", "service", "", "version", "up", "late ms", "fifo", "MB", "messages/s", "counters")
 REASONS = {
     "hangs": "is present and publishes no health: it hangs",
@@ -46,22 +51,61 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "service", nargs="?", help="query this service only, such as safety, or the router"
     )
+    parser.add_argument("--watch", "-w", action="store_true", help="repeat until Ctrl-C")
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show health once; return 1 if a needed or the queried service is unhealthy."""
+    """Show health; return 1 if a needed or the queried service is unhealthy in the last round."""
+    if not options.watch:
+        return show(listened(options), in_json=wants_json(options))
+    code = 0
+    with until_interrupt():
+        for _ in itertools.count():
+            code = watched(options)
+            time.sleep(PAUSE_S)
+    return code
+
+
+def watched(options: argparse.Namespace) -> int:
+    """Show one round of ``--watch``; the router may be restarting."""
+    try:
+        found = listened(options)
+    except LinkError as error:
+        output.warn(f"t2 health: {error}")
+        return 1
+    if sys.stdout.isatty():
+        print(CLEAR, end="")
+    return show(found, in_json=wants_json(options))
+
+
+def listened(options: argparse.Namespace) -> list[Row]:
+    """Return the services that the options name."""
     with open_session(options) as session:
-        found = query(session, options.service) if options.service else listen_to_all(session)
-    if wants_json(options):
+        service = options.service
+        return query(session, service) if service else listen_to_all(session)
+
+
+def show(found: list[Row], *, in_json: bool) -> int:
+    """Print the services; return 1 if one is unhealthy."""
+    if in_json:
         for row in found:
             output.line(as_json(row))
     else:
-        print(output.table(HEAD, list(map(as_cells, found))))
+        head, *lines = output.table(HEAD, list(map(as_cells, found))).splitlines()
+        painted = (output.painted(line, tone(row)) for line, row in zip(lines, found, strict=True))
+        print("\n".join([head, *painted]), flush=True)
     unhealthy = [row for row in found if row.state != "ok"]
     for row in unhealthy:
         output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
     return 1 if unhealthy else 0
+
+
+def tone(row: Row) -> str:
+    """Return the tone of a service's line."""
+    if row.state != "ok":
+        return "bad"
+    return "note" if row.health and row.health.lateness > LATE_S else "good"
 
 
 def query(session: BusSession, name: str) -> list[Row]:
@@ -103,13 +147,12 @@ def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
     """Return the newest health message of each service, by robot and name."""
     newest: dict[tuple[str, str], Health] = {}
     probe.listen(keys.HEALTH.on(robot, service="*"))
-    with until_interrupt():
-        for sample in probe.samples(LISTEN_S):
-            try:
-                health = decode(sample, Health)
-                newest[chunks(sample.key)[0], health.service] = health
-            except MessageError as error:
-                output.warn(f"t2 health: {sample.key}: {error}")
+    for sample in probe.samples(LISTEN_S):
+        try:
+            health = decode(sample, Health)
+            newest[chunks(sample.key)[0], health.service] = health
+        except MessageError as error:
+            output.warn(f"t2 health: {sample.key}: {error}")
     return newest
 
 

@@ -3,6 +3,7 @@
 Every table, value and JSON line of the inspection commands is printed here.
 """
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -10,12 +11,23 @@ from typing import Any
 import msgspec
 
 Row = Mapping[str, Any]
+COLOURS = {"good": 32, "note": 33, "bad": 31}  # of a terminal, by ECMA-48
 
 
 def line(thing: object) -> None:
     """Print one JSON line."""
     sys.stdout.write(json(thing) + "\n")
     sys.stdout.flush()
+
+
+def painted(text: str, tone: str) -> str:
+    """Return a text in the colour of ``good``, ``note`` or ``bad``, if a terminal shows it.
+
+    ``NO_COLOR`` in the environment turns colours off.
+    """
+    if tone not in COLOURS or not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
+        return text
+    return f"\x1b[{COLOURS[tone]}m{text}\x1b[0m"
 
 
 def warn(text: str) -> None:

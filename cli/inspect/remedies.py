@@ -9,11 +9,15 @@ NO_NAME = "use a numeric address, or correct bus.connect"
 NO_SOCKET = "the router creates this file: start it, or correct bus.connect"
 KEYS = "`t2 keys list` shows the validity of certificates; renew it and copy its folder here again"
 NOT_A_ROUTER = "it hangs, requires TLS, or is not a router: restart it, or correct bus.connect"
+NO_ROBOT = "is it switched on, and its stack started? Otherwise correct --robot or robot.id"
 START = "on the robot: `t2 up`, or start this service; if its process exists, it hangs: kill it"
 HANGS = "kill its process; its supervisor restarts it"
 TWICE = "stop one of them: a robot has one of each; look for a second `t2 up`"
 UPDATE = "install the same version on both, and restart the robot's services"
-RIGHTS = "the router's access rules allow this laptop's certificate to read only"
+RIGHTS = (
+    "the router passes only a part of what this laptop's certificate sends; the emergency stop may "
+    "be allowed. `t2 keys list` shows its role"
+)
 BLIND = "the router's access rules do not allow this laptop to read: use another certificate"
 CLOCK = "synchronize both clocks with chrony or NTP; driving does not need it, recordings do"
 SLOW_LINK = "move closer to the access point; safety refuses requests with too high a delay"
@@ -43,6 +47,11 @@ SONAR_FAULT = "check its cable; the vehicle does not move into its sector until 
 SONAR_NEAR = "remove the object that covers it"
 DRIVER = "switch the vehicle off and on; check what the fault names; then reset"
 SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
+DOWNSAMPLED = (
+    "expected over TLS: the robot's router downsamples streams for laptops (bus.laptop_rate); "
+    "otherwise the network is too slow. The services on board receive all of it"
+)
+NOT_HERE = "the network or the router drops it: move closer to the access point; see `t2 hz`"
 ONE_DRIVER = "stop one of the two programs; `t2 services` lists them"
 LONG_STOPS = (
     "drive slowly; record stops with `t2 record`, then `t2 checkout stop RECORDING` proposes "

@@ -26,6 +26,7 @@ def diagnose_vehicle(seen: Observation) -> Iterator[Finding]:
         yield from link(seen.link, seen.first_link)
         if seen.link.state == "up":
             yield from switches(seen)
+            yield from streams(seen)
             yield from sensors(seen)
             yield from drivers(seen.drivers)
         else:
@@ -92,15 +93,32 @@ def switches(seen: Observation) -> Iterator[Finding]:
         yield Finding("switches", "ok", "both emergency brakes of the board are on")
 
 
-def sensors(seen: Observation) -> Iterator[Finding]:
-    """Report streams with a low rate, the bumper, and each sonar."""
+def streams(seen: Observation) -> Iterator[Finding]:
+    """Report streams with a low rate, by what their publisher sends and what arrives here."""
+    downsampled = []
     for topic in STREAMS:
         rate = seen.rates.get(topic.path, 0.0)
-        if rate >= ENOUGH * topic.rate_hz:
+        enough_hz = ENOUGH * topic.rate_hz
+        if rate >= enough_hz:
             continue
-        level: Level = "note" if rate else "wrong"
-        text = f"{topic.path} has {rate:.0f} of {topic.rate_hz:g} Hz"
-        yield Finding("sensors", level, text, remedies.SILENT)
+        sent_hz = seen.sent_hz(topic.path)
+        if sent_hz < enough_hz:
+            level: Level = "note" if rate else "wrong"
+            text = f"{topic.path} has {rate:.0f} of {topic.rate_hz:g} Hz"
+            yield Finding("sensors", level, text, remedies.SILENT)
+        elif rate:
+            name = topic.path.rpartition("/")[2]
+            downsampled.append(f"{name} {rate:.0f} of {sent_hz:.0f} Hz")
+        else:
+            text = f"{topic.path} is sent with {sent_hz:.0f} Hz and does not arrive here"
+            yield Finding("sensors", "wrong", text, remedies.NOT_HERE)
+    if downsampled:
+        text = f"of what the robot sends, this laptop receives a part: {', '.join(downsampled)}"
+        yield Finding("sensors", "note", text, remedies.DOWNSAMPLED)
+
+
+def sensors(seen: Observation) -> Iterator[Finding]:
+    """Report the bumper and each sonar."""
     if seen.bumper and seen.bumper.pressed:
         yield Finding("bumper", "wrong", "the bumper is pressed", remedies.BUMPER)
     elif seen.bumper:

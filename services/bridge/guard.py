@@ -154,6 +154,9 @@ class Guard:
         return child.wait()
 
     def _await_restart(self, code: int, lived_s: float) -> None:
+        if self._stopping and code == 0:
+            self._log.info("the bridge ended", exit_code=code)
+            return
         wait_s = self._backoff.after(lived_s)
         self._log.error("the bridge ended", exit_code=code, wait_s=wait_s)
         end_s = time.monotonic() + wait_s

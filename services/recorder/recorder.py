@@ -1,5 +1,6 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,7 @@ from services.recorder.writer import RecordingWriter, RollingWriter
 EVERYTHING = ("**", "@cmd/**")
 DEPTH = 10_000  # samples that may wait for a slow disk: about 20 s of a whole stack
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
+PROGRESS_S = 5.0  # on a terminal
 
 
 class Recorder:
@@ -46,6 +48,8 @@ class Recorder:
         )
         node.loop.every(FLUSH_S, self._flush)
         node.loop.every(CHECK_S, self._check_storage)
+        if self._rolling is not None and sys.stderr.isatty():
+            node.loop.every(PROGRESS_S, self._report_progress)
         node.on_exit = self._close
 
     def _on_sample(self, sample: Sample) -> None:
@@ -90,6 +94,12 @@ class Recorder:
             self._stop()
         elif not had_room and self._storage.has_room:
             self._node.event("disk_room", "info", "the disk has room again: recording continues")
+
+    def _report_progress(self, _: int) -> None:
+        """Report on a terminal that messages arrive and the file grows."""
+        if self._rolling is not None:
+            count, size = self._node.counters["recorded"], self._rolling.size / MB
+            self._node.log.info(f"{count} messages recorded, this file {size:.1f} MB")
 
     def _report_removed(self, removed: list[StoredFile]) -> None:
         self._node.counters["removed"] += len(removed)

@@ -1,6 +1,7 @@
 """The recorder on a real bus: recordings, disk errors and SIGKILL."""
 
 import errno
+import re
 import shutil
 import signal
 import subprocess
@@ -20,6 +21,7 @@ from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.messages import Event
 from common.service import Node
+from services.recorder import recorder as recorder_module
 from services.recorder.config import MB, RecorderConfig
 from services.recorder.mcap_codec import Entry
 from services.recorder.reader import Reader
@@ -271,3 +273,17 @@ def test_t2_record_completes_its_files_on_ctrl_c(buses: BusFixture, tmp_path: Pa
         assert [each for each in reader if each.kind == "Velocity"]
     assert not reader.cut
     assert reader.about["why"] == "everything"
+
+
+def test_a_terminal_shows_the_progress(
+    buses: BusFixture,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(recorder_module, "PROGRESS_S", 0.05)
+    caplog.set_level("INFO")
+    pretend(buses, "bridge", {keys.BUMPER: lambda: m.Bumper(pressed=False)})
+    with recorder(buses, tmp_path, "recorder.everything=true"):
+        wait_until(lambda: re.search(r"[1-9]\d* messages recorded", caplog.text), "progress")

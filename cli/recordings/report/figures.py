@@ -17,6 +17,7 @@ from cli.recordings.report.timing import Stream
 WIDTH = 1100  # pixels
 REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#c5ccd3"
 STOPPED, TEXT, MUTED = "#cf1f26", "#0a0e13", "#8a939c"
+GROUND = "white"
 VERDICTS = {
     "run": "#1a7f37", "slow": "#f0b429", "stop": "#8a939c", "brake": "#cf1f26",
     "inhibited": "#7a3fd0",
@@ -113,7 +114,7 @@ def ranges(timeline: Timeline) -> str:
 
 
 def arrivals(timeline: Timeline, streams: Sequence[Stream], names: Sequence[str]) -> str:
-    """Draw the arrivals of each stream, one row each, with gaps in red."""
+    """Draw the arrivals of each stream, one row each, with gaps in red and silences blank."""
     graph = _rows(timeline, names, "time, s")
     for row, stream in enumerate(streams):
         if not stream.expected_hz:  # event-driven
@@ -121,8 +122,10 @@ def arrivals(timeline: Timeline, streams: Sequence[Stream], names: Sequence[str]
             graph.add(ticks.marker("|", 5).color(MEASURED))
             continue
         _bar(graph, (stream.times[0], stream.times[-1]), row, MEASURED, 5)
+        for silence in stream.silences:
+            _bar(graph, silence, row, GROUND, 5)
         for gap in stream.gaps:
-            _bar(graph, gap, row, "white", 5)
+            _bar(graph, gap, row, GROUND, 5)
             _bar(graph, gap, row, STOPPED, 2)
     return svg(graph, 90 + 24 * len(streams), "arrivals")
 
@@ -140,7 +143,8 @@ def svg(drawing: zp.Graph | zp.LayoutV, height: float, name: str) -> str:
     """Return a drawing as an SVG element, ``height`` in pixels; its ids begin with the name."""
     drawing.size(WIDTH, height)
     # The page contains several figures, and ids are unique in a page.
-    return re.sub(r'( id="|"url\(#)', rf"\1{name}-", drawing.tosvg())
+    unique = re.sub(r'( id="|"url\(#)', rf"\1{name}-", drawing.tosvg())
+    return re.sub(r">-?[\d.]+e-1\d<", ">0<", unique)  # a tick label that rounding keeps off zero
 
 
 def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None) -> zp.Graph:

@@ -91,8 +91,8 @@ def label(name: str) -> str:
 
 def clock(seconds: float) -> str:
     """Format a time or a duration."""
-    minutes, rest = divmod(seconds, 60)
-    return f"{minutes:.0f} min {rest:04.1f} s" if minutes else f"{rest:.1f} s"
+    minutes, tenths = divmod(round(10 * seconds), 600)
+    return f"{minutes} min {tenths / 10:04.1f} s" if minutes else f"{tenths / 10:.1f} s"
 
 
 def figure(value: float | None, form: str) -> str:

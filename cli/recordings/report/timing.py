@@ -5,14 +5,16 @@ The worst value belongs to the recording only if it rose meanwhile. Otherwise th
 slowest bucket replaces it.
 """
 
+import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 from cli.inspect.addressing import topic_of
 from cli.inspect.stream_stats import quantile as sample_quantile
-from common.messages import Durations, Health, Message, Timing
+from common import keys
+from common.messages import Drive, Durations, Health, Message, Timing
 from services.bridge.timing import quantile
 
 MISSED = 3.0  # a gap is longer than this many periods
@@ -29,12 +31,13 @@ class Stream:
     restarts: int = 0  # of its publisher
     undecoded: int = 0  # samples that are not valid messages
     _last: Message | None = None
+    _whole: set[int] = field(default_factory=set)  # after a silence on purpose
 
     def add(self, at_s: float, message: Message | None) -> None:
-        """Count a sample."""
+        """Count a sample; the emergency stop has no message."""
         self.times.append(at_s)
         if message is None:
-            self.undecoded += 1
+            self.undecoded += not self.key.endswith(f"/{keys.ESTOP_PATH}")
             return
         last, self._last = self._last, message
         if last is None:
@@ -43,6 +46,8 @@ class Stream:
             self.restarts += 1
         else:
             self.lost += max(0, message.seq - last.seq - 1)
+            if message.seq == last.seq + 1 and _is_neutral(last):
+                self._whole.add(len(self.times) - 1)
 
     @property
     def expected_hz(self) -> float:
@@ -52,21 +57,41 @@ class Stream:
 
     @property
     def hz(self) -> float | None:
-        """Return the mean rate from the first to the last sample."""
-        span_s = self.times[-1] - self.times[0] if self.times else 0.0
-        return (len(self.times) - 1) / span_s if span_s > 0 else None
+        """Return the mean rate while the stream is not silent."""
+        intervals = self._intervals
+        span_s = sum(intervals)
+        return len(intervals) / span_s if span_s > 0 else None
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
         """Return begin and end of each gap, in s."""
-        if not self.expected_hz:
-            return []
-        longest_s = MISSED / self.expected_hz
-        return [(a, b) for a, b in pairwise(self.times) if b - a > longest_s]
+        return [period for number, period in self._pauses() if number not in self._whole]
+
+    @property
+    def silences(self) -> list[tuple[float, float]]:
+        """Return begin and end of each time, in s, in which a source had nothing to request."""
+        return [period for number, period in self._pauses() if number in self._whole]
 
     def interval_s(self, share: float) -> float | None:
-        """Return a quantile of the interval between samples."""
-        return sample_quantile(sorted(b - a for a, b in pairwise(self.times)), share)
+        """Return a quantile of the interval between samples, silences left out."""
+        return sample_quantile(sorted(self._intervals), share)
+
+    @property
+    def _intervals(self) -> list[float]:
+        silences = set(self.silences)
+        return [b - a for a, b in pairwise(self.times) if (a, b) not in silences]
+
+    def _pauses(self) -> Iterator[tuple[int, tuple[float, float]]]:
+        """Yield the intervals of more than three periods, with the number of the later sample."""
+        longest_s = MISSED / self.expected_hz if self.expected_hz else math.inf
+        for number, (a, b) in enumerate(pairwise(self.times), 1):
+            if b - a > longest_s:
+                yield number, (a, b)
+
+
+def _is_neutral(message: Message) -> bool:
+    """Return whether it is a request of zero: with it a source ends, and may be silent after it."""
+    return isinstance(message, Drive) and message.linear == 0 == message.angular
 
 
 @dataclass(frozen=True, slots=True)

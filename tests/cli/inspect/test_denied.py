@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from cli.inspect import estop
 from common import keys
 from common.bus.bus import Arrival, Bus
+from common.bus.probe import probe
 from common.bus.session import client_config
 from common.loop import Loop
 from common.messages import Drive, ResetDone, ResetRequest
@@ -31,6 +33,7 @@ class OnBoard:
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
         bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="reset")))
+        bus.live(keys.live_key(bus.robot, "safety", "1"))
         self.state = bus.publisher(keys.SAFETY)
 
 
@@ -123,6 +126,20 @@ def test_a_driver_drives_and_a_viewer_is_refused(site: Site, join: Callable[...,
         anna.bus.estop()
         wait_until(lambda: robot.estops, "Anna's stop")
         assert len(robot.estops) == 1
+
+
+def test_t2_estop_reports_why_a_robot_does_not_confirm(
+    site: Site, join: Callable[..., Bus]
+) -> None:
+    def reason(role: str, name: str, robot: str = "001") -> str:
+        with probe(connecting(site.settings(role, name), secured)) as session:
+            return estop.why_unconfirmed(session, robot)
+
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        on_board(join, onboard)
+        assert reason("viewer", "hall").startswith("not allowed, as it seems")
+        assert reason("driver", "anna") == ""
+        assert reason("driver", "anna", "009").endswith("is at this router; seen: 001")
 
 
 def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(

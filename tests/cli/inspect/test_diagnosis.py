@@ -11,6 +11,7 @@ from cli.inspect.diagnosis import (
     diagnose_bus,
     network,
     rights,
+    robot,
     router,
     services,
     versions,
@@ -37,6 +38,15 @@ def levels(found: list[Finding]) -> set[str]:
 
 def test_a_healthy_robot() -> None:
     assert levels(list(diagnose_bus(seen()))) == {"ok"}
+
+
+def test_a_wrong_robot_is_told_which_robots_are_there() -> None:
+    (found,) = robot(seen(instances={}, others=["001", "berlin-2"]), "002")
+    assert found.level == "wrong"
+    assert found.text == "no service of robot 002 is here; the router knows 001, berlin-2"
+    assert found.todo == remedies.NO_ROBOT
+    assert not list(robot(seen(others=["002"]), "001"))
+    assert not list(robot(seen(instances={}), "001"))
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ class Robot:
 
     def declare(self, bus: Bus) -> None:
         bus.on_any(keys.estop_key(bus.robot), self.stops.append)
+        bus.on_any(keys.DRIVE.on(bus.robot, source="web"), lambda _: None)
 
     def state(self) -> SafetyState:
         latched = bool(self.stops) and self._obeys
@@ -116,7 +117,9 @@ def test_stop_of_an_empty_site(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(estop, "TIMEOUT_S", 0.2)
     result = t2("estop", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
-    assert result.err == "t2 estop: sent, but no robot found\n"
+    assert result.err.startswith(
+        "t2 estop: sent, but no robot found. If one moves, USE THE VEHICLE'S"
+    )
 
 
 @pytest.mark.parametrize(

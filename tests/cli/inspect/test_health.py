@@ -1,5 +1,8 @@
 """``t2 health``: all services by their messages, one service by its answer."""
 
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -8,6 +11,7 @@ import msgspec
 import pytest
 
 from cli.inspect import health as command
+from cli.inspect import output
 from common import keys
 from common.bus.bus import Bus
 from tests.cli.inspect.tool import Tool, health, pretend
@@ -124,3 +128,34 @@ def test_health_of_the_router(tool: Tool) -> None:
     result = tool("health", "router", "--text")
     assert (result.code, result.err) == (0, "")
     assert result.out.splitlines()[1].split() == [tool.robot, "router", "ok"]
+
+
+def test_watch_repeats_until_ctrl_c(buses: BusFixture, tool: Tool) -> None:
+    for name in ("bridge", "safety", "odom"):
+        pretend(buses, name, {keys.HEALTH: partial(health, name)}, service=name)
+    words = ["health", "--watch", "--robot", buses.robot, "--set", f"bus.connect={tool.endpoint}"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cli", *words], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    seen = [process.stdout.readline() for _ in range(8)]  # two tables of four lines
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10) == 0
+    process.stdout.close()
+    assert [line.split()[0] for line in seen] == ["robot", *[buses.robot] * 3] * 2
+    assert "\x1b" not in "".join(seen)  # no terminal
+
+
+def test_lines_have_the_colour_of_their_state_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    late = command.Row("001", "safety", "ok", health("safety", lateness=0.2))
+    rows = [command.Row("001", "odom", "ok", health("odom")), late,
+            command.Row("001", "bridge", "hangs", None)]  # fmt: skip
+    assert list(map(command.tone, rows)) == ["good", "note", "bad"]
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert output.painted("x", "bad") == "\x1b[31mx\x1b[0m"
+    assert output.painted("x", "") == "x"
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert output.painted("x", "bad") == "x"

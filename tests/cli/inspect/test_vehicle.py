@@ -126,6 +126,31 @@ def test_streams_that_are_missing_or_slow() -> None:
     ]
 
 
+def test_streams_that_the_router_downsamples_are_no_fault_of_the_board() -> None:
+    paths = {topic.path: topic.rate_hz for topic in STREAMS}
+    bridge = replace(
+        health("bridge"),
+        rates={f"t2/v1/001/{path}": hz for path, hz in paths.items() if "odom" not in path},
+    )
+    rates = {path: min(10.0, hz) for path, hz in paths.items()} | {"tel/bridge/bumper": 0.0}
+    found = list(diagnose_vehicle(seen(rates=rates, health={"bridge": bridge})))
+    sensors = [each for each in found if each.where == "sensors"]
+    assert [(each.level, each.text, each.todo) for each in sensors] == [
+        (
+            "wrong",
+            "tel/bridge/bumper is sent with 50 Hz and does not arrive here",
+            remedies.NOT_HERE,
+        ),
+        ("note", "tel/odom/odometry has 10 of 25 Hz", remedies.SILENT),
+        (
+            "note",
+            "of what the robot sends, this laptop receives a part: "
+            "velocity 10 of 50 Hz, mileage 10 of 25 Hz",
+            remedies.DOWNSAMPLED,
+        ),
+    ]
+
+
 def test_no_finding_without_a_message() -> None:
     where = {each.where for each in diagnose_vehicle(seen(bumper=None, ultrasonic=None))}
     assert not where & {"bumper", "sonar"}

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
+from cli.recordings.report.page import clock
 from common import codec
 from common.keys import ROOT
 from common.sample import Sample
@@ -118,3 +119,17 @@ def test_error_messages(
     assert main(["report", str(folder / name), *words]) == 1
     assert sentence in capsys.readouterr().err
     assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0.0 s"),
+        (59.94, "59.9 s"),
+        (59.96, "1 min 00.0 s"),
+        (119.97, "2 min 00.0 s"),
+        (125.25, "2 min 05.2 s"),
+    ],
+)
+def test_a_duration_has_less_than_60_seconds_beside_its_minutes(seconds: float, text: str) -> None:
+    assert clock(seconds) == text

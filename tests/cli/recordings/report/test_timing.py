@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from cli.recordings.report.timing import Stream, reactions
-from common.messages import Durations, Health, Timing, Velocity
+from common.messages import Drive, Durations, EstopKeepalive, Health, Timing, Velocity
 
 
 def test_stream_rate_gaps_losses_and_restarts() -> None:
@@ -66,3 +66,33 @@ def test_no_reactions_no_durations() -> None:
         service="bridge", version="", uptime=0.0, rates={}, counters={}, lateness=0.0, rss=0
     )
     assert reactions([(silent, silent)]) == []
+
+
+def test_a_source_that_requested_nothing_lost_nothing() -> None:
+    stream = Stream("t2/v1/001/@cmd/drive/teleop")
+    for at_s, seq in ((0.0, 1), (0.05, 2), (9.0, 3), (9.05, 4), (10.0, 9)):
+        stream.add(at_s, Drive(seq=seq, boot=9, linear=0.0, angular=0.0, echo=1))
+    assert stream.silences == [(0.05, 9.0)]
+    assert (stream.gaps, stream.lost) == ([(9.05, 10.0)], 4)
+    assert stream.hz == pytest.approx(3 / 1.05)
+    assert stream.interval_s(1.0) == pytest.approx(0.95)
+
+
+def test_a_source_that_falls_silent_while_it_drives_has_a_gap() -> None:
+    stream = Stream("t2/v1/001/@cmd/drive/teleop")
+    for at_s, seq in ((0.0, 1), (0.05, 2), (0.85, 3)):
+        stream.add(at_s, Drive(seq=seq, boot=9, linear=0.5, angular=0.0, echo=1))
+    assert (stream.silences, stream.gaps) == ([], [(0.05, 0.85)])
+
+
+def test_a_keepalive_that_falls_silent_has_a_gap() -> None:
+    stream = Stream("t2/v1/001/@cmd/estop_keepalive/web")
+    for at_s, seq in ((0.0, 1), (2.9, 2)):
+        stream.add(at_s, EstopKeepalive(seq=seq, boot=9, echo=1))
+    assert (stream.silences, stream.gaps) == ([], [(0.0, 2.9)])
+
+
+def test_an_emergency_stop_has_no_message_to_decode() -> None:
+    stream = Stream("t2/v1/001/estop")
+    stream.add(0.0, None)
+    assert (stream.undecoded, len(stream.times)) == (0, 1)
