@@ -174,8 +174,9 @@ wheelhouse: $(STAMP) ## package set for a robot without internet; SET=laptop WHE
 	  sha256sum -- * > SHA256SUMS
 	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
 
-systemd-test: $(STAMP) ## t2-install.sh, units and watchdog under a real systemd; needs root, Docker and debootstrap
+systemd-test: $(STAMP) ## t2-install.sh, units, watchdog and the relay's image under a real systemd; needs root, Docker and debootstrap
 	$(BIN)/python -m verification.systemd
+	$(BIN)/python -m verification.relay.image
 
 audit: $(STAMP) ## known vulnerabilities of FILE=requirements.lock, from a public database
 	$(BIN)/python -m tools.audit $(FILE)

@@ -289,7 +289,7 @@ class Done(Struct, frozen=True, kw_only=True):
 
 
 class ResetDone(Done, frozen=True, kw_only=True):
-    """The answer to a reset; ``common.operator`` checks it against safety's state."""
+    """The answer to a reset; the next states of safety show its effect."""
 
     heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
     cleared: tuple[int, ...] = ()  # ``Cause.id`` of each cause that was cleared

@@ -15,7 +15,7 @@ from cli.inspect.schema import fields_of
 from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
-from tools import rights_table, safety_states
+from tools import rights_table, safety_states, sdk
 from verification.harness.results import filled, table
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -46,9 +46,11 @@ def generated() -> dict[Path, str]:
         DOCS / "security.md": security,
         DOCS / "operations.md": {"metrics": metrics()},
     }
-    return {
-        page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()
-    } | schemas
+    return (
+        {page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()}
+        | schemas
+        | sdk.generated()
+    )
 
 
 def kinds() -> list[type[Struct]]:

@@ -1,0 +1,67 @@
+"""Connecting: a Zenoh session to the robot's router, with or without a certificate."""
+
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from t2.errors import LinkError
+from t2.robot import Robot
+
+LOCAL = "tcp/127.0.0.1:7447"
+TIMEOUT_MS = 3_000
+FILES = {
+    "ca": "root_ca_certificate",
+    "certificate": "connect_certificate",
+    "private_key": "connect_private_key",
+}
+
+
+def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None = None) -> Robot:
+    """Connect to the router of a robot; close the result, or use it in ``with``.
+
+    ``endpoint`` is a Zenoh endpoint, by default ``tcp/127.0.0.1:7447``. ``config`` is a settings
+    file of T2 with ``[bus]``, such as the ``bus.toml`` in a folder that ``t2 keys`` made. Raises
+    ``LinkError``.
+    """
+    if not robot or set(robot) & set("/*$#?"):
+        raise LinkError(f"{robot!r} is not the id of one robot, such as 001")
+    bus = read(Path(config)) if config else {}
+    endpoints = [endpoint] if endpoint else bus.get("connect") or [LOCAL]
+    try:
+        session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(endpoints, bus))))
+    except zenoh.ZError as error:
+        raise LinkError(
+            f"no router answers at {', '.join(endpoints)}: is `t2 up` running there? "
+            f"`t2 doctor` finds the reason ({error})"
+        ) from None
+    return Robot(session, robot)
+
+
+def read(file: Path) -> dict[str, Any]:
+    """Return the table ``[bus]`` of a settings file; its file names are relative to the file."""
+    try:
+        toml = importlib.import_module("tomllib")
+    except ModuleNotFoundError:
+        raise LinkError("config= needs Python 3.11 or newer; pass endpoint= instead") from None
+    try:
+        bus: dict[str, Any] = toml.loads(file.read_text(encoding="utf-8")).get("bus", {})
+    except (OSError, ValueError) as error:
+        raise LinkError(f"{file}: {error}") from None
+    return bus | {name: str(file.parent / bus[name]) for name in FILES if bus.get(name)}
+
+
+def settings(endpoints: list[str], bus: dict[str, Any]) -> dict[str, Any]:
+    """Return Zenoh's configuration of a client."""
+    link: dict[str, Any] = {}
+    if bus.get("ca"):
+        tls = {name: bus.get(ours, "") for ours, name in FILES.items()}
+        link = {"link": {"tls": tls | {"enable_mtls": True}}}
+    return {
+        "mode": "client",
+        "connect": {"endpoints": list(endpoints), "timeout_ms": TIMEOUT_MS},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"shared_memory": {"enabled": False}, **link},
+    }

@@ -1,0 +1,295 @@
+"""Driving: requests 20 times a second, and motions by distance and angle on odometry."""
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import zenoh
+
+from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, T2Error
+from t2.messages import Drive as DriveMessage
+from t2.messages import Odometry, SafetyState
+from t2.publisher import FRESH_S, SourcePublisher
+
+if TYPE_CHECKING:
+    from t2.robot import Robot
+
+PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
+NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
+ZEROS = 3  # requests after a drive: one may be lost
+READY_S = 2.0  # from the first neutral request until we are in control
+OVERRULED_TICKS = 10  # our requests may be on their way for that long
+BLOCKED_S = 3.0  # without progress
+ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
+SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
+NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
+KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
+STANDING = 0.02  # m/s and rad/s
+RELEASE = "release"  # the source of a release, which overrules nobody
+
+
+class Target(NamedTuple):
+    """A requested velocity, with its end."""
+
+    linear: float  # m/s
+    angular: float  # rad/s
+    end_s: float = math.inf  # monotonic time
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not zero."""
+        return self.linear != 0 or self.angular != 0
+
+
+STILL = Target(0.0, 0.0)
+
+
+class Drive:
+    """Drives as one source while it is open; each method raises what stopped the vehicle.
+
+    ``with robot.drive("nav") as drive:`` sends neutral requests until safety lets the source drive,
+    and zeros at the end. A thread repeats the requests: a program that waits for something else
+    keeps its last velocity. When the program dies, safety stops the vehicle within its lease. After
+    an error the drive requests zero: open another one.
+    """
+
+    def __init__(self, session: zenoh.Session, key: str, source: str, robot: "Robot") -> None:
+        self.source = source
+        self._robot = robot
+        self._publisher: SourcePublisher[DriveMessage] = SourcePublisher(
+            session, key, "Drive", robot.safety
+        )
+        self._target = STILL
+        self._sent = 0  # requests
+        self._contested = 0  # ticks with a request while another source drives
+        self._error: T2Error | None = None
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"t2 drive {source}", daemon=True)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests are sent, or will be."""
+        return not self._ended.is_set()
+
+    def __enter__(self) -> "Drive":
+        """Start with neutral requests; return once safety would let this source drive.
+
+        Raises ``Latched``, ``Overruled``, ``NotAllowed`` and ``NoData``.
+        """
+        state = self._robot.safety.latest()
+        if state.latched:
+            raise latched(state)
+        self._thread.start()
+        try:
+            self._await_control()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, kind: "type[BaseException] | None", *_: object) -> None:
+        """Send zeros; raise what stopped the vehicle, unless it was raised before."""
+        self.close()
+        if kind is None:
+            self.check()
+
+    def close(self) -> None:
+        """Send zeros and end the requests."""
+        self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def check(self) -> None:
+        """Raise what stopped the vehicle, if anything did."""
+        if self._error is not None:
+            self._target = STILL
+            error, self._error = self._error, None
+            raise error
+
+    # --- motions ------------------------------------------------------------------------------
+
+    def velocity(
+        self, linear: float, angular: float = 0.0, *, seconds: float | None = None
+    ) -> None:
+        """Request m/s and rad/s until changed, or for some seconds; return at once.
+
+        Open loop: a program that waits for something else keeps driving.
+        """
+        _finite(linear, angular)
+        self.check()
+        end_s = math.inf if seconds is None else time.monotonic() + seconds
+        self._target = Target(linear, angular, end_s)
+
+    def stop(self) -> None:
+        """Request zero and wait until the vehicle stands."""
+        self.velocity(0.0)
+        self._until(lambda pose: abs(pose.linear) < STANDING and abs(pose.angular) < STANDING)
+
+    def forward(self, distance: float, speed: float = 0.3) -> None:
+        """Drive straight for a distance in m, negative backward, by odometry; wait for the end."""
+        _finite(distance)
+        _positive(speed)
+        start = self._robot.odometry.latest()
+        sign = math.copysign(1.0, distance)
+
+        def left(pose: Odometry) -> float:
+            along_x, along_y = math.cos(start.heading), math.sin(start.heading)
+            way = (pose.x - start.x) * along_x + (pose.y - start.y) * along_y
+            return abs(distance) - sign * way
+
+        def go(pose: Odometry, rest: float) -> tuple[float, float]:
+            correction = KEEP_HEADING * math.remainder(start.heading - pose.heading, math.tau)
+            bounded = max(-MAX_CORRECTION, min(MAX_CORRECTION, correction))
+            return sign * _slowing(rest, speed, ACCELERATION, SLOWEST), bounded
+
+        self._go(go, left, NEAR)
+
+    def turn(self, angle: float, speed: float = 0.5) -> None:
+        """Turn on the spot by an angle in rad, positive to the left, by odometry; wait for it."""
+        _finite(angle)
+        _positive(speed)
+        sign = math.copysign(1.0, angle)
+        before = self._robot.odometry.latest().heading
+        turned = 0.0
+
+        def left(pose: Odometry) -> float:
+            nonlocal before, turned
+            turned += math.remainder(pose.heading - before, math.tau)
+            before = pose.heading
+            return abs(angle) - sign * turned
+
+        def go(_: Odometry, rest: float) -> tuple[float, float]:
+            return 0.0, sign * _slowing(rest, speed, TURNING, SLOWEST_TURN)
+
+        self._go(go, left, NEAR_TURN)
+
+    def _go(
+        self,
+        go: Callable[[Odometry, float], tuple[float, float]],
+        left: Callable[[Odometry], float],
+        near: float,
+    ) -> None:
+        """Follow ``go`` until little is left; raise ``Blocked`` without progress."""
+        least, progress_s = math.inf, time.monotonic()
+
+        def arrived(pose: Odometry) -> bool:
+            nonlocal least, progress_s
+            rest = left(pose)
+            if rest <= near:
+                return True
+            if rest < least - near:
+                least, progress_s = rest, time.monotonic()
+            elif time.monotonic() - progress_s > BLOCKED_S:
+                raise self._blocked()
+            self.velocity(*go(pose, rest))
+            return False
+
+        try:
+            self._until(arrived)
+        finally:
+            self._target = STILL
+        self.stop()
+
+    def _until(self, arrived: Callable[[Odometry], bool]) -> None:
+        queue: deque[Odometry] = deque(maxlen=1)
+        stream = self._robot.odometry
+        epoch = stream.latest().epoch
+        with stream.reading(queue):
+            while True:
+                pose = stream.after(queue, 1.0)
+                self.check()
+                if pose is None:
+                    self._target = STILL
+                    raise NoData("odometry fell silent during a motion; see `t2 doctor`")
+                if pose.epoch != epoch:
+                    self._target = STILL
+                    raise T2Error("the pose of odometry was set during a motion")
+                if arrived(pose):
+                    return
+
+    def _blocked(self) -> Blocked:
+        state = self._robot.safety.latest()
+        return Blocked(f"the vehicle does not get on: {state.text}", state.causes)
+
+    # --- requests -----------------------------------------------------------------------------
+
+    def _await_control(self) -> None:
+        end_s, asked_at = time.monotonic() + READY_S, None
+        while time.monotonic() < end_s:
+            self.check()
+            state = self._robot.safety.latest()
+            if asked_at is None and self._sent >= NEUTRAL:
+                asked_at = state.seq
+            # An older state may name the source for requests of an earlier program.
+            if asked_at is not None and state.seq > asked_at + 1 and state.source == self.source:
+                return
+            time.sleep(PERIOD_S)
+        if state.source is not None:
+            raise Overruled(state.source)
+        raise NotAllowed(
+            f"safety does not let {self.source!r} drive: {state.text} The source must be one of "
+            "safety.sources, and its clock of echoes young; see `t2 doctor`"
+        )
+
+    def _run(self) -> None:
+        while not self._ended.wait(PERIOD_S):
+            target = self._target
+            if time.monotonic() >= target.end_s:
+                target = STILL
+            if self._error is None:
+                self._error = self._trouble(target)
+            if self._error is not None:
+                target = STILL
+            self._put(target.linear, target.angular)
+        for _ in range(ZEROS):
+            self._put(0.0, 0.0)
+            time.sleep(PERIOD_S)
+        self._publisher.close()
+
+    def _put(self, linear: float, angular: float) -> None:
+        self._publisher.put(DriveMessage(linear=linear, angular=angular, echo=0))
+        self._sent += 1
+
+    def _trouble(self, target: Target) -> "T2Error | None":
+        safety = self._robot.safety
+        state = safety.newest
+        if state is None or safety.age > FRESH_S:
+            return NoData("safety is silent, and the vehicle stops; see `t2 doctor`")
+        if state.latched:
+            return latched(state)
+        if self._publisher.denied:
+            return NotAllowed(
+                f"the router drops the requests of {self.source!r}: this certificate may not drive "
+                "as this source; see `t2 keys`"
+            )
+        other = state.source not in (None, RELEASE, self.source)
+        self._contested = self._contested + 1 if other and target.moves else 0
+        if self._contested >= OVERRULED_TICKS:
+            return Overruled(str(state.source))
+        return None
+
+
+def latched(state: SafetyState) -> Latched:
+    """Return the error of a latched state."""
+    names = [cause for cause in state.causes if cause.name in state.latched]
+    return Latched(f"{state.text} Robot.reset() clears what is gone.", names)
+
+
+def _slowing(left: float, speed: float, deceleration: float, slowest: float) -> float:
+    """Return the speed at this distance from the end."""
+    return max(slowest, min(speed, math.sqrt(2 * deceleration * max(left, 0.0))))
+
+
+def _finite(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"only finite numbers can be driven, not {', '.join(map(str, numbers))}")
+
+
+def _positive(speed: float) -> None:
+    if not 0 < speed < math.inf:
+        raise ValueError(
+            f"speed must be positive, not {speed}; a negative distance drives backward"
+        )

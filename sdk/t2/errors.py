@@ -1,0 +1,53 @@
+"""Errors: each states what happened, and what to do."""
+
+from collections.abc import Sequence
+
+from t2.messages import Cause
+
+
+class T2Error(Exception):
+    """Base of all errors of this library."""
+
+
+class LinkError(T2Error):
+    """No router answers, or the settings of the connection are invalid."""
+
+
+class NoData(T2Error, TimeoutError):
+    """No message arrived in time."""
+
+
+class NotAllowed(T2Error):
+    """The router drops what we send, or safety does not know our source."""
+
+
+class NotConfirmed(T2Error):
+    """Safety's state does not show the effect: look at the vehicle; it has a switch of its own."""
+
+
+class Refused(T2Error):
+    """A service refused a call; the text is its reason."""
+
+
+class Overruled(T2Error):
+    """Another source drives; ``by`` is its name."""
+
+    def __init__(self, by: str) -> None:
+        super().__init__(f"overruled by {by}, which has a higher priority")
+        self.by = by
+
+
+class Stopped(T2Error):
+    """Safety stops the vehicle; ``causes`` are the reasons, the worst first."""
+
+    def __init__(self, text: str, causes: Sequence[Cause]) -> None:
+        super().__init__(text)
+        self.causes = tuple(causes)
+
+
+class Latched(Stopped):
+    """A cause is latched: somebody must look at the vehicle, then ``Robot.reset``."""
+
+
+class Blocked(Stopped):
+    """The vehicle does not get on, for example because of an obstacle."""

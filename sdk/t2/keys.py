@@ -1,0 +1,33 @@
+"""Keys on the bus; generated from the stack's own by ``make docs``, do not edit."""
+
+from t2 import messages as m
+
+ROOT = "t2/v1"
+
+# By name: the path below the robot, and the type of the message.
+TOPICS: dict[str, tuple[str, type[m.Message]]] = {
+    "velocity": ("tel/bridge/velocity", m.Velocity),
+    "mileage": ("tel/bridge/mileage", m.Mileage),
+    "ultrasonic": ("tel/bridge/ultrasonic", m.Ultrasonic),
+    "bumper": ("tel/bridge/bumper", m.Bumper),
+    "driver": ("tel/bridge/driver/{side}", m.Driver),
+    "switches": ("tel/bridge/switches", m.Switches),
+    "link": ("tel/bridge/link", m.Link),
+    "odometry": ("tel/odom/odometry", m.Odometry),
+    "safety": ("tel/safety/state", m.SafetyState),
+    "health": ("tel/{service}/health", m.Health),
+    "events": ("evt/{service}", m.Event),
+    "drive": ("@cmd/drive/{source}", m.Drive),
+    "limit": ("@cmd/limit/{source}", m.Limit),
+    "estop_keepalive": ("@cmd/estop_keepalive/{source}", m.EstopKeepalive),
+    "motion": ("@cmd/motion", m.Motion),
+}
+
+# By service and name: the path below the robot.
+CALLS: dict[str, str] = {
+    "bridge/switches": "srv/bridge/switches",
+    "bridge/led": "srv/bridge/led",
+    "safety/reset": "srv/safety/reset",
+    "safety/release": "srv/safety/release",
+    "odom/reset": "srv/odom/reset",
+}

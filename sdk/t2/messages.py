@@ -1,0 +1,295 @@
+"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
+
+Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
+forward, y left, counter-clockwise positive. Readers ignore unknown fields.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from t2.parts import Action as Action
+from t2.parts import Cause as Cause
+from t2.parts import Direction as Direction
+from t2.parts import Durations as Durations
+from t2.parts import KeepaliveState as KeepaliveState
+from t2.parts import Limits as Limits
+from t2.parts import LimitState as LimitState
+from t2.parts import Release as Release
+from t2.parts import Timing as Timing
+
+Command = Literal["run", "stop", "brake"]
+
+# In the manual's order: counted clockwise from the left.
+SONAR_NAMES = (
+    "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",
+)  # fmt: skip
+
+RangeStatus = Literal["ok", "fault", "too_near", "no_echo"]
+FaultName = Literal["over_current", "over_voltage", "encoder", "under_voltage", "overload"]
+LinkState = Literal["up", "lost", "never"]
+Verdict = Literal["run", "slow", "stop", "brake", "inhibited"]
+Level = Literal["info", "warning", "error"]
+
+Ranges = Annotated[tuple[float | None, ...], Meta(min_length=8, max_length=8)]
+Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
+Covariance3 = Annotated[tuple[float, ...], Meta(min_length=9, max_length=9)]
+Covariance2 = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+
+Cap = Annotated[float, Meta(ge=0.0)]
+MAX_REASON = 80  # characters
+Reason = Annotated[str, Meta(max_length=MAX_REASON)]
+
+
+class Message(Struct, frozen=True, kw_only=True):
+    """The header of every message."""
+
+    seq: int = 0  # rises by one per publisher; restarts with ``boot``
+    boot: int = 0  # random per start of the sender
+    t_ns: int = 0  # the sender's wall clock, for records only
+    mono_ns: int = 0  # the sender's monotonic clock
+    host: int = 0  # identifies that clock: random per boot of the sender's host, 0 if unknown
+
+
+# --- tel/bridge -----------------------------------------------------------------------------
+
+
+class Velocity(Message, frozen=True, kw_only=True):
+    """Measured by the board (manual 2.2)."""
+
+    linear: float  # m/s, forward positive
+    angular: float  # rad/s, counter-clockwise positive
+
+
+class Mileage(Message, frozen=True, kw_only=True):
+    """Counted by the board since it was powered on (manual 2.3)."""
+
+    distance: float  # m, forward positive
+    heading: float  # rad, wrapped to -pi..pi
+    epoch: int  # number of board restarts that the bridge has detected
+
+
+class Ultrasonic(Message, frozen=True, kw_only=True):
+    """Eight ranges, counted clockwise from the left (manual 2.3, the second section 2.3)."""
+
+    ranges: Ranges  # m; None where the status is not "ok"
+    status: Statuses
+
+
+class Bumper(Message, frozen=True, kw_only=True):
+    """The bumper strip, one bit for the whole vehicle (manual 2.4)."""
+
+    pressed: bool
+    lost: int = 0  # bumper polls of the last 0.2 s that the board did not answer
+
+
+class Driver(Message, frozen=True, kw_only=True):
+    """Faults of one motor driver (manual 2.7)."""
+
+    faults: tuple[str, ...]  # names of the known bits, "bit_N" for reserved ones
+    bits: int  # all 32, as the board sent them
+
+
+class Switches(Message, frozen=True, kw_only=True):
+    """The board's own emergency brakes (manual 2.5 and 2.6); None until it has echoed."""
+
+    ultrasonic_brake: bool | None = None
+    bumper_brake: bool | None = None
+
+
+class Relay(Struct, frozen=True, kw_only=True):
+    """The relay between PC and board, by its newest report."""
+
+    state: LinkState
+    version: str
+    braking: str  # why it sends BRAKE: start, silent, hit; empty while it passes commands
+    uptime: float  # s
+    counters: dict[str, int]  # datagrams since its start, by what became of them
+
+
+class Link(Message, frozen=True, kw_only=True):
+    """State of the link to the board."""
+
+    state: LinkState
+    board: str  # address:port
+    epoch: int
+    armed: bool  # whether the bridge would obey a RUN now
+    waiting: str  # why it would not, as text; empty when armed
+    rates: dict[str, float]  # frames per second by name, over the last second
+    rejected: dict[str, int]  # frames and datagrams refused since start, by reason
+    round_trip: float | None  # s, the median of the last queries
+    latched_by: int | None = (
+        None  # ``boot`` of the safety, or this bridge, whose latch is not reset
+    )
+    ports: dict[str, int] = {}  # our UDP port that each frame is taken from, by the frame's name
+    send_errors: int = 0  # datagrams that the system refused to send, since start
+    relay: Relay | None = None  # None without ``board.relay_port``
+
+
+# --- tel/odom, tel/safety -------------------------------------------------------------------
+
+
+class Odometry(Message, frozen=True, kw_only=True):
+    """Pose in ``odom`` and twist in ``base_link``."""
+
+    x: float  # m
+    y: float  # m
+    heading: float  # rad, wrapped to -pi..pi
+    linear: float  # m/s
+    angular: float  # rad/s
+    pose_covariance: Covariance3  # 3x3 row by row over x, y, heading
+    twist_covariance: Covariance2  # 2x2 row by row over linear, angular
+    epoch: int  # number of times the pose was set
+    residual: float | None  # m, counters less integrated velocity over the last second
+    slip: bool
+    frame_id: str = "odom"
+    child_frame_id: str = "base_link"
+
+
+class SafetyState(Message, frozen=True, kw_only=True):
+    """Safety's decision and its causes."""
+
+    verdict: Verdict
+    latched: tuple[str, ...]  # names of the causes that need a reset
+    causes: tuple[Cause, ...]  # all active ones, the worst first
+    source: str | None  # the driving source
+    limits: Limits
+    heartbeat: int  # echoed by sources, see ``Drive.echo``
+    text: str  # one sentence: why the vehicle may or may not move
+    release: Release | None = None  # None while there is no contact
+    limit_sources: tuple[LimitState, ...] = ()  # those in the settings
+    estop_keepalives: tuple[KeepaliveState, ...] = ()  # likewise
+
+
+# --- @cmd -----------------------------------------------------------------------------------
+
+
+class SourceMessage(Message, frozen=True, kw_only=True):
+    """A message to safety that counts only while its echo is young."""
+
+    echo: int  # the newest ``SafetyState.heartbeat`` that the source saw
+
+
+class Drive(SourceMessage, frozen=True, kw_only=True):
+    """A drive request; valid for its source's lease."""
+
+    linear: float  # m/s
+    angular: float  # rad/s
+
+
+class Limit(SourceMessage, frozen=True, kw_only=True):
+    """A speed limit by a third party; valid for its source's lease. Zero is a protective stop."""
+
+    linear: Cap | None = None  # m/s, either way; None: no cap
+    angular: Cap | None = None  # rad/s, likewise
+    reason: Reason = ""  # for the operator, such as "person at 2 m"
+
+
+class EstopKeepalive(SourceMessage, frozen=True, kw_only=True):
+    """A sign of life of an emergency stop; without it safety brakes and latches."""
+
+
+class Motion(Message, frozen=True, kw_only=True):
+    """The motion that safety allows; the bridge obeys only this, for 200 ms."""
+
+    command: Command
+    linear: float = 0.0  # m/s
+    angular: float = 0.0  # rad/s
+    source: str | None = None
+    judged: int = 0  # ``seq`` of the newest bumper sample in the verdict
+    judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
+    latched: bool = False  # whether an operator's reset is needed
+    predecessor: int | None = None  # the newest ``Link.latched_by`` in the verdict
+    # For latency measurement only, on the clock of ``mono_ns``.
+    asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
+    heard_ns: int = 0  # when safety received that request; 0 when this answers none
+    judged_ns: int = 0  # when safety received the sample that ``judged`` names
+
+
+# --- evt, health ----------------------------------------------------------------------------
+
+
+class Event(Message, frozen=True, kw_only=True):
+    """A transition: contact, stop, release, fault, board restarted, link lost."""
+
+    name: str
+    level: Level
+    text: str
+    about: dict[str, str | int | float | bool | None] = {}
+
+
+class Health(Message, frozen=True, kw_only=True):
+    """Health of a service, once a second."""
+
+    service: str
+    version: str
+    uptime: float  # s
+    rates: dict[str, float]  # messages per second by key, in and out, over the last second
+    counters: dict[str, int]  # since start
+    lateness: float  # s, maximum lateness of the loop's timers in the last second
+    rss: int  # bytes
+    priority: int = 0  # of SCHED_FIFO; 0 for normal priority
+    timing: Timing | None = None  # None if not measured
+
+
+# --- srv ------------------------------------------------------------------------------------
+
+
+class SwitchesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set the board's emergency brakes; None leaves one as it is."""
+
+    ultrasonic_brake: bool | None = None
+    bumper_brake: bool | None = None
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class LedRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set one lamp channel; times and speed in the board's own units."""
+
+    channel: Annotated[int, Meta(ge=0, le=255)]
+    mode: Annotated[int, Meta(ge=0, le=255)]
+    on_lightness: Annotated[int, Meta(ge=0, le=10)] = 10
+    on_time: Annotated[int, Meta(ge=0, le=255)] = 0
+    off_time: Annotated[int, Meta(ge=0, le=255)] = 0
+    flash_lightness: Annotated[int, Meta(ge=0, le=255)] = 0
+    speed: Annotated[int, Meta(ge=0, le=255)] = 0
+    lightness_min: Annotated[int, Meta(ge=0, le=255)] = 0
+    lightness_max: Annotated[int, Meta(ge=0, le=255)] = 0
+
+
+class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Clear the causes that the operator saw, and no others."""
+
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+    causes: tuple[int, ...] = ()  # ``Cause.id`` of each
+
+
+class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Move slowly off a pressed bumper while the operator holds; repeat within the lease."""
+
+    held: bool = True  # False ends it
+    direction: Direction | None = None  # chosen by the operator; required while held
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set the odometry pose in ``odom``."""
+
+    x: float = 0.0  # m
+    y: float = 0.0  # m
+    heading: float = 0.0  # rad
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class Done(Struct, frozen=True, kw_only=True):
+    """A call was carried out."""
+
+    text: str
+    boot: int = 0  # of the answering service; 0 if unknown
+
+
+class ResetDone(Done, frozen=True, kw_only=True):
+    """The answer to a reset; the next states of safety show its effect."""
+
+    heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
+    cleared: tuple[int, ...] = ()  # ``Cause.id`` of each cause that was cleared

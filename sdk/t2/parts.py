@@ -1,0 +1,79 @@
+"""Parts of messages; generated from the stack by ``make docs``, do not edit."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+Action = Literal["slow", "stop", "brake"]
+Direction = Literal["forward", "backward"]
+LimitEffect = Literal["none", "slow", "stop"]
+
+
+class Cause(Struct, frozen=True, kw_only=True):
+    """One reason why the vehicle may not move as asked."""
+
+    name: str
+    action: Action
+    age: float  # s since it became active
+    text: str  # text for the operator
+    id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
+
+
+RELEASE_SOURCE = "release"  # in place of a source's name while a release moves the vehicle
+
+
+class Limits(Struct, frozen=True, kw_only=True):
+    """What a drive request may reach now; zero while a cause forbids every motion.
+
+    A release has its own speed, ``safety.release_speed``.
+    """
+
+    forward: float  # m/s
+    backward: float  # m/s, as a positive number
+    angular: float  # rad/s, either way
+
+
+class Release(Struct, frozen=True, kw_only=True):
+    """State of moving off a pressed bumper; the operator chooses the direction."""
+
+    believed_free: Direction | None  # opposite of the last motion; None when none is known
+    travelled: float  # m, net travel by the counters over the last metre before the contact
+    age: float | None  # s since that motion; None when none is known
+    forbidden: tuple[Direction, ...]  # refused until a reset: the bumper was pressed that way
+    left: float  # m that may still be travelled until a reset
+
+
+class LimitState(Struct, frozen=True, kw_only=True):
+    """State of one source of speed limits, see ``Limit``."""
+
+    source: str
+    linear: float | None  # m/s; None: no cap
+    angular: float | None  # rad/s, likewise
+    reason: str  # in the source's words
+    age: float | None  # s since its last limit; None: none was received
+    silent: bool  # whether its lease is over, or it was never received
+    effect: LimitEffect  # on the vehicle now
+
+
+class KeepaliveState(Struct, frozen=True, kw_only=True):
+    """State of an emergency stop that must be kept alive, see ``EstopKeepalive``."""
+
+    source: str
+    age: float | None  # s since safety sent the newest heartbeat that it echoed; None: not received
+    alive: bool
+    timeout: float  # s; older, and safety brakes and latches
+
+
+class Durations(Struct, frozen=True, kw_only=True):
+    """Histogram of durations since the service's start."""
+
+    counts: tuple[int, ...]  # one for each of ``Timing.bounds``, and one above the last
+    worst: float  # s, 0 without any
+
+
+class Timing(Struct, frozen=True, kw_only=True):
+    """Reaction times of a service; a name with a dot is a hop of the name before the dot."""
+
+    bounds: tuple[float, ...]  # s, rising; upper bounds of the counts
+    durations: dict[str, Durations]  # by name
+    not_counted: dict[str, int]  # number of unmeasured durations, by reason

@@ -1,0 +1,65 @@
+"""Publishing to safety: header, echo, and what the router tells about who receives it."""
+
+import os
+import time
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import zenoh
+
+from t2.messages import SafetyState, SourceMessage
+from t2.stream import Stream
+
+M = TypeVar("M", bound=SourceMessage)
+
+UNMATCHED_MAX = 10  # messages in a row without a receiver, while safety's state arrives
+FRESH_S = 0.5  # age of safety's state; older, and safety counts as silent
+QOS: dict[str, Any] = {
+    "priority": zenoh.Priority.INTERACTIVE_HIGH,
+    "congestion_control": zenoh.CongestionControl.DROP,
+    "express": True,
+    # A subscriber of this session is no receiver.
+    "allowed_destination": zenoh.Locality.REMOTE,
+}
+
+
+class SourcePublisher(Generic[M]):
+    """Sends a source's messages with the heartbeat of safety that was received last."""
+
+    def __init__(
+        self, session: zenoh.Session, key: str, kind: str, safety: Stream[SafetyState]
+    ) -> None:
+        safety.open()
+        self._safety = safety
+        self._boot = int.from_bytes(os.urandom(7), "big")
+        self._seq = 0
+        self._unmatched = 0
+        self._encoder = msgspec.msgpack.Encoder()
+        encoding = f"application/msgpack;t2.v1.{kind}"
+        self._publisher: Any = session.declare_publisher(key, encoding=encoding, **QOS)
+
+    @property
+    def denied(self) -> bool:
+        """Whether safety is there, but the router does not pass our messages on to it."""
+        return self._unmatched >= UNMATCHED_MAX
+
+    def put(self, message: M) -> None:
+        """Send a message; its header and echo are filled in."""
+        state = self._safety.newest
+        is_fresh = self._safety.age <= FRESH_S
+        matched = bool(self._publisher.matching_status.matching)
+        self._unmatched = 0 if matched or not is_fresh else self._unmatched + 1
+        self._seq += 1
+        filled = msgspec.structs.replace(
+            message,
+            seq=self._seq,
+            boot=self._boot,
+            t_ns=time.time_ns(),
+            mono_ns=time.monotonic_ns(),
+            echo=state.heartbeat if state else 0,
+        )
+        self._publisher.put(self._encoder.encode(filled))
+
+    def close(self) -> None:
+        """Send no more."""
+        self._publisher.undeclare()

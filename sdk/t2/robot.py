@@ -1,0 +1,181 @@
+"""One robot: its streams, its calls, and what may be sent to it."""
+
+import time
+from typing import Any, TypeVar
+
+import msgspec
+import zenoh
+
+from t2 import messages as m
+from t2.drive import Drive
+from t2.errors import NoData, NotConfirmed, Refused
+from t2.keys import CALLS, ROOT, TOPICS
+from t2.limit import SpeedLimit
+from t2.stream import Stream
+
+A = TypeVar("A", bound=msgspec.Struct)
+
+EVENTS_DEPTH = 100  # events that wait for a slow reader
+CALL_S = 2.0
+CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
+ESTOP_S = 3.0
+ESTOP_PERIOD_S = 0.05
+SWITCH = "use the vehicle's own switch"
+
+
+class Robot:
+    """A robot, from ``connect``; use it in ``with``, or ``close`` it.
+
+    Each stream is subscribed on first use.
+    """
+
+    def __init__(self, session: zenoh.Session, name: str) -> None:
+        self.name = name
+        self._session = session
+        self._drives: list[Drive] = []
+        self._limits: dict[str, SpeedLimit] = {}
+        self._streams: list[Stream[Any]] = []
+        self.odometry: Stream[m.Odometry] = self._stream("odometry")
+        self.safety: Stream[m.SafetyState] = self._stream("safety")
+        self.velocity: Stream[m.Velocity] = self._stream("velocity")
+        self.mileage: Stream[m.Mileage] = self._stream("mileage")
+        self.ultrasonic: Stream[m.Ultrasonic] = self._stream("ultrasonic")
+        self.bumper: Stream[m.Bumper] = self._stream("bumper")
+        self.switches: Stream[m.Switches] = self._stream("switches")
+        self.link: Stream[m.Link] = self._stream("link")
+        self.events: Stream[m.Event] = self._stream("events", EVENTS_DEPTH, service="*")
+
+    def __enter__(self) -> "Robot":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End drives with zeros, end limits, and disconnect."""
+        for drive in self._drives:
+            drive.close()
+        for limit in self._limits.values():
+            limit.end()
+        for stream in self._streams:
+            stream.close()
+        self._session.close()
+
+    # --- moving -------------------------------------------------------------------------------
+
+    def drive(self, source: str) -> Drive:
+        """Return a drive as this source, for ``with``; safety must know the source.
+
+        ``safety.sources`` lists the sources with their priorities.
+        """
+        self._drives = [each for each in self._drives if each.is_open]
+        drive = Drive(self._session, self._key("drive", source=source), source, self)
+        self._drives.append(drive)
+        return drive
+
+    def limit(
+        self,
+        source: str,
+        linear: float | None = None,
+        angular: float | None = None,
+        reason: str = "",
+    ) -> SpeedLimit:
+        """Cap the speed in m/s and rad/s as this source, until the limit's ``end`` or another call.
+
+        Zero is a protective stop, None no cap; ``reason`` is shown to operators.
+        ``safety.limits`` must list the source. Raises ``NotAllowed`` and ``ValueError``.
+        """
+        if source not in self._limits or self._limits[source].has_ended:
+            key = self._key("limit", source=source)
+            self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
+        self._limits[source].set(linear, angular, reason)
+        return self._limits[source]
+
+    # --- stopping -----------------------------------------------------------------------------
+
+    def estop(self) -> None:
+        """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``."""
+        key = f"{ROOT}/{self.name}/estop"
+        self._put_estop(key)  # before anything else
+        begin_s = time.monotonic()
+        self.safety.open()
+        while (passed_s := time.monotonic() - begin_s) < ESTOP_S:
+            state = self.safety.newest
+            # An older state may show the latch of an earlier stop.
+            if state and "estop" in state.latched and self.safety.age < passed_s:
+                return
+            time.sleep(ESTOP_PERIOD_S)
+            self._put_estop(key)
+        raise NotConfirmed(
+            f"the emergency stop was sent, and safety does not confirm it within {ESTOP_S:g} s: "
+            f"{SWITCH}. A certificate without the right to stop is one reason"
+        )
+
+    def reset(self) -> m.ResetDone:
+        """Clear the causes that are latched now; return safety's answer.
+
+        A later cause is not cleared. Raises ``Refused`` with the reason, ``NotConfirmed`` when
+        safety's state does not show the effect, and ``NoData`` without safety.
+        """
+        state = self.safety.latest()
+        seen = tuple(cause.id for cause in state.causes if cause.name in state.latched)
+        request = m.ResetRequest(echo=state.heartbeat, causes=seen)
+        done = self._call("safety/reset", request, m.ResetDone)
+        end_s = time.monotonic() + CONFIRM_S
+        while time.monotonic() < end_s:
+            state = self.safety.latest()
+            shown = {cause.id for cause in state.causes if cause.name in state.latched}
+            is_answered = state.boot == done.boot and state.heartbeat >= done.heartbeat
+            if is_answered and not shown & set(seen):
+                return done
+            time.sleep(ESTOP_PERIOD_S)
+        raise NotConfirmed("safety answered the reset, and its state does not show the effect")
+
+    # --- calls --------------------------------------------------------------------------------
+
+    def led(self, channel: int, mode: int, **settings: int) -> None:
+        """Set one lamp channel; ``settings`` are the further fields of ``LedRequest``.
+
+        Raises ``Refused`` and ``TypeError``.
+        """
+        self._call("bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
+
+    def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``."""
+        echo = self.safety.latest().heartbeat
+        request = m.PoseRequest(x=x, y=y, heading=heading, echo=echo)
+        self._call("odom/reset", request, m.Done)
+
+    def _call(self, path: str, request: msgspec.Struct, reply: type[A]) -> A:
+        key = f"{ROOT}/{self.name}/{CALLS[path]}"
+        payload = msgspec.msgpack.encode(request)
+        for answer in self._session.get(
+            key, payload=payload, timeout=CALL_S, congestion_control=zenoh.CongestionControl.DROP
+        ):
+            if answer.ok is not None:
+                return msgspec.msgpack.decode(answer.ok.payload.to_bytes(), type=reply)
+            text = answer.err.payload.to_bytes().decode(errors="replace") if answer.err else ""
+            if text != "Timeout":  # Zenoh's own
+                raise Refused(text)
+        raise NoData(
+            f"no answer from {key} within {CALL_S:g} s: its service is not running, or this "
+            "certificate may not call it; see `t2 doctor`"
+        )
+
+    def _put_estop(self, key: str) -> None:
+        self._session.put(
+            key,
+            b"",
+            priority=zenoh.Priority.REAL_TIME,
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=True,
+        )
+
+    def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
+        kind = TOPICS[name][1]
+        made: Stream[Any] = Stream(self._session, self._key(name, **names), kind, name, depth)
+        self._streams.append(made)
+        return made
+
+    def _key(self, name: str, **names: str) -> str:
+        return f"{ROOT}/{self.name}/{TOPICS[name][0].format(**names)}"

@@ -1,0 +1,147 @@
+"""Streams: the newest message of a topic, never a backlog."""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import zenoh
+
+from t2.errors import NoData
+from t2.messages import Message
+
+M = TypeVar("M", bound=Message)
+
+ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
+logger = logging.getLogger(__name__)
+
+
+class Stream(Generic[M]):
+    """The messages of a topic; subscribed on first use.
+
+    ``depth`` messages wait for a slow reader, older ones are dropped. ``invalid`` counts messages
+    that do not have the topic's type.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, key: str, kind: type[M], what: str, depth: int = 1
+    ) -> None:
+        self.key = key
+        self.invalid = 0
+        self._session = session
+        self._decoder: msgspec.msgpack.Decoder[M] = msgspec.msgpack.Decoder(kind)
+        self._what = what
+        self._depth = depth
+        self._changed = threading.Condition()
+        self._newest: M | None = None
+        self._received_s = 0.0
+        self._queues: list[deque[M]] = []
+        self._subscriber: Any = None
+        self._closed = False
+
+    @property
+    def newest(self) -> M | None:
+        """The newest message received; None before the first one, or before the first use."""
+        return self._newest
+
+    @property
+    def age(self) -> float:
+        """Time in s since the newest message was received; infinite before the first one."""
+        return time.monotonic() - self._received_s if self._newest else float("inf")
+
+    def latest(self, timeout: float = 1.0) -> M:
+        """Return the newest message, at most ``timeout`` s old; wait for it at most that long.
+
+        Raises ``NoData``.
+        """
+        self.open()
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self.age <= timeout, timeout)
+            if self._newest is None or self.age > timeout:
+                raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {ADVICE}")
+            return self._newest
+
+    def on(self, handle: Callable[[M], object]) -> threading.Thread:
+        """Call a function with the newest message, in a thread of its own, until the robot closes.
+
+        A slow function skips messages. Its exceptions are logged, and the next message is handled.
+        """
+        messages = iter(self)
+
+        def run() -> None:
+            for message in messages:
+                try:
+                    handle(message)
+                except Exception:
+                    logger.exception("handler of %s", self.key)
+
+        thread = threading.Thread(target=run, name=f"t2 {self._what}", daemon=True)
+        thread.start()
+        return thread
+
+    def __iter__(self) -> Iterator[M]:
+        """Yield each new message; end when the robot is closed."""
+        queue: deque[M] = deque(maxlen=self._depth)
+        self._add(queue)
+        return self._messages(queue)
+
+    @contextmanager
+    def reading(self, queue: "deque[M]") -> Iterator[None]:
+        """Add each message to a queue during the context."""
+        self._add(queue)
+        try:
+            yield
+        finally:
+            self._remove(queue)
+
+    def after(self, queue: "deque[M]", timeout: float) -> M | None:
+        """Return the next message of a queue; None after ``timeout`` s, or when closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: queue or self._closed, timeout)
+            return queue.popleft() if queue else None
+
+    def open(self) -> None:
+        """Subscribe, once."""
+        with self._changed:
+            if self._subscriber is None and not self._closed:
+                self._subscriber = self._session.declare_subscriber(self.key, self._on_sample)
+
+    def close(self) -> None:
+        """End all iterations."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _messages(self, queue: "deque[M]") -> Iterator[M]:
+        try:
+            while not self._closed:
+                message = self.after(queue, 1.0)
+                if message is not None:
+                    yield message
+        finally:
+            self._remove(queue)
+
+    def _add(self, queue: "deque[M]") -> None:
+        with self._changed:
+            self._queues.append(queue)
+        self.open()
+
+    def _remove(self, queue: "deque[M]") -> None:
+        with self._changed:  # by identity: two empty queues are equal
+            self._queues = [each for each in self._queues if each is not queue]
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        try:
+            message = self._decoder.decode(sample.payload.to_bytes())
+        except msgspec.MsgspecError:
+            self.invalid += 1
+            return
+        with self._changed:
+            self._newest, self._received_s = message, time.monotonic()
+            for queue in self._queues:
+                queue.append(message)
+            self._changed.notify_all()

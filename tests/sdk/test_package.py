@@ -1,0 +1,38 @@
+"""The client library stands alone: Python 3.10, Zenoh and msgspec, and nothing of the stack."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tools import sdk
+
+FILES = sorted(sdk.SDK.glob("*.py"))
+
+
+def imported(tree: ast.Module) -> Iterator[str]:
+    """Yield the names of the imported packages."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            yield str(node.module).partition(".")[0]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_a_module_is_python_3_10_and_imports_nothing_of_the_stack(file: Path) -> None:
+    tree = ast.parse(file.read_text(encoding="utf-8"), feature_version=(3, 10))
+    assert set(imported(tree)) <= {*sys.stdlib_module_names, "msgspec", "t2", "zenoh"}
+
+
+def test_hand_written_code_is_short() -> None:
+    written = [file for file in FILES if file not in sdk.generated()]
+    assert sum(len(file.read_text(encoding="utf-8").splitlines()) for file in written) < 900
+
+
+def test_generated_modules_are_current() -> None:
+    for file, text in sdk.generated().items():
+        assert file.read_text(encoding="utf-8") == text, f"{file.name}: run `make docs`"

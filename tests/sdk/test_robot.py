@@ -1,0 +1,155 @@
+"""The client library on the real stack: drives, limits, stops and resets."""
+
+import math
+from collections.abc import Iterator
+
+import pytest
+
+import t2
+from common.bus.bus import Bus
+from common.loop import Loop
+from common.source import DriveSource
+from sim.requests import Bumper, Sonar
+from verification.harness.bus import bus_on, running
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
+
+pytestmark = pytest.mark.timed
+
+SETS = ('safety.limits.detector={lease=1.0, silence="ignore"}',)
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("sdk"), sets=SETS) as it:
+        yield it
+
+
+@pytest.fixture
+def robot(stack: RunningStack) -> Iterator[t2.Robot]:
+    with t2.connect("001", endpoint=stack.endpoint) as it:
+        it.odometry.latest(timeout=20.0)
+        wait_until(lambda: not blocked(it), "a vehicle that may drive")
+        yield it
+
+
+def blocked(robot: t2.Robot) -> bool:
+    """Return whether something else than a missing request stops the vehicle; reset it."""
+    state = robot.safety.latest(timeout=5.0)
+    if state.latched:
+        try:
+            robot.reset()
+        except t2.Refused:
+            return True
+    return not {cause.name for cause in state.causes} <= {"no_request", "neutral"}
+
+
+def test_a_distance_and_a_turn(robot: t2.Robot) -> None:
+    start = robot.odometry.latest()
+    with robot.drive("nav") as drive:
+        drive.forward(0.5)
+        there = robot.odometry.latest()
+        assert math.dist((start.x, start.y), (there.x, there.y)) == pytest.approx(0.5, abs=0.05)
+        drive.turn(math.pi / 2)
+        turned = math.remainder(robot.odometry.latest().heading - there.heading, math.tau)
+        assert turned == pytest.approx(math.pi / 2, abs=0.1)
+        drive.turn(-math.pi / 2)
+        drive.forward(-0.5)
+    back = robot.odometry.latest()
+    assert math.dist((start.x, start.y), (back.x, back.y)) < 0.1
+
+
+def test_a_velocity_ends_by_itself_or_with_the_drive(robot: t2.Robot) -> None:
+    with robot.drive("nav") as drive:
+        drive.velocity(0.2, seconds=2.0)
+        wait_until(lambda: robot.velocity.latest().linear > 0.1, "motion")
+        wait_until(lambda: robot.velocity.latest().linear < 0.02, "the end of the velocity")
+        drive.velocity(-0.2)
+        wait_until(lambda: robot.velocity.latest().linear < -0.1, "motion")
+    wait_until(lambda: robot.velocity.latest().linear > -0.02, "the end of the drive")
+
+
+def test_an_emergency_stop_latches_until_a_reset(robot: t2.Robot) -> None:
+    with robot.drive("nav") as drive:
+        drive.velocity(0.2)
+        robot.estop()
+        with pytest.raises(t2.Latched) as stopped:
+            drive.forward(1.0)
+    assert [cause.name for cause in stopped.value.causes] == ["estop"]
+    with pytest.raises(t2.Latched), robot.drive("nav"):
+        pass
+    robot.reset()
+    with pytest.raises(t2.Refused, match="Nothing is latched"):
+        robot.reset()
+
+
+def test_a_pressed_bumper_refuses_the_reset(robot: t2.Robot, stack: RunningStack) -> None:
+    stack.control.do(Bumper(pressed=True))
+    wait_until(lambda: "contact" in robot.safety.latest().latched, "the contact")
+    with pytest.raises(t2.Refused, match="bumper"):
+        robot.reset()
+    stack.control.do(Bumper(pressed=False))
+
+
+def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
+    limit = robot.limit("detector", linear=0.1, reason="person ahead")
+
+    def is_shown() -> bool:
+        return any(each.reason == "person ahead" for each in robot.safety.latest().limit_sources)
+
+    wait_until(is_shown, "the limit")
+    with robot.drive("nav") as drive:
+        drive.velocity(0.3)
+        wait_until(lambda: robot.safety.latest().verdict == "slow", "the verdict")
+        limit.end()
+        wait_until(lambda: robot.safety.latest().verdict == "run", "the end of the limit")
+        again = robot.limit("detector", linear=0.1)
+        wait_until(lambda: robot.safety.latest().verdict == "slow", "the next limit")
+        again.end()
+
+
+def test_an_unknown_source_is_told_so(robot: t2.Robot) -> None:
+    with pytest.raises(t2.NotAllowed, match="it lists detector"):
+        robot.limit("stranger", linear=0.1)
+    with (
+        pytest.raises(t2.NotAllowed, match=r"'stranger'.*safety\.sources"),
+        robot.drive("stranger"),
+    ):
+        pass
+
+
+def test_who_is_overruled_is_told_by_whom(robot: t2.Robot, stack: RunningStack) -> None:
+    made: list[DriveSource] = []
+
+    def declare(bus: Bus) -> None:
+        made.append(DriveSource(bus, "teleop"))
+        loop.post(lambda: loop.every(0.05, lambda _: made[0].request(0.0, 0.0)))
+
+    with running(Loop()) as loop, robot.drive("nav") as drive:
+        drive.velocity(0.05)
+        with bus_on(stack.endpoint, loop, declare), pytest.raises(t2.Overruled) as overruled:
+            drive.forward(5.0, speed=0.05)
+    assert overruled.value.by == "teleop"
+
+
+def test_an_obstacle_blocks_a_distance(robot: t2.Robot, stack: RunningStack) -> None:
+    stack.control.do(Sonar(name="front", range=0.2))
+    try:
+        with pytest.raises(t2.Blocked) as stopped, robot.drive("nav") as drive:
+            drive.forward(1.0)
+    finally:
+        stack.control.do(Sonar(name="front"))
+    assert stopped.value.causes
+
+
+def test_invalid_numbers_are_refused(robot: t2.Robot) -> None:
+    with robot.drive("nav") as drive:
+        for move in (drive.velocity, drive.forward, drive.turn):
+            for number in (math.nan, math.inf):
+                with pytest.raises(ValueError, match="only finite"):
+                    move(number)
+        with pytest.raises(ValueError, match="speed must be positive"):
+            drive.forward(1.0, speed=-0.3)
+    with pytest.raises(ValueError, match="not negative"):
+        robot.limit("detector", linear=-1.0)
+    robot.led(channel=1, mode=1)

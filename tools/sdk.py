@@ -1,0 +1,83 @@
+"""The generated modules of the client library ``sdk/``: message types, and the table of keys."""
+
+import ast
+from pathlib import Path
+from types import ModuleType
+
+from common import keys, messages, timing, verdict
+
+SDK = Path(__file__).parent.parent / "sdk" / "t2"
+PARTS = (verdict, timing)
+USED = ("Literal", "Struct")  # that messages import themselves
+PARTS_HEAD = '''"""Parts of messages; generated from the stack by ``make docs``, do not edit."""
+
+from typing import Literal
+
+from msgspec import Struct
+'''
+HEAD = '''"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
+
+Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
+forward, y left, counter-clockwise positive. Readers ignore unknown fields.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+{imports}
+Command = Literal["run", "stop", "brake"]
+'''
+KEYS_HEAD = '''"""Keys on the bus; generated from the stack's own by ``make docs``, do not edit."""
+
+from t2 import messages as m
+
+'''
+
+
+def generated() -> dict[Path, str]:
+    """Return the text of each generated module."""
+    found = {
+        name
+        for part in PARTS
+        for name, value in vars(part).items()
+        if getattr(messages, name, None) is value and not name.startswith("_") and name not in USED
+    }
+    names = sorted(found, key=str.lower)  # as the linter sorts imports
+    imports = "".join(f"from t2.parts import {name} as {name}\n" for name in names)
+    return {
+        SDK / "parts.py": _joined(PARTS_HEAD, *map(_body, PARTS)),
+        SDK / "messages.py": _joined(HEAD.format(imports=imports), _body(messages)),
+        SDK / "keys.py": KEYS_HEAD + _keys(),
+    }
+
+
+def _joined(*parts: str) -> str:
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _body(module: ModuleType) -> str:
+    """Return a module without its docstring and its imports."""
+    text = Path(str(module.__file__)).read_text("utf-8")
+    lines = text.splitlines(keepends=True)
+    for node in reversed(ast.parse(text).body):
+        is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
+            del lines[node.lineno - 1 : node.end_lineno]
+    return "".join(lines).strip("\n") + "\n\n"
+
+
+def _keys() -> str:
+    topics = {name: topic for name, topic in vars(keys).items() if isinstance(topic, keys.Topic)}
+    rows = [
+        f'    "{name.lower()}": ("{topic.path}", m.{topic.message.__name__}),\n'
+        for name, topic in topics.items()
+    ]
+    calls = [f'    "{call.path.removeprefix("srv/")}": "{call.path}",\n' for call in keys.CALLS]
+    return (
+        f'ROOT = "{keys.ROOT}"\n\n'
+        "# By name: the path below the robot, and the type of the message.\n"
+        "TOPICS: dict[str, tuple[str, type[m.Message]]] = {\n" + "".join(rows) + "}\n\n"
+        "# By service and name: the path below the robot.\n"
+        "CALLS: dict[str, str] = {\n" + "".join(calls) + "}\n"
+    )
