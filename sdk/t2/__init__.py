@@ -4,6 +4,10 @@
 counter-clockwise positive).
 """
 
+from t2.aio import AsyncDrive as AsyncDrive
+from t2.aio import AsyncRobot as AsyncRobot
+from t2.aio import AsyncStream as AsyncStream
+from t2.aio import aconnect as aconnect
 from t2.connection import connect as connect
 from t2.drive import Drive as Drive
 from t2.errors import Blocked as Blocked
@@ -18,4 +22,5 @@ from t2.errors import Stopped as Stopped
 from t2.errors import T2Error as T2Error
 from t2.limit import SpeedLimit as SpeedLimit
 from t2.robot import Robot as Robot
+from t2.sim import sim as sim
 from t2.stream import Stream as Stream

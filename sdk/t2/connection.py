@@ -25,6 +25,10 @@ def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None
     ``endpoint`` is a Zenoh endpoint, by default ``tcp/127.0.0.1:7447``. ``config`` is a settings
     file of T2 with ``[bus]``, such as the ``bus.toml`` in a folder that ``t2 keys`` made. Raises
     ``LinkError``.
+
+    >>> with t2.connect("001", endpoint=ENDPOINT) as robot:
+    ...     print(robot.bumper.latest().pressed)
+    False
     """
     if not robot or set(robot) & set("/*$#?"):
         raise LinkError(f"{robot!r} is not the id of one robot, such as 001")
@@ -37,7 +41,7 @@ def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None
             f"no router answers at {', '.join(endpoints)}: is `t2 up` running there? "
             f"`t2 doctor` finds the reason ({error})"
         ) from None
-    return Robot(session, robot)
+    return Robot(session, robot, endpoints[0])
 
 
 def read(file: Path) -> dict[str, Any]:

@@ -97,17 +97,40 @@ class Drive:
             self.check()
 
     def close(self) -> None:
-        """Send zeros and end the requests."""
+        """Send zeros and end the requests.
+
+        >>> drive = robot.drive("nav")
+        >>> drive.close()
+        >>> drive.is_open
+        False
+        """
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()
 
     def check(self) -> None:
-        """Raise what stopped the vehicle, if anything did."""
+        """Raise what stopped the vehicle, if anything did.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.velocity(0.0, 0.2, seconds=0.5)
+        ...     time.sleep(0.2)  # something else
+        ...     drive.check()
+        """
         if self._error is not None:
             self._target = STILL
             error, self._error = self._error, None
             raise error
+
+    def cancel(self) -> None:
+        """End the motion of another thread with an error, and request zero.
+
+        >>> with robot.drive("nav") as drive:
+        ...     threading.Timer(0.5, drive.cancel).start()
+        ...     drive.forward(5.0, speed=0.1)
+        Traceback (most recent call last):
+        t2.errors.T2Error: the motion was cancelled
+        """
+        self._error = T2Error("the motion was cancelled")
 
     # --- motions ------------------------------------------------------------------------------
 
@@ -117,6 +140,9 @@ class Drive:
         """Request m/s and rad/s until changed, or for some seconds; return at once.
 
         Open loop: a program that waits for something else keeps driving.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.velocity(-0.1, seconds=0.5)
         """
         _finite(linear, angular)
         self.check()
@@ -124,12 +150,22 @@ class Drive:
         self._target = Target(linear, angular, end_s)
 
     def stop(self) -> None:
-        """Request zero and wait until the vehicle stands."""
+        """Request zero and wait until the vehicle stands.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.velocity(0.1)
+        ...     drive.stop()
+        """
         self.velocity(0.0)
         self._until(lambda pose: abs(pose.linear) < STANDING and abs(pose.angular) < STANDING)
 
     def forward(self, distance: float, speed: float = 0.3) -> None:
-        """Drive straight for a distance in m, negative backward, by odometry; wait for the end."""
+        """Drive straight for a distance in m, negative backward, by odometry; wait for the end.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.forward(0.1)
+        ...     drive.forward(-0.1, speed=0.2)
+        """
         _finite(distance)
         _positive(speed)
         start = self._robot.odometry.latest()
@@ -148,7 +184,12 @@ class Drive:
         self._go(go, left, NEAR)
 
     def turn(self, angle: float, speed: float = 0.5) -> None:
-        """Turn on the spot by an angle in rad, positive to the left, by odometry; wait for it."""
+        """Turn on the spot by an angle in rad, positive to the left, by odometry; wait for it.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.turn(math.pi / 8)
+        ...     drive.turn(-math.pi / 8)
+        """
         _finite(angle)
         _positive(speed)
         sign = math.copysign(1.0, angle)
@@ -194,7 +235,7 @@ class Drive:
         self.stop()
 
     def _until(self, arrived: Callable[[Odometry], bool]) -> None:
-        queue: deque[Odometry] = deque(maxlen=1)
+        queue: deque[Odometry | None] = deque(maxlen=1)
         stream = self._robot.odometry
         epoch = stream.latest().epoch
         with stream.reading(queue):
@@ -239,8 +280,8 @@ class Drive:
             target = self._target
             if time.monotonic() >= target.end_s:
                 target = STILL
-            if self._error is None:
-                self._error = self._trouble(target)
+            trouble = self._trouble(target)
+            self._error = self._error or trouble  # an error of `cancel` stays
             if self._error is not None:
                 target = STILL
             self._put(target.linear, target.angular)

@@ -34,6 +34,10 @@ class SpeedLimit:
         """Replace the limit; send it at once.
 
         Raises ``NotAllowed``, ``ValueError``, and ``NoData`` without safety.
+
+        >>> limit = robot.limit("detector", linear=0.5)
+        >>> limit.set(0.2, None, "person close")
+        >>> limit.end()
         """
         for cap in (linear, angular):
             if cap is not None and not 0 <= cap < float("inf"):
@@ -53,7 +57,10 @@ class SpeedLimit:
             self._thread.start()
 
     def end(self) -> None:
-        """Send no more; safety treats the silence as its settings for this source say."""
+        """Send no more; safety treats the silence as its settings for this source say.
+
+        >>> robot.limit("detector", linear=0.3).end()
+        """
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()

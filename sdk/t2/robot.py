@@ -29,8 +29,9 @@ class Robot:
     Each stream is subscribed on first use.
     """
 
-    def __init__(self, session: zenoh.Session, name: str) -> None:
+    def __init__(self, session: zenoh.Session, name: str, endpoint: str) -> None:
         self.name = name
+        self.endpoint = endpoint  # of the router
         self._session = session
         self._drives: list[Drive] = []
         self._limits: dict[str, SpeedLimit] = {}
@@ -52,7 +53,11 @@ class Robot:
         self.close()
 
     def close(self) -> None:
-        """End drives with zeros, end limits, and disconnect."""
+        """End drives with zeros, end limits, and disconnect.
+
+        >>> other = t2.connect("001", endpoint=ENDPOINT)
+        >>> other.close()
+        """
         for drive in self._drives:
             drive.close()
         for limit in self._limits.values():
@@ -67,6 +72,9 @@ class Robot:
         """Return a drive as this source, for ``with``; safety must know the source.
 
         ``safety.sources`` lists the sources with their priorities.
+
+        >>> with robot.drive("nav") as drive:
+        ...     drive.velocity(0.1, seconds=1)
         """
         self._drives = [each for each in self._drives if each.is_open]
         drive = Drive(self._session, self._key("drive", source=source), source, self)
@@ -84,6 +92,9 @@ class Robot:
 
         Zero is a protective stop, None no cap; ``reason`` is shown to operators.
         ``safety.limits`` must list the source. Raises ``NotAllowed`` and ``ValueError``.
+
+        >>> limit = robot.limit("detector", linear=0.3, reason="person ahead")
+        >>> limit.end()
         """
         if source not in self._limits or self._limits[source].has_ended:
             key = self._key("limit", source=source)
@@ -94,7 +105,14 @@ class Robot:
     # --- stopping -----------------------------------------------------------------------------
 
     def estop(self) -> None:
-        """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``."""
+        """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``.
+
+        >>> robot.estop()
+        >>> robot.safety.latest().latched
+        ('estop',)
+        >>> time.sleep(1)  # look at the vehicle
+        >>> _ = robot.reset()
+        """
         key = f"{ROOT}/{self.name}/estop"
         self._put_estop(key)  # before anything else
         begin_s = time.monotonic()
@@ -116,6 +134,10 @@ class Robot:
 
         A later cause is not cleared. Raises ``Refused`` with the reason, ``NotConfirmed`` when
         safety's state does not show the effect, and ``NoData`` without safety.
+
+        >>> robot.reset()
+        Traceback (most recent call last):
+        t2.errors.Refused: Nothing is latched.
         """
         state = self.safety.latest()
         seen = tuple(cause.id for cause in state.causes if cause.name in state.latched)
@@ -137,11 +159,16 @@ class Robot:
         """Set one lamp channel; ``settings`` are the further fields of ``LedRequest``.
 
         Raises ``Refused`` and ``TypeError``.
+
+        >>> robot.led(channel=1, mode=1)
         """
         self._call("bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
 
     def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``."""
+        """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``.
+
+        >>> robot.set_pose(x=1.0)
+        """
         echo = self.safety.latest().heartbeat
         request = m.PoseRequest(x=x, y=y, heading=heading, echo=echo)
         self._call("odom/reset", request, m.Done)

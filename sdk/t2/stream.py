@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 import zenoh
@@ -15,9 +15,17 @@ from t2.errors import NoData
 from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
+T = TypeVar("T", contravariant=True)
 
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
 logger = logging.getLogger(__name__)
+
+
+class Queue(Protocol[T]):
+    """What a stream fills from Zenoh's threads, such as a ``deque``."""
+
+    def append(self, message: T, /) -> object:
+        """Add a message."""
 
 
 class Stream(Generic[M]):
@@ -25,6 +33,9 @@ class Stream(Generic[M]):
 
     ``depth`` messages wait for a slow reader, older ones are dropped. ``invalid`` counts messages
     that do not have the topic's type.
+
+    >>> robot.odometry.latest(timeout=1.0).epoch >= 0
+    True
     """
 
     def __init__(
@@ -35,32 +46,45 @@ class Stream(Generic[M]):
         self._session = session
         self._decoder: msgspec.msgpack.Decoder[M] = msgspec.msgpack.Decoder(kind)
         self._what = what
-        self._depth = depth
+        self.depth = depth
+        self.closed = False
         self._changed = threading.Condition()
         self._newest: M | None = None
         self._received_s = 0.0
-        self._queues: list[deque[M]] = []
+        self._queues: list[Queue[M | None]] = []
         self._subscriber: Any = None
-        self._closed = False
 
     @property
     def newest(self) -> M | None:
-        """The newest message received; None before the first one, or before the first use."""
+        """The newest message received; None before the first one, or before the first use.
+
+        >>> _ = robot.ultrasonic.latest()  # subscribes
+        >>> len(robot.ultrasonic.newest.ranges)
+        8
+        """
         return self._newest
 
     @property
     def age(self) -> float:
-        """Time in s since the newest message was received; infinite before the first one."""
+        """Time in s since the newest message was received; infinite before the first one.
+
+        >>> _ = robot.velocity.latest()
+        >>> robot.velocity.age < 1.0
+        True
+        """
         return time.monotonic() - self._received_s if self._newest else float("inf")
 
     def latest(self, timeout: float = 1.0) -> M:
         """Return the newest message, at most ``timeout`` s old; wait for it at most that long.
 
         Raises ``NoData``.
+
+        >>> robot.bumper.latest(timeout=1.0).pressed
+        False
         """
         self.open()
         with self._changed:
-            self._changed.wait_for(lambda: self._closed or self.age <= timeout, timeout)
+            self._changed.wait_for(lambda: self.closed or self.age <= timeout, timeout)
             if self._newest is None or self.age > timeout:
                 raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {ADVICE}")
             return self._newest
@@ -69,6 +93,11 @@ class Stream(Generic[M]):
         """Call a function with the newest message, in a thread of its own, until the robot closes.
 
         A slow function skips messages. Its exceptions are logged, and the next message is handled.
+
+        >>> def warn(sample):
+        ...     if sample.pressed:
+        ...         print("contact")
+        >>> thread = robot.bumper.on(warn)
         """
         messages = iter(self)
 
@@ -84,13 +113,19 @@ class Stream(Generic[M]):
         return thread
 
     def __iter__(self) -> Iterator[M]:
-        """Yield each new message; end when the robot is closed."""
-        queue: deque[M] = deque(maxlen=self._depth)
+        """Yield each new message; end when the robot is closed.
+
+        >>> for pose in robot.odometry:
+        ...     print(math.hypot(pose.x, pose.y) < 100.0)
+        ...     break
+        True
+        """
+        queue: deque[M | None] = deque(maxlen=self.depth)
         self._add(queue)
         return self._messages(queue)
 
     @contextmanager
-    def reading(self, queue: "deque[M]") -> Iterator[None]:
+    def reading(self, queue: "Queue[M | None]") -> Iterator[None]:
         """Add each message to a queue during the context."""
         self._add(queue)
         try:
@@ -98,39 +133,46 @@ class Stream(Generic[M]):
         finally:
             self._remove(queue)
 
-    def after(self, queue: "deque[M]", timeout: float) -> M | None:
+    def after(self, queue: "deque[M | None]", timeout: float) -> M | None:
         """Return the next message of a queue; None after ``timeout`` s, or when closed."""
         with self._changed:
-            self._changed.wait_for(lambda: queue or self._closed, timeout)
+            self._changed.wait_for(lambda: queue or self.closed, timeout)
             return queue.popleft() if queue else None
 
     def open(self) -> None:
         """Subscribe, once."""
         with self._changed:
-            if self._subscriber is None and not self._closed:
+            if self._subscriber is None and not self.closed:
                 self._subscriber = self._session.declare_subscriber(self.key, self._on_sample)
 
     def close(self) -> None:
-        """End all iterations."""
+        """End all iterations, before the robot closes.
+
+        >>> robot.link.close()
+        >>> list(robot.link)
+        []
+        """
         with self._changed:
-            self._closed = True
+            self.closed = True
+            for queue in self._queues:
+                queue.append(None)  # wakes its reader
             self._changed.notify_all()
 
-    def _messages(self, queue: "deque[M]") -> Iterator[M]:
+    def _messages(self, queue: "deque[M | None]") -> Iterator[M]:
         try:
-            while not self._closed:
+            while not self.closed:
                 message = self.after(queue, 1.0)
                 if message is not None:
                     yield message
         finally:
             self._remove(queue)
 
-    def _add(self, queue: "deque[M]") -> None:
+    def _add(self, queue: "Queue[M | None]") -> None:
         with self._changed:
             self._queues.append(queue)
         self.open()
 
-    def _remove(self, queue: "deque[M]") -> None:
+    def _remove(self, queue: "Queue[M | None]") -> None:
         with self._changed:  # by identity: two empty queues are equal
             self._queues = [each for each in self._queues if each is not queue]
 

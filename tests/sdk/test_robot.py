@@ -1,7 +1,6 @@
 """The client library on the real stack: drives, limits, stops and resets."""
 
 import math
-from collections.abc import Iterator
 
 import pytest
 
@@ -11,37 +10,10 @@ from common.loop import Loop
 from common.source import DriveSource
 from sim.requests import Bumper, Sonar
 from verification.harness.bus import bus_on, running
-from verification.harness.stack import RunningStack, running_stack
+from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.timed
-
-SETS = ('safety.limits.detector={lease=1.0, silence="ignore"}',)
-
-
-@pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
-    with running_stack(tmp_path_factory.mktemp("sdk"), sets=SETS) as it:
-        yield it
-
-
-@pytest.fixture
-def robot(stack: RunningStack) -> Iterator[t2.Robot]:
-    with t2.connect("001", endpoint=stack.endpoint) as it:
-        it.odometry.latest(timeout=20.0)
-        wait_until(lambda: not blocked(it), "a vehicle that may drive")
-        yield it
-
-
-def blocked(robot: t2.Robot) -> bool:
-    """Return whether something else than a missing request stops the vehicle; reset it."""
-    state = robot.safety.latest(timeout=5.0)
-    if state.latched:
-        try:
-            robot.reset()
-        except t2.Refused:
-            return True
-    return not {cause.name for cause in state.causes} <= {"no_request", "neutral"}
 
 
 def test_a_distance_and_a_turn(robot: t2.Robot) -> None:

@@ -1,0 +1,182 @@
+"""The examples for the client library, as processes on the real stack."""
+
+import asyncio
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import nbformat
+import pytest
+from mcp import Client, StdioServerParameters
+from nbclient import NotebookClient
+
+import t2
+from sim.requests import Bumper
+from tests.sdk.library_robot import ready
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import PATIENCE_S, wait_until
+
+pytestmark = pytest.mark.timed
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "sdk")}
+SETS = ("safety.sources.agent={priority=1, lease=0.3, operator=false}",)
+LONGEST = {"mcp_server.py": 79}  # lines
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("examples"), "office", sets=SETS) as it:
+        yield it
+
+
+@pytest.fixture
+def robot(stack: RunningStack) -> Iterator[t2.Robot]:
+    with ready(stack) as it:
+        yield it
+
+
+@contextmanager
+def example(name: str, *words: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run an example; stop it like Ctrl-C, and expect a clean end."""
+    command = [sys.executable, str(EXAMPLES / name), *words]
+    with subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+            process.send_signal(signal.SIGINT)
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+
+
+def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:
+    file = tmp_path / "poses.csv"
+    with example("odometry_logger.py", str(file), robot.endpoint):
+        wait_until(lambda: file.exists() and file.read_text().count("\n") > 5, "poses")
+    rows = list(csv.DictReader(file.read_text().splitlines()))
+    assert float(rows[0]["x"]) == pytest.approx(robot.odometry.latest().x, abs=0.05)
+
+
+def test_the_square_ends_at_its_start(robot: t2.Robot) -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "square.py"), robot.endpoint],
+        env=ENVIRONMENT, stdout=subprocess.PIPE, text=True, timeout=110, check=True,
+    )  # fmt: skip
+    distance, rest = done.stdout.split(" ", 1)
+    assert float(distance) < 0.3
+    assert rest == "m from the start\n"
+
+
+def test_a_square_without_a_robot_ends_with_the_reason() -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "square.py"), "tcp/127.0.0.1:9"],
+        env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.startswith("no router answers at tcp/127.0.0.1:9")
+
+
+def test_the_notebook_plots_while_it_drives(
+    robot: t2.Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("T2_ENDPOINT", robot.endpoint)
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
+    notebook = nbformat.read(  # type: ignore[no-untyped-call]
+        EXAMPLES / "live_plot.ipynb", as_version=4
+    )
+    client = NotebookClient(notebook, timeout=100, resources={"metadata": {"path": tmp_path}})
+    client.execute()
+    plots, text = notebook.cells[-2].outputs, notebook.cells[-1].outputs[0].text
+    assert any("image/png" in output.get("data", {}) for output in plots)
+    poses, _, _, speed, _ = text.split()
+    assert int(poses) > 20
+    assert float(speed) > 0.2
+
+
+def test_the_agent_reads_and_drives_and_stops_but_never_resets(robot: t2.Robot) -> None:
+    server = StdioServerParameters(
+        command=sys.executable,
+        args=[str(EXAMPLES / "mcp_server.py"), robot.endpoint],
+        env={"PYTHONPATH": ENVIRONMENT["PYTHONPATH"]},
+    )
+
+    async def call(client: Client, tool: str, **values: float) -> Any:
+        return await client.call_tool(tool, dict(values))
+
+    async def session() -> None:
+        async with Client(server) as client:
+            tools = {tool.name for tool in (await client.list_tools()).tools}
+            assert tools == {"state", "sonars", "incidents", "drive", "stop"}
+            before = (await call(client, "state")).structured_content
+            driven = (await call(client, "drive", distance=0.3)).structured_content
+            way = math.dist((before["x"], before["y"]), (driven["x"], driven["y"]))
+            assert way == pytest.approx(0.3, abs=0.1)
+            assert len((await call(client, "sonars")).structured_content) == 8
+            await call(client, "stop")
+            refused = await call(client, "drive", turn=90.0)
+            assert refused.is_error
+            assert "Emergency stop" in refused.content[0].text
+            seen = (await call(client, "incidents")).structured_content["result"]
+            assert any("mergency stop" in incident for incident in seen), seen
+
+    asyncio.run(asyncio.wait_for(session(), 100.0))
+    wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
+
+
+def test_the_web_hook_gets_each_latch_once(robot: t2.Robot, stack: RunningStack) -> None:
+    bodies: list[dict[str, object]] = []
+
+    class Hook(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            bodies.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+    with HTTPServer(("127.0.0.1", 0), Hook) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        with example("webhook.py", f"http://127.0.0.1:{server.server_port}/hook", robot.endpoint):
+            for _ in range(2):
+                before = len(bodies)
+                stack.control.do(Bumper(pressed=True))
+                wait_until(lambda: len(bodies) > before, "a POST")  # noqa: B023 - called here
+                stack.control.do(Bumper(pressed=False))
+                wait_until(lambda: reset(robot), "a reset")
+        server.shutdown()
+    assert [body["causes"] for body in bodies] == [["contact"], ["contact"]]
+
+
+def reset(robot: t2.Robot) -> bool:
+    """Return whether a reset was accepted."""
+    try:
+        robot.reset()
+    except t2.Refused:
+        return False
+    return True
+
+
+def test_the_wall_follower_approaches_the_wall(stack: RunningStack) -> None:
+    with ready(stack) as robot, example("wall_follower.py", robot.endpoint):
+        start = robot.odometry.latest()
+
+        def follows() -> bool:
+            pose, wall = robot.odometry.latest(5.0), robot.ultrasonic.latest(5.0).ranges[4]
+            way = math.dist((start.x, start.y), (pose.x, pose.y))
+            return way > 1.0 and wall is not None and 0.6 < wall < 1.0
+
+        wait_until(follows, "the wall beside the vehicle", 100.0)
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.py")), ids=lambda file: file.name)
+def test_an_example_is_short(file: Path) -> None:
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= LONGEST.get(file.name, 39)

@@ -1,0 +1,36 @@
+"""A simulated robot for the tests of the client library."""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+import t2
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
+
+SETS = ('safety.limits.detector={lease=1.0, silence="ignore"}',)
+
+
+def library_stack(folder: Path) -> AbstractContextManager[RunningStack]:
+    """Run the stack with a source of limits, ``detector``."""
+    return running_stack(folder, sets=SETS)
+
+
+@contextmanager
+def ready(stack: RunningStack) -> Iterator[t2.Robot]:
+    """Connect, and wait until the robot may drive."""
+    with t2.connect("001", endpoint=stack.endpoint) as it:
+        it.odometry.latest(timeout=20.0)
+        wait_until(lambda: not _blocked(it), "a vehicle that may drive")
+        yield it
+
+
+def _blocked(robot: t2.Robot) -> bool:
+    """Return whether something else than a missing request stops the vehicle; reset it."""
+    state = robot.safety.latest(timeout=5.0)
+    if state.latched:
+        try:
+            robot.reset()
+        except t2.Refused:
+            return True
+    return not {cause.name for cause in state.causes} <= {"no_request", "neutral"}

@@ -1,0 +1,94 @@
+"""The built wheels in an empty repository that has packages of the same names as ours."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.timed
+
+ROOT = Path(__file__).parents[2]
+UV = [str(Path(sys.executable).with_name("uv")), "--quiet"]
+ENVIRONMENT = {**os.environ, "PATH": os.defpath}  # without our own `t2`
+ENVIRONMENT.pop("PYTHONPATH", None)
+FOREIGN = ("common", "services", "sim", "tests")
+TEST = """
+import t2
+from common import SIDE  # of this repository
+
+
+def test_forward(t2_robot: t2.Robot) -> None:
+    start = t2_robot.odometry.latest().x
+    with t2_robot.drive("nav") as drive:
+        drive.forward(SIDE)
+    assert abs(t2_robot.odometry.latest().x - start - SIDE) < 0.1
+"""
+USE = """
+import asyncio, t2
+
+assert "site-packages" in t2.__file__
+try:
+    t2.connect(endpoint="tcp/127.0.0.1:9")
+except t2.LinkError as error:
+    print(error)
+try:
+    with t2.sim():
+        pass
+except t2.LinkError as error:
+    print(error)
+"""
+
+
+def run(*words: str | Path, cwd: Path) -> str:
+    """Run a command; return its output, and fail with it."""
+    done = subprocess.run(
+        [str(word) for word in words], cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Build both distributions; return their wheels by name."""
+    folder = tmp_path_factory.mktemp("wheels")
+    for project in (ROOT, ROOT / "sdk"):
+        run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=project)
+    return {wheel.name.partition("-")[0]: wheel for wheel in folder.glob("*.whl")}
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """Return a folder with packages of its own, and a virtual environment."""
+    folder = tmp_path / "repository"
+    for name in FOREIGN:
+        (folder / name).mkdir(parents=True)
+        (folder / name / "__init__.py").write_text("SIDE = 0.3\n")
+    run(*UV, "venv", "--python", sys.executable, folder / ".venv", cwd=folder)
+    return folder
+
+
+def install(repository: Path, *packages: str | Path) -> Path:
+    """Install packages at the locked versions; return the interpreter."""
+    python = repository / ".venv/bin/python"
+    options = ("--system-certs", "--python", python, "-c", ROOT / "requirements.lock")
+    run(*UV, "pip", "install", *options, *packages, cwd=ROOT)
+    return python
+
+
+def test_a_program_without_the_stack_gets_clear_errors(
+    wheels: dict[str, Path], repository: Path
+) -> None:
+    python = install(repository, wheels["t2_sdk"])
+    no_router, no_stack = run(python, "-c", USE, cwd=repository).splitlines()
+    assert no_router.startswith("no router answers at tcp/127.0.0.1:9")
+    assert no_stack.startswith("the simulated robot needs the stack, and 't2' is not found")
+
+
+def test_a_test_drives_the_robot_of_the_fixture(wheels: dict[str, Path], repository: Path) -> None:
+    python = install(repository, wheels["t2"], wheels["t2_sdk"], "pytest")
+    (repository / "tests/test_forward.py").write_text(TEST)
+    assert "1 passed" in run(python, "-m", "pytest", "-q", cwd=repository)
