@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet vehicles bench compose-test check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet vehicles bench compose-test rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -86,6 +86,10 @@ bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/perfor
 
 compose-test: $(STAMP) ## test the containers on a Docker engine: build, drive, kill, disconnect, upgrade
 	$(BIN)/python -m verification.containers
+
+rust-example: $(STAMP) ## compile examples/rust and drive with it; needs cargo
+	$(BIN)/pytest tests/examples/test_rust.py
+	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo clippy --quiet -- -D warnings
 
 roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roaming.md
 	$(BIN)/python -m verification.roaming --out docs/roaming.md

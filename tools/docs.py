@@ -45,6 +45,7 @@ def generated() -> dict[Path, str]:
         DOCS / "safety.md": safety,
         DOCS / "security.md": security,
         DOCS / "operations.md": {"metrics": metrics()},
+        DOCS / "integrate.md": {f"rust_{name}": rust(name) for name in ("read", "drive", "limit")},
     }
     return (
         {page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()}
@@ -122,6 +123,12 @@ def metrics() -> str:
         for one in FAMILIES
     ]
     return table(("metric", "kind", "labels", ""), rows)
+
+
+def rust(name: str) -> str:
+    """Return a program of the Rust example as a fenced block."""
+    file = DOCS.parent / "examples" / "rust" / "src" / "bin" / f"{name}.rs"
+    return f"```rust\n{file.read_text(encoding='utf-8')}```"
 
 
 def _link(kind: type[Struct]) -> str:

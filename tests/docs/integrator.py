@@ -1,0 +1,165 @@
+"""An integrator: a folder with the files of docs/integrate.md, and a stack for its programs."""
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import t2
+from sim.requests import Sonar
+from verification.harness.stack import SETTINGS_FILE, RunningStack, running_stack
+from verification.harness.waiting import wait_until
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "integrate.md"
+SDK = ROOT / "sdk"
+# A block with a file name after its language: ```python plain/drive.py
+NAMED = re.compile(r"^```\w+ (?P<name>[\w./]+)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+NO_REQUEST = {"no_request", "neutral"}
+
+
+def save_files(page: Path, folder: Path) -> None:
+    """Write each block of a page that has a file name to a folder."""
+    for block in NAMED.finditer(page.read_text(encoding="utf-8")):
+        file = folder / block["name"]
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(block["text"], encoding="utf-8")
+
+
+class Integrator:
+    """A folder, the robot that its settings describe, and what the robot reports."""
+
+    def __init__(self, folder: Path, stack: RunningStack, robot: t2.Robot) -> None:
+        self.folder = folder
+        self.stack = stack
+        self.robot = robot
+
+    def words(self, program: Sequence[str], router: str = "") -> list[str]:
+        """Return the command of a program: a Python file of the page, or an executable."""
+        python = [sys.executable] if program[0].endswith(".py") else []
+        return [*python, *program, router or self.stack.endpoint]
+
+    def run(self, *program: str, router: str = "") -> "subprocess.CompletedProcess[str]":
+        """Run a program to its end."""
+        return subprocess.run(
+            self.words(program, router), cwd=self.folder, env=environment(),
+            capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+
+    @contextlib.contextmanager
+    def running(self, *program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
+        """Run a program during the context."""
+        with subprocess.Popen(
+            self.words(program, router), cwd=self.folder, env=environment(),
+            stdout=subprocess.PIPE, text=True,
+        ) as process:  # fmt: skip
+            try:
+                yield process
+            finally:
+                process.kill()
+
+    def causes(self) -> set[str]:
+        """Return the names of the causes that safety reports."""
+        return {cause.name for cause in self.robot.safety.latest(timeout=5.0).causes}
+
+    def await_clear(self) -> None:
+        """Wait until nothing but a missing request stops the vehicle; reset what is latched."""
+
+        def is_clear() -> bool:
+            if self.robot.safety.latest(timeout=5.0).latched:
+                with contextlib.suppress(t2.Refused):
+                    self.robot.reset()
+            return self.causes() <= NO_REQUEST
+
+        wait_until(is_clear, "a vehicle that may drive")
+
+    @contextlib.contextmanager
+    def limited(self, *program: str) -> Iterator["subprocess.Popen[str]"]:
+        """Run a limit program, and wait until its limit is valid and the vehicle may drive.
+
+        It starts after the lease of an earlier one: two publishers on one source are a conflict.
+        """
+        wait_until(lambda: self.limit().silent, "the end of an earlier limit")
+        with self.running(*program) as process:
+            wait_until(lambda: not self.limit().silent, "the limit")
+            self.await_clear()
+            yield process
+
+    def limit(self) -> t2.messages.LimitState:
+        """Return what safety reports of the limit source of the page."""
+        (limit,) = self.robot.safety.latest(timeout=5.0).limit_sources
+        assert limit.source == "detector"
+        return limit
+
+    @contextlib.contextmanager
+    def obstacle(self, range_m: float) -> Iterator[None]:
+        """Make the front sonar measure an obstacle during the context."""
+        self.stack.control.do(Sonar(name="front", range=range_m))
+        try:
+            yield
+        finally:
+            self.stack.control.do(Sonar(name="front"))
+
+
+@contextlib.contextmanager
+def integrator(folder: Path) -> Iterator[Integrator]:
+    """Run a stack with the settings of the page; the board is simulated in an empty world."""
+    save_files(PAGE, folder)
+    (folder / "robot.toml").rename(folder / SETTINGS_FILE)
+    with running_stack(folder) as stack, t2.connect("001", endpoint=stack.endpoint) as robot:
+        robot.odometry.latest(timeout=20.0)
+        yield Integrator(folder, stack, robot)
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of an integrator who has installed the package t2."""
+    return {**os.environ, "PYTHONPATH": str(SDK), "PYTHONUNBUFFERED": "1"}
+
+
+def lines_until(process: "subprocess.Popen[str]", true: Callable[[str], bool]) -> list[str]:
+    """Return the output of a program up to the line for which ``true`` is."""
+    lines: list[str] = []
+    assert process.stdout is not None
+    for line in process.stdout:
+        lines.append(line)
+        if true(line):
+            return lines
+    raise AssertionError(f"ended with {process.wait()}: {lines}")
+
+
+# --- what each program of the page must do, in whichever language --------------------------------
+
+
+def check_reading(it: Integrator, *program: str) -> None:
+    """Check that a consumer prints pose and nearest obstacle."""
+    place = it.robot.odometry.latest()
+    with it.obstacle(0.62), it.running(*program) as process:
+        line = lines_until(process, lambda line: "nearest 0.6" in line)[-1]
+    pose = f"x {place.x:.1f}"
+    assert re.match(pose + r"\d m  y -?\d+\.\d\d m  heading -?\d\.\d\d rad  nearest 0\.6\d m", line)
+
+
+def check_driving(it: Integrator, *program: str) -> None:
+    """Check that a source drives forward and ends without an error."""
+    with it.limited("plain/limit.py"):
+        before = it.stack.control.truth().x
+        done = it.run(*program)
+        assert done.returncode == 0, done
+        wait_until(lambda: abs(it.stack.speed()) < 0.02, "standstill")
+        assert 0.2 < it.stack.control.truth().x - before < 0.6
+
+
+def check_limiting(it: Integrator, *program: str) -> None:
+    """Check that a limit caps the speed before an obstacle, and that its end stops the vehicle."""
+    with it.limited(*program) as process:
+        assert it.limit().linear is None
+        with it.obstacle(1.0):
+            wait_until(lambda: it.limit().linear == 0.1, "the cap")
+            wait_until(lambda: it.limit().reason.startswith("obstacle at "), "its reason")
+        wait_until(lambda: it.limit().linear is None, "no cap")
+        process.send_signal(signal.SIGKILL)
+        wait_until(lambda: "limit_silent" in it.causes(), "the stop")
