@@ -78,13 +78,13 @@ class Integrator:
         wait_until(is_clear, "a vehicle that may drive")
 
     @contextlib.contextmanager
-    def limited(self, *program: str) -> Iterator["subprocess.Popen[str]"]:
+    def limited(self, *program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
         """Run a limit program, and wait until its limit is valid and the vehicle may drive.
 
         It starts after the lease of an earlier one: two publishers on one source are a conflict.
         """
         wait_until(lambda: self.limit().silent, "the end of an earlier limit")
-        with self.running(*program) as process:
+        with self.running(*program, router=router) as process:
             wait_until(lambda: not self.limit().silent, "the limit")
             self.await_clear()
             yield process
@@ -106,11 +106,16 @@ class Integrator:
 
 
 @contextlib.contextmanager
-def integrator(folder: Path) -> Iterator[Integrator]:
-    """Run a stack with the settings of the page; the board is simulated in an empty world."""
+def running_integrator(
+    folder: Path, *, sets: Sequence[str] = (), listen: str = "tcp/127.0.0.1:{port}"
+) -> Iterator[Integrator]:
+    """Run a stack with the settings of the page, in an empty world; see ``running_stack``."""
     save_files(PAGE, folder)
     (folder / "robot.toml").rename(folder / SETTINGS_FILE)
-    with running_stack(folder) as stack, t2.connect("001", endpoint=stack.endpoint) as robot:
+    with (
+        running_stack(folder, sets=sets, listen=listen) as stack,
+        t2.connect("001", endpoint=stack.endpoint) as robot,
+    ):
         robot.odometry.latest(timeout=20.0)
         yield Integrator(folder, stack, robot)
 
@@ -143,11 +148,11 @@ def check_reading(it: Integrator, *program: str) -> None:
     assert re.match(pose + r"\d m  y -?\d+\.\d\d m  heading -?\d\.\d\d rad  nearest 0\.6\d m", line)
 
 
-def check_driving(it: Integrator, *program: str) -> None:
+def check_driving(it: Integrator, *program: str, router: str = "") -> None:
     """Check that a source drives forward and ends without an error."""
     with it.limited("plain/limit.py"):
         before = it.stack.control.truth().x
-        done = it.run(*program)
+        done = it.run(*program, router=router)
         assert done.returncode == 0, done
         wait_until(lambda: abs(it.stack.speed()) < 0.02, "standstill")
         assert 0.2 < it.stack.control.truth().x - before < 0.6

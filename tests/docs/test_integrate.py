@@ -18,8 +18,9 @@ from tests.docs.integrator import (
     check_driving,
     check_limiting,
     check_reading,
-    integrator,
     lines_until,
+    running_integrator,
+    save_files,
 )
 from verification.harness.bus import bus_on, running
 from verification.harness.waiting import wait_until
@@ -31,14 +32,14 @@ TEXT = PAGE.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
-def running_integrator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
-    with integrator(tmp_path_factory.mktemp("integrate")) as it:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
+    with running_integrator(tmp_path_factory.mktemp("integrate")) as it:
         yield it
 
 
 @pytest.fixture
-def it(running_integrator: Integrator) -> Integrator:
-    return running_integrator
+def it(shared: Integrator) -> Integrator:
+    return shared
 
 
 def test_the_first_program_prints_the_pose(it: Integrator) -> None:
@@ -134,3 +135,19 @@ def test_the_command_that_shows_the_text_of_safety(it: Integrator) -> None:
         cwd=ROOT, capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     assert done.stdout.strip() in {it.robot.safety.latest().text, "No source requests motion."}
+
+
+def test_the_version_of_zenoh_is_that_of_the_stack() -> None:
+    (locked,) = re.findall(
+        r"^eclipse-zenoh==(\S+)", (ROOT / "requirements.lock").read_text(encoding="utf-8"), re.M
+    )
+    assert re.findall(r"eclipse-zenoh==(\S+)", TEXT) == [locked]
+
+
+def test_the_program_of_the_page_on_the_bus(it: Integrator) -> None:
+    save_files(PAGE.with_name("bus.md"), it.folder)
+    with it.limited("plain/limit.py"):
+        before = it.stack.control.truth().x
+        done = it.run("drive_nav.py")
+        assert done.returncode == 0, done
+        assert it.stack.control.truth().x > before + 0.2

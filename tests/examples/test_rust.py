@@ -15,8 +15,9 @@ from tests.docs.integrator import (
     check_driving,
     check_limiting,
     check_reading,
-    integrator,
+    running_integrator,
 )
+from tests.docs.secured import secured_integrator
 
 PROJECT = ROOT / "examples" / "rust"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "out" / "rust"))
@@ -60,7 +61,7 @@ def programs() -> Path:
 
 @pytest.fixture(scope="module")
 def it(programs: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
-    with integrator(tmp_path_factory.mktemp("rust")) as it:
+    with running_integrator(tmp_path_factory.mktemp("rust")) as it:
         yield it
 
 
@@ -103,3 +104,12 @@ def test_the_limit(it: Integrator, programs: Path) -> None:
 def test_a_source_without_its_limit(it: Integrator, programs: Path) -> None:
     done = it.run(str(programs / "drive"))
     assert "No speed limit arrives of detector." in done.stdout
+
+
+@needs_cargo
+@campaign
+@pytest.mark.timed
+@pytest.mark.timeout(400)
+def test_the_source_with_a_certificate(programs: Path, tmp_path: Path) -> None:
+    with secured_integrator(tmp_path) as secured:
+        check_driving(secured.integrator, str(programs / "drive"), router=secured.configuration())

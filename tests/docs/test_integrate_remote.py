@@ -1,0 +1,73 @@
+"""docs/integrate.md with certificates, and its own test file, as they stand there."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import t2
+from cli.demo import host_stalls
+from common.config import Sources, load
+from common.settings import Shared
+from tests.cli.stack import ports
+from tests.docs.integrator import PAGE, environment, lines_until, save_files
+from tests.docs.secured import Secured, secured_integrator
+from verification.harness.ports import free_port
+
+pytestmark = [pytest.mark.timed, pytest.mark.campaign, pytest.mark.timeout(300)]
+
+
+@pytest.fixture(scope="module")
+def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
+    with secured_integrator(tmp_path_factory.mktemp("secured")) as it:
+        yield it
+
+
+def test_each_role_may_do_what_the_page_states(secured: Secured) -> None:
+    it = secured.integrator
+    driver, device, viewer = (
+        secured.configuration(member)
+        for member in ("driver.planner", "device.detector", "viewer.screen")
+    )
+    with it.running("plain/read.py", router=viewer) as process:
+        lines_until(process, lambda line: "nearest" in line)
+    with it.limited("plain/limit.py", router=device):
+        done = it.run("plain/drive.py", router=driver)
+        assert done.returncode == 0, done
+        for other in (device, viewer):
+            done = it.run("plain/drive.py", router=other)
+            assert done.stderr.startswith("safety does not obey patrol: ")
+
+
+def test_the_package_takes_the_folder_of_a_certificate(secured: Secured) -> None:
+    toml = secured.integrator.folder / "keys" / "driver.planner" / "bus.toml"
+    bus = load(Shared, Sources(files=(toml,), environ={})).config.bus
+    text = toml.read_text(encoding="utf-8")
+    toml.write_text(text.replace(bus.connect[0], secured.endpoint), encoding="utf-8")
+    with t2.connect("001", config=toml) as robot:
+        assert robot.odometry.latest(timeout=5.0).frame_id == "odom"
+
+
+def test_the_test_file_of_the_page(tmp_path: Path) -> None:
+    """It drives the simulated vehicle, with settings for the stalls of this host."""
+    save_files(PAGE, tmp_path)
+    control = free_port()
+    stalls = host_stalls.settings(max(host_stalls.measured(), 0.3))
+    own = ports()
+    relaxed = {one.partition("=")[0] for one in stalls}
+    own = [one for one in own if one.partition("=")[0] not in relaxed | {"bridge.unsafe_overrides"}]
+    sets = host_stalls.with_accepted_joined([*own, *stalls, f"sim.control_port={control}"])
+    given = dict(one.split("=", 1) for one in sets)
+    env = {f"T2__{name.upper().replace('.', '__')}": value for name, value in given.items()}
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    words = ["-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", str(tmp_path)]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words, "test_patrol.py"], cwd=tmp_path, check=False,
+        env={**environment(), **env, "PATH": path, "ROUTER": given["bus.listen"]},
+        capture_output=True, text=True, timeout=250,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
