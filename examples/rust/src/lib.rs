@@ -53,9 +53,16 @@ impl Newest {
 #[derive(Deserialize, Default)]
 pub struct SafetyState {
     pub heartbeat: u64,
-    pub text: String,
     pub source: Option<String>,
-    pub latched: Vec<String>,
+    pub causes: Vec<Cause>, // the worst first
+}
+
+/// One reason why the vehicle may not move as requested.
+#[derive(Deserialize)]
+pub struct Cause {
+    pub name: String,
+    pub action: String, // slow, stop or brake
+    pub text: String,
 }
 
 #[derive(Serialize)]

@@ -12,6 +12,10 @@ const STILL: Drive = Drive {
     linear: 0.0,
     angular: 0.0,
 };
+const FORWARD: Drive = Drive {
+    linear: 0.2,
+    angular: 0.0,
+};
 
 #[derive(Serialize)]
 struct Drive {
@@ -32,40 +36,44 @@ fn main() -> Result<(), Failure> {
 
 fn drive(patrol: &mut Source) -> Result<(), Failure> {
     take_control(patrol)?;
-    let mut shown = String::new();
     let end = Instant::now() + Duration::from_secs(2);
     while Instant::now() < end {
-        patrol.put(&Drive {
-            linear: 0.2,
-            angular: 0.0,
-        })?;
+        patrol.put(&FORWARD)?;
         sleep(PERIOD);
-        let state = patrol.state.as_ref().ok_or("safety is silent")?;
-        if !state.latched.is_empty() || is_overruled(state) {
-            return Err(state.text.clone().into());
-        }
-        if state.text != shown {
-            shown.clone_from(&state.text); // such as: slowed by an obstacle
-            println!("{shown}");
+        if let Some(stopped) = reason(patrol.state.as_ref()) {
+            return Err(stopped.into());
         }
     }
     Ok(())
 }
 
-/// Put neutral requests until safety obeys this source, for 2 s at most.
+/// Put neutral requests until safety would let this source drive, for 2 s at most.
 fn take_control(patrol: &mut Source) -> Result<(), Failure> {
     for tick in 0..40 {
         patrol.put(&STILL)?;
         sleep(PERIOD);
         let state = patrol.state.as_ref();
-        if tick > 10 && state.is_some_and(|it| it.source.as_deref() == Some(NAME)) {
+        let in_control = state.is_some_and(|it| it.source.as_deref() == Some(NAME));
+        if tick > 10 && in_control && reason(state).is_none() {
             return Ok(());
         }
     }
-    let state = patrol.state.as_ref().ok_or("safety is silent")?;
-    Err(format!("safety does not obey {NAME}: {}", state.text).into())
+    let why = reason(patrol.state.as_ref()).unwrap_or_default();
+    Err(format!("safety does not obey {NAME}: {why}").into())
 }
 
-fn is_overruled(state: &SafetyState) -> bool {
-    state.source.as_deref().is_some_and(|source| source != NAME)
+/// Return why safety does not move the vehicle for this source; None if it does.
+fn reason(state: Option<&SafetyState>) -> Option<String> {
+    let Some(state) = state else {
+        return Some("safety is silent".into());
+    };
+    for cause in &state.causes {
+        if cause.action != "slow" && cause.name != "no_request" {
+            return Some(cause.text.clone());
+        }
+    }
+    match state.source.as_deref() {
+        None | Some(NAME) => None,
+        Some(other) => Some(format!("{other} drives")),
+    }
 }
