@@ -117,7 +117,10 @@ def running_integrator(
 ) -> Iterator[Integrator]:
     """Run a stack with the settings of the page, in an empty world; see ``running_stack``."""
     save_files(PAGE, folder)
-    (folder / "robot.toml").rename(folder / SETTINGS_FILE)
+    settings = [
+        (folder / name).read_text(encoding="utf-8") for name in ("robot.toml", "limit.toml")
+    ]
+    (folder / SETTINGS_FILE).write_text("\n".join(settings), encoding="utf-8")
     with (
         running_stack(folder, sets=(*LEASES, *sets), listen=listen) as stack,
         t2.connect("001", endpoint=stack.endpoint) as robot,

@@ -24,6 +24,7 @@ from tests.docs.integrator import (
     save_files,
 )
 from verification.harness.bus import bus_on, running
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.timed
@@ -136,6 +137,21 @@ def test_an_unknown_source(it: Integrator, way: str, reported: str) -> None:
         done = it.run(f"{way}/stranger.py")
     assert done.returncode == 1
     assert done.stderr.startswith(reported)
+
+
+def test_two_programs_with_one_name(it: Integrator) -> None:
+    with (
+        it.limited("plain/limit.py"),
+        it.running("plain/drive.py"),
+        it.running("sdk/drive.py"),
+    ):
+        wait_until(lambda: "two_publishers" in it.causes(), "the conflict")
+
+
+def test_no_router(it: Integrator) -> None:
+    done = it.run("sdk/drive.py", router=f"tcp/127.0.0.1:{free_port()}")
+    assert done.returncode == 1
+    assert done.stderr.startswith("LinkError: no router answers at ")
 
 
 def test_the_command_that_shows_the_text_of_safety(it: Integrator) -> None:

@@ -1,6 +1,7 @@
 """docs/integrate.md with certificates, and its own test file, as they stand there."""
 
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -54,12 +55,11 @@ def test_the_package_takes_the_folder_of_a_certificate(secured: Secured) -> None
 def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     """It drives the simulated vehicle, with settings for the stalls of this host."""
     save_files(PAGE, tmp_path)
-    control = free_port()
     stalls = host_stalls.settings(max(host_stalls.measured(), 0.3))
-    own = ports()
-    relaxed = {one.partition("=")[0] for one in stalls}
-    own = [one for one in own if one.partition("=")[0] not in relaxed | {"bridge.unsafe_overrides"}]
-    sets = host_stalls.with_accepted_joined([*own, *stalls, *LEASES, f"sim.control_port={control}"])
+    relaxed = {"bridge.unsafe_overrides", *(one.partition("=")[0] for one in stalls)}
+    own = [one for one in ports() if one.partition("=")[0] not in relaxed]
+    control = f"sim.control_port={free_port(socket.SOCK_DGRAM)}"
+    sets = host_stalls.with_accepted_joined([*own, *stalls, LEASES[0], control])
     given = dict(one.split("=", 1) for one in sets)
     env = {f"T2__{name.upper().replace('.', '__')}": value for name, value in given.items()}
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
