@@ -88,6 +88,7 @@ compose-test: $(STAMP) ## test the containers on a Docker engine: build, drive, 
 	$(BIN)/python -m verification.containers
 
 rust-example: $(STAMP) ## compile examples/rust and drive with it; needs cargo
+	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo build
 	$(BIN)/pytest tests/examples/test_rust.py
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo clippy --quiet -- -D warnings
 

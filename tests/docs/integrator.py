@@ -179,5 +179,17 @@ def check_limiting(it: Integrator, *program: str) -> None:
             wait_until(lambda: it.limit().linear == 0.1, "the cap")
             wait_until(lambda: it.limit().reason.startswith("obstacle at "), "its reason")
         wait_until(lambda: it.limit().linear is None, "no cap")
+        assert it.limit().reason == ""
         process.send_signal(signal.SIGKILL)
         wait_until(lambda: "limit_silent" in it.causes(), "the stop")
+
+
+def check_silent_safety(it: Integrator, *program: str) -> None:
+    """Check that a source ends when safety dies."""
+    with it.limited("plain/limit.py"), it.running(*program) as process:
+        wait_until(lambda: it.stack.speed() > 0.1, "motion")
+        it.stack.kill("safety")
+        try:
+            assert process.wait(timeout=20.0) == 1
+        finally:
+            it.stack.start("safety")

@@ -15,6 +15,7 @@ from tests.docs.integrator import (
     check_driving,
     check_limiting,
     check_reading,
+    check_silent_safety,
     running_integrator,
 )
 from tests.docs.secured import secured_integrator
@@ -87,6 +88,14 @@ def test_the_consumer(it: Integrator, programs: Path) -> None:
 @pytest.mark.timeout(400)
 def test_the_source(it: Integrator, programs: Path) -> None:
     check_driving(it, str(programs / "drive"))
+
+
+@needs_cargo
+@campaign
+@pytest.mark.timed
+@pytest.mark.timeout(400)
+def test_the_source_ends_when_safety_dies(it: Integrator, programs: Path) -> None:
+    check_silent_safety(it, str(programs / "drive"))
 
 
 @needs_cargo

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{de::DeserializeOwned, Deserialize, Serialize};
 use zenoh::handlers::{RingChannel, RingChannelHandler};
@@ -69,7 +69,7 @@ pub struct Cause {
 struct Request<'a, T> {
     seq: u64,
     boot: u64,
-    t_ns: u64,
+    t_ns: u64, // for recordings
     echo: u64,
     #[serde(flatten)]
     body: &'a T,
@@ -77,7 +77,8 @@ struct Request<'a, T> {
 
 /// Publisher of one source's requests to safety.
 pub struct Source<'a> {
-    pub state: Option<SafetyState>,
+    pub state: Option<SafetyState>, // the newest; None while safety is silent
+    received: Instant,              // when it arrived
     publisher: Publisher<'a>,
     states: Newest,
     boot: u64,
@@ -95,6 +96,7 @@ impl Source<'_> {
             .wait()?;
         Ok(Self {
             state: None,
+            received: Instant::now(),
             publisher,
             states: Newest::subscribe(session, "tel/safety/state")?,
             boot: RandomState::new().build_hasher().finish() >> 8, // random per start
@@ -106,6 +108,9 @@ impl Source<'_> {
     pub fn put<T: Serialize>(&mut self, body: &T) -> Result<(), Failure> {
         if let Some(state) = self.states.take()? {
             self.state = Some(state);
+            self.received = Instant::now();
+        } else if self.received.elapsed() > Duration::from_millis(500) {
+            self.state = None;
         }
         self.seq += 1;
         let request = Request {

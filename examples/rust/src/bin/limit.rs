@@ -29,9 +29,12 @@ fn main() -> Result<(), Failure> {
             continue; // no data, no limit: safety then applies `silence`
         };
         let nearest = front(&sonars);
+        let is_near = nearest < NEAR;
         detector.put(&Limit {
-            linear: (nearest < NEAR).then_some(0.1),
-            reason: format!("obstacle at {nearest:.1} m"),
+            linear: is_near.then_some(0.1),
+            reason: is_near
+                .then(|| format!("obstacle at {nearest:.1} m"))
+                .unwrap_or_default(),
         })?;
     }
 }
