@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from common.config import Sources, load
+from common.settings import Shared
 from tests.docs.integrator import PAGE, Integrator, running_integrator
 from verification.harness.certificates import ADDRESS, Site
 from verification.harness.ports import free_port
@@ -35,6 +37,14 @@ class Secured:
         text = text.replace(ROBOT, self.endpoint).replace(DRIVER, f"keys/{member}")
         (folder / f"{member}.json5").write_text(text, encoding="utf-8")
         return f"{member}.json5"
+
+    def bus_toml(self, member: str) -> Path:
+        """Return the settings file of a member; it connects to this stack's port."""
+        file = self.integrator.folder / "keys" / member / "bus.toml"
+        bus = load(Shared, Sources(files=(file,), environ={})).config.bus
+        text = file.read_text(encoding="utf-8")
+        file.write_text(text.replace(bus.connect[0], self.endpoint), encoding="utf-8")
+        return file
 
 
 @contextlib.contextmanager

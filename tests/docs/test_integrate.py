@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +20,7 @@ from tests.docs.integrator import (
     check_driving,
     check_limiting,
     check_reading,
+    check_silent_safety,
     lines_until,
     running_integrator,
     save_files,
@@ -82,6 +84,11 @@ def test_a_killed_source_stops_the_vehicle(it: Integrator) -> None:
         wait_until(lambda: "no_request" in it.causes(), "the cause")
         assert it.robot.safety.latest().source is None
         wait_until(lambda: it.stack.speed() < 0.02, "a stop")
+
+
+@PYTHON
+def test_a_source_ends_when_safety_dies(it: Integrator, way: str) -> None:
+    check_silent_safety(it, f"{way}/drive.py")
 
 
 @pytest.mark.parametrize(
@@ -181,3 +188,13 @@ def test_the_program_of_the_page_on_the_bus(it: Integrator) -> None:
                 return
             it.await_clear()
         raise AssertionError(done)
+
+
+def test_the_programs_are_formatted(tmp_path: Path) -> None:
+    save_files(PAGE, tmp_path)
+    save_files(PAGE.with_name("bus.md"), tmp_path)
+    words = ["format", "--check", "--isolated", "--line-length", "100", str(tmp_path)]
+    done = subprocess.run(
+        [sys.executable, "-m", "ruff", *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout

@@ -11,8 +11,6 @@ import pytest
 
 import t2
 from cli.demo import host_stalls
-from common.config import Sources, load
-from common.settings import Shared
 from tests.cli.stack import ports
 from tests.docs.integrator import LEASES, PAGE, TRIES, environment, lines_until, save_files
 from tests.docs.secured import Secured, secured_integrator
@@ -44,12 +42,20 @@ def test_each_role_may_do_what_the_page_states(secured: Secured) -> None:
 
 
 def test_the_package_takes_the_folder_of_a_certificate(secured: Secured) -> None:
-    toml = secured.integrator.folder / "keys" / "driver.planner" / "bus.toml"
-    bus = load(Shared, Sources(files=(toml,), environ={})).config.bus
-    text = toml.read_text(encoding="utf-8")
-    toml.write_text(text.replace(bus.connect[0], secured.endpoint), encoding="utf-8")
+    toml = secured.bus_toml("driver.planner")
     with t2.connect("001", config=toml) as robot:
         assert robot.odometry.latest(timeout=5.0).frame_id == "odom"
+
+
+def test_the_package_reports_a_certificate_that_may_not_drive(secured: Secured) -> None:
+    toml = secured.bus_toml("viewer.screen")
+    with (
+        secured.integrator.limited("plain/limit.py"),
+        t2.connect("001", config=toml) as robot,
+        pytest.raises(t2.NotAllowed, match="this certificate may not drive"),
+        robot.drive("patrol"),
+    ):
+        pass
 
 
 def test_the_test_file_of_the_page(tmp_path: Path) -> None:
