@@ -12,7 +12,7 @@ from pathlib import Path
 import t2
 from sim.requests import Sonar
 from verification.harness.stack import SETTINGS_FILE, RunningStack, running_stack
-from verification.harness.waiting import wait_until
+from verification.harness.waiting import becomes_true, wait_until
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "integrate.md"
@@ -56,6 +56,24 @@ class Integrator:
             capture_output=True, text=True, timeout=60, check=False,
         )  # fmt: skip
 
+    def check_success(self, *program: str, router: str = "") -> None:
+        """Check that a program ends without an error; on a busy host at the third try."""
+        for _ in range(TRIES):
+            done = self.run(*program, router=router)
+            if done.returncode == 0:
+                break
+            self.await_clear()
+        assert done.returncode == 0, done
+
+    def check_failure(self, reported: str, *program: str, router: str = "") -> None:
+        """Check that a program ends with this error text; likewise."""
+        for _ in range(TRIES):
+            done = self.run(*program, router=router)
+            if reported in done.stderr:
+                break
+        assert reported in done.stderr, done
+        assert done.returncode == 1
+
     @contextlib.contextmanager
     def running(self, *program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
         """Run a program during the context."""
@@ -67,6 +85,17 @@ class Integrator:
                 yield process
             finally:
                 process.kill()
+
+    @contextlib.contextmanager
+    def moving(self, *program: str) -> Iterator["subprocess.Popen[str]"]:
+        """Run a source, and wait until the vehicle moves; on a busy host at the third try."""
+        for _ in range(TRIES):
+            with self.running(*program) as process:
+                if becomes_true(lambda: self.stack.speed() > 0.1, 6.0):
+                    yield process
+                    return
+            self.await_clear()
+        raise AssertionError(f"{program} does not move the vehicle")
 
     def causes(self) -> set[str]:
         """Return the names of the causes that safety reports."""
@@ -161,12 +190,7 @@ def check_driving(it: Integrator, *program: str, router: str = "") -> None:
     """Check that a source drives forward and ends without an error."""
     with it.limited("plain/limit.py"):
         before = it.stack.control.truth().x
-        for _ in range(TRIES):
-            done = it.run(*program, router=router)
-            if done.returncode == 0:
-                break
-            it.await_clear()
-        assert done.returncode == 0, done
+        it.check_success(*program, router=router)
         wait_until(lambda: abs(it.stack.speed()) < 0.02, "standstill")
         assert 0.2 < it.stack.control.truth().x - before < 1.5
 
@@ -186,8 +210,7 @@ def check_limiting(it: Integrator, *program: str) -> None:
 
 def check_silent_safety(it: Integrator, *program: str) -> None:
     """Check that a source ends when safety dies."""
-    with it.limited("plain/limit.py"), it.running(*program) as process:
-        wait_until(lambda: it.stack.speed() > 0.1, "motion")
+    with it.limited("plain/limit.py"), it.moving(*program) as process:
         it.stack.kill("safety")
         try:
             assert process.wait(timeout=20.0) == 1

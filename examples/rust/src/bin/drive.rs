@@ -58,7 +58,8 @@ fn take_control(patrol: &mut Source) -> Result<(), Failure> {
             return Ok(());
         }
     }
-    let why = reason(patrol.state.as_ref()).unwrap_or_default();
+    let why = reason(patrol.state.as_ref())
+        .unwrap_or("safety.sources or your certificate does not name it".into());
     Err(format!("safety does not obey {NAME}: {why}").into())
 }
 
