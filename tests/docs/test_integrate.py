@@ -77,8 +77,8 @@ def test_a_vehicle_without_its_limit_does_not_drive(it: Integrator) -> None:
 
 def test_a_killed_source_stops_the_vehicle(it: Integrator) -> None:
     with it.limited("plain/limit.py"):
-        with it.running("plain/drive.py"):
-            wait_until(lambda: it.stack.speed() > 0.1, "motion")
+        with it.moving("plain/drive.py"):
+            pass
         wait_until(lambda: "no_request" in it.causes(), "the cause")
         assert it.robot.safety.latest().source is None
         wait_until(lambda: it.stack.speed() < 0.02, "a stop")
