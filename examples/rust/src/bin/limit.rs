@@ -29,13 +29,18 @@ fn main() -> Result<(), Failure> {
             continue; // no data, no limit: safety then applies `silence`
         };
         let nearest = front(&sonars);
-        let is_near = nearest < NEAR;
-        detector.put(&Limit {
-            linear: is_near.then_some(0.1),
-            reason: is_near
-                .then(|| format!("obstacle at {nearest:.1} m"))
-                .unwrap_or_default(),
-        })?;
+        let limit = if nearest < NEAR {
+            Limit {
+                linear: Some(0.1),
+                reason: format!("obstacle at {nearest:.1} m"),
+            }
+        } else {
+            Limit {
+                linear: None,
+                reason: String::new(),
+            }
+        };
+        detector.put(&limit)?;
     }
 }
 
