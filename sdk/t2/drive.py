@@ -22,7 +22,7 @@ NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the fi
 ZEROS = 3  # requests after a drive: one may be lost
 READY_S = 2.0  # from the first neutral request until we are in control
 OVERRULED_TICKS = 10  # our requests may be on their way for that long
-BLOCKED_S = 3.0  # without progress
+PATIENCE_S = 3.0  # without progress
 ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
 NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
@@ -159,8 +159,10 @@ class Drive:
         self.velocity(0.0)
         self._until(lambda pose: abs(pose.linear) < STANDING and abs(pose.angular) < STANDING)
 
-    def forward(self, distance: float, speed: float = 0.3) -> None:
+    def forward(self, distance: float, speed: float = 0.3, patience: float = PATIENCE_S) -> None:
         """Drive straight for a distance in m, negative backward, by odometry; wait for the end.
+
+        Raises ``Blocked`` after ``patience`` s without progress, and what else stops the vehicle.
 
         >>> with robot.drive("nav") as drive:
         ...     drive.forward(0.1)
@@ -181,10 +183,10 @@ class Drive:
             bounded = max(-MAX_CORRECTION, min(MAX_CORRECTION, correction))
             return sign * _slowing(rest, speed, ACCELERATION, SLOWEST), bounded
 
-        self._go(go, left, NEAR)
+        self._go(go, left, NEAR, patience)
 
-    def turn(self, angle: float, speed: float = 0.5) -> None:
-        """Turn on the spot by an angle in rad, positive to the left, by odometry; wait for it.
+    def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
+        """Turn on the spot by an angle in rad, positive to the left; else as ``forward``.
 
         >>> with robot.drive("nav") as drive:
         ...     drive.turn(math.pi / 8)
@@ -205,13 +207,14 @@ class Drive:
         def go(_: Odometry, rest: float) -> tuple[float, float]:
             return 0.0, sign * _slowing(rest, speed, TURNING, SLOWEST_TURN)
 
-        self._go(go, left, NEAR_TURN)
+        self._go(go, left, NEAR_TURN, patience)
 
     def _go(
         self,
         go: Callable[[Odometry, float], tuple[float, float]],
         left: Callable[[Odometry], float],
         near: float,
+        patience: float,
     ) -> None:
         """Follow ``go`` until little is left; raise ``Blocked`` without progress."""
         least, progress_s = math.inf, time.monotonic()
@@ -223,7 +226,7 @@ class Drive:
                 return True
             if rest < least - near:
                 least, progress_s = rest, time.monotonic()
-            elif time.monotonic() - progress_s > BLOCKED_S:
+            elif time.monotonic() - progress_s > patience:
                 raise self._blocked()
             self.velocity(*go(pose, rest))
             return False
@@ -237,7 +240,7 @@ class Drive:
     def _until(self, arrived: Callable[[Odometry], bool]) -> None:
         queue: deque[Odometry | None] = deque(maxlen=1)
         stream = self._robot.odometry
-        epoch = stream.latest().epoch
+        start = stream.latest()
         with stream.reading(queue):
             while True:
                 pose = stream.after(queue, 1.0)
@@ -245,9 +248,9 @@ class Drive:
                 if pose is None:
                     self._target = STILL
                     raise NoData("odometry fell silent during a motion; see `t2 doctor`")
-                if pose.epoch != epoch:
+                if (pose.boot, pose.epoch) != (start.boot, start.epoch):
                     self._target = STILL
-                    raise T2Error("the pose of odometry was set during a motion")
+                    raise T2Error("odometry restarted, or its pose was set, during a motion")
                 if arrived(pose):
                     return
 

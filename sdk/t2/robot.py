@@ -18,6 +18,8 @@ A = TypeVar("A", bound=msgspec.Struct)
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
+RELEASE_PERIOD_S = 0.1  # a held release expires after 0.3 s
+STANDSTILL_S = 1.0  # a release is refused until the vehicle stands
 ESTOP_S = 3.0
 ESTOP_PERIOD_S = 0.05
 SWITCH = "use the vehicle's own switch"
@@ -153,6 +155,30 @@ class Robot:
             time.sleep(ESTOP_PERIOD_S)
         raise NotConfirmed("safety answered the reset, and its state does not show the effect")
 
+    def release(self, direction: m.Direction, timeout: float = 5.0) -> None:
+        """Creep off a pressed bumper, "forward" or "backward"; return once the bumper is free.
+
+        As a release that an operator holds: at most 0.1 m/s and 0.15 m, and ``contact`` stays
+        latched until ``reset``. Know which direction is free: the bumper has none. Raises
+        ``Refused`` with the reason, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
+        """
+        begin_s, refusal = time.monotonic(), None
+        try:
+            while (passed_s := time.monotonic() - begin_s) < timeout:
+                if not self.bumper.latest().pressed:
+                    return
+                if refusal and passed_s > STANDSTILL_S:
+                    raise refusal
+                try:
+                    self._call_release(direction, held=True)
+                    refusal = None
+                except Refused as error:
+                    refusal = error
+                time.sleep(RELEASE_PERIOD_S)
+        finally:
+            self._call_release(None, held=False)
+        raise NotConfirmed(f"the bumper is still pressed after {timeout:g} s of release")
+
     # --- calls --------------------------------------------------------------------------------
 
     def led(self, channel: int, mode: int, **settings: int) -> None:
@@ -188,6 +214,11 @@ class Robot:
             f"no answer from {key} within {CALL_S:g} s: its service is not running, or this "
             "certificate may not call it; see `t2 doctor`"
         )
+
+    def _call_release(self, direction: "m.Direction | None", *, held: bool) -> None:
+        echo = self.safety.latest().heartbeat
+        request = m.ReleaseRequest(held=held, direction=direction, echo=echo)
+        self._call("safety/release", request, m.Done)
 
     def _put_estop(self, key: str) -> None:
         self._session.put(

@@ -1,6 +1,9 @@
 """The client library on the real stack: drives, limits, stops and resets."""
 
+import contextlib
 import math
+import threading
+import time
 
 import pytest
 
@@ -63,6 +66,52 @@ def test_a_pressed_bumper_refuses_the_reset(robot: t2.Robot, stack: RunningStack
     stack.control.do(Bumper(pressed=False))
 
 
+@pytest.fixture
+def pressed(robot: t2.Robot, stack: RunningStack) -> Iterator[None]:
+    """Press the bumper while the vehicle drives forward, and wait for the latch."""
+    try:
+        with contextlib.suppress(t2.Latched), robot.drive("nav") as drive:
+            drive.velocity(0.2)
+            wait_until(lambda: robot.velocity.latest().linear > 0.1, "motion")
+            stack.control.do(Bumper(pressed=True))
+            drive.forward(5.0, speed=0.2)
+        wait_until(lambda: "contact" in robot.safety.latest().latched, "the contact")
+        yield
+    finally:
+        stack.control.do(Bumper(pressed=False))
+
+
+@pytest.mark.usefixtures("pressed")
+def test_a_release_creeps_until_the_bumper_is_free(robot: t2.Robot, stack: RunningStack) -> None:
+    def free() -> None:
+        wait_until(lambda: robot.velocity.latest().linear < -0.02, "creeping backward")
+        stack.control.do(Bumper(pressed=False))
+
+    freeing = threading.Thread(target=free)
+    freeing.start()
+    robot.release("backward")
+    freeing.join()
+    assert not robot.bumper.latest().pressed
+    assert robot.safety.latest().latched == ("contact",)
+    wait_until(lambda: not blocked(robot), "the reset")
+    robot.release("backward")  # a free bumper needs none
+
+
+@pytest.mark.usefixtures("pressed")
+def test_a_release_that_frees_nothing_is_not_confirmed_then_refused(robot: t2.Robot) -> None:
+    with pytest.raises(t2.NotConfirmed, match=r"still pressed after 0\.5 s"):
+        robot.release("backward", timeout=0.5)
+    with pytest.raises(t2.Refused, match="by hand"):  # the travel of a release is used up
+        robot.release("backward", timeout=30.0)
+
+
+@pytest.mark.usefixtures("pressed")
+def test_a_release_beside_another_latch_is_refused(robot: t2.Robot) -> None:
+    robot.estop()
+    with pytest.raises(t2.Refused, match="mergency stop"):
+        robot.release("forward", timeout=30.0)
+
+
 def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
     limit = robot.limit("detector", linear=0.1, reason="person ahead")
 
@@ -106,12 +155,14 @@ def test_who_is_overruled_is_told_by_whom(robot: t2.Robot, stack: RunningStack) 
 
 def test_an_obstacle_blocks_a_distance(robot: t2.Robot, stack: RunningStack) -> None:
     stack.control.do(Sonar(name="front", range=0.2))
+    began_s = time.monotonic()
     try:
         with pytest.raises(t2.Blocked) as stopped, robot.drive("nav") as drive:
-            drive.forward(1.0)
+            drive.forward(1.0, patience=0.5)
     finally:
         stack.control.do(Sonar(name="front"))
     assert stopped.value.causes
+    assert time.monotonic() - began_s >= 0.5
 
 
 def test_invalid_numbers_are_refused(robot: t2.Robot) -> None:
