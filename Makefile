@@ -22,14 +22,14 @@ docs: $(STAMP) ## renew the generated tables of the documents, and the JSON sche
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
-$(STAMP): requirements.lock pyproject.toml
+$(STAMP): requirements.lock pyproject.toml sdk/pyproject.toml
 	$(PYTHON) -c '$(CHECK_PYTHON)'
 	$(PYTHON) -m venv --clear .venv
 	awk '/^[^ #]/{on = /^uv==/} on' requirements.lock > .venv/uv.lock
 	$(PIP_INSTALL) --require-hashes -r .venv/uv.lock
 	$(UV_INSTALL) --require-hashes -r requirements.lock || \
 	  $(PIP_INSTALL) --require-hashes -r requirements.lock
-	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e . -e sdk
 	touch $@
 
 # The demo needs a fourth of what the tests need; with all of it there, it takes that.
@@ -40,7 +40,7 @@ $(DEMO): requirements-demo.lock
 	touch $@
 
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap through the real services
-	$(BIN)/python -m cli demo
+	PYTHONPATH=sdk $(BIN)/python -m cli demo
 
 up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C
 	$(BIN)/t2 up

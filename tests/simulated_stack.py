@@ -5,23 +5,22 @@ the same each time. The shells are tested elsewhere, with real processes.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from cli.demo.script import Action, Lap, View
 from common import messages as m
 from common.freshness import NS_PER_S, Latest
-from common.operator import reset_request
 from services.bridge.config import BridgeConfig
 from services.bridge.core import Core
 from services.bridge.output import Output, Send
 from services.odom.config import Odom
 from services.odom.estimator import Estimator
 from services.safety.config import SafetyConfig
-from services.safety.inputs import DriveRequest, Event, Hold, Inputs, Reset
+from services.safety.inputs import Event, Inputs
 from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import motion_message, state_message
+from services.safety.state import Reply
 from sim import trace as t
 from sim.config import Config, load_plan
 from sim.simulation import Simulation
@@ -33,10 +32,15 @@ START_NS = 100 * NS_PER_S
 
 
 class SimulatedStack:
-    """Sim, bridge, safety, odometry and the lap's driver, turned by hand."""
+    """Sim, bridge, safety and odometry, turned by hand.
 
-    def __init__(self, lap: Lap, world: str = "office") -> None:
-        self.lap = lap
+    ``on_message`` is called with each message that a client may read, and its name; the calls of
+    ``each_beat`` are made 20 times a second.
+    """
+
+    def __init__(self, world: str = "office") -> None:
+        self.on_message: Callable[[str, m.Message], object] = lambda *_: None
+        self.each_beat: list[Callable[[], object]] = []
         self.now_ns = START_NS
         self.records: list[t.Line] = []
         self.odometry: list[m.Odometry] = []
@@ -50,22 +54,26 @@ class SimulatedStack:
         self._state = self._policy.start()
         self._inputs = Inputs(estop_session_up=True, boot=1)
         self._estimator = Estimator(Odom())
-        self._pressed = False
-        self._told: m.SafetyState | None = None
-        self._refusal: str | None = None
-        self._granted = False
-        self._index = 0
         self._do(self._bridge.start())
 
-    def run(self, seconds: float) -> Iterator[None]:
-        """Turn for so long, a tick at a time."""
-        end_ns = self.now_ns + round(seconds * NS_PER_S)
-        while self.now_ns < end_ns:
-            self.now_ns += TICK_NS
-            self.sim.advance(self.now_ns)
-            self._deliver()
-            self._tick()
-            yield
+    def advance(self) -> None:
+        """Turn for one tick."""
+        self.now_ns += TICK_NS
+        self.sim.advance(self.now_ns)
+        self._deliver()
+        self._tick()
+
+    def decide(self, event: Event) -> Reply | None:
+        """Pass a request or a call to safety; return its answer."""
+        reply = self._decide(event)
+        if reply:
+            self.answers.append((type(event).__name__, reply.done, reply.text))
+        return reply
+
+    @property
+    def heartbeat(self) -> int:
+        """Safety's newest heartbeat."""
+        return self._state.heartbeat.number
 
     # --- bridge ---------------------------------------------------------------------------
 
@@ -96,8 +104,7 @@ class SimulatedStack:
             self._estimator.on_velocity(message, self.now_ns)
         elif isinstance(message, m.Mileage):
             self._estimator.on_mileage(message, self.now_ns)
-        elif isinstance(message, m.Bumper):
-            self._pressed = message.pressed
+        self.on_message(stream, message)
         self._keep(**{stream.removeprefix("driver_"): message})
         if stream in ("bumper", "ultrasonic"):
             brake = brake_for_contact(self._state, self._inputs)
@@ -115,14 +122,11 @@ class SimulatedStack:
             latest[name] = Latest(stamped, self.now_ns)
         self._inputs = replace(self._inputs, **latest)
 
-    def _decide(self, event: Event | None = None) -> None:
+    def _decide(self, event: Event | None = None) -> Reply | None:
         inputs = replace(self._inputs, event=event)
         self._state, verdict = self._policy.decide(self._state, inputs, self.now_ns)
-        if verdict.reply:
-            self._refusal = None if verdict.reply.done else verdict.reply.text
-            self._granted = verdict.reply.done
-            self.answers.append((type(event).__name__, verdict.reply.done, verdict.reply.text))
         self._move(motion_message(self._state, inputs))
+        return verdict.reply
 
     def _move(self, motion: m.Motion) -> None:
         self._seq["motion"] += 1
@@ -139,11 +143,14 @@ class SimulatedStack:
             estimate = self._estimator.estimate(self.now_ns)
             if estimate is not None:
                 self.odometry.append(replace(estimate, mono_ns=self.now_ns))
+                self.on_message("odometry", self.odometry[-1])
         if elapsed % 5 == 0:
             beat = self._state.heartbeat.beat(self.now_ns)
             self._state = replace(self._state, heartbeat=beat)
-            self._told = state_message(self._policy, self._state, self.now_ns)
-            self._drive()
+            state = state_message(self._policy, self._state, self.now_ns)
+            self.on_message("safety", state)
+            for call in self.each_beat:
+                call()
         self._deliver()
 
     def _tick_bridge(self, elapsed: int) -> None:
@@ -152,24 +159,3 @@ class SimulatedStack:
             self._do(self._bridge.link(self.now_ns, 0))
         if elapsed % 100 == 0:
             self._do(self._bridge.second())
-
-    def _drive(self) -> None:
-        assert self._told is not None
-        if not self.odometry:
-            return
-        view = View(self.odometry[-1], self._told, self._pressed, self._refusal, self._granted)
-        action = self.lap.advance(view, self.now_ns)
-        if self.lap.index != self._index:
-            self._index, self._refusal, self._granted = self.lap.index, None, False
-        self._request(action, self._told.heartbeat)
-
-    def _request(self, action: Action, echo: int) -> None:
-        self._seq["drive"] += 1
-        linear, angular = action.twist.linear, action.twist.angular
-        request = m.Drive(linear=linear, angular=angular, echo=echo, seq=self._seq["drive"], boot=5)
-        self._decide(DriveRequest("demo", request, self.now_ns))
-        assert self._told is not None
-        if action.press == "reset":
-            self._decide(Reset(echo, reset_request(self._told).causes))
-        elif action.press == "release":  # the lap hits its box driving forward
-            self._decide(Hold(True, "backward", echo))

@@ -1,67 +1,65 @@
 """The demo's lap with the shipped settings, in simulated time."""
 
-from collections.abc import Callable
+import threading
 from functools import cache
 
 import pytest
 
+from cli.demo.driver import Driver
+from cli.demo.lap import PATIENT, QUICK, Pace, drive_lap
+from cli.demo.record import LapRecord
 from cli.demo.score import Trace, good, results, stops
-from cli.demo.script import PATIENT, QUICK, Lap, Pace, lap
 from sim import trace as t
+from t2.messages import Odometry
+from tests.cli.demo.lap_fixture import as_client
+from tests.simulated_robot import simulated_robot
 from tests.simulated_stack import SimulatedStack
 
-LAP_S = 60.0
+
+@cache
+def driven(pace: Pace) -> tuple[SimulatedStack, LapRecord]:
+    """Drive a lap; return the stack and the record after it."""
+    stack, record = SimulatedStack(), LapRecord()
+    with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
+        drive_lap(Driver(robot, record, threading.Event()), pace)
+    record.finished = True
+    record.odometry = [as_client(pose, Odometry) for pose in stack.odometry]
+    return stack, record
 
 
-def driven(pace: Pace, seconds: float) -> SimulatedStack:
-    it = SimulatedStack(Lap(lap(fast=False, pace=pace)))
-    for _ in it.run(seconds):
-        if it.lap.step is None:
-            break
-    return it
-
-
-def trace_of(it: SimulatedStack) -> Trace:
+def trace_of(stack: SimulatedStack) -> Trace:
     return Trace(
-        [r for r in it.records if isinstance(r, t.Truth)],
-        [r for r in it.records if isinstance(r, t.Command)],
-        [r for r in it.records if isinstance(r, t.BumperSent)],
+        [r for r in stack.records if isinstance(r, t.Truth)],
+        [r for r in stack.records if isinstance(r, t.Command)],
+        [r for r in stack.records if isinstance(r, t.BumperSent)],
     )
 
 
-@cache
-def quick() -> SimulatedStack:
-    return driven(QUICK, LAP_S)
-
-
-@cache
-def patient() -> SimulatedStack:
-    return driven(PATIENT, 2 * LAP_S)
-
-
-@pytest.mark.parametrize("made", [quick, pytest.param(patient, marks=pytest.mark.campaign)])
-def test_the_lap_is_driven_as_it_should_be(made: Callable[[], SimulatedStack]) -> None:
-    it = made()
-    assert it.lap.step is None, f"stuck at: {it.lap.step.name}"
-    trace = trace_of(it)
-    rows = results(trace, it.odometry, it.lap, fast=False)
+@pytest.mark.parametrize("pace", [QUICK, pytest.param(PATIENT, marks=pytest.mark.campaign)])
+def test_the_lap_is_driven_as_it_should_be(pace: Pace) -> None:
+    stack, record = driven(pace)
+    trace = trace_of(stack)
+    rows = results(trace, record, fast=False)
     assert good(rows), rows
-    assert it.lap.unplanned == []
+    assert record.unplanned == []
     assert min(x.clearance for x in trace.truth if x.clearance is not None) > 0.15
     (stop,) = stops(trace)
     assert stop.reaction_s is not None
     assert stop.reaction_s < 0.02
 
 
-def test_safety_answers_as_the_story_says() -> None:
-    it = quick()
-    said = [(kind, done) for kind, done, _ in it.answers]
-    first_reset = said.index(("Reset", False))
-    first_hold = said.index(("Hold", True))
-    last_reset = len(said) - 1 - said[::-1].index(("Reset", True))
+def test_safety_answers_as_the_steps_expect() -> None:
+    stack, record = driven(QUICK)
+    answers = [(kind, done) for kind, done, _ in stack.answers]
+    first_reset = answers.index(("Reset", False))
+    first_hold = answers.index(("Hold", True))
+    last_reset = len(answers) - 1 - answers[::-1].index(("Reset", True))
     assert first_reset < first_hold < last_reset
+    assert record.answers[0][:2] == ("reset, refused", False)
+    assert record.answers[-1][:2] == ("reset", True)
 
 
 def test_the_same_lap_twice_is_the_same() -> None:
-    again = driven(QUICK, 9.0)
-    assert again.records == quick().records[: len(again.records)]
+    first = driven(QUICK)[0].records
+    driven.cache_clear()
+    assert driven(QUICK)[0].records == first

@@ -7,26 +7,25 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
 from cli.demo import host_stalls
-from cli.demo.driver import PERIOD_S, Driver
-from cli.demo.score import good, read, results
-from cli.demo.script import PATIENT, QUICK, Lap, lap
 from cli.inspect.session import interruptible
 from cli.run.supervisor import Supervisor
 from cli.run.up import commands
 from cli.settings import Everything
 from common import log
-from common.bus.bus import Bus
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
-from common.freshness import NS_PER_S
 from common.loop import Loop
 from sim import profiles
 from sim.config import load_plan
+
+if TYPE_CHECKING:
+    from cli.demo.lap_thread import LapThread
 
 WORLD = "office"
 TIMEOUT_S = 120.0  # a lap takes 40 s; scheduling stalls stop the vehicle now and then
@@ -47,9 +46,14 @@ def run(options: argparse.Namespace) -> int:
     """Drive the lap; return 0 if it is good, 128 plus the signal's number after a signal."""
     try:
         from cli.demo.display import LapDisplay
+        from cli.demo.lap import PATIENT, QUICK, drive_lap
+        from cli.demo.lap_thread import LapThread
+        from cli.demo.record import LapRecord
+        from cli.demo.score import good, read, results
     except ImportError as error:
         raise RobotError(
             f"the demo needs {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
+            " -e sdk"
         ) from None
     options.no_sim, options.world = False, WORLD
     profiles.tables(options.profile)  # refuses an unknown one before anything starts
@@ -61,53 +65,53 @@ def run(options: argparse.Namespace) -> int:
     config = load(Everything, sources(options)).config
     # The processes log to a file; on the terminal it would destroy the live display.
     log.configure(replace(config.log, level="error"), "demo")
-    pace = PATIENT if stall_s > host_stalls.LIMIT_S else QUICK
-    driven, plan = Lap(lap(options.fast, pace)), load_plan(WORLD, config.vehicle)
-    with (
-        LapDisplay(plan, config.vehicle, options.out) as display,
-        closing(Loop()) as loop,
-        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
-    ):
-        if stall_s > host_stalls.LIMIT_S:
+    is_stalling = stall_s > host_stalls.LIMIT_S
+    pace = PATIENT if is_stalling else QUICK
+    plan, record = load_plan(WORLD, config.vehicle), LapRecord()
+    lap = LapThread(
+        lambda driver: drive_lap(driver, pace, fast=options.fast),
+        record, config.robot.id, config.bus.endpoints[0],
+    )  # fmt: skip
+    with LapDisplay(plan, config.vehicle, options.out) as display:
+        if is_stalling:
             display.show(host_stalls.warning(stall_s))
-        driver = Driver(bus, driven, display.step)
-        bus.open()
-        interrupted = drive(options, loop, driver, display.draw)
+        record.on_step = display.step
+        interrupted = drive(options, lap, lambda: display.draw(record, time.monotonic()))
     if interrupted:
         return 128 + interrupted
     trace = read(trace_file(options)) if trace_file(options).exists() else None
     if trace is None or not trace.truth:
         raise LinkError(f"the simulated vehicle did not run; see {log_file(options)}")
-    rows = results(trace, driver.odometry, driven, options.fast)
+    rows = results(trace, record, options.fast)
     if not options.fast:
-        display.plot(trace, driver.odometry)
-    display.results(rows, driver)
+        display.plot(trace, record.odometry)
+    display.results(rows, record)
     return 0 if good(rows) else 1
 
 
-def drive(
-    options: argparse.Namespace,
-    loop: Loop,
-    driver: Driver,
-    draw: Callable[[Driver, int], None],
-) -> int:
+def drive(options: argparse.Namespace, lap: "LapThread", draw: Callable[[], None]) -> int:
     """Run the processes until the end of the lap or the timeout; return a signal or 0."""
-    began_ns = time.monotonic_ns()
-    with log_file(options).open("wb") as output, interruptible(loop) as signals:
+    end_s = time.monotonic() + TIMEOUT_S
+    with (
+        log_file(options).open("wb") as output,
+        closing(Loop()) as loop,
+        interruptible(loop) as signals,
+    ):
         supervisor = Supervisor(traced(options), output)
 
-        def poll(now_ns: int) -> None:
+        def poll(_: int) -> None:
             if supervisor.look(time.monotonic()):
                 raise LinkError(f"a process cannot run; see {output.name}")
-            if driver.lap.step is None or now_ns - began_ns > TIMEOUT_S * NS_PER_S:
+            if not lap.is_alive() or time.monotonic() > end_s:
                 loop.stop()
 
+        lap.start()
         loop.every(POLL_S, poll)
-        loop.every(PERIOD_S, driver.on_beat)
-        loop.every(DRAW_S, lambda now_ns: draw(driver, now_ns))
+        loop.every(DRAW_S, lambda _: draw())
         try:
             loop.run()
         finally:
+            lap.end()
             supervisor.end()
     return signals[0] if signals else 0
 

@@ -12,13 +12,13 @@ from rich.table import Table
 from rich.text import Text
 
 from cli.demo import plot
-from cli.demo.driver import Driver
+from cli.demo.record import LapRecord
 from cli.demo.score import Result, Trace
-from cli.demo.script import Step
-from common.messages import SONAR_NAMES, Odometry, Ultrasonic
+from common.messages import SONAR_NAMES
 from common.settings import Vehicle
 from sim.geometry import Pose, Rectangle, Segment
 from sim.world import Plan, World
+from t2.messages import Odometry, Ultrasonic
 
 SIDE_COLUMNS = 46
 FRAME_COLUMNS = 6
@@ -54,21 +54,20 @@ class LapDisplay:
         """Print a line."""
         self._console.print(text)
 
-    def step(self, step: Step) -> None:
+    def step(self, name: str) -> None:
         """Print the start of a step, except on a terminal."""
         if not self._console.is_terminal:
-            self._console.print(f"  {step.name}")
+            self._console.print(f"  {name}")
 
-    def draw(self, driver: Driver, now_ns: int) -> None:
+    def draw(self, record: LapRecord, now_s: float) -> None:
         """Redraw the live display."""
         if self._console.is_terminal:
-            self._live.update(panel(self._map, driver, now_ns), refresh=True)
+            self._live.update(panel(self._map, record, now_s), refresh=True)
 
-    def results(self, rows: Sequence[Result], driver: Driver) -> None:
+    def results(self, rows: Sequence[Result], record: LapRecord) -> None:
         """Print the results, and safety's answers."""
-        for step, press, granted, text in driver.answers:
-            result = "granted" if granted else "refused"
-            self._console.print(f"{step}: {press} {result}: {text}")
+        for step, granted, text in record.answers:
+            self._console.print(f"{step}: {'granted' if granted else 'refused'}: {text}")
         self._console.print(results_table(list(rows)))
 
     def plot(self, trace: Trace, odometry: Sequence[Odometry]) -> None:
@@ -125,12 +124,12 @@ class RoomMap:
         return round((x - self._left) / self._per_column), round((self._top - y) / self._per_row)
 
 
-def panel(room: RoomMap, driver: Driver, now_ns: int) -> RenderableType:
-    """Return the live display at one time."""
-    poses = driver.odometry
+def panel(room: RoomMap, record: LapRecord, now_s: float) -> RenderableType:
+    """Return the live display at one monotonic time."""
+    poses = record.odometry
     path = [(p.x, p.y) for p in poses[::10]]
     pose = Pose(poses[-1].x, poses[-1].y, poses[-1].heading) if poses else None
-    side = Group(_steps(driver, now_ns), Text(), _state(driver), Text(), _ranges(driver.ranges))
+    side = Group(_steps(record, now_s), Text(), _state(record), Text(), _ranges(record.ranges))
     grid = Table.grid(padding=(0, 2))
     grid.add_column()
     grid.add_column(width=SIDE_COLUMNS)
@@ -147,32 +146,27 @@ def results_table(rows: list[Result], title: str = "The lap") -> Table:
     return table
 
 
-def _steps(driver: Driver, now_ns: int) -> Text:
-    lap = driver.lap
-    text = Text(f"{lap.seconds(now_ns):5.1f} s\n", "bold")
-    for index, step in enumerate(lap.steps):
-        done, current = index < lap.index, index == lap.index
-        mark = "✓" if done else "▶" if current else " "
-        style = "green" if done else "bold" if current else "bright_black"
-        text.append(f"{mark} {step.name}\n", style)
-    return text
+def _steps(record: LapRecord, now_s: float) -> Text:
+    passed_s = 0.0 if record.began_s is None else now_s - record.began_s
+    text = Text(f"{passed_s:5.1f} s\n", "bold")
+    *done, current = record.steps or [""]
+    for name in done:
+        text.append(f"✓ {name}\n", "green")
+    return text.append(f"▶ {current}\n", "bold")
 
 
-def _state(driver: Driver) -> RenderableType:
+def _state(record: LapRecord) -> RenderableType:
     table = Table.grid(padding=(0, 1))
-    measured = driver.velocity
-    requested = driver.requested
-    table.add_row("requested", f"{requested.linear:5.2f} m/s  {requested.angular:5.2f} rad/s")
+    measured, safety = record.velocity, record.safety
     if measured is not None:
         table.add_row("measured", f"{measured.linear:5.2f} m/s  {measured.angular:5.2f} rad/s")
-    if driver.safety is not None:
-        safety = driver.safety
+    if safety is not None:
         table.add_row("safety", Text(safety.verdict.upper(), STYLES[safety.verdict]))
         table.add_row("", Text(safety.text, overflow="fold"))
-    if driver.answers:
-        _, press, granted, answer = driver.answers[-1]
-        result = "granted" if granted else "refused"
-        table.add_row(press, Text(f"{result}: {answer}", "green" if granted else "yellow"))
+    if record.answers:
+        _, granted, answer = record.answers[-1]
+        result, style = ("granted", "green") if granted else ("refused", "yellow")
+        table.add_row(result, Text(answer, style))
     return table
 
 

@@ -1,94 +1,124 @@
-"""Driver of the lap: an ordinary consumer of the bus and a source of drive requests."""
+"""Driver of the lap: the motions of ``t2.Drive``, continued after each stop of safety.
 
+On a host with scheduling stalls safety stops the vehicle now and then. A motion waits and goes on.
+A latch that the lap does not expect is reset and counted.
+"""
+
+import math
+import threading
+import time
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
-from cli.demo.script import Action, Lap, Press, Step, View
-from common import keys
-from common import messages as m
-from common.bus.bus import Arrival, Bus
-from common.freshness import NS_PER_S
-from common.motion import STILL
-from common.operator import release_request, reset_request
-from common.source import DriveSource
+import t2
+from cli.demo.record import LapRecord
+from t2.messages import Direction, Odometry
 
-PERIOD_S = 0.05
-PRESS_NS = round(0.15 * NS_PER_S)  # between two calls; a held release expires after 0.3 s
+SOURCE = "demo"  # of ``safety.sources``
+PATIENCE_S = 1.0  # without progress, until a motion is requested anew
+RETRY_S = 0.1
+T = TypeVar("T")
+
+
+class LapEndedError(Exception):
+    """The lap was ended: a timeout, or Ctrl-C."""
 
 
 class Driver:
-    """Drives a lap over the bus; runs in the loop's thread."""
+    """Moves one robot until ``ended`` is set; then each method raises ``LapEndedError``."""
 
-    def __init__(self, bus: Bus, lap: Lap, on_step: Callable[[Step], None]) -> None:
-        self.lap = lap
-        self.odometry: list[m.Odometry] = []
-        self.ranges: m.Ultrasonic | None = None
-        self.velocity: m.Velocity | None = None
-        self.safety: m.SafetyState | None = None
-        self.link: m.Link | None = None
-        self.requested = STILL
-        self.answers: list[tuple[str, Press, bool, str]] = []  # step, call, granted, text
-        self._pressed = False
-        self._bus = bus
-        self._source = DriveSource(bus, "demo")
-        self._on_step = on_step
-        self._announced = -1
-        self._refusal: str | None = None
-        self._granted = False
-        self._pressed_ns = 0
-        self._listen()
+    def __init__(self, robot: t2.Robot, record: LapRecord, ended: threading.Event) -> None:
+        self.record = record
+        self.robot = robot
+        self._ended = ended
 
-    def on_beat(self, now_ns: int) -> None:
-        """Decide and send a drive request, at 20 Hz."""
-        if self.safety is None or not self.odometry:
-            return
-        view = View(self.odometry[-1], self.safety, self._pressed, self._refusal, self._granted)
-        action = self.lap.advance(view, now_ns)
-        self._announce()
-        self._source.request(action.twist.linear, action.twist.angular)
-        self.requested = action.twist
-        self._press(action, self.safety, now_ns)
+    def pose(self) -> Odometry:
+        """Return the pose in ``odom``; wait for it."""
+        return self._repeat(self.located)
 
-    def _listen(self) -> None:
-        def keep(name: str) -> Callable[[Arrival[Any]], None]:
-            return lambda arrival: setattr(self, name, arrival.message)
+    def located(self) -> Odometry:
+        """Return the pose in ``odom``; raise ``t2.T2Error`` while it is unknown."""
+        return self.robot.odometry.latest()
 
-        self._bus.subscribe(keys.SAFETY, keep("safety"))
-        self._bus.subscribe(keys.ULTRASONIC, keep("ranges"))
-        self._bus.subscribe(keys.VELOCITY, keep("velocity"))
-        self._bus.subscribe(keys.LINK, keep("link"))
-        self._bus.subscribe(keys.ODOMETRY, lambda a: self.odometry.append(a.message), depth=64)
-        self._bus.subscribe(keys.BUMPER, lambda a: setattr(self, "_pressed", a.message.pressed))
+    def wait(self) -> None:
+        """Wait until safety lets the vehicle drive."""
 
-    def _announce(self) -> None:
-        if self.lap.index != self._announced:
-            self._announced = self.lap.index
-            self._refusal, self._granted, self._pressed_ns = None, False, 0
-            if self.lap.step is not None:
-                self._on_step(self.lap.step)
+        def ready(_: t2.Drive) -> None:
+            state = self.robot.safety.latest()
+            if state.verdict not in ("run", "slow"):
+                raise t2.Blocked(state.text, state.causes)
 
-    def _press(self, action: Action, seen: m.SafetyState, now_ns: int) -> None:
-        if action.press is None or now_ns - self._pressed_ns < PRESS_NS:
-            return
-        self._pressed_ns = now_ns
-        press, index = action.press, self.lap.index
+        self._drive(ready)
 
-        def answer(granted: bool, text: str) -> None:
-            step = self.lap.steps[index]
-            known = (step.name, press, granted, text)
-            if not self.answers or self.answers[-1] != known:
-                self.answers.append(known)
-            if index == self.lap.index:
-                self._granted, self._refusal = granted, None if granted else text
+    def forward(self, distance: float, speed: float, expected: str = "") -> None:
+        """Drive straight, m and m/s; an ``expected`` cause raises ``Blocked`` or ``Latched``."""
+        start = self.pose()
 
-        def done(reply: m.Done) -> None:
-            answer(True, reply.text)
+        def go(drive: t2.Drive) -> None:
+            drive.forward(distance - _travelled(start, self.located()), speed, PATIENCE_S)
 
-        def refused(reason: str) -> None:
-            answer(False, reason)
+        self._drive(go, expected)
 
-        if press == "reset":
-            self._bus.call(keys.RESET, reset_request(seen), done, refused)
-        else:  # the lap hits its box while driving forward
-            request = release_request(seen, "backward", held=True)
-            self._bus.call(keys.RELEASE, request, done, refused)
+    def turn(self, angle: float, speed: float) -> None:
+        """Turn on the spot, rad and rad/s."""
+        goal = self.pose().heading + angle
+
+        def go(drive: t2.Drive) -> None:
+            drive.turn(math.remainder(goal - self.located().heading, math.tau), speed, PATIENCE_S)
+
+        self._drive(go)
+
+    def release(self, direction: Direction) -> None:
+        """Move off the bumper until it is free."""
+        self._repeat(lambda: self.robot.release(direction))
+
+    def reset(self) -> None:
+        """Reset until nothing is latched."""
+
+        def clear() -> None:
+            while self.robot.safety.latest().latched:
+                self.record.answer(True, self.robot.reset().text)
+
+        self._repeat(clear)
+
+    def _drive(self, go: Callable[[t2.Drive], None], expected: str = "") -> None:
+        def once() -> None:
+            with self.robot.drive(SOURCE) as drive:
+                go(drive)
+
+        self._repeat(once, expected)
+
+    def _repeat(self, act: Callable[[], T], expected: str = "") -> T:
+        """Repeat an action until it succeeds, or an expected cause stops it."""
+        while not self._ended.is_set():
+            try:
+                return act()
+            except t2.Stopped as stop:
+                names = [cause.name for cause in stop.causes]
+                if expected in names:
+                    raise
+                if isinstance(stop, t2.Latched):
+                    self.record.unplanned.append(", ".join(names))
+                    self.reset()
+            except t2.Refused as refusal:
+                self.record.answer(False, str(refusal))
+            except t2.T2Error:  # no data, for example: wait for it
+                pass
+            time.sleep(RETRY_S)
+        raise LapEndedError
+
+
+def connected(robot: str, endpoint: str, ended: threading.Event) -> t2.Robot:
+    """Connect, as soon as the router runs; raise ``t2.LinkError`` once ``ended`` is set."""
+    while True:
+        try:
+            return t2.connect(robot, endpoint=endpoint)
+        except t2.LinkError:
+            if ended.is_set():
+                raise
+
+
+def _travelled(start: Odometry, now: Odometry) -> float:
+    """Return the distance along the heading of the start, m."""
+    along_x, along_y = math.cos(start.heading), math.sin(start.heading)
+    return (now.x - start.x) * along_x + (now.y - start.y) * along_y

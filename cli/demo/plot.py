@@ -10,11 +10,11 @@ from matplotlib.patches import Polygon
 
 from cli.demo.score import Trace
 from common.freshness import NS_PER_S
-from common.messages import Odometry
 from common.motion import Command
 from sim import trace as t
 from sim.geometry import Pose, Rectangle
 from sim.world import Box, Plan
+from t2.messages import Odometry
 
 INK, TRUE, COUNTED, HIT = "#37474f", "#1565c0", "#ef6c00", "#c62828"
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cli.demo.script import Lap
+from cli.demo.record import LapRecord
 from common.freshness import NS_PER_S
-from common.messages import Odometry
 from common.motion import Command
 from sim import trace as t
+from t2.messages import Odometry
 
 Result = tuple[str, str, bool | None]  # quantity, value, whether it is within its limit
 
@@ -79,13 +79,13 @@ def odometry_errors(trace: Trace, odometry: Sequence[Odometry]) -> tuple[float, 
     return driving, resting
 
 
-def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) -> list[Result]:
+def results(trace: Trace, record: LapRecord, fast: bool) -> list[Result]:
     """Return the table of results; a lap is good without a False in it."""
     last = trace.truth[-1]
     wall = min((x.clearance for x in trace.truth if x.clearance is not None), default=math.inf)
-    driving, resting = odometry_errors(trace, odometry)
+    driving, resting = odometry_errors(trace, record.odometry)
     rows: list[Result] = [
-        ("lap finished", f"{lap.index} of {len(lap.steps)} steps", lap.step is None),
+        ("lap finished", f"{len(record.steps)} steps", record.finished),
         ("distance driven", f"{last.distance:.2f} m", last.distance > 1.0),
         ("closest to an obstacle", f"{wall:.2f} m", wall > CLEARANCE_MIN),
         ("odometry error, driving", f"{driving * 100:.1f} cm at most", None),
@@ -109,7 +109,7 @@ def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap, fast: bool) ->
     if not fast:
         home = math.hypot(last.x, last.y)
         rows.append(("distance from the start at the end", f"{home * 100:.1f} cm", home < HOME_MAX))
-    rows.append(("unplanned latches", ", ".join(lap.unplanned) or "none", None))
+    rows.append(("unplanned latches", ", ".join(record.unplanned) or "none", None))
     return rows
 
 

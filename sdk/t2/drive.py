@@ -271,8 +271,8 @@ class Drive:
             if asked_at is not None and state.seq > asked_at + 1 and state.source == self.source:
                 return
             time.sleep(PERIOD_S)
-        if state.source is not None:
-            raise Overruled(state.source)
+        if state.source not in (None, self.source):
+            raise Overruled(str(state.source))
         raise NotAllowed(
             f"safety does not let {self.source!r} drive: {state.text} The source must be one of "
             "safety.sources, and its clock of echoes young; see `t2 doctor`"
@@ -280,18 +280,21 @@ class Drive:
 
     def _run(self) -> None:
         while not self._ended.wait(PERIOD_S):
-            target = self._target
-            if time.monotonic() >= target.end_s:
-                target = STILL
-            trouble = self._trouble(target)
-            self._error = self._error or trouble  # an error of `cancel` stays
-            if self._error is not None:
-                target = STILL
-            self._put(target.linear, target.angular)
+            self._tick()
         for _ in range(ZEROS):
             self._put(0.0, 0.0)
             time.sleep(PERIOD_S)
         self._publisher.close()
+
+    def _tick(self) -> None:
+        target = self._target
+        if time.monotonic() >= target.end_s:
+            target = STILL
+        trouble = self._trouble(target)
+        self._error = self._error or trouble  # an error of `cancel` stays
+        if self._error is not None:
+            target = STILL
+        self._put(target.linear, target.angular)
 
     def _put(self, linear: float, angular: float) -> None:
         self._publisher.put(DriveMessage(linear=linear, angular=angular, echo=0))

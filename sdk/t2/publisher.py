@@ -2,6 +2,9 @@
 
 import os
 import time
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import count
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -13,6 +16,9 @@ from t2.stream import Stream
 M = TypeVar("M", bound=SourceMessage)
 
 UNMATCHED_MAX = 10  # messages in a row without a receiver, while safety's state arrives
+# A program is one publisher: safety would take the next drive of a source for a second one.
+BOOT = int.from_bytes(os.urandom(7), "big")
+SEQS: defaultdict[str, Iterator[int]] = defaultdict(lambda: count(1))  # by key
 FRESH_S = 0.5  # age of safety's state; older, and safety counts as silent
 QOS: dict[str, Any] = {
     "priority": zenoh.Priority.INTERACTIVE_HIGH,
@@ -31,8 +37,7 @@ class SourcePublisher(Generic[M]):
     ) -> None:
         safety.open()
         self._safety = safety
-        self._boot = int.from_bytes(os.urandom(7), "big")
-        self._seq = 0
+        self._seqs = SEQS[key]
         self._unmatched = 0
         self._encoder = msgspec.msgpack.Encoder()
         encoding = f"application/msgpack;t2.v1.{kind}"
@@ -49,11 +54,10 @@ class SourcePublisher(Generic[M]):
         is_fresh = self._safety.age <= FRESH_S
         matched = bool(self._publisher.matching_status.matching)
         self._unmatched = 0 if matched or not is_fresh else self._unmatched + 1
-        self._seq += 1
         filled = msgspec.structs.replace(
             message,
-            seq=self._seq,
-            boot=self._boot,
+            seq=next(self._seqs),
+            boot=BOOT,
             t_ns=time.time_ns(),
             mono_ns=time.monotonic_ns(),
             echo=state.heartbeat if state else 0,

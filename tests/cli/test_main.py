@@ -143,9 +143,10 @@ def test_an_early_ctrl_c_exits_silently(
 # The robot's requirements have no extras: only commands that need one may fail, with a message.
 ROBOT_SET = """
 import sys
+ABSENT = {"rich", "matplotlib", "textual", "pygame", "dpkt"}
 class Absent:
     def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in ("rich", "matplotlib", "textual", "pygame", "dpkt"):
+        if name.split(".")[0] in ABSENT:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Absent())
 from cli.__main__ import COMMANDS, main
@@ -159,6 +160,9 @@ for name in COMMANDS:
 capture = sys.argv[1]
 for words in (["demo"], ["drive"], ["wire", "decode", capture]):
     print(words[0], "gives", main(words), file=sys.stderr)
+ABSENT.clear()
+ABSENT.add("t2")
+main(["demo"])
 """
 
 
@@ -170,9 +174,10 @@ def test_without_the_extras(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
-    demo, demo_code, drive, drive_code, wire, wire_code = result.stderr.splitlines()
+    demo, demo_code, drive, drive_code, wire, wire_code, client = result.stderr.splitlines()
     assert demo.startswith("t2 demo: the demo needs rich; ")
-    assert demo.endswith("pip install -e '.[demo]'")
+    assert demo.endswith("pip install -e '.[demo]' -e sdk")
+    assert client.startswith("t2 demo: the demo needs t2; ")
     assert drive.startswith("t2 drive: the screen needs ")
     assert wire.endswith("pip install -e '.[inspect]'")
     assert [demo_code, drive_code, wire_code] == ["demo gives 1", "drive gives 1", "wire gives 1"]

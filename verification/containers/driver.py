@@ -1,11 +1,15 @@
 """A driver that connects over TLS like a laptop."""
 
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
-from cli.demo.driver import PERIOD_S, Driver
-from cli.demo.script import Lap, Pace, lap
+import t2
+from cli.demo.driver import Driver
+from cli.demo.lap import Pace, drive_lap
+from cli.demo.record import LapRecord
 from common import keys, settings
 from common import messages as m
 from common.bus.bus import Bus
@@ -16,42 +20,49 @@ from verification.harness.bus import running
 from verification.harness.waiting import wait_until
 
 SPEED = 0.3  # m/s, requested
+PERIOD_S = 0.05
 MOVING = 0.1  # m/s, true speed
 LAP_S = 180.0  # a lap takes a third of that
 
 
 class LaptopDriver:
-    """Requests motion 20 times a second: the lap's while one is driven, else ``linear``."""
+    """Requests ``linear`` 20 times a second, except while a lap is driven."""
 
     def __init__(self, where: settings.BusSettings, robot: str, loop: Loop) -> None:
         self.linear = 0.0  # m/s
         self.bus = Bus(where, robot, loop.post)
-        self.lap_driver = Driver(self.bus, Lap(()), lambda _: None)
+        self.safety: m.SafetyState | None = None
+        self.odometry: m.Odometry | None = None
+        self.bus.subscribe(keys.SAFETY, lambda a: setattr(self, "safety", a.message))
+        self.bus.subscribe(keys.ODOMETRY, lambda a: setattr(self, "odometry", a.message))
+        self._where = where
         self._loop = loop
         self._source = DriveSource(self.bus, "teleop")
-        self._lap: Lap | None = None
+        self._in_lap = False
 
-    @property
-    def safety(self) -> m.SafetyState | None:
-        """The last safety state."""
-        return self.lap_driver.safety
-
-    def beat(self, now_ns: int) -> None:
+    def beat(self, _: int) -> None:
         """Send a request; in the loop's thread."""
-        if self._lap is not None:
-            self.lap_driver.on_beat(now_ns)
-        else:
-            del self.lap_driver.odometry[:-1]
+        if not self._in_lap:
             self._source.request(self.linear, 0.0)
 
-    def drive_lap(self, pace: Pace) -> Sequence[m.Odometry]:
-        """Drive a lap to its end; return its odometry."""
-        self._lap = self.lap_driver.lap = whole = Lap(lap(fast=False, pace=pace))
+    def drive_lap(self, pace: Pace) -> LapRecord:
+        """Drive a lap to its end, with the settings that ``t2 keys`` wrote."""
+        self._in_lap = True
+        record, ended = LapRecord(), threading.Event()
+        timeout = threading.Timer(LAP_S, ended.set)
+        timeout.start()
         try:
-            wait_until(lambda: whole.step is None, "the lap is driven", LAP_S)
-            return list(self.lap_driver.odometry)
+            folder = Path(self._where.certificate).parent
+            with t2.connect(
+                self.bus.robot, endpoint=self._where.endpoints[0], config=folder / "bus.toml"
+            ) as robot:
+                record.subscribe(robot)
+                drive_lap(Driver(robot, record, ended), pace)
+                record.finished = True
+            return record
         finally:
-            self._lap = None
+            timeout.cancel()
+            self._in_lap = False
 
     def push(self, speed: Callable[[], float]) -> None:
         """Request motion until the vehicle moves, after zero when safety requires neutral."""

@@ -6,8 +6,8 @@ import re
 import time
 
 from cli.demo import host_stalls
+from cli.demo.lap import PATIENT, QUICK
 from cli.demo.score import good, results
-from cli.demo.script import PATIENT, QUICK
 from verification.containers.engine import Project, size_mb
 from verification.containers.stack_fixture import BUILD_S, HEALTH_CHECKED, SERVICES, StackFixture
 
@@ -31,8 +31,8 @@ def all_services_are_healthy(fixture: StackFixture) -> str:
 def lap_is_driven(fixture: StackFixture) -> str:
     """Drive the demo's lap over TLS."""
     slow = fixture.stall_s > host_stalls.LIMIT_S
-    odometry = fixture.driver.drive_lap(PATIENT if slow else QUICK)
-    rows = results(fixture.trace(), odometry, fixture.driver.lap_driver.lap, fast=False)
+    record = fixture.driver.drive_lap(PATIENT if slow else QUICK)
+    rows = results(fixture.trace(), record, fast=False)
     seen = "; ".join(f"{what}: {value}" for what, value, fine in rows if fine is not None)
     assert good(rows), seen
     pace = f"host stalls of {fixture.stall_s:.2f} s, relaxed limits" if slow else "as shipped"

@@ -30,8 +30,8 @@ def changed(fixture: StackFixture, project: Project) -> str:
     others = {name for name in SERVICES if before[name] != after[name]}
     assert others == {ONE}, others
     fixture.wait_healthy(ONE)
-    seen = fixture.driver.lap_driver.odometry[-1].boot
-    wait_until(lambda: fixture.driver.lap_driver.odometry[-1].boot == seen, "odometry")
+    fixture.driver.odometry = None
+    wait_until(lambda: fixture.driver.odometry, "odometry")
     fixture.driver.push(fixture.speed)
     stop(fixture)
     return str(fixture[ONE].about["Image"])[7:19]

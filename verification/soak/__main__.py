@@ -21,7 +21,7 @@ from cli.demo.command import (
     trace_file,
     traced,
 )
-from cli.demo.script import PATIENT, QUICK
+from cli.demo.lap import PATIENT, QUICK
 from cli.inspect.session import interruptible
 from cli.run.supervisor import Supervisor
 from cli.run.up import passed_on

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import t2
 from verification.harness.waiting import wait_until
 from verification.soak import driver
 from verification.systemd.machine import Machine
@@ -19,7 +20,8 @@ UNITS = [f"t2-{name}.service" for name in CORE]
 INSTALL = ("sh", "/wheelhouse/t2-install.sh")
 SETTINGS = "/etc/t2/t2.toml"
 T2 = "/opt/t2/current/bin/t2"
-DRIVER = "/opt/drive_laps.py"  # copied: it is not part of the installation
+LAPS = "/opt/laps"  # the driver and the package t2, copied: they are not installed
+DRIVER = f"{LAPS}/drive.py"
 TRACE = """[Service]
 StateDirectory=t2
 ExecStart=
@@ -258,9 +260,12 @@ def drives(m: Machine) -> float:
     """Start the driver of laps, and return the speed once the vehicle moves."""
     if not active(m, "driver.service"):
         m.attempt("systemctl", "reset-failed", "driver.service")
+        if m.attempt("test", "-e", LAPS).returncode:
+            m.copy(Path(t2.__file__).parent.parent, LAPS)
         m.write(DRIVER, Path(driver.__file__).read_text(encoding="utf-8"))
         m.run(
             "systemd-run", "--unit=driver", "--uid=t2", "--property=Restart=always",
+            f"--setenv=PYTHONPATH={LAPS}",
             "/opt/t2/current/bin/python", "-P", DRIVER, "--config", SETTINGS,
         )  # fmt: skip
     return float(wait_until(lambda: moving(m), "a moving vehicle", PATIENCE_S))

@@ -1,24 +1,33 @@
 """Artificial poses, states, views and traces of a lap."""
 
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import Struct
 
 from cli.demo.score import Trace
-from cli.demo.script import View
 from common import motion
 from common.freshness import NS_PER_S
-from common.messages import Cause, Limits, Odometry, SafetyState
+from common.messages import Cause, Limits, SafetyState
 from sim import trace as t
+from t2.messages import Odometry
 from tests import factories
 
+M = TypeVar("M", bound=Struct)
 RUN, STOP, BRAKE = motion.Command
 
 TICK_NS = NS_PER_S // 20  # the simulator records the truth at 20 Hz
 
 
+def as_client(message: Struct, kind: type[M]) -> M:
+    """Return a message of the stack as the client library decodes it."""
+    return msgspec.msgpack.decode(msgspec.msgpack.encode(message), type=kind)
+
+
 def odometry(**fields: Any) -> Odometry:
     """Return a standing pose at the start, with the given differences."""
     standing = dict.fromkeys(("x", "y", "heading", "linear", "residual"), 0.0)
-    return factories.odometry(**(standing | fields))
+    return as_client(factories.odometry(**(standing | fields)), Odometry)
 
 
 def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> SafetyState:
@@ -35,19 +44,6 @@ def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> Safety
         "text": ", ".join(causes) or "drives as asked",
     }
     return SafetyState(**(known | fields))
-
-
-def view(
-    *causes: str,
-    latched: tuple[str, ...] = (),
-    verdict: str | None = None,
-    pressed: bool = False,
-    refusal: str | None = None,
-    **pose: float,
-) -> View:
-    """Return the driver's input."""
-    words = {} if verdict is None else {"verdict": verdict}
-    return View(odometry(**pose), safety(*causes, latched=latched, **words), pressed, refusal)
 
 
 def truth(tick: int, **fields: Any) -> t.Truth:

@@ -8,18 +8,13 @@ from rich.console import Console, RenderableType
 
 from cli.demo import plot
 from cli.demo.display import STYLES, LapDisplay, RoomMap, panel, results_table
-from cli.demo.driver import Driver
+from cli.demo.record import LapRecord
 from cli.demo.score import Trace
-from cli.demo.script import Lap, lap
-from common.bus.bus import Bus
-from common.freshness import NS_PER_S
-from common.messages import Ultrasonic, Velocity
-from common.motion import Twist
 from common.settings import Vehicle
 from sim.config import load_plan
 from sim.geometry import Pose, Rectangle
-from tests.cli.demo.lap_fixture import hit_lap, odometry, safety
-from verification.harness.bus import at
+from t2.messages import SafetyState, Ultrasonic, Velocity
+from tests.cli.demo.lap_fixture import as_client, hit_lap, odometry, safety
 
 PLAN = load_plan("office", Vehicle())
 BODY = Rectangle(0.55, 0.35)
@@ -33,32 +28,32 @@ def text(what: RenderableType, columns: int = COLUMNS) -> str:
 
 
 @pytest.fixture
-def driver() -> Driver:
-    """Return a driver without a router and without messages."""
-    bus = Bus(at("tcp/127.0.0.1:1"), "001", lambda call: call())
-    return Driver(bus, Lap(lap(fast=True)), lambda _: None)
+def record() -> LapRecord:
+    """Return a record without steps and messages."""
+    return LapRecord()
 
 
-def seen(driver: Driver) -> Driver:
-    """Set the driver's messages to a vehicle that safety has stopped before the wall."""
-    driver.odometry += [odometry(x=0.2 * n) for n in range(16)]
-    driver.safety = safety("blocked", text="Stopped short of what front sees.")
-    driver.velocity = Velocity(linear=0.25, angular=-0.5)
-    driver.ranges = Ultrasonic(
+def seen(record: LapRecord) -> LapRecord:
+    """Set the messages to those of a vehicle that safety has stopped before the wall."""
+    record.steps += ["wait for safety", "drive off to the wall"]
+    record.began_s = 0.0
+    record.odometry += [odometry(x=0.2 * n) for n in range(16)]
+    state = safety("blocked", text="Stopped short of what front sees.")
+    record.safety = as_client(state, SafetyState)
+    record.velocity = Velocity(linear=0.25, angular=-0.5)
+    record.ranges = Ultrasonic(
         ranges=(1.5, 0.8, 0.21, None, None, None, 3.0, 2.0),
         status=("ok", "ok", "ok", "fault", "no_echo", "too_near", "ok", "ok"),
     )
-    driver.lap.index = 1
-    driver.requested = Twist(0.5, 0.1)
-    driver.answers.append(("drive on", "reset", False, "Not gone yet: [bumper] was hit."))
-    return driver
+    record.answers.append(("drive on", False, "Not gone yet: [bumper] was hit."))
+    return record
 
 
 # --- the live display -------------------------------------------------------------------------
 
 
-def test_the_room_without_messages(driver: Driver) -> None:
-    shown = text(panel(RoomMap(PLAN, COLUMNS), driver, 0))
+def test_the_room_without_messages(record: LapRecord) -> None:
+    shown = text(panel(RoomMap(PLAN, COLUMNS), record, 0.0))
     assert "T2 drives a lap" in shown
     assert shown.count("█") > 100
     assert "▒" in shown  # the low box, which sonar does not see
@@ -66,17 +61,17 @@ def test_the_room_without_messages(driver: Driver) -> None:
     assert "  0.0 s" in shown
 
 
-def test_vehicle_verdict_and_causes(driver: Driver) -> None:
-    shown = text(panel(RoomMap(PLAN, COLUMNS), seen(driver), 3 * NS_PER_S))
+def test_vehicle_verdict_and_causes(record: LapRecord) -> None:
+    shown = text(panel(RoomMap(PLAN, COLUMNS), seen(record), 3.0))
     assert "→" in shown
     for words in (
         "✓ wait for safety",
         "▶ drive off to the wall",
         "STOP",
         "Stopped short of what front sees.",
-        "0.50 m/s   0.10 rad/s",
+        "  3.0 s",
         "0.25 m/s  -0.50 rad/s",
-        "refused: Not gone yet",
+        "Not gone yet",
         "[bumper]",
         "0.21",
         "fault",
@@ -87,8 +82,8 @@ def test_vehicle_verdict_and_causes(driver: Driver) -> None:
 
 
 @pytest.mark.parametrize("columns", [80, 100, 160])
-def test_it_fits_the_terminal(driver: Driver, columns: int) -> None:
-    shown = text(panel(RoomMap(PLAN, columns), seen(driver), NS_PER_S), columns)
+def test_it_fits_the_terminal(record: LapRecord, columns: int) -> None:
+    shown = text(panel(RoomMap(PLAN, columns), seen(record), 1.0), columns)
     lines = shown.splitlines()
     assert max(map(len, lines)) <= columns
     assert lines[0].startswith("╭")
@@ -103,10 +98,10 @@ def test_heading_of_the_vehicle(heading: float, arrow: str) -> None:
     assert arrow in RoomMap(PLAN, COLUMNS).render([], Pose(0.0, 0.0, heading)).plain
 
 
-def test_every_verdict_has_its_style(driver: Driver) -> None:
+def test_every_verdict_has_its_style(record: LapRecord) -> None:
     for verdict in STYLES:
-        driver.safety = safety(verdict=verdict)
-        assert verdict.upper() in text(panel(RoomMap(PLAN, COLUMNS), driver, 0))
+        record.safety = as_client(safety(verdict=verdict), SafetyState)
+        assert verdict.upper() in text(panel(RoomMap(PLAN, COLUMNS), record, 0.0))
 
 
 def test_failed_results_are_marked() -> None:
@@ -126,24 +121,24 @@ def display(out: Path) -> LapDisplay:
 
 
 def test_without_a_terminal_steps_and_answers_are_lines(
-    driver: Driver, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    record: LapRecord, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with display(tmp_path) as it:
         it.show("A sentence [in brackets].")
-        it.step(driver.lap.steps[0])
-        it.draw(seen(driver), NS_PER_S)
-    it.results([("lap finished", "9 of 9", True)], driver)
+        it.step("wait for safety")
+        it.draw(seen(record), 1.0)
+    it.results([("lap finished", "9 of 9", True)], record)
     shown = capsys.readouterr().out
     assert shown.startswith("starting simulator, router")
     assert "A sentence [in brackets]." in shown
     assert "  wait for safety\n" in shown
-    assert "drive on: reset refused: Not gone yet: [bumper] was hit." in shown
+    assert "drive on: refused: Not gone yet: [bumper] was hit." in shown
     assert "9 of 9" in shown
     assert "╭" not in shown  # no live display
 
 
 def test_live_display_on_a_terminal(
-    driver: Driver,
+    record: LapRecord,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -151,8 +146,8 @@ def test_live_display_on_a_terminal(
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm-256color")
     with display(tmp_path) as it:
-        it.step(driver.lap.steps[0])
-        it.draw(seen(driver), NS_PER_S)
+        it.step("wait for safety")
+        it.draw(seen(record), 1.0)
     shown = capsys.readouterr().out
     assert "T2 drives a lap" in shown
     assert "starting simulator" not in shown

@@ -1,109 +1,114 @@
-"""The driver of the lap: drive requests, calls, and their answers."""
+"""The driver of the lap: it goes on after stops, and counts latches; in simulated time."""
+
+import math
+import threading
+from collections.abc import Callable
 
 import pytest
 
-from cli.demo.driver import PRESS_NS, Driver
-from cli.demo.script import Lap, Step, View, lap, still
-from common import keys
-from common import messages as m
-from common.freshness import NS_PER_S
-from common.motion import STILL, Twist
-from tests.cli.demo.lap_fixture import odometry, safety
-from tests.fake_bus import FakeBus
+import t2
+from cli.demo.driver import Driver, LapEndedError
+from cli.demo.record import LapRecord
+from services.safety.inputs import Estop
+from sim.requests import Sonar
+from tests.simulated_robot import simulated_robot
+from tests.simulated_stack import SimulatedStack
+
+
+class Vehicle:
+    """A driver in an empty world, and its stack."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.stack, self.record = SimulatedStack("empty"), LapRecord(steps=["step"])
+        self.ended = threading.Event()
+        self.driver = Driver(simulated_robot(self.stack, patch), self.record, self.ended)
+        self.driver.wait()
+
+    def block(self, distance: float | None) -> None:
+        """Make the front sonar report an obstacle, or none."""
+        self.stack.sim.sonars.inject(Sonar(name="front", range=distance))
+
+    @property
+    def x(self) -> float:
+        return self.driver.pose().x
+
+    def when(self, true: Callable[[], bool], act: Callable[[], object]) -> None:
+        """Act once, as soon as a condition is true."""
+
+        def beat() -> None:
+            if true():
+                self.stack.each_beat.remove(beat)
+                act()
+
+        self.stack.each_beat.append(beat)
+
+    def has_moved(self, distance: float) -> Callable[[], bool]:
+        return lambda: self.stack.odometry[-1].x >= distance
+
+    def after(self, seconds: float) -> Callable[[], bool]:
+        end_ns = self.stack.now_ns + seconds * 1e9
+        return lambda: self.stack.now_ns >= end_ns
 
 
 @pytest.fixture
-def bus() -> FakeBus:
-    return FakeBus()
+def vehicle(monkeypatch: pytest.MonkeyPatch) -> Vehicle:
+    return Vehicle(monkeypatch)
 
 
-def never(_: View, __: m.Odometry) -> bool:
-    return False
+def test_a_distance_and_an_angle(vehicle: Vehicle) -> None:
+    vehicle.driver.forward(1.0, 0.5)
+    assert vehicle.x == pytest.approx(1.0, abs=0.03)
+    vehicle.driver.turn(math.pi / 2, 0.8)
+    assert vehicle.driver.pose().heading == pytest.approx(math.pi / 2, abs=0.04)
+    vehicle.driver.forward(-0.5, 0.5)
+    assert vehicle.driver.pose().y == pytest.approx(-0.5, abs=0.03)
 
 
-RESET = Step("reset", still, lambda view, _: view.refusal is not None, "reset", latched=True)
-RELEASE = Step("release", still, never, "release", latched=True)
-DRIVE = Step("drive", lambda *_: Twist(0.5, 0.1), never)
+def test_an_unplanned_latch_is_reset_and_counted_and_the_motion_goes_on(vehicle: Vehicle) -> None:
+    vehicle.when(vehicle.has_moved(0.5), lambda: vehicle.stack.decide(Estop()))
+    vehicle.driver.forward(1.0, 0.5)
+    assert vehicle.record.unplanned == ["estop"]
+    assert vehicle.x == pytest.approx(1.0, abs=0.03)
+    vehicle.when(vehicle.has_moved(1.5), lambda: vehicle.stack.decide(Estop()))
+    vehicle.driver.forward(1.0, 0.5)
+    assert vehicle.record.unplanned == ["estop", "estop"]
 
 
-def driver_of(bus: FakeBus, *steps: Step) -> tuple[Driver, list[str]]:
-    """Return a driver at the start, and a list that collects the names of its steps."""
-    started: list[str] = []
-    driver = Driver(bus, Lap(steps), lambda step: started.append(step.name))
-    driver.safety, driver.odometry = safety(), [odometry()]
-    return driver, started
+def test_a_motion_waits_for_an_obstacle_to_leave(vehicle: Vehicle) -> None:
+    vehicle.block(0.2)
+    leaves = vehicle.after(4.0)
+    vehicle.when(leaves, lambda: vehicle.block(None))
+    vehicle.driver.forward(1.0, 0.5)
+    assert leaves()
+    assert vehicle.x == pytest.approx(1.0, abs=0.03)
+    assert vehicle.record.unplanned == []
 
 
-def newest_request(bus: FakeBus) -> m.Drive | None:
-    """Return the newest drive request."""
-    (source,) = (p for p in bus.publishers if p.topic is keys.DRIVE)
-    assert source.key == "t2/v1/001/@cmd/drive/demo"
-    return source.last
+def test_an_expected_cause_ends_the_motion(vehicle: Vehicle) -> None:
+    vehicle.when(vehicle.has_moved(0.5), lambda: vehicle.stack.decide(Estop()))
+    with pytest.raises(t2.Latched):
+        vehicle.driver.forward(5.0, 0.5, expected="estop")
+    assert vehicle.record.unplanned == []
+    vehicle.driver.reset()
+    assert vehicle.record.answers[-1][:2] == ("step", True)
+    vehicle.block(0.2)
+    with pytest.raises(t2.Blocked):
+        vehicle.driver.forward(5.0, 0.5, expected="blocked")
 
 
-def test_no_request_before_the_first_messages(bus: FakeBus) -> None:
-    driver = Driver(bus, Lap(lap(fast=True)), lambda _: None)
-    driver.on_beat(0)
-    driver.safety = safety()
-    driver.on_beat(0)
-    assert newest_request(bus) is None
-    assert driver.lap.times_ns == []
+def test_a_refused_call_is_repeated_and_its_answer_kept_once(vehicle: Vehicle) -> None:
+    vehicle.stack.sim.pressed_by_hand = True
+    vehicle.stack.sim.update_bumper(vehicle.stack.now_ns)
+    vehicle.stack.decide(Estop())
+    vehicle.when(vehicle.after(8.0), vehicle.ended.set)
+    with pytest.raises(LapEndedError):
+        vehicle.driver.release("backward")
+    assert [granted for _, granted, _ in vehicle.record.answers] == [False]
 
 
-def test_a_request_per_beat_and_one_start_per_step(bus: FakeBus) -> None:
-    driver, started = driver_of(bus, DRIVE)
-    for beat in range(3):
-        driver.on_beat(beat)
-    request = newest_request(bus)
-    assert request is not None
-    assert (request.linear, request.angular, request.seq) == (0.5, 0.1, 3)
-    assert driver.requested == Twist(0.5, 0.1)
-    assert started == ["drive"]
-    assert bus.asked == []
-
-
-def test_zero_is_requested_after_the_end(bus: FakeBus) -> None:
-    driver, started = driver_of(bus)
-    driver.on_beat(0)
-    assert driver.requested == STILL
-    assert started == []
-
-
-def test_a_call_is_repeated_in_time_for_a_held_release(bus: FakeBus) -> None:
-    driver, _ = driver_of(bus, RELEASE)
-    for now_ns in (NS_PER_S, NS_PER_S + PRESS_NS - 1, NS_PER_S + PRESS_NS):
-        driver.on_beat(now_ns)
-    assert [path for path, _ in bus.asked] == [keys.RELEASE.path] * 2
-    assert PRESS_NS < 0.3 * NS_PER_S
-
-
-def test_a_refusal_ends_the_step_that_waits_for_it(bus: FakeBus) -> None:
-    driver, started = driver_of(bus, RESET, DRIVE)
-    driver.on_beat(NS_PER_S)
-    ((path, _),) = bus.asked
-    ((_, refuse),) = bus.answers
-    assert path == keys.RESET.path
-    refuse("still pressed")
-    driver.on_beat(2 * NS_PER_S)
-    assert started == ["reset", "drive"]
-    assert driver.answers == [("reset", "reset", False, "still pressed")]
-
-
-def test_a_late_answer_is_kept_and_ends_no_step(bus: FakeBus) -> None:
-    driver, started = driver_of(bus, RESET, RESET, DRIVE)
-    driver.on_beat(NS_PER_S)
-    refuse = bus.answers[0][1]
-    refuse("still pressed")
-    driver.on_beat(2 * NS_PER_S)
-    refuse("late")
-    driver.on_beat(3 * NS_PER_S)
-    assert started == ["reset", "reset"]
-    assert [words for _, _, _, words in driver.answers] == ["still pressed", "late"]
-
-
-def test_the_same_answer_again_is_started_once(bus: FakeBus) -> None:
-    driver, _ = driver_of(bus, RELEASE)
-    driver.on_beat(NS_PER_S)
-    for _ in range(2):
-        bus.answers[0][0](m.Done(text="creeping"))
-    assert driver.answers == [("release", "release", True, "creeping")]
+def test_the_end_ends_what_waits(vehicle: Vehicle) -> None:
+    vehicle.block(0.2)
+    vehicle.when(vehicle.after(4.0), vehicle.ended.set)
+    with pytest.raises(LapEndedError):
+        vehicle.driver.forward(1.0, 0.5)
+    assert vehicle.stack.each_beat == []  # no drive is left

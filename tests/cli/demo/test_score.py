@@ -2,18 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
+from cli.demo.record import LapRecord
 from cli.demo.score import Result, Trace, good, odometry_errors, read, results, stops
-from cli.demo.script import Lap, lap
 from tests.cli.demo.lap_fixture import TICK_NS, hit_lap, odometry, truth
 
 
-def finished() -> Lap:
-    steps = lap(fast=True)
-    return Lap(steps, index=len(steps))
+def finished(**fields: Any) -> LapRecord:
+    """Return the record of a fast lap."""
+    usual: dict[str, Any] = {"steps": ["step"] * 9, "finished": True}
+    return LapRecord(**(usual | fields))
 
 
 def named(rows: list[Result]) -> dict[str, tuple[str, bool | None]]:
@@ -28,9 +30,9 @@ def test_a_stop_is_measured_from_frame_to_frame() -> None:
 
 
 def test_a_good_lap() -> None:
-    rows = results(hit_lap(), [], finished(), fast=True)
+    rows = results(hit_lap(), finished(), fast=True)
     assert named(rows) == {
-        "lap finished": ("9 of 9 steps", True),
+        "lap finished": ("9 steps", True),
         "distance driven": ("2.04 m", True),
         "closest to an obstacle": ("1.00 m", True),
         "odometry error, driving": ("0.0 cm at most", None),
@@ -42,15 +44,15 @@ def test_a_good_lap() -> None:
     assert good(rows)
 
 
-def wrong(trace: Trace, driven: Lap | None = None, fast: bool = True) -> set[str]:
+def wrong(trace: Trace, driven: LapRecord | None = None, fast: bool = True) -> set[str]:
     """Return the failed results of a lap."""
-    rows = results(trace, [], driven or finished(), fast)
+    rows = results(trace, driven or finished(), fast)
     assert not good(rows)
     return {what for what, _, fine in rows if fine is False}
 
 
 def test_an_unfinished_lap() -> None:
-    assert wrong(hit_lap(), Lap(lap(fast=True), index=3)) == {"lap finished"}
+    assert wrong(hit_lap(), finished(finished=False)) == {"lap finished"}
 
 
 def test_a_vehicle_that_brakes_without_a_frame() -> None:
@@ -62,7 +64,7 @@ def test_a_vehicle_that_brakes_without_a_frame() -> None:
 def test_a_vehicle_without_standstill() -> None:
     trace = hit_lap(stands=False)
     assert wrong(trace) == {"contact 1: stopped within"}
-    amount, _ = named(results(trace, [], finished(), fast=True))["contact 1: stopped within"]
+    amount, _ = named(results(trace, finished(), fast=True))["contact 1: stopped within"]
     assert amount == "never from 0.80 m/s"
 
 
@@ -91,15 +93,14 @@ def test_too_close_and_not_driven() -> None:
 def test_the_whole_lap_ends_at_the_start(x: float, home: bool) -> None:
     trace = hit_lap()
     back = replace(trace, truth=[*trace.truth, truth(91, x=x, distance=4.0)])
-    rows = results(back, [], finished(), fast=False)
+    rows = results(back, finished(), fast=False)
     assert named(rows)["distance from the start at the end"] == (f"{x * 100:.1f} cm", home)
     assert good(rows) is home
 
 
 def test_unplanned_latches_are_named() -> None:
-    driven = finished()
-    driven.unplanned.append("runaway")
-    assert results(hit_lap(), [], driven, fast=True)[-1][1] == "runaway"
+    driven = finished(unplanned=["runaway"])
+    assert results(hit_lap(), driven, fast=True)[-1][1] == "runaway"
 
 
 # --- odometry ---------------------------------------------------------------------------------
@@ -117,8 +118,8 @@ def test_only_the_odometry_error_at_rest_fails() -> None:
     standing = odometry(mono_ns=80 * TICK_NS, x=2.04 - 0.16)
     assert list(odometry_errors(hit_lap(), [moving])) == pytest.approx([0.5, 0.0])
     assert list(odometry_errors(hit_lap(), [standing])) == pytest.approx([0.16, 0.16])
-    assert good(results(hit_lap(), [moving], finished(), fast=True))
-    assert not good(results(hit_lap(), [standing], finished(), fast=True))
+    assert good(results(hit_lap(), finished(odometry=[moving]), fast=True))
+    assert not good(results(hit_lap(), finished(odometry=[standing]), fast=True))
 
 
 @pytest.mark.parametrize("tick", [0, 19, 91, 1000])

@@ -1,32 +1,35 @@
 """The driver of a soak: recovery before driving, and restarted laps."""
 
-import math
+import threading
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
-from cli.demo.script import QUICK, lap
-from common import keys
-from common import messages as m
+import t2
+from cli.demo.driver import Driver, LapEndedError
+from cli.demo.lap import QUICK, Pace
+from cli.demo.record import LapRecord
+from common import log
 from common.errors import LinkError
-from common.freshness import NS_PER_S
 from sim.requests import Asked, Place
 from sim.sockets import Control
 from sim.trace import Truth
-from tests.cli.demo.lap_fixture import odometry, safety, truth
-from tests.fake_bus import FakeBus
-from verification.soak.driver import OLD_NS, STEP_S, TRY_NS, Operator
-
-BEAT_NS = NS_PER_S // 20
+from tests.cli.demo.lap_fixture import odometry, truth
+from verification.soak import driver as soak
+from verification.soak.driver import LocatedDriver, Operator, StepTimeout
 
 
 class Vehicle:
-    """The simulator's control socket, made up."""
+    """The simulator's control socket and the robot, made up."""
 
     def __init__(self) -> None:
         self.done: list[Asked] = []
-        self.now = truth(0)
+        self.poses: list[tuple[float, ...]] = []
+        self.now = truth(0, x=1.0, y=2.0, heading=0.5)
         self.there = True
+        self.boot = 5
+        self.odometry = SimpleNamespace(latest=lambda: odometry(boot=self.boot))
 
     def do(self, request: Asked) -> None:
         if not self.there:
@@ -34,120 +37,96 @@ class Vehicle:
         self.done.append(request)
 
     def truth(self) -> Truth:
+        if not self.there:
+            raise LinkError("the simulator's control socket: timed out")
         return self.now
 
-
-class DriverFixture:
-    """An operator, his bus and his vehicle, at a clock of their own."""
-
-    def __init__(self) -> None:
-        self.bus, self.vehicle, self.now_ns = FakeBus(), Vehicle(), 100 * NS_PER_S
-        self.operator = Operator(self.bus, cast("Control", self.vehicle), QUICK)
-        self.driver = self.operator._driver
-        self.driver.safety = safety("neutral")
-
-    def beat(self, seconds: float = 0.0, boot: int = 5, verdict: m.Verdict = "run") -> None:
-        """Beat for so long, at least once, with a pose that is always young."""
-        end_ns = self.now_ns + round(seconds * NS_PER_S)
-        while True:
-            self.now_ns += BEAT_NS
-            self.driver.safety = safety(verdict=verdict)
-            self.driver.odometry.append(odometry(boot=boot, mono_ns=self.now_ns))
-            self.operator.on_beat(self.now_ns)
-            if self.now_ns >= end_ns:
-                return
-
-    def drives(self) -> bool:
-        """Run one control step; return whether a request was sent."""
-        (source,) = (p for p in self.bus.publishers if p.topic is keys.DRIVE)
-        before = source.last
-        self.beat()
-        return source.last is not before
-
-    @property
-    def asked(self) -> list[Any]:
-        """The requests of the calls."""
-        return [request for _, request in self.bus.asked]
-
-    def ready(self) -> None:
-        """Run the setup steps of the operator, and confirm the pose."""
-        self.now_ns += TRY_NS
-        self.beat()
-        self.bus.answers[-1][0](m.Done(text="the pose is set"))
+    def set_pose(self, *pose: float) -> None:
+        self.poses.append(pose)
 
 
 @pytest.fixture
-def fixture() -> DriverFixture:
-    return DriverFixture()
+def vehicle() -> Vehicle:
+    return Vehicle()
 
 
-def test_the_vehicle_is_put_back_and_its_pose_set_before_it_drives(fixture: DriverFixture) -> None:
-    assert not fixture.drives()
-    assert fixture.vehicle.done == [Place(x=0.0, y=0.0)]
-    assert fixture.asked == [m.PoseRequest(echo=1)]
-    assert not fixture.drives()
-    fixture.ready()
-    assert fixture.drives()
+@pytest.fixture
+def logged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Collect the driver's events."""
+    events: list[str] = []
+
+    def keep(event: str, **_: object) -> None:
+        events.append(event)
+
+    logger = SimpleNamespace(info=keep, warning=keep)
+    monkeypatch.setattr(log, "Logger", lambda: logger)
+    return events
 
 
-def test_what_cannot_be_set_right_is_tried_again(fixture: DriverFixture) -> None:
-    fixture.vehicle.there = False
-    fixture.beat(2.0)
-    assert fixture.asked == []
-    fixture.vehicle.there = True
-    fixture.beat(1.0)
-    fixture.bus.answers[-1][1]("there is no router")
-    fixture.beat(2 * TRY_NS / NS_PER_S)
-    assert len(fixture.asked) >= 3
-    assert not fixture.drives()
+def located(vehicle: Vehicle) -> LocatedDriver:
+    robot, control = cast("t2.Robot", vehicle), cast("Control", vehicle)
+    return LocatedDriver(robot, LapRecord(), threading.Event(), control)
 
 
-def test_a_new_odometry_gets_the_true_pose_once_the_vehicle_stands(fixture: DriverFixture) -> None:
-    fixture.ready()
-    assert fixture.drives()
-    fixture.bus.asked.clear()
-    fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0, linear=0.1)
-    fixture.beat(2.0, boot=6)
-    assert fixture.asked == []
-    fixture.vehicle.now = truth(0, x=1.0, y=2.0, heading=7.0)
-    fixture.beat(1.0, boot=6)
-    pose = fixture.asked[0]
-    assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, 7.0 - math.tau))
-    index = fixture.driver.lap.index
-    fixture.bus.answers[-1][0](m.Done(text="the pose is set"))
-    fixture.beat(boot=6)
-    assert fixture.driver.lap.index >= index, "the lap goes on"
+def operator(vehicle: Vehicle) -> Operator:
+    return Operator(cast("t2.Robot", vehicle), cast("Control", vehicle), QUICK)
 
 
-def test_without_odometry_nobody_asks_to_move(fixture: DriverFixture) -> None:
-    fixture.ready()
-    assert fixture.drives()
-    (source,) = (p for p in fixture.bus.publishers if p.topic is keys.DRIVE)
-    before = source.last
-    fixture.operator.on_beat(fixture.now_ns + OLD_NS + 1)
-    assert source.last is before
+def test_the_pose_is_set_after_each_restart_of_odometry(vehicle: Vehicle) -> None:
+    driver = located(vehicle)
+    for boot in (5, 6):
+        vehicle.boot = boot
+        with pytest.raises(t2.NoData, match="was set"):
+            driver.located()
+        assert driver.located().boot == boot
+    assert vehicle.poses == [(1.0, 2.0, 0.5)] * 2
 
 
-def test_a_lap_that_gets_nowhere_is_begun_anew(fixture: DriverFixture) -> None:
-    fixture.ready()
-    fixture.vehicle.done.clear()
-    fixture.beat(STEP_S[QUICK] - 1.0, verdict="stop")
-    assert fixture.vehicle.done == []
-    fixture.beat(2.0, verdict="stop")
-    assert fixture.vehicle.done[0] == Place(x=0.0, y=0.0)
-    assert fixture.driver.lap.index == 0
+def test_the_pose_of_a_moving_vehicle_is_not_set(vehicle: Vehicle) -> None:
+    driver, standing = located(vehicle), vehicle.now
+    vehicle.now = truth(0, linear=0.1)
+    with pytest.raises(t2.NoData, match="moves"):
+        driver.located()
+    vehicle.there = False
+    with pytest.raises(t2.NoData, match="timed out"):
+        driver.located()
+    assert vehicle.poses == []
+    vehicle.now, vehicle.there = standing, True
+    assert driver.pose().boot == 5
 
 
-def test_after_a_lap_comes_the_next_one(fixture: DriverFixture) -> None:
-    fixture.ready()
-    first = fixture.driver.lap
-    first.index = len(lap(fast=False))
-    fixture.beat()
-    assert fixture.driver.lap is not first
-    assert fixture.drives()
+def test_a_lap_begins_at_the_start(
+    vehicle: Vehicle, logged: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lap(driver: Driver, _: Pace) -> None:
+        assert vehicle.done == [Place(x=0.0, y=0.0)]
+        driver.record.step("only")
+
+    monkeypatch.setattr(soak, "drive_lap", lap)
+    operator(vehicle).drive()
+    assert logged == ["step", "lap finished"]
 
 
-def test_old_poses_are_not_kept(fixture: DriverFixture) -> None:
-    fixture.ready()
-    fixture.beat(5.0)
-    assert len(fixture.driver.odometry) == 1
+@pytest.mark.parametrize("error", [LapEndedError(), LinkError("no control socket")])
+def test_a_lap_that_is_stuck_is_begun_anew(
+    vehicle: Vehicle, logged: list[str], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def lap(*_: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(soak, "drive_lap", lap)
+    monkeypatch.setattr(soak, "TRY_S", 0.0)
+    operator(vehicle).drive()
+    assert logged == ["begun anew"]
+
+
+def test_a_step_expires_and_the_next_one_begins_anew(logged: list[str]) -> None:
+    timeout = StepTimeout(0.01)
+    timeout.restart("stuck")
+    assert timeout.expired.wait(20.0)
+    patient = StepTimeout(600.0)
+    patient.restart("first")
+    patient.restart("second")
+    patient.close()
+    assert not patient.expired.is_set()
+    assert logged == ["step"] * 3
