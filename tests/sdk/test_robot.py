@@ -34,6 +34,13 @@ def test_a_distance_and_a_turn(robot: t2.Robot) -> None:
     assert math.dist((start.x, start.y), (back.x, back.y)) < 0.1
 
 
+def test_the_next_drive_of_a_program_is_no_second_publisher(robot: t2.Robot) -> None:
+    for _ in range(3):
+        with robot.drive("nav"):
+            causes = {cause.name for cause in robot.safety.latest().causes}
+            assert "two_publishers" not in causes
+
+
 def test_a_velocity_ends_by_itself_or_with_the_drive(robot: t2.Robot) -> None:
     with robot.drive("nav") as drive:
         drive.velocity(0.2, seconds=2.0)

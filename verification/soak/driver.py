@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 import time
-from contextlib import closing
 
 import t2
 from cli.demo.driver import Driver, LapEndedError, connected
@@ -68,44 +67,39 @@ class Operator:
 
     def drive(self) -> None:
         """Drive one lap; give it up when a step takes too long."""
-        with closing(StepTimeout(STEP_S[self._pace])) as timeout:
-            record = LapRecord(timeout.restart)
-            driver = LocatedDriver(self._robot, record, timeout.expired, self._control)
-            try:
-                self._put_back()
-                drive_lap(driver, self._pace)
-            except (LapEndedError, LinkError, MessageError) as error:
-                why = [text for *_, text in record.answers[-1:]]
-                self._log.warning(
-                    "begun anew", stuck="".join(record.steps[-1:]), why=" ".join([str(error), *why])
-                )
-                time.sleep(TRY_S)
-            else:
-                self._log.info("lap finished", latches=record.unplanned)
+        timeout = StepTimeout(STEP_S[self._pace])
+        record = LapRecord(timeout.restart)
+        driver = LocatedDriver(self._robot, record, timeout, self._control)
+        try:
+            self._put_back()
+            drive_lap(driver, self._pace)
+        except (LapEndedError, LinkError, MessageError) as error:
+            why = [str(error), *(text for *_, text in record.answers[-1:])]
+            self._log.warning("begun anew", stuck="".join(record.steps[-1:]), why=" ".join(why))
+            time.sleep(TRY_S)
+        else:
+            self._log.info("lap finished", latches=record.unplanned)
 
     def _put_back(self) -> None:
         self._control.do(Place(x=0.0, y=0.0))
 
 
-class StepTimeout:
-    """Expires when a step takes too long."""
+class StepTimeout(threading.Event):
+    """Set when a step takes too long; without a thread, whose number the soak watches."""
 
     def __init__(self, seconds: float) -> None:
-        self.expired = threading.Event()
+        super().__init__()
         self._seconds = seconds
-        self._timer = threading.Timer(seconds, self.expired.set)
+        self._end_s = time.monotonic() + seconds
 
     def restart(self, name: str) -> None:
         """Begin a step."""
         log.Logger().info("step", name=name)
-        self.close()
-        self._timer = threading.Timer(self._seconds, self.expired.set)
-        self._timer.daemon = True
-        self._timer.start()
+        self._end_s = time.monotonic() + self._seconds
 
-    def close(self) -> None:
-        """End without expiry."""
-        self._timer.cancel()
+    def is_set(self) -> bool:
+        """Return whether the step has taken too long."""
+        return time.monotonic() > self._end_s
 
 
 def main() -> int:
