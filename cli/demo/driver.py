@@ -17,6 +17,8 @@ from t2.messages import Direction, Odometry
 SOURCE = "demo"  # of ``safety.sources``
 PATIENCE_S = 1.0  # without progress, until a motion is requested anew
 RETRY_S = 0.1
+FACING = 0.03  # rad
+TURNS_MAX = 3  # old measurements make a turn end late; the next one corrects it
 T = TypeVar("T")
 
 
@@ -64,7 +66,11 @@ class Driver:
         goal = self.pose().heading + angle
 
         def go(drive: t2.Drive) -> None:
-            drive.turn(math.remainder(goal - self.located().heading, math.tau), speed, PATIENCE_S)
+            for _ in range(TURNS_MAX):
+                left = math.remainder(goal - self.located().heading, math.tau)
+                if abs(left) < FACING:
+                    return
+                drive.turn(left, speed, PATIENCE_S)
 
         self._drive(go)
 
