@@ -96,8 +96,10 @@ def drive(options: argparse.Namespace, lap: "LapThread", draw: Callable[[], None
         log_file(options).open("wb") as output,
         closing(Loop()) as loop,
         interruptible(loop) as signals,
+        contextlib.ExitStack() as ends,
     ):
         supervisor = Supervisor(traced(options), output)
+        ends.callback(supervisor.end)
 
         def poll(_: int) -> None:
             if supervisor.look(time.monotonic()):
@@ -106,13 +108,10 @@ def drive(options: argparse.Namespace, lap: "LapThread", draw: Callable[[], None
                 loop.stop()
 
         lap.start()
+        ends.callback(lap.end)  # before the processes end: the last requests are zeros
         loop.every(POLL_S, poll)
         loop.every(DRAW_S, lambda _: draw())
-        try:
-            loop.run()
-        finally:
-            lap.end()
-            supervisor.end()
+        loop.run()
     return signals[0] if signals else 0
 
 
