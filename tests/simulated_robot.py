@@ -155,4 +155,4 @@ def simulated_robot(stack: SimulatedStack, patch: pytest.MonkeyPatch) -> t2.Robo
     )
     patch.setattr(t2.drive, "threading", thread)
     session: Any = SimulatedSession(stack)
-    return t2.Robot(session, "001")
+    return t2.Robot(session, "001", "simulated")

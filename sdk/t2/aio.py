@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from t2 import messages as m
 from t2.connection import connect
-from t2.drive import Drive
+from t2.drive import PATIENCE_S, Drive
 from t2.errors import T2Error
 from t2.limit import SpeedLimit
 from t2.robot import Robot
@@ -136,7 +136,9 @@ class AsyncDrive:
         """
         await self._wait(self._drive.stop)
 
-    async def forward(self, distance: float, speed: float = 0.3) -> None:
+    async def forward(
+        self, distance: float, speed: float = 0.3, patience: float = PATIENCE_S
+    ) -> None:
         """Drive a distance in m as ``Drive.forward`` does.
 
         >>> async def main():
@@ -145,9 +147,9 @@ class AsyncDrive:
         ...             await drive.forward(0.1)
         >>> asyncio.run(main())
         """
-        await self._wait(self._drive.forward, distance, speed)
+        await self._wait(self._drive.forward, distance, speed, patience)
 
-    async def turn(self, angle: float, speed: float = 0.5) -> None:
+    async def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
         """Turn by an angle in rad as ``Drive.turn`` does.
 
         >>> async def main():
@@ -156,7 +158,7 @@ class AsyncDrive:
         ...             await drive.turn(math.pi / 8)
         >>> asyncio.run(main())
         """
-        await self._wait(self._drive.turn, angle, speed)
+        await self._wait(self._drive.turn, angle, speed, patience)
 
     async def _wait(self, motion: Callable[..., object], *values: float) -> None:
         task = asyncio.create_task(asyncio.to_thread(motion, *values))
@@ -196,6 +198,7 @@ class AsyncRobot:
         linear: float | None = None,
         angular: float | None = None,
         reason: str = "",
+        seconds: float | None = None,
     ) -> SpeedLimit:
         """Cap the speed in m/s and rad/s as ``Robot.limit`` does.
 
@@ -205,7 +208,7 @@ class AsyncRobot:
         ...         limit.end()
         >>> asyncio.run(main())
         """
-        return await asyncio.to_thread(self.robot.limit, source, linear, angular, reason)
+        return await asyncio.to_thread(self.robot.limit, source, linear, angular, reason, seconds)
 
     async def estop(self) -> None:
         """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts.
@@ -222,6 +225,16 @@ class AsyncRobot:
     async def reset(self) -> m.ResetDone:
         """Reset as ``Robot.reset`` does; ``estop`` has an example."""
         return await asyncio.to_thread(self.robot.reset)
+
+    async def release(self, direction: m.Direction, timeout: float = 5.0) -> None:
+        """Creep off a pressed bumper as ``Robot.release`` does.
+
+        >>> async def main():
+        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
+        ...         await robot.release("backward")  # the bumper is free
+        >>> asyncio.run(main())
+        """
+        await asyncio.to_thread(self.robot.release, direction, timeout)
 
     async def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set the pose of odometry in ``odom``: m, m, rad.

@@ -12,6 +12,7 @@ import zenoh
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, T2Error
 from t2.messages import Drive as DriveMessage
 from t2.messages import Odometry, SafetyState
+from t2.motion import Straight, Turn, check_finite
 from t2.publisher import FRESH_S, SourcePublisher
 
 if TYPE_CHECKING:
@@ -23,10 +24,6 @@ ZEROS = 3  # requests after a drive: one may be lost
 READY_S = 2.0  # from the first neutral request until we are in control
 OVERRULED_TICKS = 10  # our requests may be on their way for that long
 PATIENCE_S = 3.0  # without progress
-ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
-SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
-NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
-KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
 STANDING = 0.02  # m/s and rad/s
 RELEASE = "release"  # the source of a release, which overrules nobody
 
@@ -144,7 +141,7 @@ class Drive:
         >>> with robot.drive("nav") as drive:
         ...     drive.velocity(-0.1, seconds=0.5)
         """
-        _finite(linear, angular)
+        check_finite(linear, angular)
         self.check()
         end_s = math.inf if seconds is None else time.monotonic() + seconds
         self._target = Target(linear, angular, end_s)
@@ -168,22 +165,7 @@ class Drive:
         ...     drive.forward(0.1)
         ...     drive.forward(-0.1, speed=0.2)
         """
-        _finite(distance)
-        _positive(speed)
-        start = self._robot.odometry.latest()
-        sign = math.copysign(1.0, distance)
-
-        def left(pose: Odometry) -> float:
-            along_x, along_y = math.cos(start.heading), math.sin(start.heading)
-            way = (pose.x - start.x) * along_x + (pose.y - start.y) * along_y
-            return abs(distance) - sign * way
-
-        def go(pose: Odometry, rest: float) -> tuple[float, float]:
-            correction = KEEP_HEADING * math.remainder(start.heading - pose.heading, math.tau)
-            bounded = max(-MAX_CORRECTION, min(MAX_CORRECTION, correction))
-            return sign * _slowing(rest, speed, ACCELERATION, SLOWEST), bounded
-
-        self._go(go, left, NEAR, patience)
+        self._go(Straight(self._robot.odometry.latest(), distance, speed), patience)
 
     def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
         """Turn on the spot by an angle in rad, positive to the left; else as ``forward``.
@@ -192,43 +174,22 @@ class Drive:
         ...     drive.turn(math.pi / 8)
         ...     drive.turn(-math.pi / 8)
         """
-        _finite(angle)
-        _positive(speed)
-        sign = math.copysign(1.0, angle)
-        before = self._robot.odometry.latest().heading
-        turned = 0.0
+        self._go(Turn(self._robot.odometry.latest(), angle, speed), patience)
 
-        def left(pose: Odometry) -> float:
-            nonlocal before, turned
-            turned += math.remainder(pose.heading - before, math.tau)
-            before = pose.heading
-            return abs(angle) - sign * turned
-
-        def go(_: Odometry, rest: float) -> tuple[float, float]:
-            return 0.0, sign * _slowing(rest, speed, TURNING, SLOWEST_TURN)
-
-        self._go(go, left, NEAR_TURN, patience)
-
-    def _go(
-        self,
-        go: Callable[[Odometry, float], tuple[float, float]],
-        left: Callable[[Odometry], float],
-        near: float,
-        patience: float,
-    ) -> None:
-        """Follow ``go`` until little is left; raise ``Blocked`` without progress."""
+    def _go(self, motion: "Straight | Turn", patience: float) -> None:
+        """Follow a motion until little is left; raise ``Blocked`` without progress."""
         least, progress_s = math.inf, time.monotonic()
 
         def arrived(pose: Odometry) -> bool:
             nonlocal least, progress_s
-            rest = left(pose)
-            if rest <= near:
+            left = motion.left(pose)
+            if left <= motion.near:
                 return True
-            if rest < least - near:
-                least, progress_s = rest, time.monotonic()
+            if left < least - motion.near:
+                least, progress_s = left, time.monotonic()
             elif time.monotonic() - progress_s > patience:
                 raise self._blocked()
-            self.velocity(*go(pose, rest))
+            self.velocity(*motion.velocity(pose, left))
             return False
 
         try:
@@ -291,7 +252,8 @@ class Drive:
         if time.monotonic() >= target.end_s:
             target = STILL
         trouble = self._trouble(target)
-        self._error = self._error or trouble  # an error of `cancel` stays
+        if trouble is not None:  # an error of `cancel` stays
+            self._error = trouble
         if self._error is not None:
             target = STILL
         self._put(target.linear, target.angular)
@@ -323,20 +285,3 @@ def latched(state: SafetyState) -> Latched:
     """Return the error of a latched state."""
     names = [cause for cause in state.causes if cause.name in state.latched]
     return Latched(f"{state.text} Robot.reset() clears what is gone.", names)
-
-
-def _slowing(left: float, speed: float, deceleration: float, slowest: float) -> float:
-    """Return the speed at this distance from the end."""
-    return max(slowest, min(speed, math.sqrt(2 * deceleration * max(left, 0.0))))
-
-
-def _finite(*numbers: float) -> None:
-    if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"only finite numbers can be driven, not {', '.join(map(str, numbers))}")
-
-
-def _positive(speed: float) -> None:
-    if not 0 < speed < math.inf:
-        raise ValueError(
-            f"speed must be positive, not {speed}; a negative distance drives backward"
-        )

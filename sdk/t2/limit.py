@@ -1,6 +1,8 @@
 """Speed limits: a cap or a protective stop, repeated until it ends."""
 
+import math
 import threading
+import time
 
 import zenoh
 
@@ -22,6 +24,7 @@ class SpeedLimit:
         self._source = source
         self._safety = safety
         self._limit = Limit(echo=0)
+        self._end_s = math.inf  # monotonic time
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"t2 limit {source}", daemon=True)
 
@@ -30,13 +33,19 @@ class SpeedLimit:
         """Whether ``end`` was called; another limit of the source needs another object."""
         return self._ended.is_set()
 
-    def set(self, linear: float | None, angular: float | None, reason: str) -> None:
-        """Replace the limit; send it at once.
+    def set(
+        self,
+        linear: float | None,
+        angular: float | None = None,
+        reason: str = "",
+        seconds: float | None = None,
+    ) -> None:
+        """Replace the limit; send it at once, and repeat it for some seconds or until ``end``.
 
         Raises ``NotAllowed``, ``ValueError``, and ``NoData`` without safety.
 
         >>> limit = robot.limit("detector", linear=0.5)
-        >>> limit.set(0.2, None, "person close")
+        >>> limit.set(0.2, reason="person close", seconds=1)
         >>> limit.end()
         """
         for cap in (linear, angular):
@@ -52,6 +61,7 @@ class SpeedLimit:
                 "certificate of role device with this source; see `t2 keys`"
             )
         self._limit = Limit(linear=linear, angular=angular, reason=reason[:80], echo=0)
+        self._end_s = time.monotonic() + (math.inf if seconds is None else seconds)
         self._publisher.put(self._limit)
         if not self._thread.is_alive():
             self._thread.start()
@@ -68,4 +78,5 @@ class SpeedLimit:
 
     def _run(self) -> None:
         while not self._ended.wait(PERIOD_S):
-            self._publisher.put(self._limit)
+            if time.monotonic() < self._end_s:
+                self._publisher.put(self._limit)

@@ -89,10 +89,13 @@ class Robot:
         linear: float | None = None,
         angular: float | None = None,
         reason: str = "",
+        seconds: float | None = None,
     ) -> SpeedLimit:
         """Cap the speed in m/s and rad/s as this source, until the limit's ``end`` or another call.
 
-        Zero is a protective stop, None no cap; ``reason`` is shown to operators.
+        Zero is a protective stop, None no cap; ``reason`` is shown to operators. With ``seconds``
+        it is repeated that long at most: a program that hangs then falls silent, which safety's
+        setting ``silence`` for this source can treat as a stop.
         ``safety.limits`` must list the source. Raises ``NotAllowed`` and ``ValueError``.
 
         >>> limit = robot.limit("detector", linear=0.3, reason="person ahead")
@@ -101,7 +104,7 @@ class Robot:
         if source not in self._limits or self._limits[source].has_ended:
             key = self._key("limit", source=source)
             self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
-        self._limits[source].set(linear, angular, reason)
+        self._limits[source].set(linear, angular, reason, seconds)
         return self._limits[source]
 
     # --- stopping -----------------------------------------------------------------------------
@@ -161,6 +164,8 @@ class Robot:
         As a release that an operator holds: at most 0.1 m/s and 0.15 m, and ``contact`` stays
         latched until ``reset``. Know which direction is free: the bumper has none. Raises
         ``Refused`` with the reason, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
+
+        >>> robot.release("backward")  # the bumper is free
         """
         begin_s, refusal = time.monotonic(), None
         try:

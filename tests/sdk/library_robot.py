@@ -21,11 +21,11 @@ def ready(stack: RunningStack) -> Iterator[t2.Robot]:
     """Connect, and wait until the robot may drive."""
     with t2.connect("001", endpoint=stack.endpoint) as it:
         it.odometry.latest(timeout=20.0)
-        wait_until(lambda: not _blocked(it), "a vehicle that may drive")
+        wait_until(lambda: not blocked(it), "a vehicle that may drive")
         yield it
 
 
-def _blocked(robot: t2.Robot) -> bool:
+def blocked(robot: t2.Robot) -> bool:
     """Return whether something else than a missing request stops the vehicle; reset it."""
     state = robot.safety.latest(timeout=5.0)
     if state.latched:

@@ -4,6 +4,7 @@ import contextlib
 import math
 import threading
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -12,6 +13,7 @@ from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
 from sim.requests import Bumper, Sonar
+from tests.sdk.library_robot import blocked
 from verification.harness.bus import bus_on, running
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
@@ -134,6 +136,19 @@ def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
         again = robot.limit("detector", linear=0.1)
         wait_until(lambda: robot.safety.latest().verdict == "slow", "the next limit")
         again.end()
+
+
+def test_a_limit_is_repeated_for_some_seconds_at_most(robot: t2.Robot) -> None:
+    limit = robot.limit("detector", linear=0.1, seconds=2.0)
+
+    def is_held() -> bool:
+        return any(each.linear == 0.1 for each in robot.safety.latest().limit_sources)
+
+    wait_until(is_held, "the limit")
+    wait_until(lambda: not is_held(), "its end")
+    limit.set(0.1)
+    wait_until(is_held, "the limit again")
+    limit.end()
 
 
 def test_an_unknown_source_is_told_so(robot: t2.Robot) -> None:
