@@ -235,6 +235,19 @@ class Echoes(Struct, frozen=True):
         return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)
 
 
+def no_answer(server: str) -> str:
+    """Return the text of a call without any answer."""
+    return f"{server} does not answer; run `t2 doctor`"
+
+
+def not_allowed(server: str) -> str:
+    """Return the text of a call without any answer from a service whose messages arrive.
+
+    A router whose access rules forbid a call drops it without an error.
+    """
+    return f"no reply, though {server} runs: this certificate may not call it (see `t2 keys list`)"
+
+
 def reset_request(seen: SafetyState) -> ResetRequest:
     """Return the request to clear exactly the latched causes of this state."""
     latched = tuple(cause.id for cause in seen.causes if cause.name in seen.latched)

@@ -19,7 +19,7 @@ from common.bus.probe import Answer, Probe
 from common.errors import MessageError, RobotError
 from common.keys import CALLS, Call
 from common.messages import ReleaseRequest, ResetDone, SafetyState
-from common.operator import CONFIRM_S, confirms, reset_request
+from common.operator import CONFIRM_S, confirms, no_answer, not_allowed, reset_request
 
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
 HEAD = ("key", "request", "reply", "does")
@@ -85,12 +85,23 @@ def make(
     key = call.on(session.robot) if call else expression(path, session.robot)
     answers = session.probe.query(key, packed(call, request), options.timeout)
     if not answers and call:
-        raise RobotError(f"{call.server} does not answer on {key}; run `t2 doctor`")
+        raise RobotError(why_unanswered(session, call, key))
     if not answers:
         raise RobotError(f"no service answers on {key}; `t2 call` lists the calls")
     show(answers, options.output)
     if seen and call is keys.RESET and not is_confirmed(session.probe, seen, answers):
         raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
+
+
+def why_unanswered(session: BusSession, call: Call[Any, Any], key: str) -> str:
+    """Return why no service answers a call: it is absent or hangs, or the router drops the call.
+
+    The router announces no queryable to a certificate that may not call it.
+    """
+    runs = session.probe.alive(keys.live_key(session.robot, call.server, "*"))
+    if runs and not session.probe.has_server(key):
+        return f"{key}: {not_allowed(call.server)}"
+    return f"{key}: {no_answer(call.server)}"
 
 
 def show(answers: list[Answer], form: str) -> None:

@@ -9,6 +9,7 @@ from msgspec import Struct
 
 from common import codec
 from common.errors import MessageError
+from common.operator import no_answer
 
 R = TypeVar("R", bound=Struct)
 A = TypeVar("A")  # a decoded answer: a call's reply, or raw bytes
@@ -67,7 +68,7 @@ class Answers(Generic[A]):
     def end(self) -> None:
         """Process the end of the answers, on a thread of Zenoh."""
         if not self._answered:
-            self.fail(f"{self._server} does not answer; run `t2 doctor`")
+            self.fail(no_answer(self._server))
 
     def fail(self, reason: str) -> None:
         """Report a refusal, from any thread."""

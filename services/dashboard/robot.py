@@ -3,6 +3,7 @@
 Each robot has a bus session of its own, which opens when the first viewer selects the robot.
 """
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -144,7 +145,9 @@ class Robot:
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
-        if not self._estop.is_pending:
+        state = self.telemetry.newest(keys.SAFETY, time.monotonic_ns())
+        is_latched = state is not None and "estop" in state.latched  # a page repeats its requests
+        if not self._estop.is_pending and not is_latched:
             self._log.warning("emergency stop", requested_by=requested_by)
         self._estop.start()
 

@@ -47,7 +47,6 @@ class Controller:
         self._gamepad: Gamepad = NoGamepad("searching")
         self._drawn_ns = 0  # the last redraw of the screen
         self._requested: Twist | None = None
-        self._calls = OperatorCalls(node, event_log)
         self._leaving = False
         self.terminal = RoundTrip(self._settings.round_trip, unmeasurable)
         self._slow = False  # the warning about the slow terminal was shown
@@ -57,7 +56,8 @@ class Controller:
         self._contest = Contest(self._settings.source)
         self._overruled_by: str | None = None  # while that source drives
         self._unconfirmed = False  # whether safety never showed our emergency stop
-        self._source = DriveSource(bus, self._settings.source, self._report_denied)
+        self._source = source = DriveSource(bus, self._settings.source, self._report_denied)
+        self._calls = OperatorCalls(node, event_log, lambda: source.denied)
         self._safety = LatestTopic(bus, keys.SAFETY, FAST_S)
         self._velocity = LatestTopic(bus, keys.VELOCITY, FAST_S)
         self._odometry = LatestTopic(bus, keys.ODOMETRY, FAST_S)
@@ -95,7 +95,7 @@ class Controller:
         if self._leaving:
             return
         if press.key == ESTOP:
-            self._start_estop()
+            self._start_estop(now_ns)
         elif press.key == STOP:
             self._controls.press(STOP, now_ns)
         elif press.age_s(now_ns) > MAX_PRESS_AGE_S:
@@ -181,11 +181,15 @@ class Controller:
                 text = "no state of safety for 1 s: controls released; check it with `t2 doctor`"
                 self._node.event("unheard", "warning", text)
 
-    def _start_estop(self) -> None:
+    def _start_estop(self, now_ns: int) -> None:
+        """Stop; a key that repeats, or a press during the stop, is no further event."""
+        state = self._safety.at(now_ns)
+        is_known = self._estop.is_pending or (state is not None and "estop" in state.latched)
         self._controls.stop()
         self._bus.estop()
         self._estop.start()
-        self._node.event("estop", "warning", "emergency stop requested by the operator")
+        if not is_known:
+            self._node.event("estop", "warning", "emergency stop requested by the operator")
 
     def _repeat_estop(self, now_ns: int) -> None:
         state = self._safety.at(now_ns)

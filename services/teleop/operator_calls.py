@@ -1,10 +1,12 @@
 """Calls of the operator to safety: reset, and release off a pressed bumper; in the node's loop."""
 
+from collections.abc import Callable
+
 from msgspec.structs import replace
 
 from common import keys
 from common.messages import Direction, Level, ResetDone, SafetyState
-from common.operator import ReleaseCalls, ResetCheck, reset_request
+from common.operator import ReleaseCalls, ResetCheck, no_answer, not_allowed, reset_request
 from common.service import Node
 from common.source import call_release
 from services.teleop.config import TeleopConfig
@@ -21,10 +23,14 @@ NOT_CONFIRMED = (
 class OperatorCalls:
     """Makes at most one call of each kind at a time and adds its result to the event log."""
 
-    def __init__(self, node: Node[TeleopConfig], event_log: EventLog) -> None:
+    def __init__(
+        self, node: Node[TeleopConfig], event_log: EventLog, denied: Callable[[], bool]
+    ) -> None:
+        """``denied``: whether safety runs and the router drops this certificate's requests."""
         self._node = node
         self._bus = node.bus
         self._event_log = event_log
+        self._denied = denied
         self._reset: ResetCheck | None = None
         self._release = ReleaseCalls()
 
@@ -64,7 +70,7 @@ class OperatorCalls:
     def _reset_refused(self, check: ResetCheck, reason: str) -> None:
         if self._reset is check:
             self._reset = None
-        self._add("warning", f"reset refused: {reason}")
+        self._add("warning", f"reset refused: {self._explained(reason)}")
 
     # --- release ------------------------------------------------------------------------------
 
@@ -79,7 +85,11 @@ class OperatorCalls:
         if is_held:
             self._add("info", f"release: {text}")
         else:
-            self._add("warning", f"release refused: {text}")
+            self._add("warning", f"release refused: {self._explained(text)}")
+
+    def _explained(self, reason: str) -> str:
+        """Return the reason; for a call that the router drops, that it is not allowed."""
+        return not_allowed("safety") if reason == no_answer("safety") and self._denied() else reason
 
     def _add(self, level: Level, text: str) -> None:
         self._event_log.add("safety", level, text)

@@ -27,6 +27,7 @@ class RobotFixture:
         )
         self.now_ns = 0
         self.release: Direction | None = None
+        self.latched: tuple[str, ...] = ()
         assert self.robot.driver_lock.take("1", force=False)
 
     def ticks(self, number: int, source: str | None, *, held: bool = True) -> None:
@@ -35,7 +36,9 @@ class RobotFixture:
             self.now_ns += TICK_NS
             self.bus.deliver(keys.SAFETY, safety_state(heartbeat=count, source=source))
             self.robot.telemetry.update(
-                "tel/safety/state", safety_state(source=source), self.now_ns
+                "tel/safety/state",
+                safety_state(source=source, latched=self.latched),
+                self.now_ns,
             )
             lock.sent(self.now_ns, self.now_ns)
             if held:
@@ -105,6 +108,24 @@ def test_an_unconfirmed_estop_is_reported(fixture: RobotFixture) -> None:
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices == [("error", "estop_unconfirmed", "")]
+
+
+def test_a_repeated_estop_is_logged_once(
+    fixture: RobotFixture, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A page sends it by WebSocket and by POST, and repeats it until it sees the latch."""
+    fixture.robot.estop("a page")
+    fixture.robot.estop("a page")
+    fixture.latched = ("estop",)
+    fixture.ticks(3, None)
+    monkeypatch.setattr("time.monotonic_ns", lambda: fixture.now_ns)
+    fixture.robot.estop("a page")
+    assert [record.getMessage() for record in caplog.records].count("emergency stop") == 1
+    fixture.ticks(1, None)
+    fixture.latched = ()
+    fixture.ticks(1, None)
+    fixture.robot.estop("a page")
+    assert [record.getMessage() for record in caplog.records].count("emergency stop") == 2
 
 
 def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,6 +38,12 @@ class FakeNode(Node[TeleopConfig]):
         publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
         return publisher.next_seq - 1, publisher.last
 
+    @property
+    def events(self) -> int:
+        """The number of events published."""
+        publisher = next(p for p in self.bus.publishers if p.topic is keys.EVENTS)
+        return publisher.next_seq - 1
+
 
 def view(**fields: Any) -> View:
     """Return a view that knows nothing yet, but for the given fields."""

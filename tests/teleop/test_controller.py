@@ -44,6 +44,21 @@ def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> No
     assert operator.node.fake.estops == 4
 
 
+def test_a_repeated_estop_is_sent_and_reported_once(operator: Operator) -> None:
+    for _ in range(3):  # a held key repeats
+        operator.press("e")
+        operator.ticks(1)
+    operator.tell_safety(latched=("estop",))
+    operator.ticks(1)
+    operator.press("e")
+    operator.ticks(1)
+    assert operator.node.fake.estops == 7
+    assert operator.node.events == 1
+    operator.tell_safety()  # reset
+    operator.press("e")
+    assert operator.node.events == 2
+
+
 def test_an_unconfirmed_estop_is_reported(operator: Operator) -> None:
     operator.press("e")
     operator.ticks(ESTOP_TICKS - 1)

@@ -4,7 +4,10 @@ import pytest
 from msgspec import structs
 
 from common import keys
+from common.bus.publisher import Publisher
 from common.messages import Direction, Done, ReleaseRequest, ResetDone, ResetRequest
+from common.operator import no_answer, not_allowed
+from common.source import DENIED_AFTER
 from tests.teleop.support import Operator
 
 DONE = ResetDone(text="cleared contact", boot=5, heartbeat=8, cleared=(42,))
@@ -61,6 +64,22 @@ def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator
     operator.tell_contact()
     operator.press("r")
     assert len(operator.node.fake.asked) == 2
+
+
+@pytest.mark.parametrize(("key", "what"), [("r", "reset"), ("b", "release")])
+@pytest.mark.parametrize("denied", [True, False])
+def test_an_unanswered_call_without_the_right_is_not_allowed(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch, key: str, what: str, denied: bool
+) -> None:
+    monkeypatch.setattr(Publisher, "passed_on", not denied)
+    for _ in range(DENIED_AFTER):
+        operator.tell_contact()
+        operator.ticks(1)
+    operator.press(key)
+    operator.ticks(1)
+    operator.node.fake.answers[0][1](no_answer("safety"))
+    reason = not_allowed("safety") if denied else no_answer("safety")
+    assert operator.lines[-1] == f"{what} refused: {reason}"
 
 
 def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from cli.inspect import estop
+from cli.inspect import call, estop
+from cli.inspect.session import BusSession
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
@@ -140,6 +141,19 @@ def test_t2_estop_reports_why_a_robot_does_not_confirm(
         assert reason("viewer", "hall").startswith("not allowed, as it seems")
         assert reason("driver", "anna") == ""
         assert reason("driver", "anna", "009").endswith("is at this router; seen: 001")
+
+
+def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., Bus]) -> None:
+    def reason(role: str, name: str, robot: str = "001") -> str:
+        with probe(connecting(site.settings(role, name), secured)) as session:
+            key = keys.RESET.on(robot)
+            return call.why_unanswered(BusSession(session, robot), keys.RESET, key)
+
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        on_board(join, onboard)
+        assert "this certificate may not call it" in reason("viewer", "hall")
+        assert "safety does not answer" in reason("driver", "anna")
+        assert "safety does not answer" in reason("viewer", "hall", "009")
 
 
 def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
