@@ -51,6 +51,7 @@ AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one receiv
 ZEROS = 3  # requests after a drive: one may be lost
 OVERRULED_TICKS = 10  # 0.5 s: the operator's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
+BUMPER_FREE = "The bumper is free. Next: reset."  # the answer to a hold once it has succeeded
 NO_ECHO = (0, -1)  # boot and heartbeat before any
 
 

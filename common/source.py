@@ -17,7 +17,7 @@ from common.messages import (
     SafetyState,
     SourceMessage,
 )
-from common.operator import ReleaseCalls
+from common.operator import BUMPER_FREE, ReleaseCalls
 
 M = TypeVar("M", bound=SourceMessage)
 
@@ -114,12 +114,13 @@ def call_release(
 ) -> None:
     """Make the calls of one tick of a release, see ``ReleaseCalls.tick``.
 
-    ``report`` receives whether the release is held, and the text: once, and for each new refusal.
+    ``report`` receives whether safety accepts the hold, and the text: when the motion begins, when
+    the bumper is free, and for each new refusal.
     """
 
     def answered(is_held: bool, text: str) -> None:
         calls.answered()
-        if calls.is_new(HELD if is_held else text):
+        if calls.is_new(HELD if is_held and text != BUMPER_FREE else text):
             report(is_held, text)
 
     for request in calls.tick(direction, seen, newest):

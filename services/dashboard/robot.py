@@ -17,6 +17,7 @@ from common.keys import Call, Topic
 from common.log import Logger
 from common.motion import Twist
 from common.operator import (
+    BUMPER_FREE,
     Contest,
     DriveRequests,
     EstopRepetition,
@@ -241,7 +242,9 @@ class Robot:
         """Report a release to its driver; the page shows the distance that is left."""
         if (driver := self.driver_lock.driver) is None:
             return
-        if is_held:
+        if text == BUMPER_FREE:
+            self._notify(driver, "info", text, "release_freed")
+        elif is_held:
             self._notify(driver, "info", text, "release_held")
         else:
             self._notify(driver, "warning", text, "release_refused")

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction
+from common.operator import BUMPER_FREE
 from services.safety.causes import bars_motion
 from services.safety.config import Safety
 from services.safety.inputs import Hold, Inputs, Reset
@@ -149,6 +150,11 @@ def _hold(
         late = "The release was ended after this call was made: hold it again."
     if late:
         return state, Reply(False, late)
+    if "contact" in state.latches and not _is_pressed(inputs):
+        # The operator still holds the key that has freed the bumper: that is no refusal.
+        return replace(state, release=replace(state.release, held_ns=None)), Reply(
+            True, BUMPER_FREE
+        )
     reason = _no_release(state, inputs, settings) or _direction_refusal(state, call.direction)
     reason = reason or _no_start(state, inputs, call, settings, now_ns)
     direction = call.direction
@@ -184,7 +190,7 @@ def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
     if "contact" not in state.latches:
         return "There is no contact to release."
     if not _is_pressed(inputs):
-        return "The bumper is free: reset instead."
+        return BUMPER_FREE
     others = ordered(n for n in state.latches if bars_motion(n) and n != "contact")
     if others:
         due = others[0] in latched(state.latches) and others[0] not in still_present(state.latches)

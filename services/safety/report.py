@@ -20,6 +20,12 @@ from services.safety.trajectory import OPPOSITE
 MOVING = ("run", "slow")
 # Event names that differ from the cause's name.
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
+# What the operator does about a latched cause that is still present, before a reset.
+STILL_PRESENT = {
+    "contact": "It is still pressed: move off first, then reset.",
+    "estop": "It is still pressed or requested: release it, then reset.",
+    "estop_keepalive": "Start its program again, then reset.",
+}
 REPEATED_NS = NS_PER_S  # a refusal that comes again within this time is no new event
 
 
@@ -103,8 +109,9 @@ def sentence(state: State) -> str:
     text = state.latches[worst].text
     if worst not in latched(state.latches):
         return text
-    gone = state.latches[worst].good >= GOOD_SAMPLES
-    return f"{text} {'Reset to go on.' if gone else 'It is still present.'}"
+    if state.latches[worst].good >= GOOD_SAMPLES:
+        return f"{text} Reset to go on."
+    return f"{text} {STILL_PRESENT.get(worst, 'The cause is still present: fix it, then reset.')}"
 
 
 def signature(state: State) -> tuple[object, ...]:
@@ -130,12 +137,13 @@ class Repetition(Struct):
 def transitions(before: State, after: State, trigger: Trigger | None) -> Iterator[Transition]:
     """Yield the transitions of one decision."""
     old, new = before.verdict, after.verdict
-    for name in latched(after.latches):
-        known, one = before.latches.get(name), after.latches[name]
-        if known is None or known.id != one.id:
-            yield Transition(EVENT_NAMES.get(name, name), "error", one.text, {"cause": name})
-    if old.name in MOVING and new.name not in MOVING:
-        worst = ordered(after.latches)[0]
+    tripped = [name for name in latched(after.latches) if _is_new(before, after, name)]
+    for name in tripped:
+        text = after.latches[name].text
+        yield Transition(EVENT_NAMES.get(name, name), "error", text, {"cause": name})
+    worst = next(iter(ordered(after.latches)), None)
+    # A cause that latches has an event of its own.
+    if old.name in MOVING and new.name not in MOVING and worst and worst not in tripped:
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
     if old.control != new.control:
@@ -150,6 +158,11 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         text = "Creeping off the bumper." if began else "No longer creeping off the bumper."
         yield Transition("release" if began else "release_end", "warning", text, {})
     yield from _reply_events(after, trigger)
+
+
+def _is_new(before: State, after: State, name: str) -> bool:
+    """Return whether this occurrence of a cause began with this decision."""
+    return name not in before.latches or before.latches[name].id != after.latches[name].id
 
 
 def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]:

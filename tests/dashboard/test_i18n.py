@@ -87,6 +87,7 @@ def test_every_result_of_a_call_has_its_text() -> None:
         "reset_done",
         "reset_partial",
         "release_held",
+        "release_freed",
         "release_refused",
         "call_refused",
     } == {name for name in found if name}

@@ -4,8 +4,8 @@ import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
-from common.messages import Direction
-from common.operator import ESTOP_TICKS, OVERRULED_TICKS
+from common.messages import Direction, Done
+from common.operator import BUMPER_FREE, ESTOP_TICKS, OVERRULED_TICKS
 from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
@@ -23,7 +23,10 @@ class RobotFixture:
         self.bus = FakeBus()
         self.notices: list[tuple[str, str, str]] = []
         self.robot = Robot(
-            self.bus, Dashboard(), lambda *words: self.notices.append(words), lambda *_: None
+            self.bus,
+            Dashboard(),
+            lambda *words: self.notices.append(words),
+            lambda _, *words: self.notices.append(words),
         )
         self.now_ns = 0
         self.release: Direction | None = None
@@ -35,12 +38,9 @@ class RobotFixture:
         for count in range(number):
             self.now_ns += TICK_NS
             self.bus.deliver(keys.SAFETY, safety_state(heartbeat=count, source=source))
-            self.robot.telemetry.update(
-                "tel/safety/state",
-                safety_state(source=source, latched=self.latched),
-                self.now_ns,
-            )
-            lock.sent(self.now_ns, self.now_ns)
+            state = safety_state(source=source, latched=self.latched)
+            self.robot.telemetry.update("tel/safety/state", state, self.now_ns)
+            lock.sent(self.now_ns, self.now_ns, state)
             if held:
                 push = Push(release=self.release) if self.release else Push(1.0)
                 lock.hold("1", self.now_ns, push, self.now_ns)
@@ -102,6 +102,17 @@ def test_a_release_overrules_nobody(fixture: RobotFixture) -> None:
     fixture.ticks(40, "release")
     assert fixture.is_held()
     assert fixture.robot.driver_state({}).other is None
+
+
+def test_a_held_release_reports_once_that_the_bumper_is_free(fixture: RobotFixture) -> None:
+    fixture.release = "backward"
+    for text in ("0.15 m left", BUMPER_FREE, BUMPER_FREE):
+        fixture.ticks(1, "release")
+        fixture.bus.answers[-1][0](Done(text=text))
+    assert fixture.notices == [
+        ("info", "0.15 m left", "release_held"),
+        ("info", BUMPER_FREE, "release_freed"),
+    ]
 
 
 def test_an_unconfirmed_estop_is_reported(fixture: RobotFixture) -> None:

@@ -3,6 +3,7 @@
 import pytest
 
 from common.messages import Direction
+from common.operator import BUMPER_FREE
 from services.safety.inputs import Hold
 from services.safety.latches import latched
 from services.safety.state import Reply
@@ -139,7 +140,8 @@ def test_a_release_ends_when_the_bumper_is_free() -> None:
     fixture.hold()
     fixture.pressed = False
     assert fixture.tick().command == "brake"
-    assert fixture.hold() == "The bumper is free: reset instead."
+    assert fixture.decide(Hold(True, "backward", fixture.echo)).reply == Reply(True, BUMPER_FREE)
+    assert fixture.tick().command == "brake"
     fixture.hold(held=False)
     fixture.pressed = True
     assert fixture.tick(5).command == "brake"

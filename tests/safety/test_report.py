@@ -5,6 +5,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction, Drive, Limits
+from common.operator import BUMPER_FREE
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
 from services.safety.report import (
     Repetition,
@@ -15,6 +16,7 @@ from services.safety.report import (
     transitions,
     with_times,
 )
+from services.safety.state import Reply
 from tests.safety.policy_fixture import PolicyFixture, hit
 
 
@@ -113,17 +115,43 @@ def test_one_sentence_says_why() -> None:
     )
     fixture.pressed = True
     fixture.tick()
-    assert sentence(fixture.state) == "The bumper was hit. It is still present."
+    assert sentence(fixture.state) == (
+        "The bumper was hit. It is still pressed: move off first, then reset."
+    )
     fixture.pressed = False
     fixture.tick(5)
     assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
+
+
+def test_a_latched_cause_names_what_is_due_before_a_reset() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.estop()
+    due = "It is still pressed or requested: release it, then reset."
+    assert sentence(fixture.state) == f"Emergency stop. {due}"
+    fixture.tick(5)
+    assert sentence(fixture.state) == "Emergency stop. Reset to go on."
+    fixture = PolicyFixture().ready()
+    fixture.left_bits = 1
+    fixture.tick()
+    assert sentence(fixture.state).endswith("The cause is still present: fix it, then reset.")
+
+
+def test_a_hold_that_frees_the_bumper_is_not_refused() -> None:
+    fixture = hit()
+    fixture.decide(Hold(True, "backward", fixture.echo))
+    fixture.pressed = False
+    fixture.tick()
+    for _ in range(3):
+        assert noted(fixture, Hold(True, "backward", fixture.echo)) == []
+        assert fixture.verdict.reply == Reply(True, BUMPER_FREE)
+        assert fixture.verdict.command == "brake"
 
 
 def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
     assert ticked(fixture) == []
     fixture.pressed = True
-    assert ticked(fixture) == ["contact", "stop", "source"]
+    assert ticked(fixture) == ["contact", "source"]  # the contact is the stop
     fixture.linear = 0.0
     assert ticked(fixture) == []
     fixture.left_bits = 3

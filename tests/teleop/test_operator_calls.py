@@ -6,7 +6,7 @@ from msgspec import structs
 from common import keys
 from common.bus.publisher import Publisher
 from common.messages import Direction, Done, ReleaseRequest, ResetDone, ResetRequest
-from common.operator import no_answer, not_allowed
+from common.operator import BUMPER_FREE, no_answer, not_allowed
 from common.source import DENIED_AFTER
 from tests.teleop.support import Operator
 
@@ -136,6 +136,19 @@ def test_a_release_is_repeated_while_held_one_at_a_time(
     operator.ticks(5)
     assert len(fake.asked) == count
     assert operator.lines == ["release: 0.15 m left", "release refused: safety does not answer"]
+
+
+def test_a_held_release_reports_once_that_the_bumper_is_free(operator: Operator) -> None:
+    operator.tell_contact()
+    for text in ("0.15 m left", BUMPER_FREE, BUMPER_FREE):
+        operator.press("b")
+        operator.ticks(1)
+        operator.node.fake.answers[-1][0](Done(text=text))
+    lines = operator.node.event_log.last(9)
+    assert [(line.level, line.text) for line in lines] == [
+        ("info", "release: 0.15 m left"),
+        ("info", f"release: {BUMPER_FREE}"),
+    ]
 
 
 def test_a_release_is_not_sent_without_a_fresh_state(operator: Operator) -> None:
