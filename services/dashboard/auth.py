@@ -132,10 +132,13 @@ class AuthMiddleware:
 
 
 def content_policy(camera: str, embed: str) -> str:
-    """Return the policy of the page; only the origins of these two URLs may be shown in it."""
+    """Return the policy of the page; only the origins of these two URLs may be shown in it.
+
+    The page also fetches the embedded one, without reading it, to report one that does not answer.
+    """
     frames = _origin(embed) or "'none'"
     return (
-        "default-src 'none'; script-src 'self'; connect-src 'self'; "
+        f"default-src 'none'; script-src 'self'; connect-src 'self' {_origin(embed)}; "
         f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self' {_origin(camera)}; "
         f"frame-src {frames}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )

@@ -116,4 +116,5 @@ def test_only_the_origins_of_camera_and_frame_may_be_shown() -> None:
     policy = content_policy("http://10.0.0.5:8081/{robot}/stream", "https://map.example/a?b=1")
     assert "img-src 'self' http://10.0.0.5:8081; " in policy
     assert "frame-src https://map.example; " in policy
+    assert "connect-src 'self' https://map.example; " in policy
     assert "frame-src 'none'" in content_policy("", "")

@@ -1,4 +1,4 @@
-// The page: WebSocket, messages from the server, state bar, and language.
+// The page: WebSocket, messages from the server, commands, and language.
 import * as charts from "./charts.js";
 import * as driving from "./driving.js";
 import * as estop from "./estop.js";
@@ -6,6 +6,7 @@ import * as notices from "./notices.js";
 import * as panels from "./panels.js";
 import * as slots from "./slots.js";
 import * as sonarView from "./sonar_view.js";
+import * as stateBar from "./state_bar.js";
 import * as theme from "./theme.js";
 import * as trail from "./trail.js";
 
@@ -15,9 +16,6 @@ const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
 const INVALID_MESSAGE = 1003; // close code of the server
-const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
-const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
-const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
 
@@ -124,12 +122,20 @@ const HANDLERS = {
   },
   path: (message) => trail.begin(message.points),
   notice: (message) => toast(message.text, message.level, message.about),
-  taken: (message) => confirm("take_over", `${viewerName(message.by)} ${t("take_over_from")}`,
+  taken: (message) => confirm("take_over", `${stateBar.viewerName(message.by, t)} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
 
-// --- state bar --------------------------------------------------------------------------------
+// --- drawing ----------------------------------------------------------------------------------
+
+const newest = () => (lost() ? null : fast);
+
+/** What the state bar and the header show; `fast` is null without a connection. */
+const view = () => ({
+  fast: newest(), t, language, robot: shown(), isDriver: isDriver(), viewer: hello?.id,
+  keepsAlive: !!hello?.keepalive, watching: Object.keys(slow?.viewers ?? {}).length,
+});
 
 function draw() {
   requestAnimationFrame(draw);
@@ -137,90 +143,14 @@ function draw() {
   if (number === drawn) return;
   drawn = number;
   document.body.classList.toggle("stale", lost());
-  showState();
-  showHead();
-  driving.show(isDriver(), lost() ? null : fast.driver, nextStep());
+  stateBar.show(view());
+  driving.show(isDriver(), lost() ? null : fast.driver, stateBar.nextStep(newest()));
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
   panels.showCauses(fast.safety, t);
   trail.draw(fast.pose);
   charts.draw(t);
-}
-
-function showState() {
-  const safety = lost() ? null : fast.safety;
-  const worst = safety?.causes[0];
-  const verdict = lost() ? "lost" : !fast.connected ? "no_router" : safety?.verdict ?? "none";
-  const quiet = verdict === "stop" && QUIET.includes(worst?.name);
-  set("verdict", t(`verdict.${verdict}`));
-  $("state").dataset.tone = quiet ? "idle" : TONES[verdict] ?? "stop";
-  $("state").dataset.verdict = verdict;
-  document.title = `${t(`verdict.${verdict}`)} · ${shown()} · T2`;
-  const known = !WITHOUT_STATE.includes(verdict);
-  set("sentence", known ? sentence(safety, worst) : t(`text.${verdict}`));
-  set("detail", known ? detail(safety, worst) : "");
-  set("speed", lost() || !fast.measured ? "–" : fast.measured[0].toFixed(2));
-  set("turn", lost() || !fast.measured ? "–" : fast.measured[1].toFixed(2));
-}
-
-// The other latched causes, and what to do.
-function detail(safety, worst) {
-  const others = safety.causes.filter((it) => it !== worst && safety.latched.includes(it.name));
-  return [
-    language !== "en" && worst ? worst.text : "",
-    others.length ? `${t("also_latched")} ${others.map((it) => panels.causeText(it, safety, t)).join(" ")}` : "",
-    safety.latched.length && !isDriver() && fast.driver.may ? t("take_to_reset") : "",
-  ].filter(Boolean).join(" ");
-}
-
-// The next step: while a pressed bumper is all that is latched, a reset would be refused.
-function nextStep() {
-  const safety = lost() ? null : fast.safety;
-  if (!safety?.latched.length) return "";
-  const pressed = fast.bumper === true && safety.latched.every((it) => it === "contact");
-  return pressed && safety.release ? "release" : "reset";
-}
-
-function sentence(safety, worst) {
-  if (language === "en") return safety.text;
-  if (!worst) return t("text.run");
-  const next = nextStep() === "release" ? t("release_due") : t("reset_due");
-  return panels.causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? next : "");
-}
-
-function showHead() {
-  const off = lost() || !fast.connected; // without a router all values are old
-  chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
-  chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
-  chip("driver", off ? "" : driver(), isDriver() && !fast.driver.other ? "clear" : "slow");
-  const keeper = off || !hello?.keepalive ? "" : fast.keeper === hello.id ? "keeps_alive" : "keeps_not_alive";
-  chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
-  const count = Object.keys(slow?.viewers ?? {}).length;
-  chip("watching", off || !count ? "" : `${count} ${t("watching")}`);
-}
-
-// A viewer without a name has a number.
-const viewerName = (name) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
-
-function driver() {
-  const { id, name, may, other, overruled } = fast.driver;
-  if (!may) return t("view_only");
-  if (isDriver() && overruled) return `${t("overruled_by")} ${other}`;
-  if (isDriver()) return other ? `${other} ${t("drives")}` : t("you_drive");
-  if (id) return `${viewerName(name)} ${t("drives")}`;
-  const source = fast.safety?.source;
-  return source ? `${source} ${t("drives")}` : t("nobody_drives");
-}
-
-function chip(id, text, tone = "") {
-  set(id, text);
-  $(id).dataset.tone = tone;
-}
-
-function set(id, text) {
-  const element = $(id);
-  if (element.textContent !== text) element.textContent = text;
 }
 
 function showRobots() {
@@ -252,7 +182,7 @@ function stop() {
 
 function reset() {
   if (!isDriver()) toast(fast?.driver.may === false ? "view_only_why" : "take_first");
-  else if (nextStep() === "release") toast("release_due", "warning");
+  else if (stateBar.nextStep(newest()) === "release") toast("release_due", "warning");
   else if (!$("reset").disabled) send({ k: "reset", n: seen() });
 }
 

@@ -1,15 +1,17 @@
 // The slots of the page: a camera, another page in a frame, and the recordings of this host.
-const RETRY_MS = 5000; // after an error of the camera
+const RETRY_MS = 5000; // after an error, and until a slot without an answer is reported
 let page = null;
 let retry = 0; // the timer of the camera's next attempt
+let probe = 0; // the timer of the frame's next attempt
+let wanted = ""; // the address of the frame
 
 export function begin(given) {
   page = given;
   const image = document.querySelector("#camera img");
-  image.onload = () => visible(true);
+  image.onload = () => { clearTimeout(retry); note("camera", ""); };
   image.onerror = () => {
-    visible(false);
     clearTimeout(retry);
+    note("camera", "camera_lost");
     retry = setTimeout(connect, RETRY_MS);
   };
   for (const name of ["camera", "embed", "recordings"])
@@ -20,17 +22,39 @@ export function begin(given) {
 
 // Another robot is shown: a picture of the one before must not stay.
 export function show() {
-  if (address("camera") && document.querySelector("#camera img").getAttribute("src") !== address("camera")) connect();
-  const frame = document.querySelector("#embed iframe");
-  if (address("embed") && frame.getAttribute("src") !== address("embed")) frame.src = address("embed");
+  if (address("camera") && document.querySelector("#camera img").getAttribute("src") !== address("camera")) {
+    note("camera", "camera_waiting");
+    connect();
+  }
+  if (address("embed") && wanted !== address("embed")) {
+    wanted = address("embed");
+    note("embed", "embed_waiting");
+    open();
+  }
 }
 
 function connect() {
   clearTimeout(retry);
-  visible(false);
   const image = document.querySelector("#camera img");
   image.removeAttribute("src");
   image.src = address("camera");
+  retry = setTimeout(() => note("camera", "camera_lost"), RETRY_MS); // it accepts and sends nothing
+}
+
+// A frame reports no error: the browser would show a page of its own. Any answer counts.
+async function open() {
+  clearTimeout(probe);
+  const url = wanted;
+  const stop = new AbortController();
+  const limit = setTimeout(() => stop.abort(), RETRY_MS);
+  const answers = await fetch(url, { mode: "no-cors", cache: "no-store", signal: stop.signal })
+    .then(() => true, () => false);
+  clearTimeout(limit);
+  stop.abort(); // the content is not read
+  if (url !== wanted) return;
+  if (answers) document.querySelector("#embed iframe").src = url;
+  else probe = setTimeout(open, RETRY_MS);
+  note("embed", answers ? "" : "embed_lost");
 }
 
 // Keys that are typed into the frame do not reach the page, and with them the emergency stop.
@@ -40,7 +64,7 @@ function watchFocus() {
     frame.blur();
     window.focus();
   }
-  document.querySelector("#embed p").hidden = document.activeElement !== frame;
+  document.querySelector("#embed .bad").hidden = document.activeElement !== frame;
 }
 
 function address(name) {
@@ -48,9 +72,13 @@ function address(name) {
   return url && url.replaceAll("{robot}", encodeURIComponent(page.robot()));
 }
 
-function visible(is) {
-  document.querySelector("#camera img").hidden = !is;
-  document.querySelector("#camera p").hidden = is;
+// Show a text instead of the content of a slot; the content without a text.
+function note(slot, text) {
+  const line = document.querySelector(`#${slot} .note`);
+  document.querySelector(`#${slot} img, #${slot} iframe`).hidden = !!text;
+  line.hidden = !text;
+  line.dataset.t = text;
+  line.textContent = text && page.t(text);
 }
 
 async function list(event) {

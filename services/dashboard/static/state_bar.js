@@ -1,0 +1,91 @@
+// The state bar and the chips of the header: verdict, reason, speed, connections, driver.
+import { causeText } from "./panels.js";
+
+const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
+const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
+const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
+const $ = (id) => document.getElementById(id);
+
+/** Show a view of `dashboard.js`; its `fast` is the newest snapshot, null without a connection. */
+export function show(view) {
+  showState(view);
+  showHead(view);
+}
+
+function showState(view) {
+  const { fast, t } = view;
+  const safety = fast?.safety;
+  const worst = safety?.causes[0];
+  const verdict = !fast ? "lost" : !fast.connected ? "no_router" : safety?.verdict ?? "none";
+  const quiet = verdict === "stop" && QUIET.includes(worst?.name);
+  set("verdict", t(`verdict.${verdict}`));
+  $("state").dataset.tone = quiet ? "idle" : TONES[verdict] ?? "stop";
+  $("state").dataset.verdict = verdict;
+  document.title = `${t(`verdict.${verdict}`)} · ${view.robot} · T2`;
+  const known = !WITHOUT_STATE.includes(verdict);
+  set("sentence", known ? sentence(view, worst) : t(`text.${verdict}`));
+  set("detail", known ? detail(view, worst) : "");
+  set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
+  set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
+}
+
+// The other latched causes, and what to do.
+function detail({ fast, t, language, isDriver }, worst) {
+  const { safety } = fast;
+  const others = safety.causes.filter((it) => it !== worst && safety.latched.includes(it.name));
+  return [
+    language !== "en" && worst ? worst.text : "",
+    others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
+    safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
+  ].filter(Boolean).join(" ");
+}
+
+// The next step: while a pressed bumper is all that is latched, a reset would be refused.
+export function nextStep(fast) {
+  const safety = fast?.safety;
+  if (!safety?.latched.length) return "";
+  const pressed = fast.bumper === true && safety.latched.every((it) => it === "contact");
+  return pressed && safety.release ? "release" : "reset";
+}
+
+function sentence({ fast, t, language }, worst) {
+  const { safety } = fast;
+  if (language === "en") return safety.text;
+  if (!worst) return t("text.run");
+  const next = nextStep(fast) === "release" ? t("release_due") : t("reset_due");
+  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? next : "");
+}
+
+function showHead(view) {
+  const { fast, t, isDriver, viewer, keepsAlive, watching } = view;
+  const off = !fast?.connected; // without a router all values are old
+  chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
+  chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
+  chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
+  const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
+  chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
+  chip("watching", off || !watching ? "" : `${watching} ${t("watching")}`);
+}
+
+// A viewer without a name has a number.
+export const viewerName = (name, t) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
+
+function driver({ fast, t, isDriver }) {
+  const { id, name, may, other, overruled } = fast.driver;
+  if (!may) return t("view_only");
+  if (isDriver && overruled) return `${t("overruled_by")} ${other}`;
+  if (isDriver) return other ? `${other} ${t("drives")}` : t("you_drive");
+  if (id) return `${viewerName(name, t)} ${t("drives")}`;
+  const source = fast.safety?.source;
+  return source ? `${source} ${t("drives")}` : t("nobody_drives");
+}
+
+function chip(id, text, tone = "") {
+  set(id, text);
+  $(id).dataset.tone = tone;
+}
+
+function set(id, text) {
+  const element = $(id);
+  if (element.textContent !== text) element.textContent = text;
+}
