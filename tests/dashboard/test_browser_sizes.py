@@ -1,6 +1,6 @@
 """The driving layout on eight screens: what a driver needs is visible, and nothing overlaps."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 
@@ -25,6 +25,7 @@ SCREENS = (
     (360, 640),
 )  # fmt: skip
 NEEDED = ("#estop", "#verdict", "#sentence", "#speed", "#sonar-view", "#stick")
+RELEASE = ("#release-forward", "#release-backward")  # at a pressed bumper
 BOX = """where => {
   const it = document.querySelector(where).getBoundingClientRect();
   return [it.left, it.top, it.right, it.bottom];
@@ -53,12 +54,12 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     page.close()
 
 
-def problems(page: Page, width: int, height: int) -> list[str]:
-    """Return what is wrong on a screen of this size."""
+def problems(page: Page, width: int, height: int, needed: Sequence[str]) -> list[str]:
+    """Return what is wrong on a screen of this size; ``needed`` must be visible."""
     page.set_viewport_size({"width": width, "height": height})
     page.evaluate("scrollTo(0, 0)")
     page.wait_for_timeout(100)
-    boxes = {where: page.evaluate(BOX, where) for where in NEEDED}
+    boxes = {where: page.evaluate(BOX, where) for where in needed}
     found = [
         f"{where} is outside: {box}"
         for where, box in boxes.items()
@@ -66,7 +67,7 @@ def problems(page: Page, width: int, height: int) -> list[str]:
     ]
     found += [
         f"{one} and {other} overlap"
-        for one, other in combinations(NEEDED, 2)
+        for one, other in combinations(needed, 2)
         if overlap(boxes[one], boxes[other])
     ]
     if page.evaluate("document.documentElement.scrollWidth") > width:
@@ -86,10 +87,12 @@ def overlap(one: list[float], other: list[float]) -> bool:
     return left < min(one[2], other[2]) - 1 and top < min(one[3], other[3]) - 1
 
 
-def on_all_screens(page: Page, pictures: Path, name: str) -> dict[str, list[str]]:
+def on_all_screens(
+    page: Page, pictures: Path, name: str, needed: Sequence[str] = NEEDED
+) -> dict[str, list[str]]:
     found = {}
     for width, height in SCREENS:
-        wrong = problems(page, width, height)
+        wrong = problems(page, width, height, needed)
         page.evaluate("scrollTo(0, 0)")
         page.screenshot(path=pictures / f"{name}-{width}x{height}.png")
         if wrong:
@@ -106,6 +109,7 @@ def test_a_driver_sees_everything(
     found = on_all_screens(page, tmp_path, f"free-{language}")
     stack.control.do(Bumper(pressed=True))
     page.wait_for_selector("#release.due")
+    found |= on_all_screens(page, tmp_path, f"release-{language}", (*NEEDED, *RELEASE))
     page.click("#estop")
     wait_for_text(page, "#detail", "Also latched" if language == "en" else "同时锁定")
     found |= on_all_screens(page, tmp_path, f"contact-{language}")
@@ -113,6 +117,16 @@ def test_a_driver_sees_everything(
     page.set_viewport_size({"width": 1440, "height": 900})
     reset_all(page)
     assert found == {}, f"{found}; see {tmp_path}"
+
+
+@pytest.mark.parametrize("size", [(844, 390), (1440, 900)])
+def test_no_notice_covers_the_stick(page: Page, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.click("#leave")
+    page.wait_for_selector(".driving:not(.is-driver)")
+    page.keyboard.press("w")  # without control
+    page.wait_for_selector("#toasts div")
+    assert not overlap(page.evaluate(BOX, "#toasts div"), page.evaluate(BOX, "#stick"))
 
 
 def test_the_next_step_is_the_one_that_is_accepted(page: Page, stack: RunningStack) -> None:
