@@ -144,6 +144,7 @@ def svg(drawing: zp.Graph | zp.LayoutV, height: float, name: str) -> str:
     drawing.size(WIDTH, height)
     # The page contains several figures, and ids are unique in a page.
     unique = re.sub(r'( id="|"url\(#)', rf"\1{name}-", drawing.tosvg())
+    unique = re.sub(r'( d="M[^"L]*) L "', r'\1"', unique)  # a single point, invalid with its "L"
     return re.sub(r">-?[\d.]+e-1\d<", ">0<", unique)  # a tick label that rounding keeps off zero
 
 

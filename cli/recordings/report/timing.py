@@ -22,15 +22,23 @@ EMPTY = Timing(bounds=(), durations={}, not_counted={})
 
 
 @dataclass(slots=True)
+class Publisher:
+    """One process that published on a key, by the ``boot`` of its messages."""
+
+    begins_s: float  # its first message
+    ends_s: float  # its newest one
+    last: Message
+
+
+@dataclass(slots=True)
 class Stream:
     """The samples of a key, by arrival time in s."""
 
     key: str
     times: list[float] = field(default_factory=list)
     lost: int = 0  # missing numbers in ``seq``
-    restarts: int = 0  # of its publisher
     undecoded: int = 0  # samples that are not valid messages
-    _last: Message | None = None
+    _publishers: dict[int, Publisher] = field(default_factory=dict)  # by ``boot``
     _whole: set[int] = field(default_factory=set)  # after a silence on purpose
 
     def add(self, at_s: float, message: Message | None) -> None:
@@ -39,15 +47,29 @@ class Stream:
         if message is None:
             self.undecoded += not self.key.endswith(f"/{keys.ESTOP_PATH}")
             return
-        last, self._last = self._last, message
-        if last is None:
+        publisher = self._publishers.get(message.boot)
+        if publisher is None:
+            self._publishers[message.boot] = Publisher(at_s, at_s, message)
             return
-        if last.boot != message.boot:
-            self.restarts += 1
-        else:
-            self.lost += max(0, message.seq - last.seq - 1)
-            if message.seq == last.seq + 1 and _is_neutral(last):
-                self._whole.add(len(self.times) - 1)
+        last = publisher.last
+        publisher.last, publisher.ends_s = message, at_s
+        self.lost += max(0, message.seq - last.seq - 1)
+        if message.seq == last.seq + 1 and _is_neutral(last):
+            self._whole.add(len(self.times) - 1)
+
+    @property
+    def restarts(self) -> int:
+        """Return how many publishers began after all earlier ones had ended."""
+        return max(0, len(self._publishers) - self.concurrent - 1)
+
+    @property
+    def concurrent(self) -> int:
+        """Return how many publishers began while an earlier one still published."""
+        found, ends_s = 0, -math.inf
+        for each in self._publishers.values():  # by their begin
+            found += each.begins_s < ends_s
+            ends_s = max(ends_s, each.ends_s)
+        return found
 
     @property
     def expected_hz(self) -> float:

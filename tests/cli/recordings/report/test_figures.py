@@ -37,6 +37,15 @@ def test_a_gap_breaks_the_line() -> None:
     assert not any("nan" in points for points in broken)
 
 
+def test_a_single_point_makes_no_path() -> None:
+    timeline = Timeline()
+    timeline.add(*drive_fixture.at("tel/odom/odometry", drive_fixture.odometry(1), 0.0))
+    timeline.add(*drive_fixture.at("tel/safety/state", drive_fixture.state(False), 0.0))
+    drawn = figures.path(timeline) + figures.speeds(timeline)
+    assert re.findall(r' d="M[^"L]*"', drawn)
+    assert re.findall(r' d="[^"]*L *"', drawn) == []
+
+
 def test_the_path_has_equal_scales() -> None:
     timeline = timeline_of_the_drive()
     segment = timeline.path[0]

@@ -18,6 +18,16 @@ def test_stream_rate_gaps_losses_and_restarts() -> None:
     assert stream.interval_s(1.0) == pytest.approx(0.48)
 
 
+def test_two_publishers_at_the_same_time_are_no_restarts() -> None:
+    stream = Stream("t2/v1/001/tel/recorder/health")
+    for number in range(10):  # two recorders of one robot
+        for boot in (5, 6):
+            stream.add(number + boot / 10, Velocity(seq=number, boot=boot, linear=0, angular=0))
+    assert (stream.restarts, stream.concurrent, stream.lost) == (0, 1, 0)
+    stream.add(11.0, Velocity(seq=1, boot=7, linear=0, angular=0))
+    assert (stream.restarts, stream.concurrent) == (1, 1)
+
+
 def test_an_unknown_key_is_only_counted() -> None:
     stream = Stream("t2/v1/001/tel/lidar/points")
     stream.add(0.0, None)
