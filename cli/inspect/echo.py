@@ -11,6 +11,7 @@ from cli.inspect.payload import Reading, at, read
 from cli.inspect.session import BusSession, add_end, add_options, open_session, until_interrupt
 from common.errors import MessageError, RobotError
 from common.freshness import NS_PER_S
+from common.messages import Event
 from common.sample import Sample
 
 FIRST_S = 2.0  # the slowest streams have 1 Hz
@@ -103,7 +104,7 @@ def as_text(sample: Sample, reading: Reading, robot: str, header: bool) -> str:
     value = reading.value
     seq = f"  seq {value['seq']}" if isinstance(value, dict) and "seq" in value else ""
     kind = "DELETE" if sample.deleted else reading.kind
-    lines = [f"# {short(sample.key, robot)}  {kind}{seq}  {clock(sample)}"]
+    lines = [f"# {short(sample.key, robot)}  {kind}{seq}  {clock(sample, reading)}"]
     if reading.complaint:
         lines.append(f"# invalid: {reading.complaint}")
     value = body(value, header)
@@ -116,7 +117,8 @@ def as_line(sample: Sample, reading: Reading, robot: str, header: bool) -> str:
     """Return a sample as one line: time, key, and its fields as JSON."""
     value = "DELETE" if sample.deleted else output.json(body(reading.value, header))
     complaint = f"  # invalid: {reading.complaint}" if reading.complaint else ""
-    return f"{clock(sample)}  {short(sample.key, robot)}  {output.printable(value)}{complaint}"
+    head = f"{clock(sample, reading)}  {short(sample.key, robot)}"
+    return f"{head}  {output.printable(value)}{complaint}"
 
 
 def body(value: Any, header: bool) -> Any:
@@ -126,7 +128,15 @@ def body(value: Any, header: bool) -> Any:
     return {name: each for name, each in value.items() if name not in HEADER}
 
 
-def clock(sample: Sample) -> str:
-    """Return the local receive time, to the millisecond."""
-    wall = time.strftime("%H:%M:%S", time.localtime(sample.wall_ns // NS_PER_S))
-    return f"{wall}.{sample.wall_ns // 1_000_000 % 1000:03d}"
+def clock(sample: Sample, reading: Reading) -> str:
+    """Return the local receive time, to the millisecond; of an event, the time of its publisher.
+
+    A stored event is received long after it happened: one of another day has its date.
+    """
+    wall_ns, form = sample.wall_ns, "%H:%M:%S"
+    if reading.kind == Event.__name__ and not reading.complaint:
+        wall_ns = reading.value.get("t_ns") or wall_ns
+    at, today = (time.localtime(ns // NS_PER_S) for ns in (wall_ns, sample.wall_ns))
+    if at[:3] != today[:3]:
+        form = "%Y-%m-%d %H:%M:%S"
+    return f"{time.strftime(form, at)}.{wall_ns // 1_000_000 % 1000:03d}"

@@ -9,7 +9,8 @@ import argparse
 import ipaddress
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -32,8 +33,10 @@ from common.errors import MessageError, RobotError
 from common.keys import Topic
 from common.messages import Link, Message, SafetyState, SourceMessage
 from common.sample import Sample
+from common.settings import is_encrypted
 
 FIRST_S = 2.0  # wait for safety's first heartbeat, which has 20 Hz
+PASS_S = 1.0  # wait for our own message, through the router
 LINK_S = 1.5  # the bridge publishes its link at 5 Hz; listen long enough to find a second bridge
 OWN_SERVICES = ("bridge", "safety", "odom")  # other services act on their messages
 
@@ -72,10 +75,11 @@ def run(options: argparse.Namespace) -> int:
         except MessageError as error:
             output.warn(f"t2 pub: {error}; see `t2 schema {options.key}`")
             return 2
-        if not session.probe.has_reader(key):
+        has_reader = session.probe.watch_readers(key)
+        if not has_reader():
             output.warn(f"t2 pub: no reader on {short(key, session.robot)} yet")
         with until_interrupt():
-            publish(session, key, options)
+            publish(session, key, options, has_reader)
     return 0
 
 
@@ -110,8 +114,13 @@ def echoes(topic: Topic[Message]) -> bool:
     return issubclass(topic.message, SourceMessage)
 
 
-def publish(session: BusSession, key: str, options: argparse.Namespace) -> None:
-    """Publish the message at the rate; a message of a source echoes safety's newest heartbeat."""
+def publish(
+    session: BusSession, key: str, options: argparse.Namespace, has_reader: Callable[[], bool]
+) -> None:
+    """Publish the message at the rate; a message of a source echoes safety's newest heartbeat.
+
+    Raise ``RobotError`` if the router does not pass the first one on.
+    """
     probe, message, topic = session.probe, options.message, topic_of(key)
     encoding = codec.encoding(topic.message) if topic else codec.ENCODING
     service = topic.service if topic else keys.SLOW
@@ -121,11 +130,43 @@ def publish(session: BusSession, key: str, options: argparse.Namespace) -> None:
         probe.listen(safety)
     for number in publish_times(options):
         echo = {"echo": newest_heartbeat(probe, safety)} if wants_echo else {}
-        probe.put(key, cli_codec.encode(key, json.dumps(echo | message)), encoding, service)
+        payload = cli_codec.encode(key, json.dumps(echo | message))
+        put = partial(probe.put, key, payload, encoding, service)
+        if number > 1:
+            put()
+        elif not passes(session, options, key, put, payload):
+            raise RobotError(
+                f"not published: the router drops {short(key, session.robot)}; "
+                "this certificate may not publish there (see `t2 keys list`)"
+            )
         if wants_json(options):
-            output.line({"key": short(key, session.robot), "published": number})
+            known = {"key": short(key, session.robot), "published": number}
+            output.line(known | {"reader": has_reader()})
         else:
-            print(f"published {number} on {short(key, session.robot)}", flush=True)
+            none = "" if has_reader() else ", no reader"
+            print(f"published {number} on {short(key, session.robot)}{none}", flush=True)
+
+
+def passes(
+    session: BusSession,
+    options: argparse.Namespace,
+    key: str,
+    put: Callable[[], None],
+    payload: bytes,
+) -> bool:
+    """Publish, and return whether the router passes it on; without TLS it passes everything.
+
+    It drops what a certificate may not publish, without an error. A second session of the same
+    certificate, which may read every key, shows it.
+    """
+    if not any(map(is_encrypted, settings(options).bus.endpoints)):
+        put()
+        return True
+    with open_session(options) as second:
+        second.probe.listen(key)
+        session.probe.has_reader(key)  # until the router has announced the second session
+        put()
+        return any(sample.payload == payload for sample in second.probe.samples(PASS_S))
 
 
 def publish_times(options: argparse.Namespace) -> Iterator[int]:

@@ -31,7 +31,11 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
     which.add_argument("--robot", type=str if every else one_robot, help="which robot, such as 001")
     if every:
         which.add_argument(
-            "--site", dest="robot", type=parse_site, help="all robots of a site, such as berlin"
+            "--site",
+            dest="robot",
+            type=parse_site,
+            metavar="SITE",
+            help="all robots whose id begins with SITE-, such as berlin-007 for berlin",
         )
         which.add_argument(
             "--all", dest="robot", action="store_const", const=EVERY_ROBOT, help="all robots"

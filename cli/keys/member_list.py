@@ -11,7 +11,7 @@ from common.errors import RobotError
 from common.members import Member, Members, Role
 
 SOON_DAYS = 30
-HEAD = ("role", "name", "robots", "until", "state", "certificate")
+HEAD = ("role", "name", "robots", "sources", "until", "state", "certificate")
 
 State = Literal["valid", "expires soon", "expired", "revoked"]
 
@@ -101,6 +101,7 @@ def as_table(members: Members, now_s: float) -> str:
             member.role,
             member.name,
             robots(member),
+            sources(member),
             f"{member.expires:%Y-%m-%d}",
             state(member, now_s),
             member.common_name,
@@ -146,6 +147,13 @@ def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
 def robots(member: Member) -> str:
     """Return the robots of a member as text."""
     return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
+
+
+def sources(member: Member) -> str:
+    """Return the sources of a member as text; a driver's certificate without any may use each."""
+    if member.role == "driver" and not member.sources:
+        return "any"
+    return " ".join(member.sources) or "-"
 
 
 def days(ends_s: float, now_s: float) -> int:

@@ -1,6 +1,7 @@
 """``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C."""
 
 import argparse
+import shlex
 import signal
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -44,16 +45,23 @@ def run(options: argparse.Namespace) -> int:
     log.configure(config.log, "up")
     started = selected([*commands(options), *recorder(options)], options.only)
     with claimed(wanted(config, [name for name, _ in started])):
-        return supervised(started, config, simulated=not options.no_sim)
+        return supervised(started, config, driving(options), simulated=not options.no_sim)
 
 
-def supervised(started: Commands, config: Everything, *, simulated: bool) -> int:
-    """Supervise these processes until a signal."""
+def driving(options: argparse.Namespace) -> str:
+    """Return the command that drives this robot from another terminal, with its bus settings."""
+    files = [word for file in options.config or () for word in ("--config", str(file))]
+    sets = [word for text in options.sets if text.startswith("bus.") for word in ("--set", text)]
+    return shlex.join(["t2", "drive", *files, *sets])
+
+
+def supervised(started: Commands, config: Everything, hint: str, *, simulated: bool) -> int:
+    """Supervise these processes until a signal; ``hint`` is the command that drives."""
     supervisor = Supervisor(started)
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, lambda *_: supervisor.stop())
     log.Logger().info(
-        "starting; `t2 drive` in a second terminal drives it",
+        f"starting; `{hint}` in a second terminal drives it",
         robot=config.robot.id,
         board=f"{config.board.address}:{config.board.port}",
         simulated=simulated,

@@ -6,7 +6,7 @@ queue samples.
 
 import queue
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -100,23 +100,30 @@ class Probe:
 
     def has_reader(self, key: str) -> bool:
         """Return whether another session subscribes to the key; publishes nothing."""
-        elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
-        return self._matched(self._session.declare_publisher(key, allowed_destination=elsewhere))
+        declared = self._publisher(key)
+        try:
+            return _matches(declared)
+        finally:
+            declared.undeclare()
+
+    def watch_readers(self, key: str) -> Callable[[], bool]:
+        """Return a function that returns whether another session subscribes to the key now."""
+        declared = self._publisher(key)
+        self._declared.append(declared)
+        _matches(declared)
+        return lambda: bool(declared.matching_status.matching)
 
     def has_server(self, key: str) -> bool:
         """Return whether a queryable matches the key; sends no query."""
-        return self._matched(self._session.declare_querier(key))
-
-    def _matched(self, declared: Any) -> bool:
-        end_s = time.monotonic() + MATCH_TIMEOUT_S
+        declared = self._session.declare_querier(key)
         try:
-            while not declared.matching_status.matching:
-                if time.monotonic() > end_s:
-                    return False
-                time.sleep(POLL_PERIOD_S)
-            return True
+            return _matches(declared)
         finally:
             declared.undeclare()
+
+    def _publisher(self, key: str) -> Any:
+        elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
+        return self._session.declare_publisher(key, allowed_destination=elsewhere)
 
     def _queue(self, sample: zenoh.Sample) -> None:
         received_ns, wall_ns = time.monotonic_ns(), time.time_ns()
@@ -142,6 +149,16 @@ def _opened(where: BusSettings) -> zenoh.Session:
         f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
         "Run `t2 doctor`, or choose another router: --set bus.connect=tcp/HOST:7447"
     )
+
+
+def _matches(declared: Any) -> bool:
+    """Return whether a publisher or querier is matched within ``MATCH_TIMEOUT_S``."""
+    end_s = time.monotonic() + MATCH_TIMEOUT_S
+    while not declared.matching_status.matching:
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(POLL_PERIOD_S)
+    return True
 
 
 def valid(expression: str) -> bool:

@@ -34,9 +34,10 @@ def refusal(robot: str, alive: Collection[str]) -> str:
     running = [name for name in DECIDING if name in alive]
     if not running:
         return ""
+    are, own, them = ("is", "its", "it") if len(running) == 1 else ("are", "their", "them")
     return (
-        f"{' and '.join(running)} of robot {robot} is running: replayed messages would be taken "
-        "for its own. Stop it, or replay as another robot: --robot replay"
+        f"{' and '.join(running)} of robot {robot} {are} running: replayed messages would be taken "
+        f"for {own} own. Stop {them}, or replay as another robot: --robot replay"
     )
 
 

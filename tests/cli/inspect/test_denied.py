@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from cli.__main__ import main
 from cli.inspect import call, estop
 from cli.inspect.session import BusSession
 from common import keys
@@ -21,6 +22,8 @@ from tests.factories import safety_state
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site, connecting
 from verification.harness.waiting import wait_until
+
+CERTIFIED = ("ca", "certificate", "private_key")
 
 
 class OnBoard:
@@ -154,6 +157,25 @@ def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., 
         assert "this certificate may not call it" in reason("viewer", "hall")
         assert "safety does not answer" in reason("driver", "anna")
         assert "safety does not answer" in reason("viewer", "hall", "009")
+
+
+def test_t2_pub_reports_a_message_that_the_router_drops(
+    site: Site, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def published(role: str, name: str, key: str) -> tuple[int, str]:
+        where = connecting(site.settings(role, name), secured)
+        sets = (f"--set=bus.{field}={getattr(where, field)}" for field in CERTIFIED)
+        code = main(["pub", key, "{}", "--once", *sets, f"--set=bus.connect={secured}"])
+        captured = capsys.readouterr()
+        return code, captured.out + captured.err
+
+    with site.router(site.settings("robot", "001")) as (secured, _):
+        code, text = published("viewer", "hall", "tel/mine/x")
+        assert (code, "published 1" in text) == (1, False)
+        assert "this certificate may not publish there" in text
+        # Its own site's router may: it passes on what it has checked.
+        code, text = published("robot", "001", "tel/mine/x")
+        assert (code, "published 1" in text) == (0, True), text
 
 
 def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(

@@ -29,7 +29,7 @@ def test_pub_fills_in_the_header(buses: BusFixture, tool: Tool) -> None:
     )
     result = tool("pub", "tel/mine/t", '{"celsius": 21.5}', "--rate", "50", "--times", "2")
     assert (result.code, result.err) == (0, "")
-    assert [line["published"] for line in result.lines] == [1, 2]
+    assert [(line["published"], line["reader"]) for line in result.lines] == [(1, True), (2, True)]
     wait_until(lambda: len(watched) == 2, "both messages")
     from cli.inspect.payload import read
 
@@ -41,7 +41,7 @@ def test_pub_fills_in_the_header(buses: BusFixture, tool: Tool) -> None:
 
 def test_pub_reports_a_missing_reader(tool: Tool) -> None:
     result = tool("pub", "tel/mine/t", "--once", "--text")
-    assert (result.code, result.out) == (0, "published 1 on tel/mine/t\n")
+    assert (result.code, result.out) == (0, "published 1 on tel/mine/t, no reader\n")
     assert "no reader on tel/mine/t" in result.err
 
 

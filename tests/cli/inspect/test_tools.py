@@ -7,12 +7,17 @@ import sys
 import time
 
 import pytest
+from msgspec import structs
 
 from cli.inspect import measure, topic
+from cli.inspect.echo import clock
+from cli.inspect.payload import Reading
 from common import codec, keys
 from common.bus.bus import Bus
+from common.freshness import NS_PER_S
 from common.messages import Bumper, Event
 from common.motion import Command
+from common.sample import Sample
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
 from tests.common.bus_fixture import BusFixture
@@ -102,6 +107,16 @@ def test_echo_shows_earlier_events(buses: BusFixture, tool: Tool) -> None:
 
     buses.bus(publish)
     assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
+
+
+def test_echo_shows_the_time_of_an_event_itself() -> None:
+    at_ns = 1_700_000_000 * NS_PER_S
+    late = Sample("t2/v1/001/evt/safety", b"", "", False, None, 0, at_ns + 30 * NS_PER_S)
+    stored = structs.replace(late, wall_ns=at_ns)
+    assert clock(late, Reading("Event", {"t_ns": at_ns})) == clock(stored, Reading("text", ""))
+    next_day = structs.replace(late, wall_ns=at_ns + 86_400 * NS_PER_S)
+    assert clock(next_day, Reading("Event", {"t_ns": at_ns})).startswith("2023-11-1")
+    assert not clock(next_day, Reading("Event", {"t_ns": 0})).startswith("2023")
 
 
 def test_echo_reports_silence(tool: Tool) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from cli.run.up import commands, run, selected
+from cli.run.up import commands, driving, run, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
@@ -45,6 +45,20 @@ def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
     assert message.rindex('"service": "odom", "event": "stopped"') < message.rindex(
         '"service": "bridge", "event": "stopped"'
     )
+
+
+@pytest.mark.parametrize(
+    ("config", "sets", "command"),
+    [
+        (None, [], "t2 drive"),
+        ([Path("my keys/bus.toml")], [], "t2 drive --config 'my keys/bus.toml'"),
+        (None, ["bus.connect=tls/r:1", "log.level=debug"], "t2 drive --set bus.connect=tls/r:1"),
+    ],
+)
+def test_the_hint_reaches_the_same_bus(
+    config: list[Path] | None, sets: list[str], command: str
+) -> None:
+    assert driving(Namespace(config=config, sets=sets)) == command
 
 
 def test_a_taken_port_starts_nothing(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_times_are_relative_to_the_start_of_the_recording() -> None:
     [
         ({"bridge"}, "bridge of robot 007 is running"),
         ({"odom", "safety"}, "safety of robot 007 is running"),
-        ({"bridge", "safety"}, "bridge and safety of robot 007 is running"),
+        ({"bridge", "safety"}, "bridge and safety of robot 007 are running"),
     ],
 )
 def test_replay_is_refused_while_bridge_or_safety_run(alive: set[str], message: str) -> None:
