@@ -21,7 +21,7 @@ from services.dashboard.auth import AuthMiddleware
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
 from services.dashboard.credentials import Credentials
-from services.dashboard.i18n import table
+from services.dashboard.i18n import phrases, table
 from services.dashboard.listener import Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
 
@@ -112,13 +112,17 @@ def _application(settings: Dashboard, robot: str, hub: WebSocketHub) -> Starlett
     )
 
 
+def _script(content: object) -> str:
+    """Return JSON for a script element, which no text of it can end."""
+    return json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
+
+
 def page(settings: Dashboard, robot: str) -> str:
     """Return the page, which opens with this robot."""
-    texts = json.dumps(table(), ensure_ascii=False).replace("<", "\\u003c")
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
     camera, embed = html.escape(settings.camera), html.escape(settings.embed)
     return template.substitute(
-        robot=robot, texts=texts, camera=camera, embed=embed,
+        robot=robot, texts=_script(table()), phrases=_script(phrases()), camera=camera, embed=embed,
         recordings="yes" if settings.recordings else "",
     )  # fmt: skip
 

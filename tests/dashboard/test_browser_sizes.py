@@ -129,6 +129,21 @@ def test_no_notice_covers_the_stick(page: Page, size: tuple[int, int]) -> None:
     assert not overlap(page.evaluate(BOX, "#toasts div"), page.evaluate(BOX, "#stick"))
 
 
+def test_chinese_notices_and_events_have_the_figures(page: Page, stack: RunningStack) -> None:
+    page.click("#language")
+    stack.control.do(Bumper(pressed=True))
+    page.wait_for_selector("#release.due")
+    page.keyboard.down("b")
+    wait_for_text(page, "#toasts", "正在后退以脱离碰撞，剩余 0.1")
+    stack.control.do(Bumper(pressed=False))
+    wait_for_text(page, "#toasts", "防撞条已松开。下一步：复位。")
+    page.keyboard.up("b")
+    wait_for_text(page, "#events", "防撞条被碰撞：已制动")
+    assert "refused" not in page.inner_text("#toasts")
+    page.wait_for_selector("#reset.due")
+    reset_all(page)
+
+
 def test_the_next_step_is_the_one_that_is_accepted(page: Page, stack: RunningStack) -> None:
     stack.control.do(Bumper(pressed=True))
     page.wait_for_selector("#release.due")

@@ -10,7 +10,7 @@ from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
 from services.dashboard.auth import token_page
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import LANGUAGES, TEXTS, table
+from services.dashboard.i18n import LANGUAGES, PHRASES, PLACEHOLDER, TEXTS, table
 from services.safety.causes import RULES
 from tools.docs import DOCS
 
@@ -127,3 +127,35 @@ def test_the_token_page_has_both_languages() -> None:
         assert text in token_page(wrong=False)
     for text in TEXTS["token_wrong"]:
         assert text in token_page(wrong=True)
+
+
+def source_text() -> str:
+    """Return the code of all services with the parts of each string joined."""
+    files = [*Path(CODE).parent.rglob("*.py"), *(Path(CODE).parents[1] / "common").rglob("*.py")]
+    code = "\n".join(file.read_text(encoding="utf-8") for file in files)
+    return re.sub(r'"\s*\n\s*f?"', "", code)
+
+
+def test_every_phrase_is_one_of_a_service() -> None:
+    code = source_text()
+    sentences = [english for english in PHRASES if " " in english and english[-1] in ".:}"]
+    assert len(sentences) > 40
+    for english in sentences:
+        for part in english.split(PLACEHOLDER):
+            # A figure with its unit, or a sentence after another one.
+            assert part.strip(" .,:()m/s") in code, english
+
+
+@pytest.mark.parametrize("english", PHRASES)
+def test_a_phrase_has_the_same_placeholders_in_both_languages(english: str) -> None:
+    chinese = PHRASES[english]
+    assert HAN.search(chinese)
+    assert chinese.count(PLACEHOLDER) == english.count(PLACEHOLDER)
+
+
+def test_units_are_the_same_in_both_languages() -> None:
+    units = re.compile(r"\d ?(m|s|ms|rad|Hz|%)(?![a-z])|\b(m/s|rad/s)")
+    for english, chinese in [*TEXTS.values(), *PHRASES.items()]:
+        assert not re.search(r"\d ?[秒米]|米/秒|弧度/秒|赫兹", chinese)
+        assert not re.search(r"\d(m|s|ms|rad|Hz)\b", english + chinese)  # a space before a unit
+        assert bool(units.search(english)) == bool(units.search(chinese)), english

@@ -3,6 +3,7 @@ import * as charts from "./charts.js";
 import * as driving from "./driving.js";
 import * as estop from "./estop.js";
 import * as notices from "./notices.js";
+import * as phrases from "./phrases.js";
 import * as panels from "./panels.js";
 import * as slots from "./slots.js";
 import * as sonarView from "./sonar_view.js";
@@ -148,7 +149,7 @@ function draw() {
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
-  panels.showCauses(fast.safety, t);
+  panels.showCauses(fast.safety, t, language);
   trail.draw(fast.pose);
   charts.draw(t);
 }
@@ -206,6 +207,7 @@ function toggle(name) {
 
 function begin() {
   texts = JSON.parse($("texts").textContent);
+  phrases.begin(JSON.parse($("phrases").textContent));
   const on = (id, call) => { $(id).onclick = call; };
   on("estop", stop);
   on("lamp", lamp);

@@ -1,4 +1,6 @@
 // Notices, and questions before a consequence.
+import { translated } from "./phrases.js";
+
 const ERROR_MS = 20000;
 const NOTICE_MS = 5000;
 const $ = (id) => document.getElementById(id);
@@ -11,8 +13,10 @@ export function begin(given) {
 // A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
 function noticeText(text, about) {
   const { t, language } = page;
-  if (t(text) !== text || language() === "en" || !about) return t(text);
-  return `${t(`event.${about}`)} ${text}`;
+  if (t(text) !== text || language() === "en") return t(text);
+  const details = translated(text, language());
+  const result = about && t(`event.${about}`);
+  return result && result !== details ? `${result} ${details}` : details;
 }
 
 export function toast(text, level = "info", about = "") {

@@ -1,4 +1,6 @@
 // The panels of text: causes, limits, drivers, switches, services, streams, events.
+import { translated } from "./phrases.js";
+
 const $ = (id) => document.getElementById(id);
 const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
 const SILENT_AGE = 3; // s
@@ -39,7 +41,7 @@ export function causeText(cause, safety, t) {
   return `${t(`limited.${cause.name}`)} ${each.join(", ")}`;
 }
 
-export function showCauses(safety, t) {
+export function showCauses(safety, t, language) {
   const causes = safety?.causes ?? [];
   const shown = causes.map((it) => [it, it.age < 10 ? it.age?.toFixed(1) : Math.floor(it.age)]);
   const stamp = JSON.stringify([shown.map(([it, age]) => [it.name, it.text, age]), safety?.latched, t("why")]);
@@ -49,8 +51,9 @@ export function showCauses(safety, t) {
     const text = causeText(it, safety, t);
     const line = create("li", text, { "data-action": it.action, "data-cause": it.name });
     const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
-    const same = LIMITS[it.name] || it.text === text;
-    const more = same ? "" : `${it.text} · `;
+    const details = translated(it.text, language);
+    const same = LIMITS[it.name] || details === text;
+    const more = same ? "" : `${details} · `;
     line.append(create("small", `${more}${t("since")} ${duration(it.age)}${latched}`));
     return line;
   }));
@@ -120,12 +123,13 @@ function showDrivers(slow, t) {
 
 const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 ** bit) % 2);
 
-// An event of the catalogue by its name; its own English text follows, as it has the figures.
+// An event of the catalogue by its name; its own text follows, as it has the figures.
 function eventTexts({ service, name, text }, t, language) {
   if (language === "en") return [text];
   const keys = [`event.${service}.${name}`, `event.${name}`];
   const key = keys.find((it) => t(it) !== it); // a newer service may have other events
-  return key ? [t(key), text] : [text];
+  const details = translated(text, language);
+  return key && details !== t(key) ? [t(key), details] : [details];
 }
 
 export function showEvents(events, t, language) {

@@ -1,5 +1,6 @@
 // The state bar and the chips of the header: verdict, reason, speed, connections, driver.
 import { causeText } from "./panels.js";
+import { translated } from "./phrases.js";
 
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
 const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
@@ -33,8 +34,9 @@ function showState(view) {
 function detail({ fast, t, language, isDriver }, worst) {
   const { safety } = fast;
   const others = safety.causes.filter((it) => it !== worst && safety.latched.includes(it.name));
+  const more = language !== "en" && worst ? translated(worst.text, language) : "";
   return [
-    language !== "en" && worst ? worst.text : "",
+    more === (worst && causeText(worst, safety, t)) ? "" : more,
     others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
   ].filter(Boolean).join(" ");
