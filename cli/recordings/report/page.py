@@ -8,6 +8,7 @@ from jinja2 import Environment, StrictUndefined
 from cli.inspect.addressing import chunks
 from cli.latency import NAMES
 from cli.recordings.report import figures
+from cli.recordings.report.fixed_labels import chart
 from cli.recordings.report.timeline import Timeline
 from cli.recordings.report.timing import reactions
 from common.freshness import NS_PER_S
@@ -33,7 +34,7 @@ def page(timeline: Timeline, reader: Reader) -> str:
     bridges = (ends for (name, _), ends in timeline.healths.items() if name == "bridge")
     has_ranges = any(series.times for series in timeline.ranges.values())
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters |= {"clock": clock, "figure": figure, "ms": ms}
+    environment.filters |= {"chart": chart, "clock": clock, "figure": figure, "ms": ms}
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
         timeline=timeline,
         title=reader.path.name,
