@@ -142,8 +142,9 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         text = after.latches[name].text
         yield Transition(EVENT_NAMES.get(name, name), "error", text, {"cause": name})
     worst = next(iter(ordered(after.latches)), None)
-    # A cause that latches has an event of its own.
-    if old.name in MOVING and new.name not in MOVING and worst and worst not in tripped:
+    # A cause that latches, and a release, have events of their own.
+    is_stop = old.name in MOVING and new.name not in MOVING and "release" not in before.latches
+    if is_stop and worst and worst not in tripped:
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
     if old.control != new.control:
@@ -161,8 +162,12 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
 
 
 def _is_new(before: State, after: State, name: str) -> bool:
-    """Return whether this occurrence of a cause began with this decision."""
-    return name not in before.latches or before.latches[name].id != after.latches[name].id
+    """Return whether this occurrence of a cause began with this decision.
+
+    A program repeats its emergency stop: while one is latched, another one is no transition.
+    """
+    known = before.latches.get(name)
+    return known is None or (known.id != after.latches[name].id and name != "estop")
 
 
 def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]:

@@ -97,9 +97,9 @@ def _safety(view: View, rows: int) -> Text:
 
 
 def release(view: View) -> tuple[Text, Text] | None:
-    """Return how to move off a pressed bumper, in two rows; None without a contact."""
+    """Return how to move off a pressed bumper, in two rows; None if none is pressed."""
     known = view.safety.release if view.safety else None
-    if known is None:
+    if known is None or (view.bumper is not None and not view.bumper.pressed):
         return None
     keys = Text("   ").join(_key(known, direction, view.release) for direction in DIRECTIONS)
     return _believed(known), keys.append(f"   {known.left:.2f} m left until reset", style="bold")

@@ -51,7 +51,7 @@ def scenario(endpoint: str) -> None:
         peers.bus.estop()
         peers.until("brake", "brake")
         assert "no contact" in peers.call(keys.RELEASE, peers.release())
-        wanted = {"contact", "stop", "reset", "reset_refused", "estop", "release_refused", "source"}
+        wanted = {"contact", "reset", "reset_refused", "estop", "release_refused", "source"}
         wait_until(lambda: wanted <= set(peers.events), f"{wanted - set(peers.events)}")
 
         process.send_signal(signal.SIGTERM)

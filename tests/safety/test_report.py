@@ -147,6 +147,19 @@ def test_a_hold_that_frees_the_bumper_is_not_refused() -> None:
         assert fixture.verdict.command == "brake"
 
 
+def test_a_repeated_emergency_stop_is_one_event() -> None:
+    fixture = PolicyFixture().running()
+    assert noted(fixture, Estop()) == ["estop", "source"]
+    first = fixture.latched()
+    fixture.tick(30)
+    assert noted(fixture, Estop()) == []
+    assert fixture.latched() != first  # the reset must name the newest one
+    fixture.linear = 0.0
+    fixture.tick(30)
+    assert fixture.reset() == ""
+    assert noted(fixture, Estop()) == ["estop"]
+
+
 def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
     assert ticked(fixture) == []
@@ -181,7 +194,7 @@ def test_a_release_is_reported_when_it_begins_and_ends() -> None:
     held = Hold(True, "backward", fixture.echo)
     assert noted(fixture, held) == ["release"]
     assert noted(fixture, held) == []
-    assert noted(fixture, Hold(False)) == ["stop", "release_end"]
+    assert noted(fixture, Hold(False)) == ["release_end"]
 
 
 def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:

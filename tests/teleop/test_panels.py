@@ -153,6 +153,13 @@ def test_a_forbidden_direction_and_the_held_one_are_shown() -> None:
     assert row == " F  forward FORBIDDEN    B  backward, held   0.00 m left until reset"
 
 
+def test_a_free_bumper_needs_no_release() -> None:
+    state = contact_state(release=release())
+    for pressed in (True, False):
+        text = panels.safety(view(safety=state, bumper=Bumper(pressed=pressed)), 6).plain
+        assert ("RELEASE" in text) == pressed
+
+
 def test_the_release_fits() -> None:
     rows = contact_rows(
         believed_free="forward", age=7000.0, travelled=-0.999, forbidden=("forward", "backward")
