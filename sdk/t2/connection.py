@@ -39,8 +39,8 @@ def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None
     except zenoh.ZError as error:
         raise LinkError(
             f"no router answers at {', '.join(endpoints)}: is `t2 up` running there? "
-            f"`t2 doctor` finds the reason ({error})"
-        ) from None
+            "`t2 doctor` finds the reason"
+        ) from error
     return Robot(session, robot, endpoints[0])
 
 
@@ -53,7 +53,7 @@ def read(file: Path) -> dict[str, Any]:
     try:
         bus: dict[str, Any] = toml.loads(file.read_text(encoding="utf-8")).get("bus", {})
     except (OSError, ValueError) as error:
-        raise LinkError(f"{file}: {error}") from None
+        raise LinkError(f"{file}: {getattr(error, 'strerror', error)}") from None
     return bus | {name: str(file.parent / bus[name]) for name in FILES if bus.get(name)}
 
 

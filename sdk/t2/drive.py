@@ -235,8 +235,8 @@ class Drive:
         if state.source not in (None, self.source):
             raise Overruled(str(state.source))
         raise NotAllowed(
-            f"safety does not let {self.source!r} drive: {state.text} The source must be one of "
-            "safety.sources, and its clock of echoes young; see `t2 doctor`"
+            f"safety takes no requests of {self.source!r}: is it one of safety.sources? "
+            f"Safety's state: {state.text} See `t2 doctor`"
         )
 
     def _run(self) -> None:
@@ -272,7 +272,7 @@ class Drive:
         if self._publisher.denied:
             return NotAllowed(
                 f"the router drops the requests of {self.source!r}: this certificate may not drive "
-                "as this source; see `t2 keys`"
+                f"robot {self._robot.name} as this source; see `t2 keys list`"
             )
         other = state.source not in (None, RELEASE, self.source)
         self._contested = self._contested + 1 if other and target.moves else 0
@@ -284,4 +284,4 @@ class Drive:
 def latched(state: SafetyState) -> Latched:
     """Return the error of a latched state."""
     names = [cause for cause in state.causes if cause.name in state.latched]
-    return Latched(f"{state.text} Robot.reset() clears what is gone.", names)
+    return Latched(state.text, names)

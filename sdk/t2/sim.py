@@ -34,14 +34,13 @@ def sim(world: str = "empty", *, sets: Sequence[str] = (), command: str = "t2") 
     board, first, second = _free_ports(3, socket.SOCK_DGRAM)
     (router,) = _free_ports(1, socket.SOCK_STREAM)
     endpoint = f"tcp/127.0.0.1:{router}"
-    settings = (
+    own = (
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
         f"bus.listen={endpoint}",
-        *sets,
     )
     words = [_found(command), "up", "--world", world]
-    words += [word for each in settings for word in ("--set", each)]
+    words += [word for each in (*own, *sets) for word in ("--set", each)]
     # A folder of its own: a repository may have packages that are named like ours.
     env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     with tempfile.TemporaryDirectory(prefix="t2-sim-") as folder:

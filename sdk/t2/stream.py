@@ -12,11 +12,13 @@ import msgspec
 import zenoh
 
 from t2.errors import NoData
+from t2.keys import ROOT
 from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", contravariant=True)
 
+LIVE_S = 0.5  # for the list of robots
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
 logger = logging.getLogger(__name__)
 
@@ -85,9 +87,9 @@ class Stream(Generic[M]):
         self.open()
         with self._changed:
             self._changed.wait_for(lambda: self.closed or self.age <= timeout, timeout)
-            if self._newest is None or self.age > timeout:
-                raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {ADVICE}")
-            return self._newest
+            if self._newest is not None and self.age <= timeout:
+                return self._newest
+        raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {self._advice()}")
 
     def on(self, handle: Callable[[M], object]) -> threading.Thread:
         """Call a function with the newest message, in a thread of its own, until the robot closes.
@@ -157,6 +159,18 @@ class Stream(Generic[M]):
             for queue in self._queues:
                 queue.append(None)  # wakes its reader
             self._changed.notify_all()
+
+    def _advice(self) -> str:
+        """Return what to do about silence; another robot's name is a frequent reason."""
+        mine = self.key[len(ROOT) + 1 :].partition("/")[0]
+        try:
+            tokens = self._session.liveliness().get(f"{ROOT}/*/live/**", timeout=LIVE_S)
+            robots = {str(it.ok.key_expr).split("/")[2] for it in tokens if it.ok is not None}
+        except zenoh.ZError:  # the session is closed
+            return ADVICE
+        if not robots or mine in robots:
+            return ADVICE
+        return f"no robot {mine} at this router, which has {', '.join(sorted(robots))}"
 
     def _messages(self, queue: "deque[M | None]") -> Iterator[M]:
         try:

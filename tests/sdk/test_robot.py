@@ -151,6 +151,14 @@ def test_a_limit_is_repeated_for_some_seconds_at_most(robot: t2.Robot) -> None:
     limit.end()
 
 
+def test_the_error_of_an_unknown_robot_names_the_others(stack: RunningStack) -> None:
+    with (
+        t2.connect("007", endpoint=stack.endpoint) as other,
+        pytest.raises(t2.NoData, match="no robot 007 at this router, which has 001"),
+    ):
+        other.odometry.latest(timeout=0.2)
+
+
 def test_an_unknown_source_is_told_so(robot: t2.Robot) -> None:
     with pytest.raises(t2.NotAllowed, match="it lists detector"):
         robot.limit("stranger", linear=0.1)
