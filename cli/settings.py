@@ -12,6 +12,7 @@ from services.dashboard.config import Dashboard
 from services.metrics.config import Metrics
 from services.odom.config import Odom
 from services.recorder.config import Recorder
+from services.ros2.config import Ros2
 from services.safety.config import Safety
 from services.teleop.config import Teleop
 from sim.config import Sim
@@ -30,6 +31,7 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     dashboard: Dashboard = Dashboard()
     recorder: Recorder = Recorder()
     metrics: Metrics = Metrics()
+    ros2: Ros2 = Ros2()
     sim: Sim = Sim()
 
 

@@ -43,7 +43,7 @@ REPLACED = {
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "bus", "board", "wire", "log", "vehicle",
-    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "sim",
+    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
 )  # fmt: skip
 
 

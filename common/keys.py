@@ -16,7 +16,7 @@ from common import messages as m
 ROOT = "t2/v1"
 
 # Known values of a ``{name}`` in a path; those of sources are in the settings.
-SERVICES = ("bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics")
+SERVICES = ("bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2")
 KNOWN: Mapping[str, Collection[str]] = {"service": SERVICES, "side": ("left", "right")}
 
 MessageT = TypeVar("MessageT", bound=m.Message)

@@ -20,7 +20,7 @@ ZSH = "autoload -Uz compinit && compinit\n"
 PLACEHOLDERS = {
     "{service}": ("bridge", "safety", "odom"),
     "{side}": ("left", "right"),
-    "{source}": ("teleop", "web", "nav"),
+    "{source}": ("teleop", "web", "nav", "ros2"),
 }
 
 

@@ -1,0 +1,84 @@
+"""Services of ROS 2 as calls of the bus: emergency stop, reset, the board's brake switches."""
+
+import time
+from collections.abc import Callable
+
+from common import keys
+from common import messages as m
+from common.freshness import NS_PER_S
+from common.operator import reset_request
+from common.service import Node
+from services.ros2.cdr import Value
+from services.ros2.config import Ros2Config
+from services.ros2.endpoints import Answer, Endpoints
+
+CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
+TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
+SWITCHES = ("ultrasonic_brake", "bumper_brake")
+
+
+class Calls:
+    """Serves the robot's services; every one is answered, as ROS clients wait without a limit."""
+
+    def __init__(
+        self,
+        node: Node[Ros2Config],
+        ros: Endpoints,
+        absolute: Callable[[str], str],
+        state: Callable[[], m.SafetyState | None],
+    ) -> None:
+        self._node, self._state = node, state
+        self._stops: list[tuple[Answer, int]] = []  # answers that wait, and since when
+        ros.serve(absolute("hardware/e_stop_trigger"), TRIGGER, self._stop)
+        ros.serve(absolute("hardware/e_stop_reset"), TRIGGER, self._reset)
+        for name in SWITCHES:
+            ros.serve(absolute(f"hardware/{name}"), SET_BOOL, self._switch(name))
+        node.loop.every(REPEAT_S, self._confirm)
+
+    def _stop(self, _: Value, answer: Answer) -> None:
+        """Stop the robot, and answer when safety's state shows it."""
+        self._node.bus.estop()
+        self._stops.append((answer, time.monotonic_ns()))
+
+    def _confirm(self, now_ns: int) -> None:
+        """Repeat an emergency stop until it is confirmed, or too old."""
+        if not self._stops:
+            return
+        state = self._state()
+        stopped = state is not None and "estop" in state.latched
+        for answer, since_ns in self._stops:
+            if stopped:
+                answer((True, "Stopped and latched."))
+            elif now_ns - since_ns > CONFIRM_NS:
+                answer((False, "Sent, but safety does not confirm it. Use the vehicle's switch."))
+        self._stops = [
+            each for each in self._stops if not stopped and now_ns - each[1] <= CONFIRM_NS
+        ]
+        if self._stops:
+            self._node.bus.estop()
+
+    def _reset(self, _: Value, answer: Answer) -> None:
+        """Clear what is latched now."""
+        state = self._state()
+        if state is None:
+            answer((False, "Safety is silent."))
+            return
+        self._node.bus.call(
+            keys.RESET,
+            reset_request(state),
+            lambda done: answer((True, done.text)),
+            lambda reason: answer((False, reason)),
+        )
+
+    def _switch(self, name: str) -> Callable[[Value, Answer], None]:
+        def handle(request: Value, answer: Answer) -> None:
+            state = self._state()
+            echo = state.heartbeat if state else None
+            self._node.bus.call(
+                keys.SET_SWITCHES,
+                m.SwitchesRequest(**{name: request[0]}, echo=echo),
+                lambda _: answer((True, f"{name} is set.")),
+                lambda reason: answer((False, reason)),
+            )
+
+        return handle

@@ -1,0 +1,42 @@
+"""Settings of the gateway to ROS 2."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from common import settings
+from services.ros2.names import is_valid
+
+Rate = Annotated[float, Meta(ge=0.1, le=50.0)]  # Hz at most; what arrives slower is passed on so
+Frame = Annotated[str, Meta(pattern=r"^([A-Za-z_][A-Za-z0-9_/]*)?\Z", max_length=60)]
+
+
+class Ros2(settings.Section, frozen=True, kw_only=True):
+    """What ROS nodes see, and which commands are taken."""
+
+    domain: Annotated[int, Meta(ge=0, le=232)] = 0  # ROS_DOMAIN_ID
+    namespace: str = "/"  # of the node and its topics, such as /t2_001
+    frame_prefix: Frame = ""  # before odom, base_link and the sonars, such as t2_001/
+    cmd_vel: Literal["both", "stamped", "plain"] = "both"  # TwistStamped, Twist
+    publish_tf: bool = True  # odom to base_link; false for users of another estimator
+    publish_clock: bool = False  # for a replay with use_sim_time
+    no_echo: Literal["max_range", "inf"] = "max_range"  # the range of a sonar without an echo
+    sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening
+    odom_rate: Rate = 25.0
+    sonar_rate: Rate = 10.0  # of each sonar
+    bumper_rate: Rate = 10.0  # a change is passed on at once
+    diagnostics_rate: Rate = 1.0
+
+    def __post_init__(self) -> None:
+        if not is_valid(self.namespace):
+            raise ValueError(
+                f"namespace is {self.namespace!r}, allowed is / or a name such as /t2_001: "
+                "letters, digits and _, not beginning with a digit"
+            )
+
+
+class Ros2Config(settings.Shared, frozen=True, kw_only=True):
+    """All sections that the gateway reads."""
+
+    ros2: Ros2 = Ros2()
+    vehicle: settings.Vehicle = settings.Vehicle()

@@ -1,0 +1,198 @@
+"""The gateway's node on the wire of ROS 2: publishers, subscriptions, services and their tokens.
+
+A Zenoh session of its own, so that a gateway that is stopped takes all its tokens with it. Zenoh's
+threads only stamp what arrives; ``submit`` passes it to the service's loop.
+"""
+
+import contextlib
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import xxhash
+import zenoh
+import zenoh.ext
+
+from common.bus.session import Opener
+from common.bus.subscriber import Subscriber
+from common.settings import BusSettings
+from services.ros2 import attachment, cdr, names
+from services.ros2.attachment import Attachment
+from services.ros2.cdr import CdrError, Value
+
+Post = Callable[[Callable[[], None]], None]
+Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time (monotonic, ns)
+Answer = Callable[[Value], None]
+Serve = Callable[[Value, Answer], None]
+Seen = Callable[[str, bool], None]  # a token, and whether it appeared
+
+DEPTH = 32  # commands that wait for the loop
+LATCHED: dict[str, Any] = {
+    "cache": zenoh.ext.CacheConfig(max_samples=1),
+    "publisher_detection": True,
+    "sample_miss_detection": zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
+}
+# A slow ROS node must not hold up the gateway.
+QOS: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.DROP}
+
+
+def gid(token: str) -> bytes:
+    """Return the GID of an endpoint."""
+    return xxhash.xxh3_128_digest(token.encode())[::-1]
+
+
+class Publisher:
+    """A publisher of one topic; drops messages until there is a session."""
+
+    def __init__(self, interface: str) -> None:
+        self._interface = interface
+        self._declared: Any = None
+        self._gid = b""
+        self._sequence = 0
+        self._waiting: Value = None
+
+    def put(self, message: Value) -> None:
+        """Send a message; the last one before the session is sent when there is one."""
+        if self._declared is None:
+            self._waiting = message
+            return
+        self._sequence += 1
+        about = Attachment(self._sequence, time.time_ns(), self._gid)
+        self._declared.put(cdr.encode(self._interface, message), attachment=about.encode())
+
+    def declared(self, publisher: Any, gid: bytes) -> None:
+        """Take the session's publisher."""
+        self._declared, self._gid = publisher, gid
+        if self._waiting is not None:
+            self.put(self._waiting)
+
+
+class Endpoints:
+    """The node with all its endpoints; declare first, then ``open``."""
+
+    def __init__(self, where: BusSettings, node: names.Node, post: Post) -> None:
+        self.counters: Counter[str] = Counter(undecodable=0, overrun=0)
+        self._node = node
+        self._post = post
+        self._session: zenoh.Session | None = None
+        self._declare: list[Callable[[zenoh.Session], Any]] = []
+        self._declared: list[Any] = []  # references keep them alive
+        self._number = 0
+        self._opener = Opener(where, lambda session: post(lambda: self._adopt(session)))
+
+    def open(self) -> None:
+        """Start connecting; returns at once."""
+        self._opener.start()
+
+    def close(self) -> None:
+        """Close the session: all tokens disappear."""
+        self._session = None
+        self._opener.close()
+
+    def publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
+        """Return a publisher of an absolute topic."""
+        made, key = Publisher(interface), names.data_key(self._node.domain, topic, interface)
+        number = self._next()
+
+        def declare(session: zenoh.Session) -> Any:
+            if latched:
+                sent: Any = zenoh.ext.declare_advanced_publisher(session, key, **LATCHED)
+            else:
+                sent = session.declare_publisher(key, **QOS)
+            qos = names.QOS_LATCHED if latched else names.QOS
+            token = self._token(number, "MP", topic, interface, qos)
+            made.declared(sent, gid(token))
+            return sent, session.liveliness().declare_token(token)
+
+        self._declare.append(declare)
+        return made
+
+    def subscribe(
+        self, topic: str, interface: str, take: Take, refused: Callable[[str], None]
+    ) -> None:
+        """Call ``take`` for each message; ``refused`` gets why bytes are none."""
+        key, number = names.data_key(self._node.domain, topic, interface), self._next()
+
+        def read(sample: zenoh.Sample, received_ns: int) -> None:
+            try:
+                raw = sample.attachment.to_bytes() if sample.attachment else b""
+                about = attachment.decode(raw)
+                message = cdr.decode(interface, sample.payload.to_bytes())
+            except (CdrError, ValueError) as error:
+                self.counters["undecodable"] += 1
+                refused(str(error))
+            else:
+                take(about, message, received_ns)
+
+        made = Subscriber(key, read, DEPTH, 0, self.counters)
+
+        def declare(session: zenoh.Session) -> Any:
+            token = self._token(number, "MS", topic, interface, names.QOS)
+            return (
+                made.declare(session, self._post, self._post),
+                session.liveliness().declare_token(token),
+            )
+
+        self._declare.append(declare)
+
+    def serve(self, service: str, interface: str, handle: Serve) -> None:
+        """Answer the requests of a service; ``handle`` calls the answer once, now or later."""
+        key, number = names.data_key(self._node.domain, service, interface), self._next()
+
+        def take(query: zenoh.Query) -> None:
+            try:
+                raw = query.attachment.to_bytes() if query.attachment else b""
+                about = attachment.decode(raw)
+                payload = query.payload.to_bytes() if query.payload else cdr.HEADER
+                request = cdr.decode(f"{interface}_Request", payload)
+            except (CdrError, ValueError):
+                self.counters["undecodable"] += 1
+                query.drop()
+                return
+
+            def answer(message: Value) -> None:
+                reply = Attachment(about.sequence, time.time_ns(), about.gid)
+                encoded = cdr.encode(f"{interface}_Response", message)
+                with contextlib.suppress(zenoh.ZError):  # the client may have gone
+                    query.reply(key, encoded, attachment=reply.encode())
+                query.drop()
+
+            handle(request, answer)
+
+        def queue(query: zenoh.Query) -> None:
+            self._post(lambda: take(query))
+
+        def declare(session: zenoh.Session) -> Any:
+            token = self._token(number, "SS", service, interface, names.QOS)
+            return (
+                session.declare_queryable(key, queue, complete=True),
+                session.liveliness().declare_token(token),
+            )
+
+        self._declare.append(declare)
+
+    def watch(self, seen: Seen) -> None:
+        """Call ``seen`` for each token of the domain that appears or disappears."""
+
+        def queue(sample: zenoh.Sample) -> None:
+            token, appeared = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._post(lambda: seen(token, appeared))
+
+        key = f"{names.LIVELINESS}/{self._node.domain}/**"
+        self._declare.append(
+            lambda session: session.liveliness().declare_subscriber(key, queue, history=True)
+        )
+
+    def _adopt(self, session: zenoh.Session) -> None:
+        self._node = self._node._replace(zid=str(session.info.zid()))
+        self._declared.append(session.liveliness().declare_token(self._node.token))
+        self._declared += [declare(session) for declare in self._declare]
+        self._session = session
+
+    def _token(self, number: int, kind: str, topic: str, interface: str, qos: str) -> str:
+        return self._node.endpoint_token(number, kind, topic, interface, qos)
+
+    def _next(self) -> int:
+        self._number += 1
+        return self._number

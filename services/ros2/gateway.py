@@ -1,0 +1,95 @@
+"""The gateway: connects the robot's bus with one node of ROS 2."""
+
+import time
+from functools import partial
+
+from common.service import Node
+from common.source import DriveSource
+from services.ros2 import names, translate
+from services.ros2.attachment import Attachment
+from services.ros2.calls import Calls
+from services.ros2.cdr import Value
+from services.ros2.command import Commands, Refusal, Twist
+from services.ros2.config import Ros2Config
+from services.ros2.diagnostics import Diagnostics
+from services.ros2.endpoints import Endpoints, Publisher, gid
+from services.ros2.streams import Streams
+
+SOURCE, NODE = "ros2", "t2"
+TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "plain": "geometry_msgs/msg/Twist"}
+
+
+class Gateway:
+    """Streams to topics, services to calls, and ``cmd_vel`` to drive requests."""
+
+    def __init__(self, node: Node[Ros2Config]) -> None:
+        settings = node.config.ros2
+        self._node, self._namespace = node, settings.namespace
+        self._commands, self._diagnostics = Commands(), Diagnostics(time.monotonic_ns)
+        self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
+        self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
+        ros = names.Node(settings.domain, "", settings.namespace, NODE)
+        self._ros = Endpoints(node.config.bus, ros, node.loop.post)
+        self._drive = DriveSource(node.bus, SOURCE)
+        self._streams = Streams(node, self._publisher, self._diagnostics)
+        Calls(node, self._ros, self._absolute, lambda: self._streams.state)
+        for name, interface in TWISTS.items():
+            if settings.cmd_vel in ("both", name):
+                take = partial(self._take, name == "stamped")
+                self._ros.subscribe(self._absolute("cmd_vel"), interface, take, self._unreadable)
+        self._ros.watch(self._on_token)
+        node.on_exit = self._ros.close
+        self._ros.open()
+
+    def _take(self, stamped: bool, about: Attachment, message: Value, received_ns: int) -> None:
+        """Pass on a command, or refuse it."""
+        twist = Twist(*(message[1] if stamped else message))
+        decided = self._commands.judge(about, twist, received_ns)
+        if isinstance(decided, Refusal):
+            self._refuse(decided, about.gid)
+            return
+        self._drive.request(decided.linear, decided.angular)
+        if self._is_new(about.gid, "taken"):
+            self._note(translate.OK, "Taken.", {"publisher": self._sender(about.gid)})
+
+    def _unreadable(self, reason: str) -> None:
+        self._refuse(Refusal("unreadable", f"A command cannot be read: {reason}."), b"")
+
+    def _refuse(self, refusal: Refusal, publisher: bytes) -> None:
+        """Count a refusal; report it unless the one before of this publisher was the same."""
+        self._node.counters[f"cmd_vel_{refusal.name}"] += 1
+        if self._is_new(publisher, refusal.name):
+            values = {"reason": refusal.name, "publisher": self._sender(publisher)}
+            self._note(translate.WARN, refusal.text, values)
+            self._node.event("cmd_vel_refused", "warning", refusal.text, **values)
+
+    def _is_new(self, publisher: bytes, decision: str) -> bool:
+        known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
+        is_new = self._reported.get(known) != decision
+        self._reported[known] = decision
+        return is_new
+
+    def _note(self, level: int, text: str, values: dict[str, str]) -> None:
+        self._diagnostics.note(translate.status(level, "cmd_vel", text, values))
+
+    def _sender(self, publisher: bytes) -> str:
+        return self._publishers.get(publisher, "unknown")
+
+    def _on_token(self, token: str, appeared: bool) -> None:
+        """Keep the nodes that publish commands."""
+        peer = names.peer(token)
+        if peer is None or peer.kind != "publisher" or peer.topic != self._absolute("cmd_vel"):
+            return
+        publisher = gid(token)
+        if appeared:
+            self._publishers[publisher] = peer.node
+            return
+        self._publishers.pop(publisher, None)
+        self._reported.pop(publisher, None)
+        self._commands.gone(publisher)
+
+    def _publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
+        return self._ros.publisher(self._absolute(topic), interface, latched=latched)
+
+    def _absolute(self, name: str) -> str:
+        return names.absolute(self._namespace, name)

@@ -1,0 +1,132 @@
+"""Streams of the bus as topics of ROS 2."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival
+from common.freshness import NS_PER_S
+from common.service import Node
+from common.settings import sonar_mounts
+from services.ros2 import translate, urdf
+from services.ros2.cdr import Value
+from services.ros2.config import Ros2Config
+from services.ros2.diagnostics import Diagnostics
+from services.ros2.endpoints import Publisher
+
+SIDES = ("left", "right")
+Declare = Callable[..., Publisher]  # topic, interface, latched
+BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
+
+
+class Streams:
+    """Subscribes to the robot's streams and publishes them."""
+
+    def __init__(
+        self, node: Node[Ros2Config], publisher: Declare, diagnostics: Diagnostics
+    ) -> None:
+        self.state: m.SafetyState | None = None
+        self._node, self._publisher, self._diagnostics = node, publisher, diagnostics
+        self._settings = node.config.ros2
+        self._motion()
+        self._sonars()
+        self._stops()
+        self._statuses()
+        self._description()
+
+    def _motion(self) -> None:
+        settings, prefix = self._settings, self._settings.frame_prefix
+        odometry = self._publisher("odom", "nav_msgs/msg/Odometry")
+        tf = clock = None
+        if settings.publish_tf:
+            tf = self._publisher("/tf", TRANSFORMS)
+        if settings.publish_clock:
+            clock = self._publisher("/clock", "rosgraph_msgs/msg/Clock")
+
+        def publish(message: m.Odometry) -> None:
+            odometry.put(translate.odometry(message, prefix))
+            if tf:
+                tf.put(translate.transform(message, prefix))
+            if clock:
+                clock.put((translate.time(message.t_ns),))
+
+        self._pass_on(keys.ODOMETRY, settings.odom_rate, publish)
+
+    def _sonars(self) -> None:
+        settings, vehicle = self._settings, self._node.config.vehicle
+        mounts = sonar_mounts(vehicle)
+        topics = [f"{translate.sonar_frame(mount)}/range" for mount in mounts]
+        sonars = [self._publisher(topic, "sensor_msgs/msg/Range") for topic in topics]
+
+        def publish(message: m.Ultrasonic) -> None:
+            for index, (sonar, mount) in enumerate(zip(sonars, mounts, strict=True)):
+                sonar.put(translate.sonar_range(message, index, mount, vehicle, settings))
+
+        self._pass_on(keys.ULTRASONIC, settings.sonar_rate, publish)
+
+    def _stops(self) -> None:
+        bumper = self._publisher("bumper", BOOL)
+        rate = self._settings.bumper_rate
+        self._pass_on(
+            keys.BUMPER, rate, lambda it: bumper.put((it.pressed,)), lambda it: it.pressed
+        )
+        stopped = self._publisher("hardware/e_stop", BOOL, latched=True)
+
+        def publish(arrival: Arrival[m.SafetyState]) -> None:
+            before, self.state = self.state, arrival.message
+            if before is None or bool(before.latched) != bool(self.state.latched):
+                stopped.put((bool(self.state.latched),))
+
+        self._node.bus.subscribe(keys.SAFETY, publish)
+
+    def _statuses(self) -> None:
+        self._note(keys.SAFETY, translate.safety_status)
+        self._note(keys.LINK, translate.link_status)
+        self._note(keys.HEALTH, translate.health_status, service="*")
+        for side in SIDES:
+            self._note(keys.DRIVER, partial(translate.driver_status, side), side=side)
+        array = self._publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+
+        def publish(now_ns: int) -> None:
+            stamp = translate.header(time.time_ns(), "")
+            array.put((stamp, self._diagnostics.statuses(now_ns)))
+
+        self._node.loop.every(1 / self._settings.diagnostics_rate, publish)
+
+    def _description(self) -> None:
+        vehicle, prefix = self._node.config.vehicle, self._settings.frame_prefix
+        description = self._publisher("robot_description", "std_msgs/msg/String", latched=True)
+        description.put((urdf.describe(vehicle, prefix),))
+        static = self._publisher("/tf_static", TRANSFORMS, latched=True)
+        static.put(translate.static_transforms(time.time_ns(), urdf.poses(vehicle), prefix))
+
+    def _pass_on(
+        self,
+        topic: keys.Topic[Any],
+        rate: float,
+        publish: Callable[[Any], None],
+        value: Callable[[Any], object] = lambda _: None,
+    ) -> None:
+        """Publish messages at a rate in Hz at most; one with another value at once."""
+        period_ns = round(0.9 * NS_PER_S / rate)  # arrivals jitter
+        last_ns, last = -period_ns, None
+
+        def take(arrival: Arrival[Any]) -> None:
+            nonlocal last_ns, last
+            now = value(arrival.message)
+            if arrival.received_ns - last_ns >= period_ns or now != last:
+                last_ns, last = arrival.received_ns, now
+                publish(arrival.message)
+
+        self._node.bus.subscribe(topic, take)
+
+    def _note(self, topic: keys.Topic[Any], status: Callable[[Any], Value], **names: Any) -> None:
+        """Note the diagnostic status of each message."""
+
+        def note(arrival: Arrival[Any]) -> None:
+            self._diagnostics.note(status(arrival.message))
+
+        self._node.bus.subscribe(topic, note, depth=32, **names)

@@ -1,0 +1,132 @@
+"""Messages of the bus as messages of ROS 2, in the form of ``cdr``. Pure.
+
+Frames follow REP-103 and REP-105; a stamp is the wall clock of the robot. What is unknown stays
+unknown: no message is made of a value that is None.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from common import messages as m
+from common.freshness import NS_PER_S
+from common.settings import Mount, Vehicle
+from services.ros2.cdr import Value
+from services.ros2.config import Ros2
+
+ULTRASOUND = 0
+PLANAR = 1e-6  # variance of what a vehicle on a floor does not do: z, roll, pitch, sideways
+OK, WARN, ERROR = 0, 1, 2
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+WORST: Mapping[str, int] = {"run": OK, "slow": WARN, "stop": WARN, "brake": ERROR}
+
+
+def time(t_ns: int) -> Value:
+    """Return a builtin_interfaces/Time."""
+    return divmod(t_ns, NS_PER_S)
+
+
+def header(t_ns: int, frame: str) -> Value:
+    """Return a std_msgs/Header."""
+    return time(t_ns), frame
+
+
+def turned(yaw: float) -> Value:
+    """Return the quaternion of a heading (rad)."""
+    return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
+
+
+def odometry(message: m.Odometry, prefix: str) -> Value:
+    """Return a nav_msgs/Odometry: the pose in ``odom``, the twist in ``base_link``."""
+    pose = (message.x, message.y, 0.0), turned(message.heading)
+    twist = (message.linear, 0.0, 0.0), (0.0, 0.0, message.angular)
+    return (
+        header(message.t_ns, prefix + message.frame_id),
+        prefix + message.child_frame_id,
+        (pose, spread(message.pose_covariance, (0, 1, 5))),
+        (twist, spread(message.twist_covariance, (0, 5))),
+    )
+
+
+def spread(covariance: tuple[float, ...], axes: tuple[int, ...]) -> tuple[float, ...]:
+    """Return the 6x6 covariance over x, y, z, roll, pitch, yaw of one over some axes."""
+    full = [0.0] * 36
+    for axis in range(6):
+        full[7 * axis] = PLANAR
+    for row, to_row in enumerate(axes):
+        for column, to_column in enumerate(axes):
+            full[6 * to_row + to_column] = covariance[len(axes) * row + column]
+    return tuple(full)
+
+
+def transform(message: m.Odometry, prefix: str) -> Value:
+    """Return a tf2_msgs/TFMessage from ``odom`` to ``base_link``."""
+    where = (message.x, message.y, 0.0), turned(message.heading)
+    stamped = header(message.t_ns, prefix + message.frame_id)
+    return (((stamped, prefix + message.child_frame_id, where),),)
+
+
+def static_transforms(t_ns: int, joints: Iterator["tuple[str, Value]"], prefix: str) -> Value:
+    """Return a tf2_msgs/TFMessage from ``base_link`` to frames with their poses."""
+    stamped = header(t_ns, f"{prefix}base_link")
+    return (tuple((stamped, prefix + frame, pose) for frame, pose in joints),)
+
+
+def sonar_frame(mount: Mount) -> str:
+    """Return the frame of a sonar: its x axis is the beam."""
+    return f"sonar_{mount.name}"
+
+
+def sonar_range(
+    message: m.Ultrasonic, index: int, mount: Mount, vehicle: Vehicle, settings: Ros2
+) -> Value:
+    """Return a sensor_msgs/Range of one sonar.
+
+    Nearer than can be measured is ``min_range``; a fault is NaN (REP 117).
+    """
+    measured = message.ranges[index]
+    if measured is None:
+        far = vehicle.sonar_max if settings.no_echo == "max_range" else math.inf
+        by_status = {"no_echo": far, "too_near": vehicle.sonar_min}
+        measured = by_status.get(message.status[index], math.nan)
+    stamped = header(message.t_ns, settings.frame_prefix + sonar_frame(mount))
+    limits = vehicle.sonar_min, vehicle.sonar_max
+    return stamped, ULTRASOUND, settings.sonar_fov, *limits, measured, 0.0
+
+
+def status(level: int, name: str, text: str, values: Mapping[str, object]) -> Value:
+    """Return a diagnostic_msgs/DiagnosticStatus of this robot."""
+    pairs = tuple((key, str(value)) for key, value in values.items())
+    return level, f"t2: {name}", text, "t2", pairs
+
+
+def safety_status(state: m.SafetyState) -> Value:
+    """Return the status of safety: why the vehicle may or may not move."""
+    values = {
+        "verdict": state.verdict,
+        "source": state.source or "none",
+        "latched": ", ".join(state.latched) or "none",
+        "linear limit": state.limits.forward,
+        **{f"cause {cause.name}": cause.text for cause in state.causes},
+    }
+    return status(WORST.get(state.verdict, ERROR), "safety", state.text, values)
+
+
+def link_status(link: m.Link) -> Value:
+    """Return the status of the link to the main board."""
+    texts = {"up": "The board answers.", "lost": "The board is silent.", "never": "No board yet."}
+    values = {"board": link.board, "armed": link.armed, "waiting": link.waiting}
+    level = OK if link.state == "up" and link.armed else WARN if link.state == "up" else ERROR
+    return status(level, "link", texts[link.state], values)
+
+
+def driver_status(side: str, driver: m.Driver) -> Value:
+    """Return the status of a motor driver."""
+    faults = ", ".join(driver.faults)
+    text = f"Faults: {faults}." if faults else "No faults."
+    return status(ERROR if faults else OK, f"{side} motor driver", text, {"bits": driver.bits})
+
+
+def health_status(health: m.Health) -> Value:
+    """Return the status of a service by its health message."""
+    values = {"version": health.version, "uptime": f"{health.uptime:.0f} s", **health.counters}
+    return status(OK, f"service {health.service}", "It runs.", values)
