@@ -1,0 +1,71 @@
+"""An independent implementation of ROS messages: the package rosbags."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from services.ros2.cdr import Value
+from services.ros2.definitions import FIELDS
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+for part, text in {
+    "Trigger_Request": "uint8 structure_needs_at_least_one_member",
+    "Trigger_Response": "bool success\nstring message",
+    "SetBool_Request": "bool data",
+    "SetBool_Response": "bool success\nstring message",
+}.items():
+    STORE.register(get_types_from_msg(text, f"std_srvs/srv/{part}"))
+DISTRIBUTIONS = (Stores.ROS2_IRON, Stores.ROS2_JAZZY, Stores.ROS2_KILTED, Stores.ROS2_LYRICAL)
+STORES = [get_typestore(distribution) for distribution in DISTRIBUTIONS]
+
+TEXT = st.characters(exclude_categories=("Cs",), exclude_characters="\0")
+FINITE = {"float32": st.floats(width=32, allow_nan=False), "float64": st.floats(allow_nan=False)}
+PRIMITIVES: dict[str, st.SearchStrategy[Any]] = {
+    "bool": st.booleans(),
+    "byte": st.integers(0, 127),  # rosbags reads it as signed
+    "uint8": st.integers(0, 255),
+    "int32": st.integers(-(2**31), 2**31 - 1),
+    "uint32": st.integers(0, 2**32 - 1),
+    "string": st.text(TEXT, max_size=30),
+    **FINITE,
+}
+
+
+def values(name: str) -> st.SearchStrategy[Value]:
+    """Return a strategy for messages of a type, in the form of ``cdr``."""
+    item, bracket, rest = name.partition("[")
+    if bracket:
+        size = int(rest[:-1] or 0)
+        low, high = (size, size) if size else (0, 4)
+        return st.lists(values(item), min_size=low, max_size=high).map(tuple)
+    if item in PRIMITIVES:
+        return PRIMITIVES[item]
+    return st.tuples(*[values(kind) for _, kind in FIELDS[item]])
+
+
+def as_rosbags(name: str, value: Value) -> Any:
+    """Return a message of rosbags for a value in the form of ``cdr``."""
+    item, bracket, _ = name.partition("[")
+    if bracket:
+        return _array(item, value)
+    if item in PRIMITIVES:
+        return value
+    made = STORE.types[item]
+    parts = zip(FIELDS[item], value, strict=True)
+    return made(**{field: as_rosbags(kind, part) for (field, kind), part in parts})
+
+
+def _array(item: str, value: Value) -> Any:
+    import numpy
+
+    dtypes = {"float64": numpy.float64}
+    if item in dtypes:
+        return numpy.array(value, dtype=dtypes[item])
+    return [as_rosbags(item, part) for part in value]
+
+
+def message_types() -> Iterator[str]:
+    """Yield the types whose fields rosbags knows, too."""
+    yield from (name for name in FIELDS if name in STORE.types and FIELDS[name])

@@ -1,0 +1,92 @@
+"""Keys, tokens and attachments as captured from ROS 2 Jazzy."""
+
+import pytest
+
+from services.ros2 import attachment, names
+from services.ros2.attachment import Attachment
+from services.ros2.endpoints import gid
+
+STAMPED = "geometry_msgs/msg/TwistStamped"
+HASH = "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64"
+ZID = "9ad893a901c6d403eb7ce40cfd5a1377"
+CAPTURED = (
+    f"@ros2_lv/0/{ZID}/0/4/MP/%/%/_ros2cli_10327/%cmd_vel/"
+    f"geometry_msgs::msg::dds_::TwistStamped_/{HASH}/::,10:,:,:,,"
+)
+ATTACHED = bytes.fromhex("0100000000000000c41d526ef347ea18106ddcb54a141ce8bf846ab67b5087d2b9")
+CLI = names.Node(0, ZID, "/", "_ros2cli_10327")
+
+
+def test_a_key_is_the_captured_one() -> None:
+    key = names.data_key(0, "/cmd_vel", STAMPED)
+    assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::TwistStamped_/{HASH}"
+
+
+def test_a_token_is_the_captured_one() -> None:
+    assert CLI.endpoint_token(4, "MP", "/cmd_vel", STAMPED, names.QOS) == CAPTURED
+    assert CLI.token == f"@ros2_lv/0/{ZID}/0/0/NN/%/%/_ros2cli_10327"
+
+
+def test_a_namespace_is_one_chunk() -> None:
+    node = names.Node(7, "ab", "/site/t2", "t2")
+    assert node.token == "@ros2_lv/7/ab/0/0/NN/%/%site%t2/t2"
+    token = node.endpoint_token(
+        3, "SS", "/site/t2/hardware/e_stop_reset", "std_srvs/srv/Trigger", ""
+    )
+    peer = names.peer(token)
+    assert peer is not None
+    assert (peer.kind, peer.node, peer.topic, peer.type) == (
+        "service", "/site/t2/t2", "/site/t2/hardware/e_stop_reset", "std_srvs/srv/Trigger",
+    )  # fmt: skip
+
+
+def test_a_captured_token_is_read() -> None:
+    peer = names.peer(CAPTURED)
+    assert peer == names.Peer(
+        ZID, "publisher", "/_ros2cli_10327", "/cmd_vel", STAMPED, HASH, "::,10:,:,:,,"
+    )
+    assert names.peer(f"{CAPTURED}/backends:cpu") == peer  # Lyrical and newer
+
+
+@pytest.mark.parametrize("token", [CLI.token, "a/b", f"{CAPTURED[:40]}", "x" + CAPTURED])
+def test_other_keys_are_no_endpoint(token: str) -> None:
+    assert names.peer(token) is None
+
+
+def test_the_captured_attachment() -> None:
+    about = attachment.decode(ATTACHED)
+    assert (about.sequence, about.source_ns) == (1, 0x18EA47F36E521DC4)
+    assert about.gid.hex() == "6ddcb54a141ce8bf846ab67b5087d2b9"
+    assert about.encode() == ATTACHED
+
+
+def test_the_captured_gid_is_that_of_its_token() -> None:
+    assert gid(CAPTURED).hex() == "6ddcb54a141ce8bf846ab67b5087d2b9"
+
+
+@pytest.mark.parametrize(
+    "raw", [b"", ATTACHED[:-1], ATTACHED + b"\0", ATTACHED[:16] + b"\x11" + ATTACHED[17:]]
+)
+def test_other_bytes_are_no_attachment(raw: bytes) -> None:
+    with pytest.raises(ValueError, match="has"):
+        attachment.decode(raw)
+
+
+@pytest.mark.parametrize("name", ["/", "/t2", "/a/b_1", "/_x"])
+def test_ros_names(name: str) -> None:
+    assert names.is_valid(name)
+
+
+@pytest.mark.parametrize("name", ["", "t2", "/1", "/a//b", "/a/", "/a-b", "/a\n", "//"])
+def test_other_names(name: str) -> None:
+    assert not names.is_valid(name)
+
+
+def test_names_of_a_namespace() -> None:
+    assert names.absolute("/", "odom") == "/odom"
+    assert names.absolute("/t2", "odom") == "/t2/odom"
+    assert names.absolute("/t2", "/tf") == "/tf"
+
+
+def test_an_attachment_has_33_bytes() -> None:
+    assert len(Attachment(1, 2, bytes(16)).encode()) == 33
