@@ -1,0 +1,165 @@
+"""The gateway on the real stack, with a node of zenoh-ros2-sdk on the other side."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from common import child_process
+from services.ros2.rihs import HASHES
+from sim.requests import Bumper
+from tests.ros2.peer import LATCHED, RosPeer, peer
+from verification.harness.bus import set_options
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
+
+pytestmark = pytest.mark.timed
+
+STAMPED, PLAIN = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"
+BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
+STOP, RESET = "/hardware/e_stop_trigger", "/hardware/e_stop_reset"
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    folder: Path = tmp_path_factory.mktemp("ros2")
+
+    def gateway(config: Any) -> dict[str, list[str]]:
+        options = set_options(f"bus.connect={config.bus.endpoints[0]}")
+        return {"ros2": list(child_process.command("services.ros2", *options))}
+
+    with running_stack(folder, beside=gateway) as it:
+        yield it
+
+
+@pytest.fixture
+def node(stack: RunningStack) -> Iterator[RosPeer]:
+    with peer(stack.endpoint) as it:
+        came = it.subscribe("/odom", "nav_msgs/msg/Odometry")
+        wait_until(lambda: came, "odometry")
+        yield it
+
+
+def statuses(came: list[Any]) -> dict[str, Any]:
+    """Return the newest diagnostic statuses by name."""
+    return {status.name: status for status in came[-1].status} if came else {}
+
+
+def reset(node: RosPeer) -> bool:
+    """Return whether a reset was accepted, or nothing was latched."""
+    answer = node.trigger(RESET, HASHES["std_srvs/srv/Trigger"])
+    return answer is not None and (answer.success or "Nothing" in answer.message)
+
+
+def test_streams_arrive(node: RosPeer) -> None:
+    odom = node.subscribe("/odom", "nav_msgs/msg/Odometry")
+    tf = node.subscribe("/tf", TRANSFORMS)
+    ranges = node.subscribe("/sonar_front/range", "sensor_msgs/msg/Range")
+    bumper = node.subscribe("/bumper", BOOL)
+    wait_until(lambda: odom and tf and ranges and bumper, "all streams")
+    assert (odom[-1].header.frame_id, odom[-1].child_frame_id) == ("odom", "base_link")
+    assert odom[-1].pose.covariance[0] > 0
+    (transform,) = tf[-1].transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == ("odom", "base_link")
+    assert ranges[-1].header.frame_id == "sonar_front"
+    assert ranges[-1].min_range < ranges[-1].range <= ranges[-1].max_range
+    assert bumper[-1].data is False
+
+
+def test_latched_topics_reach_who_comes_later(node: RosPeer) -> None:
+    described = node.subscribe("/robot_description", "std_msgs/msg/String", LATCHED)
+    static = node.subscribe("/tf_static", TRANSFORMS, LATCHED)
+    wait_until(lambda: described and static, "both latched topics")
+    links = {link.get("name") for link in ElementTree.fromstring(described[-1].data).iter("link")}
+    frames = {transform.child_frame_id for transform in static[-1].transforms}
+    assert frames == links - {"base_link"}
+    assert len([frame for frame in frames if frame.startswith("sonar_")]) == 8
+
+
+@pytest.mark.parametrize("interface", [STAMPED, PLAIN])
+def test_commands_move_the_vehicle_until_they_end(
+    node: RosPeer, stack: RunningStack, interface: str
+) -> None:
+    wait_until(lambda: reset(node), "a reset")
+    commands, odom = node.commands(interface), node.subscribe("/odom", "nav_msgs/msg/Odometry")
+    commands.send(1.5)
+    wait_until(lambda: odom, "odometry")
+    start = odom[-1].pose.pose.position
+    commands.send(2.0, 0.2)
+    wait_until(lambda: abs(odom[-1].twist.twist.linear.x) < 0.01, "a standstill")
+    end = odom[-1].pose.pose.position
+    assert math.dist((start.x, start.y), (end.x, end.y)) > 0.15
+
+
+def test_an_emergency_stop_latches_until_a_reset(node: RosPeer, stack: RunningStack) -> None:
+    diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    stopped = node.subscribe("/hardware/e_stop", BOOL)
+    answer = node.trigger(STOP, HASHES["std_srvs/srv/Trigger"])
+    assert answer.success
+    wait_until(lambda: stopped and stopped[-1].data, "the latched topic")
+    wait_until(
+        lambda: "mergency stop" in getattr(statuses(diagnostics).get("t2: safety"), "message", ""),
+        "the reason in the diagnostics",
+    )
+    commands = node.commands(STAMPED)
+    commands.send(1.0)
+    commands.send(0.5, 0.3)
+    assert stack.speed() == 0
+    wait_until(lambda: reset(node), "a reset")
+    wait_until(lambda: not stopped[-1].data, "the latched topic")
+
+
+def test_a_contact_is_seen_at_once_and_its_reset_is_refused(
+    node: RosPeer, stack: RunningStack
+) -> None:
+    bumper = node.subscribe("/bumper", BOOL)
+    stack.control.do(Bumper(pressed=True))
+    wait_until(lambda: bumper and bumper[-1].data, "the contact")
+    answer = node.trigger(RESET, HASHES["std_srvs/srv/Trigger"])
+    assert not answer.success
+    assert "bumper" in answer.message.lower()
+    stack.control.do(Bumper(pressed=False))
+    wait_until(lambda: reset(node), "a reset")
+
+
+def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> None:
+    diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    commands = node.commands(STAMPED)
+    commands.send(1.0)
+    commands.send(0.3, math.nan)
+    wait_until(
+        lambda: "not finite" in getattr(statuses(diagnostics).get("t2: cmd_vel"), "message", ""),
+        "the refusal",
+    )
+    assert stack.speed() == 0
+
+
+def test_another_type_hash_receives_nothing_and_breaks_nothing(
+    node: RosPeer, stack: RunningStack
+) -> None:
+    wrong = node.commands(STAMPED, "RIHS01_" + "0" * 64)
+    wrong.send(1.0)
+    wrong.send(0.5, 0.3)
+    assert stack.speed() == 0
+    assert stack.processes["ros2"].poll() is None
+
+
+def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
+    node: RosPeer, stack: RunningStack
+) -> None:
+    wait_until(lambda: reset(node), "a reset")
+    commands = node.commands(STAMPED)
+    commands.send(1.5)
+    commands.send(0.7, -0.2)
+    assert stack.speed() < -0.05
+    stack.kill("ros2")
+    commands.send(1.0, -0.2)
+    wait_until(lambda: stack.speed() == 0, "a standstill")
+    others = {name: it.poll() for name, it in stack.processes.items() if name != "ros2"}
+    assert set(others.values()) == {None}
+    stack.start("ros2")
+    came = node.subscribe("/odom", "nav_msgs/msg/Odometry")
+    wait_until(lambda: came, "odometry from the restarted gateway")
