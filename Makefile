@@ -142,15 +142,15 @@ format: $(STAMP) ## format the code with ruff
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-LAPTOP = teleop dashboard record report foxglove keys
+LAPTOP = teleop dashboard record report foxglove keys ros2
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
   --custom-compile-command 'make lock' pyproject.toml
 
 lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, demo, dashboard, laptop, bench
 	$(LOCK) --upgrade --all-extras -o requirements.lock
-	$(LOCK) --constraint requirements.lock --extra record -o requirements-robot.lock
+	$(LOCK) --constraint requirements.lock --extra record --extra ros2 -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock --extra demo -o requirements-demo.lock
-	$(LOCK) --constraint requirements.lock --extra record --extra dashboard -o requirements-dashboard.lock
+	$(LOCK) --constraint requirements.lock --extra record --extra ros2 --extra dashboard -o requirements-dashboard.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 	$(subst pyproject.toml,,$(LOCK)) --constraint requirements.lock --group bench -o requirements-bench.lock
 	echo pip | $(subst pyproject.toml,,$(LOCK)) --upgrade - -o deploy/pip.lock

@@ -25,6 +25,7 @@ GROUPS = {
         "estop": ("inspect.estop", "emergency stop: a robot, a site or all, until a reset"),
         "router": ("run.router", "the embedded Zenoh router alone"),
         "sim": ("run.services:sim", "the simulated vehicle alone"),
+        "ros2": ("run.services:ros2", "the gateway to ROS 2: topics, services and cmd_vel"),
     },
     "Inspect": {
         "doctor": ("inspect.doctor", "diagnose the path from this laptop to the wheels"),

@@ -22,13 +22,20 @@ UNITS = Path("/usr/local/lib/systemd/system")
 USER = Path("/etc/sysusers.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
 KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; lets laptops connect
-ENABLED = Path("/etc/systemd/system/multi-user.target.wants/t2.target")
+ENABLED = {  # links of `systemctl enable`
+    "t2.target": Path("/etc/systemd/system/multi-user.target.wants/t2.target"),
+    "t2-ros2.service": Path("/etc/systemd/system/t2.target.wants/t2-ros2.service"),
+}
 # Every version recognises the units of other versions by this line: never change it.
 MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
 SIM = "t2-sim.service"
 BACKOFF = "t2-.service.d/20-backoff.conf"
 BACKOFF_SINCE = 254  # the systemd that supports it
-EXTRAS = {"t2-recorder.service": "mcap", "t2-dashboard.service": "uvicorn"}
+EXTRAS = {
+    "t2-recorder.service": "mcap",
+    "t2-dashboard.service": "uvicorn",
+    "t2-ros2.service": "xxhash",
+}
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # not visible to the units
 
 
@@ -133,8 +140,9 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
 
 def uninstall(host: Host) -> None:
     """Remove all except settings and recordings; raise ``RobotError`` while T2 is enabled."""
-    if host.has(ENABLED):
-        raise RobotError("t2.target is enabled: run `systemctl disable --now t2.target` first")
+    if enabled := [name for name, link in ENABLED.items() if host.has(link)]:
+        names = " ".join(enabled)
+        raise RobotError(f"T2 is enabled: run `systemctl disable --now {names}` first")
     for path in sorted(ours(host)):
         host.remove(path)
     print("next: systemctl daemon-reload")

@@ -1,4 +1,4 @@
-"""Commands that run one service in this terminal: dashboard, drive, metrics, record and sim.
+"""Commands that run one service in this terminal: dashboard, drive, metrics, record, ros2, sim.
 
 Each function returns the options and the entry point of its command. It imports the service only
 then, so that ``t2`` starts fast.
@@ -53,6 +53,17 @@ def metrics() -> ServiceCommand:
             "metrics.robots", "robots to export: an id, a site as 'berlin-$*', or '*' for all",
         ),
     }  # fmt: skip
+    return _with_settings(service.main, options)
+
+
+def ros2() -> ServiceCommand:
+    """Return ``t2 ros2``."""
+    from services.ros2 import __main__ as service
+
+    options = {
+        "--domain ID": ("ros2.domain", "ROS_DOMAIN_ID; ros2.domain by default"),
+        "--namespace NAME": ("ros2.namespace", "namespace of node and topics, such as /t2_001"),
+    }
     return _with_settings(service.main, options)
 
 

@@ -1,4 +1,7 @@
-"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C."""
+"""``t2 up``: router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C.
+
+``--ros2`` adds the gateway to ROS 2.
+"""
 
 import argparse
 import shlex
@@ -28,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-router", action="store_true", help="use a running router, such as zenohd"
     )
+    parser.add_argument(
+        "--ros2", action="store_true", help="start the gateway to ROS 2, too: it takes cmd_vel"
+    )
     add_insecure(parser)
     add_sources(parser)
 
@@ -43,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     if config.robot.realtime:
         realtime.request(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
-    started = selected([*commands(options), *recorder(options)], options.only)
+    started = selected([*commands(options), *recorder(options), *ros2(options)], options.only)
     with claimed(wanted(config, [name for name, _ in started])):
         return supervised(started, config, driving(options), simulated=not options.no_sim)
 
@@ -96,6 +102,20 @@ def recorder(options: argparse.Namespace) -> Commands:
     if find_spec("mcap") is None:
         return []
     return [("recorder", child_process.command("services.recorder", *passed_on(options)))]
+
+
+def ros2(options: argparse.Namespace) -> Commands:
+    """Return the command of the gateway to ROS 2, if wanted; raise ``ConfigError`` without xxhash.
+
+    Only if wanted: it lets ROS nodes drive.
+    """
+    if not options.ros2:
+        return []
+    if find_spec("xxhash") is None:
+        raise ConfigError(
+            "--ros2 needs xxhash: install the extra `ros2` (pip install -e '.[ros2]')"
+        )
+    return [("ros2", child_process.command("services.ros2", *passed_on(options)))]
 
 
 def passed_on(options: argparse.Namespace) -> list[str]:

@@ -68,9 +68,10 @@ class Publisher(Struct):
 class Commands:
     """Decides about each command; keeps what is known of its publishers."""
 
+    _owned_ns: int  # when the owner drove last
+
     def __init__(self) -> None:
         self.owner: bytes | None = None  # GID of the publisher that drives
-        self._owned_ns = 0
         self._known: dict[bytes, Publisher] = {}
 
     def judge(self, about: Attachment, twist: Twist, now_ns: int) -> Request | Refusal:

@@ -33,7 +33,7 @@ LATCHED: dict[str, Any] = {
     "publisher_detection": True,
     "sample_miss_detection": zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
 }
-# A slow ROS node must not hold up the gateway.
+# A slow ROS node must not block the gateway.
 QOS: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.DROP}
 
 

@@ -27,7 +27,7 @@ def test_every_section_has_its_source(capsys: pytest.CaptureFixture[str]) -> Non
     sections = {path.split(".")[0] for path in table}
     assert sections == {
         "robot", "bus", "board", "wire", "log", "vehicle",
-        "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "sim",
+        "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
     }  # fmt: skip
     assert table["bus.listen"]["value"] == ["tcp/127.0.0.1:7447"]
     assert str(table["bus.listen"]["origin"]).endswith("config/t2.toml")

@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[2]
 ENV = "deploy/compose/robot.env"
 OWN_ROUTER, TLS = "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml"
 REALTIME = "deploy/compose/realtime.yaml"
-PROFILES = ("--profile", "sim", "--profile", "laptop")
+OPTIONAL = {"sim", "laptop", "ros2"}  # services, each with a profile of its name
+PROFILES = [word for name in sorted(OPTIONAL) for word in ("--profile", name)]
 OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "dashboard"}
 
 
@@ -38,7 +39,7 @@ def config(*over: str, **environ: str) -> dict[str, str]:
 @pytest.mark.parametrize("over", [(TLS,), (OWN_ROUTER, TLS)])
 def test_every_container_has_the_robot_id(over: tuple[str, ...]) -> None:
     services = config(*over, T2_ROBOT="002")
-    assert services.keys() == OF_T2 | {"sim", "laptop"}
+    assert services.keys() == OF_T2 | OPTIONAL
     for name, text in services.items():
         assert re.search(r"^ +T2__ROBOT__ID: .?002", text, re.MULTILINE), name
 

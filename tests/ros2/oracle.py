@@ -20,7 +20,7 @@ for part, text in {
 DISTRIBUTIONS = (Stores.ROS2_IRON, Stores.ROS2_JAZZY, Stores.ROS2_KILTED, Stores.ROS2_LYRICAL)
 STORES = [get_typestore(distribution) for distribution in DISTRIBUTIONS]
 
-TEXT = st.characters(exclude_categories=("Cs",), exclude_characters="\0")
+TEXT = st.characters(exclude_categories=["Cs"], exclude_characters="\0")
 FINITE = {"float32": st.floats(width=32, allow_nan=False), "float64": st.floats(allow_nan=False)}
 PRIMITIVES: dict[str, st.SearchStrategy[Any]] = {
     "bool": st.booleans(),

@@ -1,9 +1,8 @@
-"""Keys, tokens and attachments as captured from ROS 2 Jazzy."""
+"""Keys and tokens as captured from ROS 2 Jazzy."""
 
 import pytest
 
-from services.ros2 import attachment, names
-from services.ros2.attachment import Attachment
+from services.ros2 import names
 from services.ros2.endpoints import gid
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -13,7 +12,6 @@ CAPTURED = (
     f"@ros2_lv/0/{ZID}/0/4/MP/%/%/_ros2cli_10327/%cmd_vel/"
     f"geometry_msgs::msg::dds_::TwistStamped_/{HASH}/::,10:,:,:,,"
 )
-ATTACHED = bytes.fromhex("0100000000000000c41d526ef347ea18106ddcb54a141ce8bf846ab67b5087d2b9")
 CLI = names.Node(0, ZID, "/", "_ros2cli_10327")
 
 
@@ -53,23 +51,8 @@ def test_other_keys_are_no_endpoint(token: str) -> None:
     assert names.peer(token) is None
 
 
-def test_the_captured_attachment() -> None:
-    about = attachment.decode(ATTACHED)
-    assert (about.sequence, about.source_ns) == (1, 0x18EA47F36E521DC4)
-    assert about.gid.hex() == "6ddcb54a141ce8bf846ab67b5087d2b9"
-    assert about.encode() == ATTACHED
-
-
 def test_the_captured_gid_is_that_of_its_token() -> None:
     assert gid(CAPTURED).hex() == "6ddcb54a141ce8bf846ab67b5087d2b9"
-
-
-@pytest.mark.parametrize(
-    "raw", [b"", ATTACHED[:-1], ATTACHED + b"\0", ATTACHED[:16] + b"\x11" + ATTACHED[17:]]
-)
-def test_other_bytes_are_no_attachment(raw: bytes) -> None:
-    with pytest.raises(ValueError, match="has"):
-        attachment.decode(raw)
 
 
 @pytest.mark.parametrize("name", ["/", "/t2", "/a/b_1", "/_x"])
@@ -86,7 +69,3 @@ def test_names_of_a_namespace() -> None:
     assert names.absolute("/", "odom") == "/odom"
     assert names.absolute("/t2", "odom") == "/t2/odom"
     assert names.absolute("/t2", "/tf") == "/tf"
-
-
-def test_an_attachment_has_33_bytes() -> None:
-    assert len(Attachment(1, 2, bytes(16)).encode()) == 33

@@ -38,7 +38,7 @@ def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFi
     assert t2_install(tmp_path) == 0
     written = files(tmp_path)
     services = {Path(name).name for name in written if name.endswith(".service")}
-    names = ("router", "bridge", "safety", "odom", "recorder", "dashboard")
+    names = ("router", "bridge", "safety", "odom", "recorder", "dashboard", "ros2")
     assert services == {f"t2-{name}.service" for name in names}
     assert not any("@PREFIX@" in text for text in written.values())
     assert (
@@ -167,6 +167,12 @@ def test_uninstall_keeps_the_settings(tmp_path: Path, capsys: pytest.CaptureFixt
     assert t2_install(tmp_path, "--uninstall") == 1
     assert "systemctl disable --now t2.target" in capsys.readouterr().err
     enabled.unlink()
+    gateway = tmp_path / "etc/systemd/system/t2.target.wants/t2-ros2.service"
+    gateway.parent.mkdir(parents=True)
+    gateway.symlink_to("/nowhere")
+    assert t2_install(tmp_path, "--uninstall") == 1
+    assert "systemctl disable --now t2-ros2.service" in capsys.readouterr().err
+    gateway.unlink()
     assert t2_install(tmp_path, "--uninstall", "--dry-run") == 0
     assert f"{UNITS}/t2.target" in files(tmp_path)
     assert t2_install(tmp_path, "--uninstall") == 0
@@ -216,10 +222,26 @@ SERVICES = sorted(path.name for path in install.TEMPLATES.glob("t2-*.service"))
 REAL = [name for name in SERVICES if name != install.SIM]
 
 
+OPT_IN = "t2-ros2.service"  # lets ROS nodes drive
+
+
 @pytest.mark.parametrize("name", SERVICES)
-def test_the_target_wants_every_service(name: str) -> None:
+def test_the_target_wants_every_service_except_the_opt_in(name: str) -> None:
     wanted = [line for line in install.template("t2.target").splitlines() if "Wants=" in line]
-    assert name in " ".join(wanted)
+    assert (name in " ".join(wanted)) == (name != OPT_IN)
+
+
+def test_the_gateway_starts_with_the_target_once_it_is_enabled() -> None:
+    assert unit(install.template(OPT_IN))["Install"]["WantedBy"] == "t2.target"
+
+
+def test_no_gateway_without_its_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "xxhash" else True)
+    t2_install(tmp_path)
+    assert "without t2-ros2.service: xxhash is not installed" in capsys.readouterr().out
+    assert f"{UNITS}/{OPT_IN}" not in files(tmp_path)
 
 
 @pytest.mark.parametrize("name", REAL)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
+from cli.run import up
 from cli.run.up import commands, driving, run, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
@@ -152,6 +153,16 @@ def test_an_unknown_profile_starts_nothing() -> None:
 def test_a_real_vehicle_has_no_profile() -> None:
     with pytest.raises(ConfigError, match="leave --no-sim or --profile out"):
         run(options(profile=["slope"], no_sim=True))
+
+
+def test_the_gateway_only_if_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert up.ros2(options(ros2=False)) == []
+    ((name, command),) = up.ros2(options(ros2=True, sets=["ros2.domain=3"]))
+    assert name == "ros2"
+    assert " ".join(command[1:]) == "-P -m services.ros2 --set ros2.domain=3"
+    monkeypatch.setattr(up, "find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match="--ros2 needs xxhash: install the extra `ros2`"):
+        up.ros2(options(ros2=True))
 
 
 def test_only_one_process() -> None:

@@ -1,0 +1,154 @@
+"""Messages of the bus as messages of ROS 2."""
+
+import math
+from typing import Any
+
+import pytest
+
+from common import messages as m
+from common.settings import Vehicle, sonar_mounts
+from services.ros2 import cdr, translate, urdf
+from services.ros2.config import Ros2
+from tests import factories
+
+T_NS = 1_700_000_000_250_000_000
+STAMP = (1_700_000_000, 250_000_000)
+VEHICLE = Vehicle()
+HALF = math.sqrt(0.5)
+
+
+def test_odometry_has_frames_pose_and_twist() -> None:
+    message = factories.odometry(
+        t_ns=T_NS, x=1.0, y=-2.0, heading=math.pi / 2, linear=0.3, angular=-0.1,
+        pose_covariance=tuple(float(n) for n in range(1, 10)),
+        twist_covariance=(11.0, 12.0, 13.0, 14.0),
+    )  # fmt: skip
+    header, child, (pose, pose_spread), (twist, twist_spread) = translate.odometry(message, "r1/")
+    assert header == (STAMP, "r1/odom")
+    assert child == "r1/base_link"
+    assert pose == ((1.0, -2.0, 0.0), pytest.approx((0.0, 0.0, HALF, HALF)))
+    assert twist == ((0.3, 0.0, 0.0), (0.0, 0.0, -0.1))
+    assert {at: value for at, value in enumerate(pose_spread) if value} == {
+        0: 1.0, 1: 2.0, 5: 3.0, 6: 4.0, 7: 5.0, 11: 6.0, 30: 7.0, 31: 8.0, 35: 9.0,
+        14: 1e-6, 21: 1e-6, 28: 1e-6,
+    }  # fmt: skip
+    assert {at: value for at, value in enumerate(twist_spread) if value} == {
+        0: 11.0, 5: 12.0, 30: 13.0, 35: 14.0, 7: 1e-6, 14: 1e-6, 21: 1e-6, 28: 1e-6
+    }  # fmt: skip
+
+
+def test_the_transform_is_that_of_the_odometry() -> None:
+    message = factories.odometry(t_ns=T_NS, x=1.0, y=-2.0, heading=-math.pi / 2)
+    (((header, child, (where, turned)),),) = translate.transform(message, "r1/")
+    assert header == (STAMP, "r1/odom")
+    assert child == "r1/base_link"
+    assert where == (1.0, -2.0, 0.0)
+    assert turned == pytest.approx((0.0, 0.0, -HALF, HALF))
+
+
+def test_static_transforms_start_at_base_link() -> None:
+    ((first, *others),) = translate.static_transforms(T_NS, urdf.poses(VEHICLE), "r1/")
+    assert first[0] == (STAMP, "r1/base_link")
+    assert len(others) == 4 + 8 - 1
+    assert all(frame.startswith("r1/") for _, frame, _ in (first, *others))
+
+
+def measured(index: int, distance: float | None, status: str, **settings: Any) -> Any:
+    ranges: list[float | None] = [1.0] * 8
+    statuses = ["ok"] * 8
+    ranges[index], statuses[index] = distance, status
+    message = m.Ultrasonic(ranges=tuple(ranges), status=tuple(statuses), t_ns=T_NS)  # type: ignore[arg-type]
+    mount = sonar_mounts(VEHICLE)[index]
+    return translate.sonar_range(message, index, mount, VEHICLE, Ros2(**settings))
+
+
+def test_a_range_has_the_sonars_frame_and_limits() -> None:
+    header, kind, opening, low, high, distance, variance = measured(
+        2, 0.75, "ok", frame_prefix="r1/", sonar_fov=0.4
+    )
+    assert header == (STAMP, "r1/sonar_front")
+    assert (kind, opening, low, high, distance, variance) == (0, 0.4, 0.05, 5.0, 0.75, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("status", "no_echo", "expected"),
+    [
+        ("no_echo", "max_range", 5.0),
+        ("no_echo", "inf", math.inf),
+        ("too_near", "max_range", 0.05),
+        ("too_near", "inf", 0.05),
+    ],
+)
+def test_a_range_without_a_number(status: str, no_echo: str, expected: float) -> None:
+    assert measured(5, None, status, no_echo=no_echo)[5] == expected
+
+
+def test_a_sonar_with_a_fault_is_not_a_number() -> None:
+    assert math.isnan(measured(0, None, "fault")[5])
+
+
+@pytest.mark.parametrize(("verdict", "level"), [("run", 0), ("slow", 1), ("stop", 1), ("brake", 2)])
+def test_the_status_of_safety(verdict: str, level: int) -> None:
+    state = factories.contact_state(verdict=verdict)
+    assert translate.safety_status(state) == (
+        level, "t2: safety", "The bumper is pressed.", "t2",
+        (
+            ("verdict", verdict), ("source", "none"), ("latched", "contact"),
+            ("linear limit", "1.0"), ("cause contact", "The bumper was hit."),
+        ),
+    )  # fmt: skip
+
+
+def test_the_status_of_safety_without_causes() -> None:
+    values = dict(translate.safety_status(factories.safety_state())[4])
+    assert values == {
+        "verdict": "run", "source": "teleop", "latched": "none", "linear limit": "1.0"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("state", "armed", "level", "text"),
+    [
+        ("up", True, 0, "The board answers."),
+        ("up", False, 1, "The board answers."),
+        ("lost", False, 2, "The board is silent."),
+        ("never", True, 2, "No board yet."),
+    ],
+)
+def test_the_status_of_the_link(state: str, armed: bool, level: int, text: str) -> None:
+    link = factories.link(state=state, armed=armed, waiting="a reset")
+    made = translate.link_status(link)
+    assert made[:3] == (level, "t2: link", text)
+    assert dict(made[4]) == {"board": "10.7.5.224:4002", "armed": str(armed), "waiting": "a reset"}
+
+
+def test_the_status_of_a_driver() -> None:
+    faulty = m.Driver(faults=("over_current", "bit_7"), bits=130)
+    assert translate.driver_status("left", faulty) == (
+        2, "t2: left motor driver", "Faults: over_current, bit_7.", "t2", (("bits", "130"),)
+    )  # fmt: skip
+    healthy = translate.driver_status("right", m.Driver(faults=(), bits=0))
+    assert healthy[:3] == (0, "t2: right motor driver", "No faults.")
+
+
+def test_the_status_of_a_service() -> None:
+    health = m.Health(
+        service="odom", version="1.2", uptime=60.4, rates={}, counters={"resets": 3},
+        lateness=0.0, rss=1,
+    )  # fmt: skip
+    made = translate.health_status(health)
+    assert made[:3] == (0, "t2: service odom", "It runs.")
+    assert dict(made[4]) == {"version": "1.2", "uptime": "60 s", "resets": "3"}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("nav_msgs/msg/Odometry", translate.odometry(factories.odometry(t_ns=T_NS), "")),
+        ("tf2_msgs/msg/TFMessage", translate.transform(factories.odometry(t_ns=T_NS), "")),
+        ("sensor_msgs/msg/Range", measured(0, 0.5, "ok")),
+        ("diagnostic_msgs/msg/DiagnosticStatus", translate.link_status(factories.link())),
+    ],
+)
+def test_every_message_has_the_fields_of_its_type(name: str, value: Any) -> None:
+    assert cdr.decode(name, cdr.encode(name, value))[0] == value[0]
