@@ -13,8 +13,8 @@ from msgspec import Meta, Struct
 
 from common.errors import ConfigError
 
-Role = Literal["robot", "driver", "device", "viewer", "fleet", "site"]
-ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site")
+Role = Literal["robot", "driver", "device", "viewer", "fleet", "site", "ros"]
+ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site", "ros")
 
 # The name of a source, as in ``safety.sources`` and ``safety.limits``.
 SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
@@ -28,7 +28,7 @@ class Member(Struct, frozen=True, kw_only=True):
     common_name: str
     role: Role
     name: Name
-    robots: tuple[str, ...] = ()  # that a driver or device may use, or that a robot is
+    robots: tuple[str, ...] = ()  # that a driver, device or ros may use, or that a robot is
     sources: tuple[SourceName, ...] = ()  # that a driver or device may use; empty: any of a driver
     addresses: tuple[str, ...] = ()  # addresses of a router; empty in older lists
     expires: datetime  # UTC

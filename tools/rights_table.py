@@ -7,6 +7,8 @@ from cli.keys.access import Rights, Verb
 from cli.keys.profile import OPERATORS_SOURCES
 from common import keys
 from common.bus.probe import includes
+from services.ros2 import names
+from services.ros2.config import Ros2
 
 MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 
@@ -17,7 +19,11 @@ ROLES: Mapping[str, Rights] = {
     "fleet": access.fleet(),
     "site's router": access.site(),
     "router of 001": access.robot(MINE),
+    "ros of 001": access.ros(Ros2()),
 }
+LATCHED = names.data_key(0, "/tf_static", "tf2_msgs/msg/TFMessage")
+TWIST, TRIGGER, SET_BOOL = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
+PLANNER = names.Node(0, "9a", "/", "nav")
 DASHBOARD = keys.EVENTS.on(MINE, service="dashboard")
 # One key of each class, with its name in the table.
 CLASSES: Mapping[str, str] = {
@@ -46,6 +52,18 @@ CLASSES: Mapping[str, str] = {
     "health of an operator's teleop": keys.HEALTH.on(MINE, service="teleop"),
     "any other key of the robot": f"{keys.ROOT}/{MINE}/anything",
     "keys outside of T2": "anything",
+    "ROS 2: topics of the domain": names.data_key(0, "/odom", "nav_msgs/msg/Odometry"),
+    "ROS 2: latched messages": f"{LATCHED}/@adv/pub/1/2/_",
+    "ROS 2: `cmd_vel`, TwistStamped": names.data_key(0, "/cmd_vel", f"{TWIST}Stamped"),
+    "ROS 2: `cmd_vel`, Twist": names.data_key(0, "/cmd_vel", TWIST),
+    "ROS 2: `cmd_vel` of another namespace": names.data_key(0, "/t2_002/cmd_vel", TWIST),
+    "ROS 2: emergency stop": names.data_key(0, "/hardware/e_stop_trigger", TRIGGER),
+    "ROS 2: reset": names.data_key(0, "/hardware/e_stop_reset", TRIGGER),
+    "ROS 2: brake switches": names.data_key(0, "/hardware/bumper_brake", SET_BOOL),
+    "ROS 2: nodes of the domain": PLANNER.token,
+    "ROS 2: their publishers": PLANNER.endpoint_token(4, "MP", "/cmd_vel", TWIST, names.QOS),
+    "ROS 2: topics of another domain": names.data_key(1, "/cmd_vel", TWIST),
+    "ROS 2: nodes of another domain": PLANNER._replace(domain=1).token,
 }
 WORDS: Mapping[Verb, str] = {
     "read": "read", "write": "**write**", "ask": "ask", "serve": "answer", "live": "be there",

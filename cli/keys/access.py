@@ -1,15 +1,17 @@
 """Access rules of the bus by role, for Zenoh's access control. Pure.
 
-A role has rights: a verb on key expressions from ``common/keys.py``. A verb stands for a set of
-Zenoh messages in each direction. The router drops all other messages without notice; see
+A role has rights: a verb on key expressions, of ``common/keys.py`` and of ROS 2. A verb stands for
+a set of Zenoh messages in each direction. The router drops all other messages without notice; see
 ``docs/security.md``.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from common import keys
 from common.members import Member
+from services.ros2 import names
+from services.ros2.config import Ros2
 
 Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
 Rights = Mapping[Verb, Sequence[str]]
@@ -50,8 +52,21 @@ QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 LAPTOP_SERVICES = ("dashboard", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
+ROS_TWISTS = ("TwistStamped", "Twist")
+ROS_CALLS = ("hardware/e_stop_trigger", "hardware/e_stop_reset")
+ROS_TOKENS = (7, 11, 12)  # chunks after the domain: of a node, an endpoint, one with backends
 
-def access_control(members: Iterable[Member], trusted: Sequence[str]) -> dict[str, object]:
+
+class RouterSettings(NamedTuple):
+    """The router's own settings that rights depend on."""
+
+    robot: str = "001"
+    ros2: Ros2 = Ros2()
+
+
+def access_control(
+    members: Iterable[Member], trusted: Sequence[str], router: RouterSettings
+) -> dict[str, object]:
     """Return Zenoh's ``access_control``; on-board clients use the ``trusted`` link protocols."""
     subjects: list[dict[str, object]] = []
     rules: dict[str, list[dict[str, object]]] = {}
@@ -61,7 +76,7 @@ def access_control(members: Iterable[Member], trusted: Sequence[str]) -> dict[st
     for member in members:
         name = member.common_name
         subjects.append({"id": name, "cert_common_names": [name]})
-        rules[name] = list(_rules(name, rights(member)))
+        rules[name] = list(_rules(name, rights(member, router)))
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -88,8 +103,10 @@ def _rules(name: str, given: Rights) -> Iterator[dict[str, object]]:
                 }
 
 
-def rights(member: Member) -> Rights:
-    """Return the rights of a member, at any router of its site."""
+def rights(member: Member, router: RouterSettings) -> Rights:
+    """Return the rights of a member at a router of its site."""
+    if member.role == "ros":
+        return ros(router.ros2) if {router.robot, ANY} & {*member.robots} else {}
     if member.role == "robot":
         return robot(member.name)
     if member.role == "site":
@@ -169,6 +186,28 @@ def robot(name: str) -> Rights:
     }
 
 
+def ros(settings: Ros2) -> Rights:
+    """Return the rights of a computer with ROS 2: read topics, command velocity, stop and reset.
+
+    It has no rights on the keys of T2.
+    """
+    domain = settings.domain
+    topics, kept = f"{domain}/**", f"{domain}/**/@adv/**"  # ``**`` does not match @adv
+    everything = (topics, kept, f"{names.LIVELINESS}/{domain}/**")
+
+    def key(name: str, interface: str) -> str:
+        return names.data_key(domain, names.absolute(settings.namespace, name), interface)
+
+    return {
+        "read": everything,
+        "know": everything,
+        "recall": (topics, kept),
+        "ask": (kept, *(key(name, "std_srvs/srv/Trigger") for name in ROS_CALLS)),
+        "write": tuple(key("cmd_vel", f"geometry_msgs/msg/{kind}") for kind in ROS_TWISTS),
+        "live": tuple(f"{names.LIVELINESS}/{domain}{'/*' * chunks}" for chunks in ROS_TOKENS),
+    }
+
+
 def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
     """Return the keys that move and stop a robot, without those reserved for safety."""
     driven = (
@@ -192,5 +231,5 @@ def publishing(services: Sequence[str]) -> dict[Verb, Sequence[str]]:
     }
 
 
-BUS = ("**", "**/@cmd/**", "**/@adv/**", "@/**")
+BUS = ("**", "**/@cmd/**", "**/@adv/**", f"{names.LIVELINESS}/**", "@/**")
 ONBOARD: Rights = dict.fromkeys(VERBS, BUS)

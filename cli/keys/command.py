@@ -69,10 +69,10 @@ def _verb(
 def _add_rights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robot", action="append", default=[], metavar="ID",
-        help="for a driver or device: allow this robot; may be repeated",
+        help="for a driver, device or ros: allow this robot; may be repeated",
     )  # fmt: skip
     parser.add_argument(
-        "--every", action="store_true", help="for a driver or device: allow every robot"
+        "--every", action="store_true", help="for a driver, device or ros: allow every robot"
     )
     parser.add_argument(
         "--source", action="append", default=[], metavar="NAME",

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from cli.keys.machine_settings import MEMBERS, SETTINGS, endpoints
+from cli.keys.machine_settings import MEMBERS, SETTINGS, connected, endpoints, ros_override
 from cli.keys.profile import EVERY_ROBOT, Profile
 from common.members import Member, Role
 
@@ -38,7 +38,7 @@ def certificate_issued(
     yield f"{member.common_name}, valid until {member.expires:%Y-%m-%d}"
     if profile.listens:
         yield f"  addresses {', '.join(profile.addresses)}; valid at no other address"
-    if profile.role == "driver":
+    if profile.role in ("driver", "ros"):
         yield f"  may move {_robots(profile)}"
     if profile.sources:
         verb = "drives" if profile.role == "driver" else f"limits {_robots(profile)}"
@@ -52,7 +52,7 @@ def certificate_issued(
     else:
         yield f"1. Copy the folder {target} to {profile.name}'s computer only."
         yield "2. On that computer:"
-        yield f"     t2 {USED_BY[profile.role]} --config {_last(target)}/{SETTINGS}"
+        yield from _use(profile, target, routers)
     others = [each for each in routers if each.label != profile.label]
     if others or not profile.listens:  # a router's own folder holds the list
         yield from _update_routers("3. ", target, others)
@@ -90,6 +90,15 @@ def _update_routers(number: str, target: str, routers: Sequence[Profile]) -> Ite
         yield f"     {copy}  # {router.role} {router.name}{unknown}"
     yield "   A router in a container needs this instead of a restart:"
     yield f"     {IN_CONTAINERS}"
+
+
+def _use(profile: Profile, target: str, routers: Sequence[Profile]) -> Iterator[str]:
+    if profile.role == "ros":
+        override = ros_override(f"$PWD/{_last(target)}", connected(profile, routers)[0])
+        yield "     export RMW_IMPLEMENTATION=rmw_zenoh_cpp"
+        yield "     export ZENOH_CONFIG_OVERRIDE=" + '"' + override.replace('"', '\\"') + '"'
+    else:
+        yield f"     t2 {USED_BY[profile.role]} --config {_last(target)}/{SETTINGS}"
 
 
 def _robots(profile: Profile) -> str:

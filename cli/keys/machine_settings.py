@@ -23,7 +23,7 @@ def bus_toml(profile: Profile, routers: Sequence[Profile]) -> str:
         lines += ["[robot]", _line("id", profile.robots[0]), ""]
     lines += ["[bus]"]
     if not profile.listens:
-        lines += _connect(endpoints(site or _robot_routers(profile, routers)))
+        lines += _connect(connected(profile, routers))
     else:
         lines += [_line("listen", [SOCKET, ANYWHERE]), _line("members", MEMBERS)]
     if profile.role == "robot" and site:
@@ -31,6 +31,29 @@ def bus_toml(profile: Profile, routers: Sequence[Profile]) -> str:
     lines += [_line("ca", CA), _line("certificate", CERTIFICATE), _line("private_key", PRIVATE_KEY)]
     lines += _sources(profile)
     return "\n".join(lines) + "\n"
+
+
+def connected(profile: Profile, routers: Sequence[Profile]) -> list[str]:
+    """Return the endpoints that a member can connect to: the site's router, or a robot's.
+
+    Topics of ROS 2 do not pass a site's router.
+    """
+    site = [router for router in routers if router.role == "site" and profile.role != "ros"]
+    return endpoints(site or _robot_routers(profile, routers))
+
+
+def ros_override(folder: str, endpoint: str) -> str:
+    """Return ``ZENOH_CONFIG_OVERRIDE`` of rmw_zenoh for a folder of certificates."""
+    tls = "transport/link/tls"
+    values = {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        f"{tls}/root_ca_certificate": f"{folder}/{CA}",
+        f"{tls}/connect_certificate": f"{folder}/{CERTIFICATE}",
+        f"{tls}/connect_private_key": f"{folder}/{PRIVATE_KEY}",
+        f"{tls}/enable_mtls": True,
+    }
+    return ";".join(f"{name}={json.dumps(value)}" for name, value in values.items())
 
 
 def endpoints(routers: Sequence[Profile]) -> list[str]:

@@ -21,7 +21,8 @@ CA_DAYS = 3650
 DAYS = 365
 EARLY_S = DAY_S  # valid from a day ago: clocks differ, and a wrong time zone is up to 14 h
 
-BOUND: tuple[Role, ...] = ("driver", "device")  # to robots and sources
+BOUND: tuple[Role, ...] = ("driver", "device", "ros")  # to robots
+SOURCED: tuple[Role, ...] = ("driver", "device")  # to sources
 LISTENERS: tuple[Role, ...] = ("robot", "site")
 LOCAL = ("localhost", "127.0.0.1")  # for clients on the same host, or through a tunnel
 VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (manual 1 and 1.1)
@@ -44,7 +45,7 @@ class Profile:
 
     role: Role
     name: str
-    robots: tuple[str, ...] = ()  # ids: of a driver or device, or the robot itself
+    robots: tuple[str, ...] = ()  # ids: of a driver, device or ros, or the robot
     addresses: tuple[str, ...] = ()  # IP addresses and host names of a router
     sources: tuple[str, ...] = ()  # of a driver or device; empty: any of a driver
 
@@ -134,14 +135,14 @@ def _check(text: str, kind: object, problem: str) -> None:
 
 
 def _check_sources(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
-    """Reject sources and robots for other roles, and a member without robots that needs one."""
+    """Reject robots and sources for other roles, and a member without robots that needs one."""
     for source in sources:
         _check(source, SourceName, f"--source {source!r} is not a source name: {SOURCE_NAMES}")
     if role in BOUND and not robots:
         raise ConfigError(f"a {role} needs --robot ID for each of its robots, or --every")
     if role not in BOUND and robots:
-        raise ConfigError(f"--robot and --every are for drivers and devices, not for a {role}")
-    if role not in BOUND and sources:
+        raise ConfigError(f"--robot and --every are for drivers, devices and ros, not for a {role}")
+    if role not in SOURCED and sources:
         raise ConfigError(f"--source is for drivers and devices; a {role} uses no source")
 
 

@@ -7,7 +7,7 @@ import signal
 import time
 from pathlib import Path
 
-from cli.keys.access import access_control
+from cli.keys.access import RouterSettings, access_control
 from cli.run.router_probe import RouterProbe
 from common import log, members, realtime
 from common.bus.session import READERS, RUNTIME_ENV, router, router_config
@@ -16,6 +16,13 @@ from common.config import load
 from common.errors import ConfigError
 from common.settings import BusSettings, Shared, is_encrypted
 from common.systemd import Systemd
+from services.ros2.config import Ros2
+
+
+class RouterConfig(Shared, frozen=True, kw_only=True):
+    """All sections that the router reads."""
+
+    ros2: Ros2 = Ros2()  # for the rights of computers with ROS 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,8 +45,8 @@ def add_insecure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Route until SIGINT or SIGTERM."""
-    config = load(Shared, sources(options)).config
-    access = access_of(config.bus)
+    config = load(RouterConfig, sources(options)).config
+    access = access_of(config)
     if options.print:
         printed = json.dumps(router_config(config.bus, access, config.robot.id), indent=2)
         write_text(printed, options.print)
@@ -74,14 +81,16 @@ def write_text(text: str, file: str) -> None:
         raise ConfigError(f"--print {file}: cannot be written: {error.strerror}") from None
 
 
-def access_of(bus: BusSettings) -> dict[str, object] | None:
+def access_of(config: RouterConfig) -> dict[str, object] | None:
     """Return the access rules; None without a member list: all clients have full access.
 
     Raise ``ConfigError`` if the member list cannot be read.
     """
+    bus = config.bus
     if not bus.members:
         return None
-    return access_control(members.read(Path(bus.members)).welcome, bus.onboard)
+    welcome = members.read(Path(bus.members)).welcome
+    return access_control(welcome, bus.onboard, RouterSettings(config.robot.id, config.ros2))
 
 
 def open_to(bus: BusSettings) -> str:

@@ -62,7 +62,7 @@ class Publisher(Struct):
     anchor_ns: int  # the fastest delivery when the settling began
     settling_ns: int  # when it began
     heard_ns: int
-    sequence: int
+    sequence: int = 0
 
 
 class Commands:
@@ -108,7 +108,7 @@ class Commands:
         passed_ns = now_ns - about.source_ns
         known = self._known.pop(about.gid, None)
         if known is None:
-            known = Publisher(passed_ns, passed_ns, now_ns, now_ns, about.sequence)
+            known = Publisher(passed_ns, passed_ns, now_ns, now_ns)
         least_ns = known.least_ns + round(DRIFT * (now_ns - known.heard_ns))
         known.least_ns = min(least_ns, passed_ns)
         if known.least_ns < known.anchor_ns - FASTER_NS:

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from cli.run.router import access_of
+from cli.run.router import RouterConfig, access_of
 from common import codec, keys
 from common.bus.bus import Bus
 from common.loop import Loop
@@ -77,7 +77,7 @@ def secured(site: Site, folder: Path, *words: str) -> Iterator[tuple[str, str]]:
     """
     outside, onboard = f"tls/127.0.0.1:{free_port()}", f"unixsock-stream/{folder}/bus.sock"
     own = site.settings("robot", "001")
-    assert access_of(own) is not None
+    assert access_of(RouterConfig(bus=own)) is not None
     given = [f"bus.{name}={getattr(own, name)}" for name in FILES]
     given.append(f"bus.listen={outside},{onboard}")
     with (folder / "zenohd.log").open("wb") as log:

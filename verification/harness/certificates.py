@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from cli.__main__ import main
-from cli.keys.access import access_control
+from cli.keys.access import RouterSettings, access_control
 from common import members
 from common.bus.session import router
 from common.settings import BusSettings
@@ -49,7 +49,7 @@ class Site:
         onboard = f"unixsock-stream/{self.folder}/bus-{free_port()}.sock"
         where = msgspec.structs.replace(of, listen=(secured, onboard), uplink=uplink)
         listed = members.read(Path(of.members)).welcome
-        with router(where, access_control(listed, ["unixsock-stream"])):
+        with router(where, access_control(listed, ["unixsock-stream"], RouterSettings())):
             yield secured, onboard
 
 

@@ -6,12 +6,16 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from cli.keys.access import VERBS, Verb, access_control, driver, rights
+from cli.keys.access import VERBS, RouterSettings, Verb, access_control, driver, rights, ros
 from common import keys
 from common.members import Member, Role
+from services.ros2 import names
+from services.ros2.config import Ros2
+from services.ros2.rihs import HASHES
 from tools.rights_table import CLASSES, MINE, OTHER, ROLES, may
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
+ROUTER = RouterSettings(robot=MINE)
 ON_BOARD = ("bridge", "safety", "odom", "recorder")
 
 
@@ -56,12 +60,12 @@ def test_a_driver_is_limited_to_its_sources() -> None:
     ):
         bo = replace(member("driver", "bo", (MINE,)), sources=sources)
         for source, wanted in may_use.items():
-            assert may(rights(bo), "write", keys.DRIVE.on(MINE, source=source)) is wanted
-        assert may(rights(bo), "write", keys.estop_key(MINE)), "a driver can stop"
+            assert may(rights(bo, ROUTER), "write", keys.DRIVE.on(MINE, source=source)) is wanted
+        assert may(rights(bo, ROUTER), "write", keys.estop_key(MINE)), "a driver can stop"
 
 
 def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> None:
-    given = rights(replace(member("device", "lidar", (MINE,)), sources=("lidar",)))
+    given = rights(replace(member("device", "lidar", (MINE,)), sources=("lidar",)), ROUTER)
     assert given == ROLES["device lidar of 001"]
     assert may(given, "write", keys.LIMIT.on(MINE, source="lidar"))
     for key in (
@@ -114,16 +118,50 @@ def test_members_can_read_every_published_key(role: str) -> None:
 
 
 def test_a_robots_router_writes_only_its_own_keys() -> None:
-    given = rights(member("robot", OTHER))
+    given = rights(member("robot", OTHER), ROUTER)
     for topic in keys.TOPICS:
         names = {"service": "x", "side": "left", "source": "x"}
         assert may(given, "write", topic.on(OTHER, **names))
         assert not may(given, "write", topic.on(MINE, **names))
 
 
+def test_a_ros_computer_has_rights_at_the_routers_of_its_robots_only() -> None:
+    for robots, wanted in (((MINE,), True), (("*",), True), ((OTHER,), False), ((), False)):
+        given = rights(member("ros", "laptop", robots), ROUTER)
+        assert given == (ROLES["ros of 001"] if wanted else {})
+
+
+def test_a_ros_computer_has_no_rights_on_keys_of_t2() -> None:
+    for expressions in ROLES["ros of 001"].values():
+        for expression in expressions:
+            assert expression.startswith(("0/", "@ros2_lv/0/")), expression
+
+
+def test_a_ros_computer_writes_only_keys_of_fixed_length() -> None:
+    given = ROLES["ros of 001"]
+    for verb in ("write", "live"):
+        assert not [each for each in given[verb] if "**" in each]
+    assert "serve" not in given
+    node = names.Node(0, "9a", "/t2", "nav")
+    endpoint = node.endpoint_token(3, "SC", "/a/b", "std_srvs/srv/Trigger", names.QOS)
+    for token in (node.token, endpoint, endpoint + "/backends:cpu"):
+        assert may(given, "live", token), token
+    assert not may(given, "live", endpoint + "/backends:cpu/more")
+
+
+def test_the_rights_of_a_ros_computer_follow_domain_and_namespace() -> None:
+    given = ros(Ros2(domain=7, namespace="/site/t2"))
+    twist, trigger = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger"
+    assert may(given, "write", names.data_key(7, "/site/t2/cmd_vel", twist))
+    assert may(given, "ask", names.data_key(7, "/site/t2/hardware/e_stop_reset", trigger))
+    assert may(given, "read", "@ros2_lv/7/a/0/0/NN/%/%/n")
+    for key in ("7/cmd_vel", "0/site/t2/cmd_vel"):
+        assert not may(given, "write", f"{key}/{names.wire_type(twist)}/{HASHES[twist]}")
+
+
 def test_rules_by_member_and_full_access_on_board() -> None:
     made: dict[str, Any] = access_control(
-        [member("viewer"), member("driver", "bo", (MINE,))], ["tcp", "unixsock-stream"]
+        [member("viewer"), member("driver", "bo", (MINE,))], ["tcp", "unixsock-stream"], ROUTER
     )
     assert (made["enabled"], made["default_permission"]) == (True, "deny")
     assert made["subjects"] == [
@@ -141,7 +179,7 @@ def test_rules_by_member_and_full_access_on_board() -> None:
 
 
 def test_without_a_trusted_protocol_there_is_no_on_board_subject() -> None:
-    made: dict[str, Any] = access_control([member("viewer")], [])
+    made: dict[str, Any] = access_control([member("viewer")], [], ROUTER)
     assert [subject["id"] for subject in made["subjects"]] == ["viewer.anna.1"]
     assert all(rule["id"].startswith("viewer.anna.1 ") for rule in made["rules"])
 

@@ -1,5 +1,7 @@
 """Instructions after an operation: next commands with actual paths."""
 
+import subprocess
+
 import msgspec
 import pytest
 
@@ -92,6 +94,26 @@ def test_a_viewers_certificate_without_routers() -> None:
     )
     assert "     t2 dashboard --config viewer.v/bus.toml" in printed
     assert "3. Copy ./members.json to each router and restart it." in printed
+
+
+def test_a_ros_computers_environment() -> None:
+    site = [SITE, ROBOT]  # topics of ROS 2 do not pass a site's router
+    laptop = profile("ros", "laptop", ("001",), ())
+    printed = list(
+        instructions.certificate_issued(laptop, member("ros", "laptop"), "keys/ros.laptop", site)
+    )
+    assert "  may move robot 001" in printed
+    (line,) = (line.strip() for line in printed if "ZENOH_CONFIG_OVERRIDE" in line)
+    shell = subprocess.run(
+        ["sh", "-c", f'{line}; printf %s "$ZENOH_CONFIG_OVERRIDE"'],
+        env={"PWD": "/home/anna"}, cwd="/", capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    override = dict(part.split("=", 1) for part in shell.stdout.split(";"))
+    assert override["mode"] == '"client"'
+    assert override["connect/endpoints"] == '["tls/192.168.201.1:7447"]'
+    assert override["transport/link/tls/connect_certificate"].endswith(
+        '/ros.laptop/certificate.pem"'
+    )
 
 
 def test_the_previous_certificate() -> None:

@@ -95,6 +95,6 @@ def test_a_local_router_is_reached_on_localhost() -> None:
 
 @pytest.mark.parametrize("role", ROLES)
 def test_the_first_line_names_the_member(role: str) -> None:
-    others = (Profile(name, "x") for name in ("device", "viewer", "fleet"))
+    others = (Profile(name, "x") for name in ("device", "viewer", "fleet", "ros"))
     who = next(each for each in (ROBOT, SITE, ANNA, *others) if each.role == role)
     assert bus_toml(who, []).startswith(f"# Bus settings of {role} {who.name}")

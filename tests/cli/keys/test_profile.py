@@ -59,6 +59,8 @@ def test_the_longest_source() -> None:
 def test_sources_are_for_drivers() -> None:
     with pytest.raises(ConfigError, match="--source is for drivers and devices; a viewer"):
         profile("viewer", "hall", (), (), ("nav",))
+    with pytest.raises(ConfigError, match="--source is for drivers and devices; a ros"):
+        profile("ros", "laptop", ("001",), (), ("ros2",))
 
 
 @pytest.mark.parametrize("role", ROLES)
@@ -70,8 +72,9 @@ def test_routers_listen(role: Role) -> None:
     ("role", "name", "robots", "addresses", "message"),
     [
         ("driver", "anna", (), (), "a driver needs --robot ID"),
-        ("viewer", "guest", ("001",), (), "are for drivers and devices, not for a viewer"),
-        ("robot", "001", ("002",), (), "are for drivers and devices, not for a robot"),
+        ("viewer", "guest", ("001",), (), "are for drivers, devices and ros, not for a viewer"),
+        ("robot", "001", ("002",), (), "are for drivers, devices and ros, not for a robot"),
+        ("ros", "laptop", (), (), "a ros needs --robot ID"),
         ("fleet", "control", (), ("10.0.0.1",), "a fleet only connects"),
         ("site", "berlin", (), (), "a site's router needs --address"),
         ("driver", "../anna", ("001",), (), "'../anna' is not a name"),
