@@ -44,7 +44,7 @@ def decode(name: str, payload: bytes) -> Value:
         raise CdrError(f"{name}: not plain little-endian CDR: {payload[:4].hex(' ')}")
     if len(payload) < len(HEADER):
         raise CdrError(f"{name}: {len(payload)} bytes are no message")
-    reader = Reader(payload)
+    reader = Reader(payload[len(HEADER) :])
     try:
         return _reader(name)(reader)
     except (struct.error, UnicodeDecodeError, CdrError) as error:
@@ -52,16 +52,16 @@ def decode(name: str, payload: bytes) -> Value:
 
 
 class Reader:
-    """A position in a payload."""
+    """A position in a payload, after its header."""
 
     def __init__(self, payload: bytes) -> None:
         self.payload = payload
-        self.at = len(HEADER)
+        self.at = 0
 
     def take(self, code: str) -> Value:
         """Return the next primitive."""
         size = struct.calcsize(code)
-        self.at += -(self.at - len(HEADER)) % size
+        self.at += -self.at % size
         (value,) = struct.unpack_from(f"<{code}", self.payload, self.at)
         self.at += size
         return value

@@ -16,6 +16,13 @@ from tests.ros2 import oracle
 TYPES = sorted(oracle.message_types())
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _new_codecs() -> None:
+    """Make the codecs anew: those of another run hide a change of the code (mutation tests)."""
+    cdr._writer.cache_clear()
+    cdr._reader.cache_clear()
+
+
 @pytest.mark.parametrize("name", TYPES)
 @given(data=st.data())
 def test_a_payload_is_that_of_rosbags(name: str, data: st.DataObject) -> None:
@@ -60,10 +67,11 @@ def test_a_captured_twist_is_read() -> None:
 @pytest.mark.parametrize(
     ("payload", "reason"),
     [
+        (b"\x01\x01\x00\x00\x00", "String: not plain little-endian CDR: 01 01 00 00$"),
         (b"", "not plain little-endian CDR"),
         (b"\x00\x00\x00\x00", "not plain little-endian CDR"),  # big-endian
         (b"\x00\x01", "2 bytes are no message"),
-        (cdr.HEADER + struct.pack("<I", 2**31), "does not end"),
+        (cdr.HEADER + struct.pack("<I", 2**31), "a string of 2147483648 bytes does not end"),
         (cdr.HEADER + struct.pack("<I", 2) + b"ab", "does not end"),
         (cdr.HEADER + struct.pack("<I", 3) + b"\xff\xfe\0", "decode"),
     ],
@@ -77,6 +85,14 @@ def test_a_sequence_without_end_is_refused() -> None:
     payload = cdr.HEADER + struct.pack("<I", 10_001)
     with pytest.raises(CdrError, match="10001 items"):
         cdr.decode("tf2_msgs/msg/TFMessage", payload)
+    payload = cdr.HEADER + struct.pack("<I", 2**32 - 1)
+    with pytest.raises(CdrError, match="a sequence of 4294967295 items"):
+        cdr.decode("tf2_msgs/msg/TFMessage", payload)
+
+
+def test_the_longest_sequence() -> None:
+    longest = tuple(number % 256 for number in range(cdr.MAX_ITEMS))
+    assert cdr.decode("uint8[]", cdr.encode("uint8[]", longest)) == longest
 
 
 def test_a_covariance_of_another_size_is_refused() -> None:
