@@ -64,6 +64,8 @@ class Observation:
     drivers: dict[str, m.Driver] = field(default_factory=dict)  # motor drivers by side
     safety: m.SafetyState | None = None
     requests: dict[str, set[int]] = field(default_factory=dict)  # boots by source of requests
+    ros_tokens: list[str] = field(default_factory=list)  # of all nodes of ROS 2
+    ros_place: tuple[int, str] | None = None  # domain and namespace of the gateway
     motion: set[int] = field(default_factory=set)  # boots on @cmd/motion
 
     def sent_hz(self, path: str) -> float:

@@ -1,7 +1,8 @@
 """``t2 doctor``: diagnosis of the path from this laptop to the wheels, with remedies.
 
 It checks in the order of a request's path: network, router, services, versions, rights, clock,
-board, switches, sensors, drivers, safety. It only listens and queries; it changes nothing.
+board, switches, sensors, drivers, safety, nodes of ROS 2. It only listens and queries; it changes
+nothing.
 """
 
 import argparse
@@ -17,6 +18,8 @@ from pathlib import Path
 from cli.inspect import diagnosis, output, remedies
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
 from cli.inspect.diagnosis import Attempt, Finding, Observation, diagnose_bus, network
+from cli.inspect.payload import read
+from cli.inspect.ros_graph import diagnose_ros, place
 from cli.inspect.services import discover, routers
 from cli.inspect.session import add_duration, add_options, settings, until_interrupt, wants_json
 from cli.inspect.vehicle import diagnose_vehicle
@@ -28,9 +31,11 @@ from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 from common.settings import BusSettings, Shared
+from services.ros2 import names
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
+ROS_S = 1.0  # a router that denies the query does not answer
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
@@ -76,6 +81,7 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
         return
     yield from diagnose_bus(seen)
     yield from diagnose_vehicle(seen)
+    yield from diagnose_ros(seen)
 
 
 def connect(endpoint: str, bus: BusSettings) -> Attempt:
@@ -148,7 +154,17 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))
+    seen.ros_tokens = opened.alive(f"{names.LIVELINESS}/**", ROS_S)
+    if "ros2" in seen.instances:
+        seen.ros_place = ros_place(opened, robot)
     return seen
+
+
+def ros_place(opened: Probe, robot: str) -> tuple[int, str] | None:
+    """Return the domain and the namespace that the gateway uses; None without its answer."""
+    answers = opened.query(keys.info_key(robot, "ros2", "config"))
+    found = (place(read(answer.payload, answer.encoding).value) for answer in answers)
+    return next((each for each in found if each), None)
 
 
 def listen(opened: Probe, robot: str, seconds: float, seen: Observation) -> None:

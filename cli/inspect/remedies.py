@@ -61,6 +61,20 @@ LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
 LIMIT_SILENT = "start its program, check its network and certificate; see safety.limits"
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
 
+ROS_GATEWAY = "start it: `t2 up --ros2`, or `systemctl enable --now t2-ros2` (docs/ros2.md)"
+ROS_HIDDEN = "this laptop's certificate may not read them: run `t2 doctor` on the robot"
+ROS_TWICE = "stop one of them, or give each robot its own ros2.namespace or ros2.domain"
+ROS_NO_NODE = (
+    "is RMW_IMPLEMENTATION=rmw_zenoh_cpp set, and does the laptop's router or client connect to "
+    "this robot? See docs/ros2.md"
+)
+ROS_DOMAIN = "set ROS_DOMAIN_ID of these nodes, or ros2.domain of the robot"
+ROS_TYPE = "use the type of the table in docs/ros2.md; see ros2.cmd_vel"
+ROS_HASH = "its ROS 2 distribution or its copy of this type is another one; Humble is not supported"
+ROS_QOS = "use durability volatile; tf_static, robot_description and hardware/e_stop are latched"
+ROS_NO_READER = "`ros2 topic echo /odom` shows whether topics arrive; check ros2.namespace"
+ROS_ONE_DRIVER = "one at a time drives: stop the others, or put twist_mux before them"
+
 # By the names of the causes in safety's state.
 CAUSES = {
     "contact": BUMPER,

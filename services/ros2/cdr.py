@@ -5,6 +5,7 @@ tuples, arrays are tuples. Strings carry their length with a closing zero byte. 
 aligned to its size, counted from the end of the four bytes of the encapsulation header.
 """
 
+import re
 import struct
 from collections.abc import Callable
 from functools import cache
@@ -17,6 +18,7 @@ PRIMITIVES = {
     "bool": "?", "byte": "B", "uint8": "B", "int32": "i", "uint32": "I",
     "float32": "f", "float64": "d",
 }  # fmt: skip
+ARRAY = re.compile(r"(.+)\[(\d*)\]")
 MAX_ITEMS = 10_000  # of one sequence that is read; ours are short
 
 Value = Any  # a primitive, a string, or a tuple of values
@@ -146,5 +148,5 @@ def _read_items(read: Read, count: int) -> Read:
 
 def _split(name: str) -> tuple[str, int | None]:
     """Return the type of an array's items and their number, 0 for any; None for no array."""
-    item, bracket, rest = name.partition("[")
-    return item, int(rest[:-1] or 0) if bracket else None
+    found = ARRAY.fullmatch(name)
+    return (found[1], int(found[2] or 0)) if found else (name, None)

@@ -7,6 +7,7 @@ from services.ros2.rihs import HASHES
 
 LIVELINESS = "@ros2_lv"
 EMPTY = "%"  # an empty enclave or namespace
+NODE_CHUNKS = 9  # of a node's token
 CHUNKS = 13  # of an endpoint's token; newer peers may append one with backends
 PART = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 KINDS = {"MP": "publisher", "MS": "subscription", "SS": "service", "SC": "client"}
@@ -21,6 +22,11 @@ class Node(NamedTuple):
     zid: str
     namespace: str  # absolute
     name: str
+
+    @property
+    def path(self) -> str:
+        """The absolute name, such as ``/t2_001/t2``."""
+        return absolute(self.namespace, self.name)
 
     @property
     def token(self) -> str:
@@ -49,15 +55,29 @@ class Peer(NamedTuple):
     qos: str
 
 
+def node(token: str) -> Node | None:
+    """Return the node of any token; None for other keys."""
+    chunks = token.split("/")
+    if len(chunks) < NODE_CHUNKS or chunks[0] != LIVELINESS or not chunks[1].isdecimal():
+        return None
+    return Node(int(chunks[1]), chunks[2], chunks[7].replace(EMPTY, "/"), chunks[8])
+
+
 def peer(token: str) -> Peer | None:
     """Return the endpoint of a token; None for a node's, and for other keys."""
-    chunks = token.split("/")
-    if len(chunks) < CHUNKS or chunks[0] != LIVELINESS or chunks[5] not in KINDS:
+    chunks, owner = token.split("/"), node(token)
+    if owner is None or len(chunks) < CHUNKS or chunks[5] not in KINDS:
         return None
-    zid, kind = chunks[2], KINDS[chunks[5]]
-    namespace, node, topic, wire, digest, qos = chunks[7:13]
-    home = "/" if namespace == EMPTY else namespace.replace(EMPTY, "/") + "/"
-    return Peer(zid, kind, home + node, topic.replace(EMPTY, "/"), interface(wire), digest, qos)
+    topic, wire, digest, qos = chunks[9:13]
+    kind = KINDS[chunks[5]]
+    return Peer(
+        owner.zid, kind, owner.path, topic.replace(EMPTY, "/"), interface(wire), digest, qos
+    )
+
+
+def is_latched(qos: str) -> bool:
+    """Return whether the durability is transient local."""
+    return qos.split(":")[1:2] == ["1"]
 
 
 def is_valid(name: str) -> bool:

@@ -16,9 +16,9 @@ from tests.ros2 import oracle
 TYPES = sorted(oracle.message_types())
 
 
-@pytest.fixture(autouse=True, scope="module")
+@pytest.fixture(autouse=True)
 def _new_codecs() -> None:
-    """Make the codecs anew: those of another run hide a change of the code (mutation tests)."""
+    """Make the codecs anew: those of another test hide a change of the code (mutation tests)."""
     cdr._writer.cache_clear()
     cdr._reader.cache_clear()
 

@@ -46,6 +46,26 @@ def test_a_captured_token_is_read() -> None:
     assert names.peer(f"{CAPTURED}/backends:cpu") == peer  # Lyrical and newer
 
 
+def test_every_token_names_its_node() -> None:
+    assert names.node(CLI.token) == names.node(CAPTURED) == CLI
+    assert CLI.path == "/_ros2cli_10327"
+    inner = names.Node(7, "ab", "/site/t2", "t2")
+    assert names.node(inner.token) == inner
+    assert inner.path == "/site/t2/t2"
+
+
+@pytest.mark.parametrize("token", ["a/b", "x" + CLI.token, CLI.token.replace("/0/", "/x/", 1)])
+def test_other_keys_are_no_node(token: str) -> None:
+    assert names.node(token) is None
+
+
+def test_durability() -> None:
+    assert names.is_latched(names.QOS_LATCHED)
+    assert names.is_latched("2:1:,5:,:,:,,")
+    assert not names.is_latched(names.QOS)
+    assert not names.is_latched("")
+
+
 @pytest.mark.parametrize("token", [CLI.token, "a/b", f"{CAPTURED[:40]}", "x" + CAPTURED])
 def test_other_keys_are_no_endpoint(token: str) -> None:
     assert names.peer(token) is None
