@@ -71,7 +71,7 @@ class CommandPublisher:
     def send(self, seconds: float, linear: float = 0.0, angular: float = 0.0) -> None:
         """Send the command again and again for this time."""
         vector = oracle.STORE.types["geometry_msgs/msg/Vector3"]
-        twist = oracle.STORE.types["geometry_msgs/msg/Twist"](
+        twist: Any = oracle.STORE.types["geometry_msgs/msg/Twist"](
             linear=vector(x=linear, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=angular)
         )
         end_s = time.monotonic() + seconds

@@ -55,9 +55,9 @@ def main() -> int:
         zenoh.open(client_config(at(it.endpoint))) as session,
     ):
         alone = cpu(it, options.seconds)
-        heard = session.declare_subscriber("0/**", lambda _: None)
+        received = session.declare_subscriber("0/**", lambda _: None)
         subscribed = cpu(it, options.seconds)
-        heard.undeclare()
+        received.undeclare()
         with sources(it, session) as both:
             delays = measured(it, both, options.rounds, options.requests)
     print(f"gateway CPU, nobody subscribed  {100 * alone:5.1f} % of a core")
