@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet vehicles bench compose-test rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench compose-test rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -97,6 +97,9 @@ roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roamin
 
 vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
 	$(BIN)/python -m verification.vehicles --runs $(or $(N),1000) --out docs/vehicles.md
+
+ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz, older versions of Zenoh and hostile peers; needs cargo
+	$(BIN)/python -m verification.ros2
 
 check: lint types cover search ## what CI runs: format, lint, spelling, types, import rules, tests, coverage, mutants
 	@$(MAKE) --no-print-directory mutants CHANGED=1

@@ -1,1 +1,1 @@
-"""Verification of the gateway to ROS 2 with independent peers, and its cost."""
+"""The gateway to ROS 2 with independent peers, older versions of Zenoh, and its cost."""

@@ -1,0 +1,160 @@
+"""The stack with its simulator and the gateway, and what ROS peers cause on it."""
+
+import contextlib
+import json
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from cli.settings import Everything
+from common import child_process, keys
+from common.bus.bus import Arrival, Bus
+from common.loop import Loop
+from common.messages import Health, SafetyState
+from sim.trace import Truth
+from verification.harness.bus import bus_on, running, set_options
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.trace import TraceFollower, last_move_s, moves
+from verification.harness.waiting import becomes_true, wait_until
+
+GATEWAY = "ros2"  # its process and its source of drive requests
+STILL_MPS, MOTION_MPS = 0.001, 0.1
+MARGIN_S = 0.2  # of a busy host, added to the lease
+PATIENCE_S = 30.0  # of a peer's command, on a busy host
+
+
+class Robot:
+    """A running stack with the gateway, observed on its bus and at its board."""
+
+    def __init__(self, stack: RunningStack, peer: Path) -> None:
+        self.stack = stack
+        self.frames = TraceFollower(stack.trace_file)
+        self.state: SafetyState | None = None
+        self.counters: Mapping[str, int] = {}  # of the gateway
+        self._peer = peer
+
+    def declare(self, bus: Bus) -> None:
+        """Subscribe to safety's state and the gateway's counters."""
+
+        def on_state(arrival: Arrival[SafetyState]) -> None:
+            self.state = arrival.message
+
+        def on_health(arrival: Arrival[Health]) -> None:
+            self.counters = arrival.message.counters
+
+        bus.subscribe(keys.SAFETY, on_state)
+        bus.subscribe(keys.HEALTH, on_health, service=GATEWAY)
+
+    def peer(self, *words: object, endpoint: str = "") -> "subprocess.Popen[str]":
+        """Start the node of the crate; it prints JSON lines."""
+        command = [str(self._peer), endpoint or self.stack.endpoint, *map(str, words)]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.stack.others.append(process)  # type: ignore[arg-type]
+        return process
+
+    def peer_lines(self, *words: object) -> list[Any]:
+        """Run the node of the crate to its end; return what it printed."""
+        return finished(self.peer(*words))
+
+    def truth(self) -> Truth:
+        """Return the true state of the vehicle."""
+        return self.stack.control.truth()
+
+    def distance(self) -> float:
+        """Return the distance driven since the start, in metres."""
+        return self.truth().distance
+
+    @property
+    def lease_s(self) -> float:
+        """Return the lease of the gateway's requests, in seconds."""
+        return self.stack.config.safety.sources[GATEWAY].lease
+
+    def latched(self) -> tuple[str, ...]:
+        """Return the causes that need a reset; fails without a state."""
+        assert self.state is not None, "safety publishes no state"
+        return self.state.latched
+
+    def is_moving(self) -> bool:
+        """Return whether the board's last command moves the vehicle."""
+        commands = self.frames.follow().commands
+        return bool(commands) and moves(commands[-1])
+
+    def wait_motion(self, direction: int = 1) -> None:
+        """Wait until the vehicle moves, forward or backward (-1), by its last command."""
+        moves = becomes_true(
+            lambda: self.is_moving() and direction * self.truth().linear > MOTION_MPS, PATIENCE_S
+        )
+        assert moves, f"does not move; safety: {self.state and self.state.text}"
+
+    def wait_standstill(self) -> None:
+        """Wait until the vehicle stands, with no command to move."""
+        stands = becomes_true(
+            lambda: not self.is_moving() and abs(self.truth().linear) < STILL_MPS, PATIENCE_S
+        )
+        assert stands, f"does not stand; safety: {self.state and self.state.text}"
+
+    def is_ready(self) -> bool:
+        """Return whether safety lacks nothing but a request."""
+        return self.state is not None and [it.name for it in self.state.causes] == ["no_request"]
+
+    def wait_counter(self, name: str, before: int) -> int:
+        """Wait until a counter of the gateway exceeds a value; return its value."""
+        return wait_until(
+            lambda: self.counters.get(name, 0) > before and self.counters[name],
+            f"counter {name} above {before}, not {dict(self.counters)}",
+        )
+
+    def killed(self, process: "subprocess.Popen[str]") -> int:
+        """Kill a peer with SIGKILL; return the time, in monotonic nanoseconds."""
+        at_ns = time.monotonic_ns()
+        process.kill()
+        process.communicate()
+        return at_ns
+
+    def stops_within_lease(self, since_ns: int) -> str:
+        """Check that the last command to move came within the lease; return the observation."""
+        self.wait_standstill()
+        took_s = last_move_s(self.frames.follow().commands, since_ns)
+        allowed_s = self.lease_s + MARGIN_S
+        assert took_s <= allowed_s, f"moved for {took_s:.3f} s, {allowed_s:.3f} s are allowed"
+        return f"last command to move after {took_s:.3f} s, lease {self.lease_s:.1f} s"
+
+    def moved_during(self, do: Callable[[], object]) -> float:
+        """Return the distance that the vehicle drives meanwhile and until it stands, in metres."""
+        before = self.distance()
+        do()
+        self.wait_standstill()
+        return self.distance() - before
+
+    def ended(self) -> list[str]:
+        """Return the processes of the stack that have ended."""
+        return [name for name, it in self.stack.processes.items() if it.poll() is not None]
+
+
+def finished(process: "subprocess.Popen[str]") -> list[Any]:
+    """Return the JSON lines of a peer that ends well; raise AssertionError."""
+    output, errors = process.communicate(timeout=2 * PATIENCE_S)
+    assert process.returncode == 0, f"exit code {process.returncode}: {errors[-500:]}"
+    return [json.loads(line) for line in output.splitlines() if line.startswith(("{", "["))]
+
+
+@contextlib.contextmanager
+def robot_with_gateway(folder: Path, peer: Path) -> Iterator[Robot]:
+    """Run the stack in an empty world; only a request is missing when the context begins."""
+
+    def beside(config: Everything) -> Mapping[str, list[str]]:
+        where = set_options(f"bus.connect={config.bus.endpoints[0]}")
+        return {GATEWAY: child_process.command(f"services.{GATEWAY}", *where)}
+
+    loop = Loop()
+    with (
+        running_stack(folder, beside=beside) as stack,
+        running(loop),
+        bus_on(stack.endpoint, loop, (robot := Robot(stack, peer)).declare),
+    ):
+        wait_until(robot.is_ready, "safety ready")
+        yield robot
