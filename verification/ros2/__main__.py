@@ -64,7 +64,7 @@ def run(folder: Path, peer: Path, checks: Sequence[Check]) -> list[Row]:
 def _row(folder: Path, peer: Path, group: str, name: str, check: Callable[[Robot], str]) -> Row:
     began_s = time.monotonic()
     try:
-        with robot_with_gateway(folder, peer) as robot:
+        with robot_with_gateway(folder, peer, independent.SETTINGS.get(name, ())) as robot:
             observed = check(robot)
     except Exception as error:
         traceback.print_exc()

@@ -2,9 +2,10 @@
 
 import contextlib
 import json
+import os
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ class Robot:
         self.frames = TraceFollower(stack.trace_file)
         self.state: SafetyState | None = None
         self.counters: Mapping[str, int] = {}  # of the gateway
+        self.ros_domain = 0  # of the crate's nodes
         self._peer = peer
 
     def declare(self, bus: Bus) -> None:
@@ -47,12 +49,13 @@ class Robot:
         bus.subscribe(keys.SAFETY, on_state)
         bus.subscribe(keys.HEALTH, on_health, service=GATEWAY)
 
-    def peer(self, *words: object, endpoint: str = "") -> "subprocess.Popen[str]":
+    def peer(self, *words: object) -> "subprocess.Popen[str]":
         """Start the node of the crate; it prints JSON lines."""
-        command = [str(self._peer), endpoint or self.stack.endpoint, *map(str, words)]
+        command = [str(self._peer), self.stack.endpoint, *map(str, words)]
         process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(self.ros_domain)},
+        )  # fmt: skip
         self.stack.others.append(process)  # type: ignore[arg-type]
         return process
 
@@ -67,6 +70,11 @@ class Robot:
     def distance(self) -> float:
         """Return the distance driven since the start, in metres."""
         return self.truth().distance
+
+    @property
+    def port(self) -> int:
+        """Return the TCP port of the router."""
+        return int(self.stack.endpoint.rsplit(":", 1)[1])
 
     @property
     def lease_s(self) -> float:
@@ -98,8 +106,8 @@ class Robot:
         assert stands, f"does not stand; safety: {self.state and self.state.text}"
 
     def is_ready(self) -> bool:
-        """Return whether safety lacks nothing but a request."""
-        return self.state is not None and [it.name for it in self.state.causes] == ["no_request"]
+        """Return whether safety lacks at most a request."""
+        return self.state is not None and {it.name for it in self.state.causes} <= {"no_request"}
 
     def wait_counter(self, name: str, before: int) -> int:
         """Wait until a counter of the gateway exceeds a value; return its value."""
@@ -143,11 +151,14 @@ def finished(process: "subprocess.Popen[str]") -> list[Any]:
 
 
 @contextlib.contextmanager
-def robot_with_gateway(folder: Path, peer: Path) -> Iterator[Robot]:
-    """Run the stack in an empty world; only a request is missing when the context begins."""
+def robot_with_gateway(folder: Path, peer: Path, sets: Sequence[str] = ()) -> Iterator[Robot]:
+    """Run the stack in an empty world; only a request is missing when the context begins.
+
+    ``sets`` are settings of the gateway.
+    """
 
     def beside(config: Everything) -> Mapping[str, list[str]]:
-        where = set_options(f"bus.connect={config.bus.endpoints[0]}")
+        where = set_options(f"bus.connect={config.bus.endpoints[0]}", *sets)
         return {GATEWAY: child_process.command(f"services.{GATEWAY}", *where)}
 
     loop = Loop()

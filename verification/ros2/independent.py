@@ -1,5 +1,6 @@
 """Checks with hiroz, an independent implementation of ROS 2; each returns its observation."""
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from verification.harness.waiting import wait_until
@@ -19,19 +20,22 @@ COMMANDS = [
     ["/cmd_vel", "geometry_msgs::msg::dds_::TwistStamped_"],
     ["/cmd_vel", "geometry_msgs::msg::dds_::Twist_"],
 ]
+GLOBAL = {"/tf", "/tf_static", "/diagnostics"}  # without the namespace
+DOMAIN, NAMESPACE = 7, "/t2_001"
 SERVICES = {
     "/hardware/e_stop_trigger": "std_srvs::srv::dds_::Trigger_",
     "/hardware/e_stop_reset": "std_srvs::srv::dds_::Trigger_",
     "/hardware/bumper_brake": "std_srvs::srv::dds_::SetBool_",
     "/hardware/ultrasonic_brake": "std_srvs::srv::dds_::SetBool_",
 }
-DRIVE = "drive", 0.4, 0.0, 2.0
+STAMPED, PLAIN = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"
+DRIVE = "drive", "/cmd_vel", STAMPED, 0.4, 0.0, 2.0
 DRIVEN_M = 0.2, 1.2  # the vehicle accelerates within its limits
 
 
 def graph(robot: Robot) -> str:
     """List the node, its topics with types, and its services."""
-    (found,) = robot.peer_lines("graph")
+    (found,) = robot.peer_lines("graph", "/")
     assert ["t2", "/"] in found["nodes"], found["nodes"]
     published = dict(found["publishers"])
     missing = {name for name, kind in TOPICS.items() if published.get(name) != kind}
@@ -51,6 +55,16 @@ def odometry(robot: Robot) -> str:
     assert abs(at["x"] - truth.x) < 0.1, (at, truth)
     assert len(last["pose"]["covariance"]) == 36, last
     return f"20 messages, x = {at['x']:.2f} m, truth {truth.x:.2f} m"
+
+
+def transforms(robot: Robot) -> str:
+    """Receive the transform from odom to base_link."""
+    *_, last = robot.peer_lines("echo", "/tf", "tf2_msgs/msg/TFMessage", 5)
+    (found,) = last["transforms"]
+    frames = found["header"]["frame_id"], found["child_frame_id"]
+    assert frames == ("odom", "base_link"), frames
+    assert found["transform"]["rotation"]["w"] > 0.99, found
+    return "5 messages, odom to base_link"
 
 
 def sonar(robot: Robot) -> str:
@@ -77,18 +91,39 @@ def description(robot: Robot) -> str:
 
 
 def drive(robot: Robot) -> str:
-    """Drive; the vehicle moves as odometry reports it, and stands afterwards."""
-    before = _x(robot)
+    """Drive by TwistStamped; the vehicle moves as odometry reports it, and stands afterwards."""
+    return _drives(robot, *DRIVE)
+
+
+def drive_plain(robot: Robot) -> str:
+    """Drive by Twist."""
+    return _drives(robot, "drive", "/cmd_vel", PLAIN, *DRIVE[3:])
+
+
+def namespace(robot: Robot) -> str:
+    """Use a gateway with another domain and namespace; the default ones do nothing."""
+    robot.ros_domain = DOMAIN
+    found = robot.peer_lines("graph", NAMESPACE)[0]
+    assert ["t2", NAMESPACE] in found["nodes"], found["nodes"]
+    expected = {name if name in GLOBAL else f"{NAMESPACE}{name}" for name in TOPICS}
+    missing = expected - set(dict(found["publishers"]))
+    assert not missing, f"{missing} missing in {found}"
+    pose = robot.peer_lines("echo", f"{NAMESPACE}/odom", "nav_msgs/msg/Odometry", 1)[0]
+    assert pose["header"]["frame_id"] == "t2_001/odom", pose
     moved = robot.moved_during(lambda: robot.peer_lines(*DRIVE))
-    assert DRIVEN_M[0] < moved < DRIVEN_M[1], f"moved {moved:.2f} m"
-    reported = _x(robot) - before
-    assert abs(reported - moved) < 0.1, f"odometry moved {reported:.2f} m, vehicle {moved:.2f} m"
-    return f"moved {moved:.2f} m, odometry {reported:.2f} m, then stands"
+    assert moved < 0.01, f"moved {moved:.2f} m by /cmd_vel"
+    topic = f"{NAMESPACE}/cmd_vel"
+    moved = robot.moved_during(lambda: robot.peer_lines("drive", topic, *DRIVE[2:]))
+    assert moved > DRIVEN_M[0], f"moved {moved:.2f} m by {topic}"
+    robot.ros_domain = 0
+    moved = robot.moved_during(lambda: robot.peer_lines("drive", topic, *DRIVE[2:]))
+    assert moved < 0.01, f"moved {moved:.2f} m from domain 0"
+    return f"node {NAMESPACE}/t2 in domain {DOMAIN}; /cmd_vel and domain 0 do not move it"
 
 
 def stop_and_reset(robot: Robot) -> str:
     """Trigger the emergency stop while it drives; a drive does nothing until the reset."""
-    driving = robot.peer("drive", 0.4, 0.0, 8.0)
+    driving = robot.peer(*DRIVE[:-1], 8.0)
     robot.wait_motion()
     (stopped,) = robot.peer_lines("call", "/hardware/e_stop_trigger")
     assert stopped["success"], stopped
@@ -109,11 +144,20 @@ def stop_and_reset(robot: Robot) -> str:
 
 def killed(robot: Robot) -> str:
     """Kill the peer with SIGKILL while it drives; the vehicle stops within the lease."""
-    driving = robot.peer("drive", 0.4, 0.0, 30.0)
+    driving = robot.peer(*DRIVE[:-1], 30.0)
     robot.wait_motion()
     observed = robot.stops_within_lease(robot.killed(driving))
     assert not robot.ended(), robot.ended()
     return observed
+
+
+def _drives(robot: Robot, *words: object) -> str:
+    before = _x(robot)
+    moved = robot.moved_during(lambda: robot.peer_lines(*words))
+    assert DRIVEN_M[0] < moved < DRIVEN_M[1], f"moved {moved:.2f} m"
+    reported = _x(robot) - before
+    assert abs(reported - moved) < 0.1, f"odometry moved {reported:.2f} m, vehicle {moved:.2f} m"
+    return f"moved {moved:.2f} m, odometry {reported:.2f} m, then stands"
 
 
 def _x(robot: Robot) -> float:
@@ -121,4 +165,14 @@ def _x(robot: Robot) -> float:
     return float(found[0]["pose"]["pose"]["position"]["x"])
 
 
-CHECKS = (graph, odometry, sonar, static_transforms, description, drive, stop_and_reset, killed)
+CHECKS: Sequence[Callable[[Robot], str]] = (
+    graph, odometry, transforms, sonar, static_transforms, description,
+    drive, drive_plain, stop_and_reset, killed, namespace,
+)  # fmt: skip
+SETTINGS: Mapping[str, Sequence[str]] = {  # of the gateway, by the name of the check
+    "namespace": (
+        f"ros2.domain={DOMAIN}",
+        f"ros2.namespace={NAMESPACE}",
+        f"ros2.frame_prefix={NAMESPACE[1:]}/",
+    ),
+}

@@ -103,6 +103,11 @@ class PlainPeer:
         self._number += 1
         return Endpoint(self.session, self._number, kind, name, about)
 
+    def tokens(self) -> list[str]:
+        """Return the liveliness tokens of all nodes and endpoints."""
+        replies = self.session.liveliness().get("@ros2_lv/0/**", timeout=PATIENCE_S)
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
     def commands(self, about: str = TWIST) -> Endpoint:
         """Declare a publisher of commands; ``about`` is another type and hash."""
         return self.endpoint("MP", "/cmd_vel", about)

@@ -1,16 +1,18 @@
 //! An independent ROS 2 node that prints what it sees as JSON lines.
 //!
-//! `t2-ros2-peer ENDPOINT graph`                               node t2: publishers, subscriptions, services
-//! `t2-ros2-peer ENDPOINT echo TOPIC TYPE COUNT`               messages of a topic
-//! `t2-ros2-peer ENDPOINT drive LINEAR ANGULAR SECONDS`        neutral commands for 1 s, motion, neutral
-//! `t2-ros2-peer ENDPOINT call SERVICE`                        a call of std_srvs/srv/Trigger
+//! `t2-ros2-peer ENDPOINT graph NAMESPACE`: node t2 with its publishers, subscriptions, services
+//! `t2-ros2-peer ENDPOINT echo TOPIC TYPE COUNT`: messages of a topic
+//! `t2-ros2-peer ENDPOINT drive TOPIC TYPE LINEAR ANGULAR SECONDS`: neutral commands, motion, neutral
+//! `t2-ros2-peer ENDPOINT call SERVICE`: a call of std_srvs/srv/Trigger
+//!
+//! `ROS_DOMAIN_ID` is the domain.
 
 mod messages;
 
 use std::time::{Duration, Instant};
 
 use hiroz::entity::EndpointKind;
-use hiroz::msg::ZMessage;
+use hiroz::msg::{SerdeCdrSerdes, ZMessage};
 use hiroz::prelude::*;
 use messages::*;
 use serde::Serialize;
@@ -35,10 +37,25 @@ async fn main() -> Result<()> {
         .build()?;
     let node = context.create_node("peer").build()?;
     match words {
-        ["graph"] => graph(&node).await,
+        ["graph", namespace] => graph(&node, namespace).await,
         ["echo", topic, kind, count] => echo(&node, topic, kind, count.parse()?),
-        ["drive", linear, angular, seconds] => {
-            drive(&node, linear.parse()?, angular.parse()?, seconds.parse()?).await
+        ["drive", topic, kind, linear, angular, seconds] => {
+            let (linear, angular) = (linear.parse()?, angular.parse()?);
+            let lasts = Duration::from_secs_f64(seconds.parse()?);
+            let plain = |moves| {
+                if moves {
+                    twist(linear, angular)
+                } else {
+                    twist(0.0, 0.0)
+                }
+            };
+            match *kind {
+                "geometry_msgs/msg/Twist" => drive(&node, topic, lasts, plain).await,
+                "geometry_msgs/msg/TwistStamped" => {
+                    drive(&node, topic, lasts, |moves| stamped(plain(moves))).await
+                }
+                _ => Err(format!("no command {kind}").into()),
+            }
         }
         ["call", service] => call(&node, service).await,
         _ => Err("commands: graph, echo, drive, call".into()),
@@ -46,12 +63,13 @@ async fn main() -> Result<()> {
 }
 
 /// Print the endpoints of the robot's node as soon as its services are known.
-async fn graph(node: &ZNode) -> Result<()> {
+async fn graph(node: &ZNode, namespace: &str) -> Result<()> {
     let began = Instant::now();
+    let root = if namespace == "/" { "" } else { namespace };
     let of = |kind| {
         let found = node
             .graph()
-            .get_entities_by_node(kind, (String::new(), "t2".into()));
+            .get_entities_by_node(kind, (root.into(), "t2".into()));
         let mut rows: Vec<_> = found
             .iter()
             .map(|one| {
@@ -89,7 +107,7 @@ fn echo(node: &ZNode, topic: &str, kind: &str, count: usize) -> Result<()> {
 
 fn receive<T>(node: &ZNode, topic: &str, count: usize, latched: bool) -> Result<()>
 where
-    T: ZMessage<Serdes = hiroz::msg::SerdeCdrSerdes<T>> + WithTypeInfo,
+    T: ZMessage<Serdes = SerdeCdrSerdes<T>> + WithTypeInfo,
     T: Serialize + DeserializeOwned + Send + Sync + 'static,
 {
     let durability = if latched {
@@ -108,45 +126,54 @@ where
     Ok(())
 }
 
-/// Publish commands at 20 Hz, and print when each part begins.
-async fn drive(node: &ZNode, linear: f64, angular: f64, seconds: f64) -> Result<()> {
-    let publisher = node.create_pub::<TwistStamped>("/cmd_vel").build()?;
-    let parts = [
-        ("neutral", 0.0, 0.0, NEUTRAL),
-        ("motion", linear, angular, Duration::from_secs_f64(seconds)),
-        ("neutral", 0.0, 0.0, NEUTRAL),
-    ];
+/// Publish commands at 20 Hz, and print when each part begins; `command` takes whether it moves.
+async fn drive<T>(
+    node: &ZNode,
+    topic: &str,
+    lasts: Duration,
+    command: impl Fn(bool) -> T,
+) -> Result<()>
+where
+    T: ZMessage<Serdes = SerdeCdrSerdes<T>> + WithTypeInfo,
+    T: Serialize + Send + Sync + 'static,
+{
+    let publisher = node.create_pub::<T>(topic).build()?;
     let mut tick = tokio::time::interval(PERIOD);
-    for (name, linear, angular, lasts) in parts {
-        print(&json!({ "part": name }))?;
+    for (moves, lasts) in [(false, NEUTRAL), (true, lasts), (false, NEUTRAL)] {
+        print(&json!({ "moves": moves }))?;
         let began = Instant::now();
         while began.elapsed() < lasts {
             tick.tick().await;
-            publisher.async_publish(&twist(linear, angular)).await?;
+            publisher.async_publish(&command(moves)).await?;
         }
     }
-    print(&json!({ "part": "end" }))
+    Ok(())
+}
+
+fn twist(linear: f64, angular: f64) -> Twist {
+    Twist {
+        linear: Vector3 {
+            x: linear,
+            y: 0.0,
+            z: 0.0,
+        },
+        angular: Vector3 {
+            x: 0.0,
+            y: 0.0,
+            z: angular,
+        },
+    }
 }
 
 /// Return a command with a zero stamp: the robot uses the time of the attachment.
-fn twist(linear: f64, angular: f64) -> TwistStamped {
+fn stamped(twist: Twist) -> TwistStamped {
+    let stamp = Time { sec: 0, nanosec: 0 };
     TwistStamped {
         header: Header {
-            stamp: Time { sec: 0, nanosec: 0 },
+            stamp,
             frame_id: "base_link".into(),
         },
-        twist: Twist {
-            linear: Vector3 {
-                x: linear,
-                y: 0.0,
-                z: 0.0,
-            },
-            angular: Vector3 {
-                x: 0.0,
-                y: 0.0,
-                z: angular,
-            },
-        },
+        twist,
     }
 }
 
