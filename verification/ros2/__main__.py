@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from verification.harness.results import table
-from verification.ros2 import build, hostile, independent, older
+from verification.ros2 import build, dead, held_back, hostile, independent, older
 from verification.ros2.fixture import Robot, robot_with_gateway
 
 HEAD = "group", "check", "observation", ""
@@ -46,7 +46,9 @@ def chosen(only: str | None) -> list[Check]:
     found += [
         ("zenoh", version, partial(older.version, zenoh=version)) for version in older.VERSIONS
     ]
-    found += [("hostile", check.__name__, check) for check in hostile.CHECKS]
+    for module in (dead, hostile, held_back):
+        group = module.__name__.rsplit(".", 1)[1]
+        found += [(group, check.__name__, check) for check in module.CHECKS]
     return [each for each in found if not only or only in f"{each[0]} {each[1]}"]
 
 

@@ -22,6 +22,7 @@ from verification.harness.waiting import becomes_true, wait_until
 
 GATEWAY = "ros2"  # its process and its source of drive requests
 STILL_MPS, MOTION_MPS = 0.001, 0.1
+STILL_M = 0.01  # no motion
 MARGIN_S = 0.2  # of a busy host, added to the lease
 PATIENCE_S = 30.0  # of a peer's command, on a busy host
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from verification.harness.waiting import wait_until
-from verification.ros2.fixture import Robot, finished
+from verification.ros2.fixture import STILL_M, Robot, finished
 
 TOPICS = {
     "/odom": "nav_msgs::msg::dds_::Odometry_",
@@ -111,13 +111,13 @@ def namespace(robot: Robot) -> str:
     pose = robot.peer_lines("echo", f"{NAMESPACE}/odom", "nav_msgs/msg/Odometry", 1)[0]
     assert pose["header"]["frame_id"] == "t2_001/odom", pose
     moved = robot.moved_during(lambda: robot.peer_lines(*DRIVE))
-    assert moved < 0.01, f"moved {moved:.2f} m by /cmd_vel"
+    assert moved < STILL_M, f"moved {moved:.2f} m by /cmd_vel"
     topic = f"{NAMESPACE}/cmd_vel"
     moved = robot.moved_during(lambda: robot.peer_lines("drive", topic, *DRIVE[2:]))
     assert moved > DRIVEN_M[0], f"moved {moved:.2f} m by {topic}"
     robot.ros_domain = 0
     moved = robot.moved_during(lambda: robot.peer_lines("drive", topic, *DRIVE[2:]))
-    assert moved < 0.01, f"moved {moved:.2f} m from domain 0"
+    assert moved < STILL_M, f"moved {moved:.2f} m from domain 0"
     return f"node {NAMESPACE}/t2 in domain {DOMAIN}; /cmd_vel and domain 0 do not move it"
 
 
@@ -133,7 +133,7 @@ def stop_and_reset(robot: Robot) -> str:
     (latched,) = robot.peer_lines("echo", "/hardware/e_stop", "std_msgs/msg/Bool", 1)
     assert latched["data"], latched
     moved = robot.moved_during(lambda: robot.peer_lines(*DRIVE))
-    assert moved < 0.01, f"moved {moved:.2f} m while latched"
+    assert moved < STILL_M, f"moved {moved:.2f} m while latched"
     (cleared,) = robot.peer_lines("call", "/hardware/e_stop_reset")
     assert cleared["success"], cleared
     wait_until(lambda: not robot.latched(), "no latch after the reset")
