@@ -23,10 +23,10 @@ Row = tuple[str, str, str, str]
 def main(argv: Sequence[str] | None = None) -> int:
     """Return 1 when a check fails, and 0 when cargo is missing."""
     options = _parser().parse_args(argv)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the processes of the check
     if not build.has_cargo():
         print("skipped: cargo is not installed; install Rust from https://rustup.rs")
         return 0
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the processes of the check
     try:
         peer = build.crate()
     except build.BuildError as error:
