@@ -8,9 +8,11 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from common.operator import reset_request
 from common.service import Node
+from services.ros2.attachment import Attachment
+from services.ros2.call_age import reset_refusal
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
-from services.ros2.endpoints import Answer, Endpoints
+from services.ros2.endpoints import Answer, Endpoints, Serve
 
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
 TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
@@ -35,7 +37,7 @@ class Calls:
             ros.serve(absolute(f"hardware/{name}"), SET_BOOL, self._switch(name))
         node.loop.every(REPEAT_S, self._confirm)
 
-    def _stop(self, _: Value, answer: Answer) -> None:
+    def _stop(self, _: Attachment, __: Value, answer: Answer) -> None:
         """Stop the robot, and answer when safety's state shows it."""
         self._node.bus.estop()
         self._stops.append((answer, time.monotonic_ns()))
@@ -57,11 +59,14 @@ class Calls:
         if self._stops:
             self._node.bus.estop()
 
-    def _reset(self, _: Value, answer: Answer) -> None:
-        """Clear what is latched now."""
+    def _reset(self, about: Attachment, _: Value, answer: Answer) -> None:
+        """Clear what is latched now, unless it is newer than the request."""
         state = self._state()
         if state is None:
             answer((False, "Safety is silent."))
+            return
+        if reason := reset_refusal(state, about.source_ns, time.time_ns()):
+            answer((False, reason))
             return
         self._node.bus.call(
             keys.RESET,
@@ -70,8 +75,8 @@ class Calls:
             lambda reason: answer((False, reason)),
         )
 
-    def _switch(self, name: str) -> Callable[[Value, Answer], None]:
-        def handle(request: Value, answer: Answer) -> None:
+    def _switch(self, name: str) -> Serve:
+        def handle(_: Attachment, request: Value, answer: Answer) -> None:
             state = self._state()
             echo = state.heartbeat if state else None
             self._node.bus.call(

@@ -24,7 +24,7 @@ from services.ros2.cdr import CdrError, Value
 Post = Callable[[Callable[[], None]], None]
 Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time (monotonic, ns)
 Answer = Callable[[Value], None]
-Serve = Callable[[Value, Answer], None]
+Serve = Callable[[Attachment, Value, Answer], None]  # the client, its request
 Seen = Callable[[str, bool], None]  # a token, and whether it appeared
 
 DEPTH = 32  # commands that wait for the loop
@@ -158,7 +158,7 @@ class Endpoints:
                     query.reply(key, encoded, attachment=reply.encode())
                 query.drop()
 
-            handle(request, answer)
+            handle(about, request, answer)
 
         def queue(query: zenoh.Query) -> None:
             self._post(lambda: take(query))

@@ -1,0 +1,30 @@
+"""Which reset came too late to count. Pure.
+
+A reset that the network held back must not clear a stop that its sender cannot have seen. The
+attachment has the sender's clock, and a client that calls once has no fastest delivery to compare
+with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old.
+"""
+
+import math
+
+from common.freshness import NS_PER_S
+from common.messages import SafetyState
+
+HELD_BACK_S = 0.2  # a younger reset always counts: safety's state is not newer than its period
+
+
+def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
+    """Return why a reset must not clear what this state has latched; empty when it may.
+
+    ``sent_ns`` and ``now_ns`` are the wall clocks of the sender and of the robot.
+    """
+    age_s = (now_ns - sent_ns) / NS_PER_S
+    latched_s = min(
+        (cause.age for cause in state.causes if cause.name in state.latched), default=math.inf
+    )
+    if age_s <= max(latched_s, HELD_BACK_S):
+        return ""
+    return (
+        f"The reset was sent {age_s:.1f} s ago by its sender's clock, before the last stop "
+        f"{latched_s:.1f} s ago. Reset again; if that fails, synchronize the clocks."
+    )

@@ -1,0 +1,55 @@
+"""Resets that the network held back."""
+
+import pytest
+
+from common.freshness import NS_PER_S
+from common.messages import Cause, SafetyState
+from services.ros2.call_age import HELD_BACK_S, reset_refusal
+from tests.factories import safety_state
+
+NOW_NS = 1_700_000_000 * NS_PER_S
+
+
+def state(**ages_s: float) -> SafetyState:
+    causes = [Cause(name=name, action="brake", age=age, text="") for name, age in ages_s.items()]
+    latched = tuple(name for name in ages_s if name != "no_request")
+    return safety_state(causes=tuple(causes), latched=latched)
+
+
+def refusal(seen: SafetyState, sent_s_ago: float) -> str:
+    return reset_refusal(seen, NOW_NS - round(sent_s_ago * NS_PER_S), NOW_NS)
+
+
+def test_a_reset_that_was_sent_after_the_stop_counts() -> None:
+    assert not refusal(state(estop=3.0), 2.9)
+
+
+def test_a_reset_that_was_sent_before_the_stop_is_refused() -> None:
+    text = refusal(state(estop=2.0), 4.3)
+    assert "4.3 s ago" in text
+    assert "2.0 s ago" in text
+
+
+def test_the_newest_stop_counts() -> None:
+    assert refusal(state(contact=60.0, estop=2.0), 3.0)
+    assert not refusal(state(contact=60.0, estop=30.0), 3.0)
+
+
+def test_only_what_is_latched_counts() -> None:
+    assert not refusal(state(estop=30.0, no_request=1.0), 3.0)
+
+
+@pytest.mark.parametrize("latched_s", [0.0, 0.01, 0.19])
+def test_an_answer_to_the_stop_itself_counts_though_the_state_is_a_little_older(
+    latched_s: float,
+) -> None:
+    assert not refusal(state(estop=latched_s), HELD_BACK_S)
+    assert refusal(state(estop=latched_s), HELD_BACK_S + 0.01)
+
+
+def test_a_clock_that_is_ahead_does_not_refuse() -> None:
+    assert not refusal(state(estop=2.0), -3600.0)
+
+
+def test_without_a_latch_safety_answers() -> None:
+    assert not refusal(state(no_request=1.0), 3600.0)
