@@ -27,6 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("skipped: cargo is not installed; install Rust from https://rustup.rs")
         return 0
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the processes of the check
+    print("building the peer; the first time takes several minutes", flush=True)
     try:
         peer = build.crate()
     except build.BuildError as error:
