@@ -132,6 +132,10 @@ class Robot:
         assert took_s <= allowed_s, f"moved for {took_s:.3f} s, {allowed_s:.3f} s are allowed"
         return f"last command to move after {took_s:.3f} s, lease {self.lease_s:.1f} s"
 
+    def refused(self) -> int:
+        """Return how many commands the gateway has refused or dropped."""
+        return sum(self.counters.values())
+
     def moved_during(self, do: Callable[[], object]) -> float:
         """Return the distance that the vehicle drives meanwhile and until it stands, in metres."""
         before = self.distance()

@@ -112,9 +112,13 @@ class PlainPeer:
         """Declare a publisher of commands; ``about`` is another type and hash."""
         return self.endpoint("MP", "/cmd_vel", about)
 
-    def send(self, publisher: Endpoint, twist: Twist) -> None:
-        """Publish a command."""
-        self.session.put(publisher.key, twist.encode(), attachment=publisher.attachment())
+    def send(self, publisher: Endpoint, twist: Twist, *, blocks: bool = False) -> None:
+        """Publish a command; with ``blocks`` it waits for space, as reliable publishers of ROS."""
+        control = zenoh.CongestionControl.BLOCK if blocks else zenoh.CongestionControl.DROP
+        self.session.put(
+            publisher.key, twist.encode(), attachment=publisher.attachment(),
+            congestion_control=control,
+        )  # fmt: skip
 
     def repeat(self, publisher: Endpoint, twist: Twist, seconds: float) -> None:
         """Publish a command at 20 Hz."""
