@@ -1,8 +1,9 @@
-"""Which reset came too late to count. Pure.
+"""Which call came too late to count. Pure.
 
 A reset that the network held back must not clear a stop that its sender cannot have seen. The
 attachment has the sender's clock, and a client that calls once has no fastest delivery to compare
-with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old.
+with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old. A
+brake switch that was held back must not undo a later one: its clocks must agree within a second.
 """
 
 import math
@@ -10,6 +11,8 @@ import math
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
 
+AHEAD_S = 1.0  # of a client's clock: the age of its calls is unknown
+SWITCH_S = 1.0  # age of a call of a switch
 HELD_BACK_S = 0.2  # a younger reset always counts: safety's state is not newer than its period
 
 
@@ -22,9 +25,25 @@ def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
     latched_s = min(
         (cause.age for cause in state.causes if cause.name in state.latched), default=math.inf
     )
+    if age_s < -AHEAD_S:
+        return _ahead(age_s)
     if age_s <= max(latched_s, HELD_BACK_S):
         return ""
     return (
         f"The reset was sent {age_s:.1f} s ago by its sender's clock, before the last stop "
         f"{latched_s:.1f} s ago. Reset again; if that fails, synchronize the clocks."
     )
+
+
+def switch_refusal(sent_ns: int, now_ns: int) -> str:
+    """Return why a brake switch must not follow a call; empty when it may."""
+    age_s = (now_ns - sent_ns) / NS_PER_S
+    if age_s < -AHEAD_S:
+        return _ahead(age_s)
+    if age_s <= SWITCH_S:
+        return ""
+    return f"The call was sent {age_s:.1f} s ago by its sender's clock. Synchronize the clocks."
+
+
+def _ahead(age_s: float) -> str:
+    return f"The sender's clock is {-age_s:.1f} s ahead of the robot's. Synchronize the clocks."

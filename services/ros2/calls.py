@@ -9,7 +9,7 @@ from common.freshness import NS_PER_S
 from common.operator import reset_request
 from common.service import Node
 from services.ros2.attachment import Attachment
-from services.ros2.call_age import reset_refusal
+from services.ros2.call_age import reset_refusal, switch_refusal
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints, Serve
@@ -76,7 +76,10 @@ class Calls:
         )
 
     def _switch(self, name: str) -> Serve:
-        def handle(_: Attachment, request: Value, answer: Answer) -> None:
+        def handle(about: Attachment, request: Value, answer: Answer) -> None:
+            if reason := switch_refusal(about.source_ns, time.time_ns()):
+                answer((False, reason))
+                return
             state = self._state()
             echo = state.heartbeat if state else None
             self._node.bus.call(

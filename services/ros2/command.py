@@ -7,8 +7,9 @@ robot. A burst of old commands at the start has no such minimum yet: motion is t
 publisher whose minimum has been steady for ``SETTLE_NS``. The minimum rises slowly, as clocks
 drift.
 
-One publisher drives at a time. A command is passed on once, as it is: it is never repeated, and no
-neutral command is invented. Safety wants a neutral one from the source before it moves.
+One publisher drives at a time, and begins with a neutral command. Safety wants that of the source,
+which all publishers share: without a gap between two of them it would not notice the second one. A
+command is passed on once, as it is: it is never repeated, and no neutral command is invented.
 """
 
 import math
@@ -93,9 +94,9 @@ class Commands:
             return Refusal(
                 "settling", "A publisher is new, or its delay changes. Commands are taken soon."
             )
-        if not self._owns(about.gid, now_ns):
-            return Refusal("second_publisher", "Another publisher drives. One at a time may.")
-        return Request(twist.linear[0], twist.angular[2])
+        return self._of_owner(about.gid, now_ns, twist) or Request(
+            twist.linear[0], twist.angular[2]
+        )
 
     def gone(self, gid: bytes) -> None:
         """Forget a publisher whose token disappeared."""
@@ -122,11 +123,17 @@ class Commands:
     def _is_settling(self, gid: bytes, now_ns: int) -> bool:
         return now_ns - self._known[gid].settling_ns < SETTLE_NS
 
-    def _owns(self, gid: bytes, now_ns: int) -> bool:
-        if self.owner not in (None, gid) and now_ns - self._owned_ns < OWNER_NS:
-            return False
+    def _of_owner(self, gid: bytes, now_ns: int, twist: Twist) -> Refusal | None:
+        """Return the refusal of a publisher that does not drive; a neutral command begins."""
+        if self.owner != gid:
+            if self.owner is not None and now_ns - self._owned_ns < OWNER_NS:
+                return Refusal("second_publisher", "Another publisher drives. One at a time may.")
+            if twist.moves:
+                return Refusal(
+                    "not_neutral", "A publisher that begins to drive must send a neutral command."
+                )
         self.owner, self._owned_ns = gid, now_ns
-        return True
+        return None
 
 
 def _of_content(twist: Twist) -> Refusal | None:

@@ -4,7 +4,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, SafetyState
-from services.ros2.call_age import HELD_BACK_S, reset_refusal
+from services.ros2.call_age import HELD_BACK_S, reset_refusal, switch_refusal
 from tests.factories import safety_state
 
 NOW_NS = 1_700_000_000 * NS_PER_S
@@ -47,8 +47,19 @@ def test_an_answer_to_the_stop_itself_counts_though_the_state_is_a_little_older(
     assert refusal(state(estop=latched_s), HELD_BACK_S + 0.01)
 
 
-def test_a_clock_that_is_ahead_does_not_refuse() -> None:
-    assert not refusal(state(estop=2.0), -3600.0)
+@pytest.mark.parametrize(("ahead_s", "refused"), [(0.9, False), (1.0, False), (1.1, True)])
+def test_a_clock_that_is_ahead_hides_the_age_of_a_call(ahead_s: float, refused: bool) -> None:
+    switched = switch_refusal(NOW_NS + round(ahead_s * NS_PER_S), NOW_NS)
+    for text in (refusal(state(estop=2.0), -ahead_s), switched):
+        assert ("1.1 s ahead" in text) == refused
+        assert bool(text) == refused
+
+
+@pytest.mark.parametrize(("sent_s_ago", "refused"), [(0.0, False), (1.0, False), (1.1, True)])
+def test_a_switch_that_was_held_back_is_refused(sent_s_ago: float, refused: bool) -> None:
+    text = switch_refusal(NOW_NS - round(sent_s_ago * NS_PER_S), NOW_NS)
+    assert bool(text) == refused
+    assert not refused or "1.1 s ago" in text
 
 
 def test_without_a_latch_safety_answers() -> None:

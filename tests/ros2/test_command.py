@@ -100,17 +100,21 @@ def test_one_publisher_drives_until_it_is_silent() -> None:
         nav.send(1.0 + number / 20)
         assert joy.send(1.0 + number / 20) in ("settling", "second_publisher")
     assert joy.send(2.0) == "second_publisher"
-    assert joy.send(2.5) == Request(0.3, 0.0)
+    assert joy.send(2.5) == "not_neutral"
+    assert joy.send(2.51, motion=twist()) == Request(0.0, 0.0)
+    assert joy.send(2.52) == Request(0.3, 0.0)
     assert nav.send(2.55) == "second_publisher"
 
 
-def test_the_next_publisher_drives_at_once_when_the_owner_is_gone() -> None:
+def test_the_next_publisher_may_begin_at_once_when_the_owner_is_gone() -> None:
     commands = Commands()
     nav, joy = Sender(commands).settle(), Sender(commands, JOY)
     assert joy.send(0.3) == "settling"
     nav.send(1.0)
     commands.gone(NAV)
-    assert joy.send(1.01) == Request(0.3, 0.0)
+    assert joy.send(1.01) == "not_neutral"
+    assert joy.send(1.02, motion=twist()) == Request(0.0, 0.0)
+    assert joy.send(1.03) == Request(0.3, 0.0)
 
 
 def test_a_command_that_is_repeated_or_late_is_refused() -> None:

@@ -74,7 +74,11 @@ def test_another_publisher_drives_after_the_owners_silence(commands: Commands) -
     assert judge(commands, 2, 10**9 + OWNER_NS - 1, gid=JOY) == Refusal(
         "second_publisher", "Another publisher drives. One at a time may."
     )
-    assert judge(commands, 3, 10**9 + OWNER_NS, gid=JOY) == TAKEN
+    assert judge(commands, 3, 10**9 + OWNER_NS, gid=JOY) == Refusal(
+        "not_neutral", "A publisher that begins to drive must send a neutral command."
+    )
+    judge(commands, 4, 10**9 + OWNER_NS, twist=NEUTRAL, gid=JOY)
+    assert judge(commands, 5, 10**9 + OWNER_NS, gid=JOY) == TAKEN
 
 
 def test_a_publisher_that_is_gone_is_forgotten(commands: Commands) -> None:
