@@ -9,8 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from t2 import messages as m
 from t2.connection import connect
-from t2.drive import PATIENCE_S, Drive
-from t2.errors import T2Error
+from t2.drive import Drive
 from t2.limit import SpeedLimit
 from t2.robot import Robot
 from t2.stream import Stream
@@ -122,6 +121,7 @@ class AsyncDrive:
         return self
 
     async def __aexit__(self, *raised: Any) -> None:
+        self._drive.end()  # at once: a thread may not be free
         await asyncio.to_thread(self._drive.__exit__, *raised)
 
     async def stop(self) -> None:
@@ -134,11 +134,10 @@ class AsyncDrive:
         ...             await drive.stop()
         >>> asyncio.run(main())
         """
+        self._drive.velocity(0.0)  # at once: a thread may not be free
         await self._wait(self._drive.stop)
 
-    async def forward(
-        self, distance: float, speed: float = 0.3, patience: float = PATIENCE_S
-    ) -> None:
+    async def forward(self, distance: float, speed: float = 0.3, patience: float = 3.0) -> None:
         """Drive a distance in m as ``Drive.forward`` does.
 
         >>> async def main():
@@ -149,7 +148,7 @@ class AsyncDrive:
         """
         await self._wait(self._drive.forward, distance, speed, patience)
 
-    async def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
+    async def turn(self, angle: float, speed: float = 0.5, patience: float = 3.0) -> None:
         """Turn by an angle in rad as ``Drive.turn`` does.
 
         >>> async def main():
@@ -166,10 +165,9 @@ class AsyncDrive:
             await asyncio.shield(task)
         except asyncio.CancelledError:
             self._drive.cancel()
-            with suppress(T2Error):
+            with suppress(Exception):
                 await task
-            with suppress(T2Error):  # the motion had ended by itself
-                self._drive.check()
+            self._drive.uncancel()  # the motion had ended by itself
             raise
 
 
@@ -220,6 +218,7 @@ class AsyncRobot:
         ...         await robot.reset()
         >>> asyncio.run(main())
         """
+        self.robot.put_estop()  # at once: a thread may not be free
         await asyncio.to_thread(self.robot.estop)
 
     async def reset(self) -> m.ResetDone:

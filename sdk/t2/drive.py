@@ -5,14 +5,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import zenoh
 
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, T2Error
 from t2.messages import Drive as DriveMessage
-from t2.messages import Odometry, SafetyState
-from t2.motion import Straight, Turn, check_finite
+from t2.messages import Odometry
+from t2.motion import STILL, Straight, Target, Turn, check_finite
 from t2.publisher import FRESH_S, SourcePublisher
 
 if TYPE_CHECKING:
@@ -28,33 +28,21 @@ STANDING = 0.02  # m/s and rad/s
 RELEASE = "release"  # the source of a release, which overrules nobody
 
 
-class Target(NamedTuple):
-    """A requested velocity, with its end."""
-
-    linear: float  # m/s
-    angular: float  # rad/s
-    end_s: float = math.inf  # monotonic time
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is not zero."""
-        return self.linear != 0 or self.angular != 0
-
-
-STILL = Target(0.0, 0.0)
+OPEN = set[str]()  # keys of the open drives of this program
 
 
 class Drive:
     """Drives as one source while it is open; each method raises what stopped the vehicle.
 
-    ``with robot.drive("nav") as drive:`` sends neutral requests until safety lets the source drive,
-    and zeros at the end. A thread repeats the requests: a program that waits for something else
-    keeps its last velocity. When the program dies, safety stops the vehicle within its lease. After
-    an error the drive requests zero: open another one.
+    In ``with`` it sends neutral requests until safety lets the source drive, and zeros at the end.
+    A thread repeats the requests: a program that waits keeps its last velocity. When the program
+    dies, safety stops the vehicle within its lease. After an error the drive requests zero for
+    good, and each method raises it: open another one.
     """
 
     def __init__(self, session: zenoh.Session, key: str, source: str, robot: "Robot") -> None:
         self.source = source
+        self._key = key
         self._robot = robot
         self._publisher: SourcePublisher[DriveMessage] = SourcePublisher(
             session, key, "Drive", robot.safety
@@ -62,7 +50,9 @@ class Drive:
         self._target = STILL
         self._sent = 0  # requests
         self._contested = 0  # ticks with a request while another source drives
-        self._error: T2Error | None = None
+        self._error: T2Error | None = None  # for good, see the class
+        self._reported = False  # whether it was raised
+        self._cancelled = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"t2 drive {source}", daemon=True)
 
@@ -78,7 +68,10 @@ class Drive:
         """
         state = self._robot.safety.latest()
         if state.latched:
-            raise latched(state)
+            raise Latched.of(state)
+        if self._key in OPEN:
+            raise T2Error(f"a drive as {self.source!r} is open in this program; close it first")
+        OPEN.add(self._key)
         self._thread.start()
         try:
             self._await_control()
@@ -90,8 +83,8 @@ class Drive:
     def __exit__(self, kind: "type[BaseException] | None", *_: object) -> None:
         """Send zeros; raise what stopped the vehicle, unless it was raised before."""
         self.close()
-        if kind is None:
-            self.check()
+        if kind is None and not self._reported:
+            self._raise()
 
     def close(self) -> None:
         """Send zeros and end the requests.
@@ -101,9 +94,16 @@ class Drive:
         >>> drive.is_open
         False
         """
-        self._ended.set()
+        self.end()
         if self._thread.is_alive():
             self._thread.join()
+
+    def end(self) -> None:
+        """Send zeros and end the requests, without waiting for that.
+
+        >>> robot.drive("nav").end()
+        """
+        self._ended.set()
 
     def check(self) -> None:
         """Raise what stopped the vehicle, if anything did.
@@ -113,10 +113,14 @@ class Drive:
         ...     time.sleep(0.2)  # something else
         ...     drive.check()
         """
+        self._raise()
+        if not self.is_open:
+            raise T2Error("this drive is closed; open another one")
+
+    def _raise(self) -> None:
         if self._error is not None:
-            self._target = STILL
-            error, self._error = self._error, None
-            raise error
+            self._target, self._reported = STILL, True
+            raise self._error
 
     def cancel(self) -> None:
         """End the motion of another thread with an error, and request zero.
@@ -127,7 +131,15 @@ class Drive:
         Traceback (most recent call last):
         t2.errors.T2Error: the motion was cancelled
         """
-        self._error = T2Error("the motion was cancelled")
+        self._cancelled = True
+
+    def uncancel(self) -> None:
+        """Forget a cancel after the end of the motion; the request is zero.
+
+        >>> robot.drive("nav").uncancel()
+        """
+        self._target = STILL  # before the flag: the thread reads them in the other order
+        self._cancelled = False
 
     # --- motions ------------------------------------------------------------------------------
 
@@ -141,7 +153,7 @@ class Drive:
         >>> with robot.drive("nav") as drive:
         ...     drive.velocity(-0.1, seconds=0.5)
         """
-        check_finite(linear, angular)
+        check_finite(linear, angular, 0.0 if seconds is None else seconds)
         self.check()
         end_s = math.inf if seconds is None else time.monotonic() + seconds
         self._target = Target(linear, angular, end_s)
@@ -178,6 +190,7 @@ class Drive:
 
     def _go(self, motion: "Straight | Turn", patience: float) -> None:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
+        check_finite(patience)
         least, progress_s = math.inf, time.monotonic()
 
         def arrived(pose: Odometry) -> bool:
@@ -205,6 +218,9 @@ class Drive:
         with stream.reading(queue):
             while True:
                 pose = stream.after(queue, 1.0)
+                if self._cancelled:
+                    self.uncancel()
+                    raise T2Error("the motion was cancelled")
                 self.check()
                 if pose is None:
                     self._target = STILL
@@ -240,20 +256,23 @@ class Drive:
         )
 
     def _run(self) -> None:
-        while not self._ended.wait(PERIOD_S):
-            self._tick()
-        for _ in range(ZEROS):
-            self._put(0.0, 0.0)
-            time.sleep(PERIOD_S)
+        try:
+            while not self._ended.wait(PERIOD_S):
+                self._tick()
+            for _ in range(ZEROS):
+                self._put(0.0, 0.0)
+                time.sleep(PERIOD_S)
+        except zenoh.ZError as error:  # the session was closed
+            self._error = self._error or T2Error(f"the drive has ended: {error}")
+        self._ended.set()
         self._publisher.close()
+        OPEN.discard(self._key)
 
     def _tick(self) -> None:
-        target = self._target
-        if time.monotonic() >= target.end_s:
+        cancelled, target = self._cancelled, self._target
+        if cancelled or time.monotonic() >= target.end_s:
             target = STILL
-        trouble = self._trouble(target)
-        if trouble is not None:  # an error of `cancel` stays
-            self._error = trouble
+        self._error = self._error or self._trouble(target)
         if self._error is not None:
             target = STILL
         self._put(target.linear, target.angular)
@@ -268,7 +287,7 @@ class Drive:
         if state is None or safety.age > FRESH_S:
             return NoData("safety is silent, and the vehicle stops; see `t2 doctor`")
         if state.latched:
-            return latched(state)
+            return Latched.of(state)
         if self._publisher.denied:
             return NotAllowed(
                 f"the router drops the requests of {self.source!r}: this certificate may not drive "
@@ -279,9 +298,3 @@ class Drive:
         if self._contested >= OVERRULED_TICKS:
             return Overruled(str(state.source))
         return None
-
-
-def latched(state: SafetyState) -> Latched:
-    """Return the error of a latched state."""
-    names = [cause for cause in state.causes if cause.name in state.latched]
-    return Latched(state.text, names)

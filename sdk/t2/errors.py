@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from t2.messages import Cause
+from t2.messages import Cause, SafetyState
 
 
 class T2Error(Exception):
@@ -47,6 +47,11 @@ class Stopped(T2Error):
 
 class Latched(Stopped):
     """A cause is latched: somebody must look at the vehicle, then ``Robot.reset``."""
+
+    @classmethod
+    def of(cls, state: SafetyState) -> "Latched":
+        """Return the error of a latched state."""
+        return cls(state.text, [cause for cause in state.causes if cause.name in state.latched])
 
 
 class Blocked(Stopped):

@@ -6,7 +6,7 @@ import time
 
 import zenoh
 
-from t2.errors import NotAllowed
+from t2.errors import NotAllowed, T2Error
 from t2.messages import Limit, SafetyState
 from t2.publisher import SourcePublisher
 from t2.stream import Stream
@@ -25,6 +25,7 @@ class SpeedLimit:
         self._safety = safety
         self._limit = Limit(echo=0)
         self._end_s = math.inf  # monotonic time
+        self._lock = threading.Lock()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"t2 limit {source}", daemon=True)
 
@@ -48,9 +49,11 @@ class SpeedLimit:
         >>> limit.set(0.2, reason="person close", seconds=1)
         >>> limit.end()
         """
-        for cap in (linear, angular):
+        if self.has_ended:
+            raise T2Error("this limit has ended; Robot.limit returns another one")
+        for cap in (linear, angular, seconds):
             if cap is not None and not 0 <= cap < float("inf"):
-                raise ValueError(f"a cap must be finite and not negative, not {cap}")
+                raise ValueError(f"caps and seconds must be finite and not negative, not {cap}")
         known = [each.source for each in self._safety.latest().limit_sources]
         if self._source not in known:
             lists = ", ".join(known) or "none"
@@ -60,9 +63,10 @@ class SpeedLimit:
                 f"the router drops the limits of {self._source!r}: it admits those of a "
                 "certificate of role device with this source; see `t2 keys`"
             )
-        self._limit = Limit(linear=linear, angular=angular, reason=reason[:80], echo=0)
-        self._end_s = time.monotonic() + (math.inf if seconds is None else seconds)
-        self._publisher.put(self._limit)
+        with self._lock:  # an old limit must not follow a new one
+            self._limit = Limit(linear=linear, angular=angular, reason=reason[:80], echo=0)
+            self._end_s = time.monotonic() + (math.inf if seconds is None else seconds)
+            self._publisher.put(self._limit)
         if not self._thread.is_alive():
             self._thread.start()
 
@@ -71,12 +75,15 @@ class SpeedLimit:
 
         >>> robot.limit("detector", linear=0.3).end()
         """
+        if self.has_ended:
+            return
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()
-            self._publisher.close()
+        self._publisher.close()
 
     def _run(self) -> None:
         while not self._ended.wait(PERIOD_S):
-            if time.monotonic() < self._end_s:
-                self._publisher.put(self._limit)
+            with self._lock:
+                if time.monotonic() < self._end_s:
+                    self._publisher.put(self._limit)

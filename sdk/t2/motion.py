@@ -1,6 +1,7 @@
 """Motions by odometry: how much is left, and which velocity to request. Pure."""
 
 import math
+from typing import NamedTuple
 
 from t2.messages import Odometry
 
@@ -8,6 +9,22 @@ ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towa
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
 NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
 KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
+
+
+class Target(NamedTuple):
+    """A requested velocity, with its end."""
+
+    linear: float  # m/s
+    angular: float  # rad/s
+    end_s: float = math.inf  # monotonic time
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not zero."""
+        return self.linear != 0 or self.angular != 0
+
+
+STILL = Target(0.0, 0.0)
 
 
 class Straight:

@@ -1,6 +1,7 @@
 """One robot: its streams, its calls, and what may be sent to it."""
 
 import time
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import msgspec
@@ -8,7 +9,7 @@ import zenoh
 
 from t2 import messages as m
 from t2.drive import Drive
-from t2.errors import NoData, NotConfirmed, Refused
+from t2.errors import NoData, NotConfirmed, Refused, T2Error
 from t2.keys import CALLS, ROOT, TOPICS
 from t2.limit import SpeedLimit
 from t2.stream import Stream
@@ -118,8 +119,7 @@ class Robot:
         >>> time.sleep(1)  # look at the vehicle
         >>> _ = robot.reset()
         """
-        key = f"{ROOT}/{self.name}/estop"
-        self._put_estop(key)  # before anything else
+        self.put_estop()  # before anything else
         begin_s = time.monotonic()
         self.safety.open()
         while (passed_s := time.monotonic() - begin_s) < ESTOP_S:
@@ -128,10 +128,25 @@ class Robot:
             if state and "estop" in state.latched and self.safety.age < passed_s:
                 return
             time.sleep(ESTOP_PERIOD_S)
-            self._put_estop(key)
+            self.put_estop()
         raise NotConfirmed(
             f"the emergency stop was sent, and safety does not confirm it within {ESTOP_S:g} s: "
             f"{SWITCH}. A certificate without the right to stop is one reason"
+        )
+
+    def put_estop(self) -> None:
+        """Send one emergency stop, without waiting for safety; ``estop`` confirms it.
+
+        >>> robot.put_estop()
+        >>> time.sleep(1)  # look at the vehicle
+        >>> _ = robot.reset()
+        """
+        self._session.put(
+            f"{ROOT}/{self.name}/estop",
+            b"",
+            priority=zenoh.Priority.REAL_TIME,
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=True,
         )
 
     def reset(self) -> m.ResetDone:
@@ -181,7 +196,8 @@ class Robot:
                     refusal = error
                 time.sleep(RELEASE_PERIOD_S)
         finally:
-            self._call_release(None, held=False)
+            with suppress(T2Error):  # else it ends by its lease
+                self._call_release(None, held=False)
         raise NotConfirmed(f"the bumper is still pressed after {timeout:g} s of release")
 
     # --- calls --------------------------------------------------------------------------------
@@ -224,15 +240,6 @@ class Robot:
         echo = self.safety.latest().heartbeat
         request = m.ReleaseRequest(held=held, direction=direction, echo=echo)
         self._call("safety/release", request, m.Done)
-
-    def _put_estop(self, key: str) -> None:
-        self._session.put(
-            key,
-            b"",
-            priority=zenoh.Priority.REAL_TIME,
-            congestion_control=zenoh.CongestionControl.DROP,
-            express=True,
-        )
 
     def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
         kind = TOPICS[name][1]

@@ -11,9 +11,8 @@ import math
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
 
-AHEAD_S = 1.0  # of a client's clock: the age of its calls is unknown
+TOLERANCE_S = 0.2  # of the two clocks, and of the age of safety's state
 SWITCH_S = 1.0  # age of a call of a switch
-HELD_BACK_S = 0.2  # a younger reset always counts: safety's state is not newer than its period
 
 
 def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
@@ -25,12 +24,12 @@ def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
     latched_s = min(
         (cause.age for cause in state.causes if cause.name in state.latched), default=math.inf
     )
-    if age_s < -AHEAD_S:
+    if age_s < -TOLERANCE_S:
         return _ahead(age_s)
-    if age_s <= max(latched_s, HELD_BACK_S):
+    if max(age_s, 0.0) + TOLERANCE_S <= latched_s:
         return ""
     return (
-        f"The reset was sent {age_s:.1f} s ago by its sender's clock, before the last stop "
+        f"The reset was sent {age_s:.1f} s ago by its sender's clock, and the last stop was "
         f"{latched_s:.1f} s ago. Reset again; if that fails, synchronize the clocks."
     )
 
@@ -38,7 +37,7 @@ def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
 def switch_refusal(sent_ns: int, now_ns: int) -> str:
     """Return why a brake switch must not follow a call; empty when it may."""
     age_s = (now_ns - sent_ns) / NS_PER_S
-    if age_s < -AHEAD_S:
+    if age_s < -TOLERANCE_S:
         return _ahead(age_s)
     if age_s <= SWITCH_S:
         return ""

@@ -15,6 +15,8 @@ from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints, Serve
 
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
+FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as silent
+STOPS_MAX = 32  # calls that wait
 TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
 SWITCHES = ("ultrasonic_brake", "bumper_brake")
 
@@ -27,7 +29,7 @@ class Calls:
         node: Node[Ros2Config],
         ros: Endpoints,
         absolute: Callable[[str], str],
-        state: Callable[[], m.SafetyState | None],
+        state: Callable[[int], m.SafetyState | None],
     ) -> None:
         self._node, self._state = node, state
         self._stops: list[tuple[Answer, int]] = []  # answers that wait, and since when
@@ -39,6 +41,9 @@ class Calls:
 
     def _stop(self, _: Attachment, __: Value, answer: Answer) -> None:
         """Stop the robot, and answer when safety's state shows it."""
+        if len(self._stops) == STOPS_MAX:
+            answer((False, "Too many calls wait for their stop."))
+            return
         self._node.bus.estop()
         self._stops.append((answer, time.monotonic_ns()))
 
@@ -46,22 +51,22 @@ class Calls:
         """Repeat an emergency stop until it is confirmed, or too old."""
         if not self._stops:
             return
-        state = self._state()
-        stopped = state is not None and "estop" in state.latched
+        waiting = []
         for answer, since_ns in self._stops:
-            if stopped:
+            state = self._state(since_ns)  # an older one may show an earlier stop
+            if state is not None and "estop" in state.latched:
                 answer((True, "Stopped and latched."))
             elif now_ns - since_ns > CONFIRM_NS:
                 answer((False, "Sent, but safety does not confirm it. Use the vehicle's switch."))
-        self._stops = [
-            each for each in self._stops if not stopped and now_ns - each[1] <= CONFIRM_NS
-        ]
-        if self._stops:
+            else:
+                waiting.append((answer, since_ns))
+        self._stops = waiting
+        if waiting:
             self._node.bus.estop()
 
     def _reset(self, about: Attachment, _: Value, answer: Answer) -> None:
         """Clear what is latched now, unless it is newer than the request."""
-        state = self._state()
+        state = self._fresh()
         if state is None:
             answer((False, "Safety is silent."))
             return
@@ -75,12 +80,15 @@ class Calls:
             lambda reason: answer((False, reason)),
         )
 
+    def _fresh(self) -> m.SafetyState | None:
+        return self._state(time.monotonic_ns() - FRESH_NS)
+
     def _switch(self, name: str) -> Serve:
         def handle(about: Attachment, request: Value, answer: Answer) -> None:
             if reason := switch_refusal(about.source_ns, time.time_ns()):
                 answer((False, reason))
                 return
-            state = self._state()
+            state = self._fresh()
             echo = state.heartbeat if state else None
             self._node.bus.call(
                 keys.SET_SWITCHES,

@@ -2,14 +2,15 @@
 
 ROS messages carry the time of the sender's clock, which need not agree with ours. For each
 publisher the difference of our receive time and that time has a minimum: the fastest delivery so
-far. A command that took ``HELD_BACK_NS`` longer was held back by the network, and must not move the
-robot. A burst of old commands at the start has no such minimum yet: motion is taken only from a
-publisher whose minimum has been steady for ``SETTLE_NS``. The minimum rises slowly, as clocks
-drift.
+far. A command that took ``HELD_BACK_NS`` longer, until it was judged, was held back by the network
+or by a busy host, and must not move the robot. A burst of old commands at the start has no such
+minimum yet: commands are taken only from a publisher whose minimum has been steady for
+``SETTLE_NS``. The minimum rises slowly, as clocks drift. A publisher that was silent for
+``IDLE_NS`` counts as a new one.
 
-One publisher drives at a time, and begins with a neutral command. Safety wants that of the source,
-which all publishers share: without a gap between two of them it would not notice the second one. A
-command is passed on once, as it is: it is never repeated, and no neutral command is invented.
+One publisher drives at a time, and begins with a neutral command. Safety cannot require that: to it
+all publishers are one source. A command is passed on once, as it is: it is never repeated, and no
+neutral command is invented.
 """
 
 import math
@@ -22,9 +23,10 @@ from services.ros2.attachment import Attachment
 
 HELD_BACK_NS = NS_PER_S // 5
 SETTLE_NS = NS_PER_S // 2
-FASTER_NS = NS_PER_S // 20  # a delivery this much faster starts the settling anew
+FASTER_NS = NS_PER_S // 50  # a delivery this much faster starts the settling anew
 DRIFT = 5e-4  # s of the minimum per s: what clocks that are slewed drift apart at most
 OWNER_NS = NS_PER_S // 2  # silence after which another publisher may drive
+IDLE_NS = 60 * NS_PER_S  # silence after which a publisher is forgotten
 MAX_PUBLISHERS = 64  # remembered; the one that was silent longest is dropped first
 
 Axes = tuple[float, float, float]
@@ -62,7 +64,7 @@ class Publisher(Struct):
     least_ns: int  # the fastest delivery: our monotonic time less the sender's time
     anchor_ns: int  # the fastest delivery when the settling began
     settling_ns: int  # when it began
-    heard_ns: int
+    received_ns: int
     sequence: int = 0
 
 
@@ -75,12 +77,17 @@ class Commands:
         self.owner: bytes | None = None  # GID of the publisher that drives
         self._known: dict[bytes, Publisher] = {}
 
-    def judge(self, about: Attachment, twist: Twist, now_ns: int) -> Request | Refusal:
-        """Return the request of a command that was received now (monotonic), or the refusal."""
+    def judge(
+        self, about: Attachment, twist: Twist, received_ns: int, now_ns: int
+    ) -> Request | Refusal:
+        """Return the request of a command, or the refusal; times are of our monotonic clock."""
         known = self._known.get(about.gid)
+        if known is not None and received_ns - known.received_ns > IDLE_NS:
+            self.gone(about.gid)
+            known = None
         if known is not None and about.sequence <= known.sequence:
             return Refusal("out_of_order", "A command arrived again, or after a later one.")
-        delay_ns = self._noted(about, now_ns)
+        delay_ns = self._noted(about, received_ns) + now_ns - received_ns
         if refusal := _of_content(twist):
             return refusal
         if delay_ns > HELD_BACK_NS:
@@ -90,11 +97,11 @@ class Commands:
                 f"A command took {late_s:.1f} s longer than the fastest of its publisher. The "
                 "network held it back, or the publisher's clock was set: restart that node.",
             )
-        if self._is_settling(about.gid, now_ns) and twist.moves:
+        if self._is_settling(about.gid, received_ns):
             return Refusal(
                 "settling", "A publisher is new, or its delay changes. Commands are taken soon."
             )
-        return self._of_owner(about.gid, now_ns, twist) or Request(
+        return self._of_owner(about.gid, received_ns, twist) or Request(
             twist.linear[0], twist.angular[2]
         )
 
@@ -110,11 +117,11 @@ class Commands:
         known = self._known.pop(about.gid, None)
         if known is None:
             known = Publisher(passed_ns, passed_ns, now_ns, now_ns)
-        least_ns = known.least_ns + round(DRIFT * (now_ns - known.heard_ns))
+        least_ns = known.least_ns + round(DRIFT * (now_ns - known.received_ns))
         known.least_ns = min(least_ns, passed_ns)
         if known.least_ns < known.anchor_ns - FASTER_NS:
             known.anchor_ns, known.settling_ns = known.least_ns, now_ns
-        known.heard_ns, known.sequence = now_ns, about.sequence
+        known.received_ns, known.sequence = now_ns, about.sequence
         self._known[about.gid] = known  # the last one of the dictionary
         if len(self._known) > MAX_PUBLISHERS:
             del self._known[next(iter(self._known))]

@@ -14,6 +14,7 @@ import xxhash
 import zenoh
 import zenoh.ext
 
+from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.session import Opener
 from common.bus.subscriber import Subscriber
 from common.settings import BusSettings
@@ -71,8 +72,11 @@ class Publisher:
 class Endpoints:
     """The node with all its endpoints; declare first, then ``open``."""
 
-    def __init__(self, where: BusSettings, node: names.Node, post: Post) -> None:
-        self.counters: Counter[str] = Counter(undecodable=0, overrun=0)
+    def __init__(
+        self, where: BusSettings, node: names.Node, post: Post, counters: Counter[str]
+    ) -> None:
+        self.counters = counters
+        counters.update(undecodable=0, overrun=0)  # Zenoh's threads must not add names
         self._node = node
         self._post = post
         self._session: zenoh.Session | None = None
@@ -111,7 +115,7 @@ class Endpoints:
     def subscribe(
         self, topic: str, interface: str, take: Take, refused: Callable[[str], None]
     ) -> None:
-        """Call ``take`` for each message; ``refused`` gets why bytes are none."""
+        """Call ``take`` for each message; ``refused`` gets the error of unreadable ones."""
         key, number = names.data_key(self._node.domain, topic, interface), self._next()
 
         def read(sample: zenoh.Sample, received_ns: int) -> None:
@@ -140,28 +144,17 @@ class Endpoints:
         """Answer the requests of a service; ``handle`` calls the answer once, now or later."""
         key, number = names.data_key(self._node.domain, service, interface), self._next()
 
-        def take(query: zenoh.Query) -> None:
-            try:
-                raw = query.attachment.to_bytes() if query.attachment else b""
-                about = attachment.decode(raw)
-                payload = query.payload.to_bytes() if query.payload else cdr.HEADER
-                request = cdr.decode(f"{interface}_Request", payload)
-            except (CdrError, ValueError):
-                self.counters["undecodable"] += 1
-                query.drop()
-                return
+        waiting: OverwritingQueue[zenoh.Query] = OverwritingQueue(DEPTH)
 
-            def answer(message: Value) -> None:
-                reply = Attachment(about.sequence, time.time_ns(), about.gid)
-                encoded = cdr.encode(f"{interface}_Response", message)
-                with contextlib.suppress(zenoh.ZError):  # the client may have gone
-                    query.reply(key, encoded, attachment=reply.encode())
-                query.drop()
-
-            handle(about, request, answer)
+        def next_query() -> None:
+            if query := waiting.take():
+                self._answer(query, key, interface, handle)
 
         def queue(query: zenoh.Query) -> None:
-            self._post(lambda: take(query))
+            if waiting.add(query):
+                self.counters["overrun"] += 1
+            else:
+                self._post(next_query)
 
         def declare(session: zenoh.Session) -> Any:
             token = self._token(number, "SS", service, interface, names.QOS)
@@ -171,6 +164,31 @@ class Endpoints:
             )
 
         self._declare.append(declare)
+
+    def _answer(self, query: zenoh.Query, key: str, interface: str, handle: Serve) -> None:
+        try:
+            raw = query.attachment.to_bytes() if query.attachment else b""
+            about = attachment.decode(raw)
+        except ValueError:  # no answer would reach the client
+            self.counters["undecodable"] += 1
+            query.drop()
+            return
+
+        def answer(message: Value) -> None:
+            reply = Attachment(about.sequence, time.time_ns(), about.gid)
+            encoded = cdr.encode(f"{interface}_Response", message)
+            with contextlib.suppress(zenoh.ZError):  # the client may have gone
+                query.reply(key, encoded, attachment=reply.encode())
+            query.drop()
+
+        try:
+            payload = query.payload.to_bytes() if query.payload else cdr.HEADER
+            request = cdr.decode(f"{interface}_Request", payload)
+        except CdrError as error:
+            self.counters["undecodable"] += 1
+            answer((False, str(error)))
+        else:
+            handle(about, request, answer)
 
     def watch(self, seen: Seen) -> None:
         """Call ``seen`` for each token of the domain that appears or disappears."""

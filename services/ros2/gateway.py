@@ -9,7 +9,7 @@ from services.ros2 import names, translate
 from services.ros2.attachment import Attachment
 from services.ros2.calls import Calls
 from services.ros2.cdr import Value
-from services.ros2.command import Commands, Refusal, Twist
+from services.ros2.command import MAX_PUBLISHERS, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
 from services.ros2.diagnostics import Diagnostics
 from services.ros2.endpoints import Endpoints, Publisher, gid
@@ -29,10 +29,10 @@ class Gateway:
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
         self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
         ros = names.Node(settings.domain, "", settings.namespace, NODE)
-        self._ros = Endpoints(node.config.bus, ros, node.loop.post)
+        self._ros = Endpoints(node.config.bus, ros, node.loop.post, node.counters)
         self._drive = DriveSource(node.bus, SOURCE)
         self._streams = Streams(node, self._publisher, self._diagnostics)
-        Calls(node, self._ros, self._absolute, lambda: self._streams.state)
+        Calls(node, self._ros, self._absolute, self._streams.state)
         for name, interface in TWISTS.items():
             if settings.cmd_vel in ("both", name):
                 take = partial(self._take, name == "stamped")
@@ -44,7 +44,7 @@ class Gateway:
     def _take(self, stamped: bool, about: Attachment, message: Value, received_ns: int) -> None:
         """Pass on a command, or refuse it."""
         twist = Twist(*(message[1] if stamped else message))
-        decided = self._commands.judge(about, twist, received_ns)
+        decided = self._commands.judge(about, twist, received_ns, time.monotonic_ns())
         if isinstance(decided, Refusal):
             self._refuse(decided, about.gid)
             return
@@ -82,7 +82,8 @@ class Gateway:
             return
         publisher = gid(token)
         if appeared:
-            self._publishers[publisher] = peer.node
+            if len(self._publishers) < MAX_PUBLISHERS:
+                self._publishers[publisher] = peer.node
             return
         self._publishers.pop(publisher, None)
         self._reported.pop(publisher, None)

@@ -9,6 +9,7 @@ LIVELINESS = "@ros2_lv"
 EMPTY = "%"  # an empty enclave or namespace
 NODE_CHUNKS = 9  # of a node's token
 CHUNKS = 13  # of an endpoint's token; newer peers may append one with backends
+DOMAIN = re.compile(r"[0-9]{1,3}\Z", re.ASCII)
 PART = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 KINDS = {"MP": "publisher", "MS": "subscription", "SS": "service", "SC": "client"}
 QOS = "::,10:,:,:,,"  # reliable, volatile, the last 10
@@ -58,7 +59,7 @@ class Peer(NamedTuple):
 def node(token: str) -> Node | None:
     """Return the node of any token; None for other keys."""
     chunks = token.split("/")
-    if len(chunks) < NODE_CHUNKS or chunks[0] != LIVELINESS or not chunks[1].isdecimal():
+    if len(chunks) < NODE_CHUNKS or chunks[0] != LIVELINESS or not DOMAIN.match(chunks[1]):
         return None
     return Node(int(chunks[1]), chunks[2], chunks[7].replace(EMPTY, "/"), chunks[8])
 

@@ -8,7 +8,7 @@ from typing import Any
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
 from common.service import Node
 from common.settings import sonar_mounts
 from services.ros2 import translate, urdf
@@ -28,7 +28,7 @@ class Streams:
     def __init__(
         self, node: Node[Ros2Config], publisher: Declare, diagnostics: Diagnostics
     ) -> None:
-        self.state: m.SafetyState | None = None
+        self._state: Latest[m.SafetyState] | None = None
         self._node, self._publisher, self._diagnostics = node, publisher, diagnostics
         self._settings = node.config.ros2
         self._motion()
@@ -36,6 +36,11 @@ class Streams:
         self._stops()
         self._statuses()
         self._description()
+
+    def state(self, since_ns: int) -> m.SafetyState | None:
+        """Return safety's newest state, if it was received since then (monotonic)."""
+        newest = self._state
+        return newest.value if newest and newest.received_ns >= since_ns else None
 
     def _motion(self) -> None:
         settings, prefix = self._settings, self._settings.frame_prefix
@@ -76,9 +81,10 @@ class Streams:
         stopped = self._publisher("hardware/e_stop", BOOL, latched=True)
 
         def publish(arrival: Arrival[m.SafetyState]) -> None:
-            before, self.state = self.state, arrival.message
-            if before is None or bool(before.latched) != bool(self.state.latched):
-                stopped.put((bool(self.state.latched),))
+            before, latched = self._state, bool(arrival.message.latched)
+            self._state = Latest(arrival.message, arrival.received_ns)
+            if before is None or bool(before.value.latched) != latched:
+                stopped.put((latched,))
 
         self._node.bus.subscribe(keys.SAFETY, publish)
 

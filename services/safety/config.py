@@ -75,7 +75,7 @@ def _sources() -> dict[str, Source]:
         "checkout": Source(priority=25, lease=0.3, operator=True),
         "web": Source(priority=20, lease=0.3, operator=True),
         "demo": Source(priority=15, lease=0.3),
-        "ros2": Source(priority=12, lease=0.3),
+        "ros2": Source(priority=11, lease=0.3),
         "nav": Source(priority=10, lease=0.2),
     }
 

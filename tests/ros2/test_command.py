@@ -29,13 +29,15 @@ class Sender:
         """Judge a command; return it, or the refusal's name."""
         self.sequence += 1
         about = Attachment(self.sequence, CLOCK + round(sent_s * S), self.gid)
-        decided = self.commands.judge(about, motion or twist(0.3), round((sent_s + delay_s) * S))
+        received_ns = round((sent_s + delay_s) * S)
+        decided = self.commands.judge(about, motion or twist(0.3), received_ns, received_ns)
         return decided.name if isinstance(decided, Refusal) else decided
 
     def settle(self, until_s: float = 1.0) -> "Sender":
         """Send neutral commands until this time."""
         for number in range(round(until_s * 20)):
-            assert self.send(number / 20, motion=twist()) == Request(0.0, 0.0)
+            decided = self.send(number / 20, motion=twist())
+            assert decided == ("settling" if number < 10 else Request(0.0, 0.0))
         return self
 
 
@@ -47,9 +49,38 @@ def test_a_command_is_passed_on_as_it_is() -> None:
 def test_a_new_publisher_moves_nothing_at_first() -> None:
     sender = Sender(Commands())
     assert sender.send(0.0) == "settling"
-    assert sender.send(0.1, motion=twist()) == Request(0.0, 0.0)
+    assert sender.send(0.1, motion=twist()) == "settling"  # it may be old, too
     assert sender.send(0.45) == "settling"
-    assert sender.send(0.55) == Request(0.3, 0.0)
+    assert sender.send(0.55) == "not_neutral"
+    assert sender.send(0.6, motion=twist()) == Request(0.0, 0.0)
+    assert sender.send(0.65) == Request(0.3, 0.0)
+
+
+@pytest.mark.parametrize(("idle_s", "delay_s"), [(59.0, 0.3), (3600.0, 1.9), (36000.0, 15.0)])
+def test_what_was_held_back_after_a_silence_is_refused(idle_s: float, delay_s: float) -> None:
+    sender = Sender(Commands()).settle()
+    sender.send(1.0)
+    begin_s = 1.0 + idle_s
+    burst = [sender.send(begin_s + n / 20, delay_s - n / 20) for n in range(int(delay_s * 20))]
+    assert Request(0.3, 0.0) not in burst[: int((delay_s - 0.25) * 20)]
+
+
+def test_a_publisher_that_was_silent_for_long_begins_anew() -> None:
+    sender = Sender(Commands()).settle()
+    assert sender.send(60.5) == Request(0.3, 0.0)
+    assert sender.send(121.0) == "settling"
+    assert sender.send(121.6) == "not_neutral"
+    assert sender.commands.owner is None
+
+
+def test_what_waited_in_a_busy_host_is_refused() -> None:
+    commands = Commands()
+    sender = Sender(commands).settle()
+    sender.send(1.0)
+    about = Attachment(99, CLOCK + 2 * S, NAV)
+    late = commands.judge(about, twist(0.3), 2 * S + 10 * MS, 2 * S + 220 * MS)
+    assert isinstance(late, Refusal)
+    assert late.name == "held_back"
 
 
 @pytest.mark.parametrize(("delay_s", "held"), [(0.2, False), (0.22, True), (5.0, True)])
@@ -81,9 +112,12 @@ def test_a_queue_that_drains_slowly_is_refused() -> None:
 
 def test_a_clock_that_is_set_forward_settles_anew() -> None:
     sender = Sender(Commands()).settle()
-    sender.commands.judge(Attachment(900, CLOCK + 60 * S, NAV), twist(), S)
+    sender.commands.judge(Attachment(900, CLOCK + 60 * S, NAV), twist(), S, S)
     about = Attachment(901, CLOCK + 60 * S + 20 * MS, NAV)
-    assert sender.commands.judge(about, twist(0.3), S + 20 * MS).name == "settling"  # type: ignore[union-attr]
+    later_ns = S + 20 * MS
+    decided = sender.commands.judge(about, twist(0.3), later_ns, later_ns)
+    assert isinstance(decided, Refusal)
+    assert decided.name == "settling"
 
 
 def test_a_clock_that_drifts_is_no_delay() -> None:
@@ -183,7 +217,8 @@ def test_motion_is_never_older_than_allowed(
         now_s += wait_s
         sequences[gid] += step
         about = Attachment(sequences[gid], CLOCK + round((now_s - delay_s) * S), gid)
-        decided = commands.judge(about, twist(speed), round(now_s * S))
+        now_ns = round(now_s * S)
+        decided = commands.judge(about, twist(speed), now_ns, now_ns)
         if step or gid not in fastest:
             fastest[gid] = min(fastest.get(gid, math.inf), delay_s)
         if isinstance(decided, Request):

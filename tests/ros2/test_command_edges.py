@@ -8,6 +8,7 @@ from services.ros2.attachment import Attachment
 from services.ros2.command import (
     FASTER_NS,
     HELD_BACK_NS,
+    IDLE_NS,
     OWNER_NS,
     SETTLE_NS,
     Commands,
@@ -20,6 +21,7 @@ NAV, JOY = b"n" * 16, b"j" * 16
 START_NS = 10**12  # our clock; the senders' clocks are 0 then
 AHEAD = Twist((0.3, 0.0, 0.0), (0.0, 0.0, 0.0))
 NEUTRAL = Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+STANDING = Request(0.0, 0.0)
 TAKEN = Request(0.3, 0.0)
 NEW = "A publisher is new, or its delay changes. Commands are taken soon."
 
@@ -29,14 +31,16 @@ def judge(
     twist: Twist = AHEAD, gid: bytes = NAV,
 ) -> Request | Refusal:  # fmt: skip
     """Judge a command that arrives ``at_ns`` after the start and was sent ``late_ns`` before."""
-    return commands.judge(Attachment(sequence, at_ns - late_ns, gid), twist, START_NS + at_ns)
+    now_ns = START_NS + at_ns
+    return commands.judge(Attachment(sequence, at_ns - late_ns, gid), twist, now_ns, now_ns)
 
 
 @pytest.fixture
 def commands() -> Commands:
     """Return a judge that has just taken a command of NAV, at 1 s."""
     made = Commands()
-    judge(made, 1, 0, twist=NEUTRAL)
+    judge(made, 0, 0, twist=NEUTRAL)
+    judge(made, 1, SETTLE_NS, twist=NEUTRAL)
     judge(made, 2, 10**9)
     assert made.owner == NAV
     return made
@@ -45,21 +49,21 @@ def commands() -> Commands:
 def test_settling_ends_after_its_time() -> None:
     made = Commands()
     judge(made, 1, 0, twist=NEUTRAL)
-    assert judge(made, 2, SETTLE_NS - 1) == Refusal("settling", NEW)
-    assert judge(made, 3, SETTLE_NS) == TAKEN
+    assert judge(made, 2, SETTLE_NS - 1, twist=NEUTRAL) == Refusal("settling", NEW)
+    assert judge(made, 3, SETTLE_NS, twist=NEUTRAL) == STANDING
 
 
 def test_a_delivery_that_is_much_faster_settles_anew() -> None:
     made = Commands()
     judge(made, 1, 0, late_ns=FASTER_NS, twist=NEUTRAL)
-    assert judge(made, 2, SETTLE_NS) == TAKEN  # exactly so much faster
+    assert judge(made, 2, SETTLE_NS, twist=NEUTRAL) == STANDING  # exactly so much faster
     assert judge(made, 3, SETTLE_NS, late_ns=-1) == Refusal("settling", NEW)
 
 
 def test_held_back_begins_above_its_limit() -> None:
     made = Commands()
     judge(made, 1, 0, twist=NEUTRAL)
-    judge(made, 2, SETTLE_NS)
+    judge(made, 2, SETTLE_NS, twist=NEUTRAL)
     assert judge(made, 3, SETTLE_NS, late_ns=HELD_BACK_NS) == TAKEN
     refused = judge(made, 4, SETTLE_NS, late_ns=HELD_BACK_NS + 1)
     assert refused == Refusal(
@@ -104,3 +108,17 @@ def test_the_texts_about_the_content(commands: Commands) -> None:
         "A command asks for motion other than linear.x and angular.z. The vehicle cannot drive "
         "sideways through this interface.",
     )
+
+
+def test_a_silence_of_exactly_the_limit_is_no_new_start(commands: Commands) -> None:
+    assert judge(commands, 3, 10**9 + IDLE_NS) == TAKEN
+    assert judge(commands, 4, 10**9 + 2 * IDLE_NS + 1) == Refusal("settling", NEW)
+    assert commands.owner is None
+
+
+def test_the_time_until_a_command_is_judged_counts(commands: Commands) -> None:
+    at_ns = START_NS + 10**9
+    for sequence, waited_ns, taken in ((3, HELD_BACK_NS, True), (4, HELD_BACK_NS + 1, False)):
+        about = Attachment(sequence, 10**9, NAV)
+        decided = commands.judge(about, AHEAD, at_ns, at_ns + waited_ns)
+        assert (decided == TAKEN) == taken

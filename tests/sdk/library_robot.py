@@ -31,6 +31,6 @@ def blocked(robot: t2.Robot) -> bool:
     if state.latched:
         try:
             robot.reset()
-        except t2.Refused:
+        except (t2.Refused, t2.NotConfirmed):
             return True
     return not {cause.name for cause in state.causes} <= {"no_request", "neutral"}

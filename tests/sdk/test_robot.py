@@ -206,3 +206,48 @@ def test_invalid_numbers_are_refused(robot: t2.Robot) -> None:
     with pytest.raises(ValueError, match="not negative"):
         robot.limit("detector", linear=-1.0)
     robot.led(channel=1, mode=1)
+
+
+def test_an_error_ends_a_drive_for_good(robot: t2.Robot) -> None:
+    with robot.drive("nav") as drive:
+        robot.estop()
+        wait_until(lambda: "estop" in robot.safety.latest().latched, "the latch")
+        for _ in range(2):
+            with pytest.raises(t2.Latched):
+                wait_until(lambda: drive.check(), "the error")
+        time.sleep(1.0)
+        robot.reset()
+        with pytest.raises(t2.Latched):
+            drive.velocity(0.3)
+    with pytest.raises(t2.Latched):
+        drive.velocity(0.3)
+    with robot.drive("nav") as drive:
+        pass
+    with pytest.raises(t2.T2Error, match="closed"):
+        drive.velocity(0.3)
+
+
+def test_a_source_has_one_drive_in_a_program(robot: t2.Robot) -> None:
+    with (
+        robot.drive("nav"),
+        pytest.raises(t2.T2Error, match="is open in this program"),
+        robot.drive("nav"),
+    ):
+        pass
+
+
+def test_a_cancel_before_a_motion_ends_it(robot: t2.Robot) -> None:
+    with robot.drive("nav") as drive:
+        drive.cancel()
+        drive.check()  # of another thread: the cancel stays
+        with pytest.raises(t2.T2Error, match="cancelled"):
+            drive.forward(5.0)
+        drive.forward(0.05)
+
+
+def test_an_ended_limit_is_not_set(robot: t2.Robot) -> None:
+    limit = robot.limit("detector", linear=0.3)
+    limit.end()
+    limit.end()
+    with pytest.raises(t2.T2Error, match="has ended"):
+        limit.set(0.1)
