@@ -147,7 +147,8 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
     if is_stop and worst and worst not in tripped:
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
         yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
-    if old.control != new.control:
+    # The end of control is worth an event of its own only while no latch is the reason.
+    if old.control != new.control and (new.control or not latched(after.latches)):
         yield Transition(
             "source", "info", _source_text(new.control), {"from": old.control, "to": new.control}
         )

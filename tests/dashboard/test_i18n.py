@@ -146,6 +146,14 @@ def test_every_phrase_is_one_of_a_service() -> None:
             assert part.strip(" .,:()m/s") in code, english
 
 
+def test_every_text_of_the_recorders_events_is_translated() -> None:
+    code = (CODE.parent / "recorder" / "recorder.py").read_text(encoding="utf-8")
+    texts = re.findall(r'(?:text = f?|"(?:info|warning|error)", f?)"([^"]+)"', code)
+    found = {re.sub(r"{[^}]*}", PLACEHOLDER, text) for text in texts} - {"{}: {}"}
+    assert "black box written to {}" in found
+    assert [text for text in found if not any(it.startswith(text) for it in PHRASES)] == []
+
+
 @pytest.mark.parametrize("english", PHRASES)
 def test_a_phrase_has_the_same_placeholders_in_both_languages(english: str) -> None:
     chinese = PHRASES[english]

@@ -149,7 +149,7 @@ def test_a_hold_that_frees_the_bumper_is_not_refused() -> None:
 
 def test_a_repeated_emergency_stop_is_one_event() -> None:
     fixture = PolicyFixture().running()
-    assert noted(fixture, Estop()) == ["estop", "source"]
+    assert noted(fixture, Estop()) == ["estop"]  # and not "No source is in control."
     first = fixture.latched()
     fixture.tick(30)
     assert noted(fixture, Estop()) == []
@@ -164,7 +164,7 @@ def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
     assert ticked(fixture) == []
     fixture.pressed = True
-    assert ticked(fixture) == ["contact", "source"]  # the contact is the stop
+    assert ticked(fixture) == ["contact"]  # it is the stop, and the end of control
     fixture.linear = 0.0
     assert ticked(fixture) == []
     fixture.left_bits = 3
