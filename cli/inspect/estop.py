@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks
-from cli.inspect.session import add_options, decoded, open_session
+from cli.inspect.session import add_options, decoded, open_session, repeated
 from common import codec, keys
 from common.bus.probe import Probe
 from common.errors import LinkError, RobotError
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, robot: str | None = None) -> int:
     while True:
         try:
             with open_session(options) as session:
-                return stop(session.probe, robot or session.robot)
+                return stop(session.probe, robot or session.robot, repeated(options))
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
@@ -57,8 +57,11 @@ def keep_alive(options: argparse.Namespace) -> int:
         return keepalive.hold(session, options.keepalive)
 
 
-def stop(probe: Probe, robot: str) -> int:
-    """Stop one robot, or several by a key expression; return 1 if one does not confirm in time."""
+def stop(probe: Probe, robot: str, settings: str = "") -> int:
+    """Stop one robot, or several by a key expression; return 1 if one does not confirm in time.
+
+    ``settings`` are the options that advised commands repeat.
+    """
     _order(probe, robot)  # before anything else
     probe.listen(keys.SAFETY.on(robot))
     expected = expected_robots(probe, robot)
@@ -72,9 +75,16 @@ def stop(probe: Probe, robot: str) -> int:
             if any("estop" in state.latched for state in decoded([sample], SafetyState)):
                 confirmed.add(chunks(sample.key)[0])
     missing = sorted(expected - confirmed)
-    report(confirmed, missing)
-    if missing == [robot] and (why := why_unconfirmed(probe, robot)):
-        output.warn(f"t2 estop: {why}")
+    if missing == [robot]:
+        if seen := other_robots(probe, robot):
+            output.warn(f"t2 estop: no such robot {robot} at this router (seen: {', '.join(seen)})")
+            return 1
+        if is_barred(probe, robot):
+            output.warn(
+                f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
+                "(as it seems: the router drops its commands)"
+            )
+    report(confirmed, missing, settings)
     return 0 if confirmed and not missing else 1
 
 
@@ -86,15 +96,16 @@ def expected_robots(probe: Probe, robot: str) -> set[str]:
     return {name for name, path in tokens if path.split("/")[1] in MOVES}
 
 
-def report(confirmed: set[str], missing: Sequence[str]) -> None:
+def report(confirmed: set[str], missing: Sequence[str], settings: str) -> None:
     """Print each stopped robot, and a warning for each that does not confirm."""
     for each in sorted(confirmed):
-        print(f"Robot {each} is stopped. `t2 call safety/reset --robot {each}` releases it.")
+        release = f"t2 call safety/reset --robot {each}{settings}"
+        print(f"Robot {each} is stopped. `{release}` releases it.")
     sys.stdout.flush()
     for each in missing:
         output.warn(
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
-            f"{SWITCH}, then `t2 doctor --robot {each}`."
+            f"{SWITCH}, then `t2 doctor --robot {each}{settings}`."
         )
     robots = len(confirmed) + len(missing)
     if missing and robots > 1:
@@ -106,21 +117,19 @@ def report(confirmed: set[str], missing: Sequence[str]) -> None:
         )
 
 
-def why_unconfirmed(probe: Probe, robot: str) -> str:
-    """Return a likely reason why a robot does not confirm; empty if none is known.
-
-    It takes up to four seconds: after the warning.
-    """
+def other_robots(probe: Probe, robot: str) -> list[str]:
+    """Return the robots at the router if the named one is not among them; otherwise nothing."""
     present = {chunks(token)[0] for token in probe.alive(keys.live_key("*", "*", "*"))}
-    if present and robot not in present:
-        return f"no service of robot {robot} is at this router; seen: {', '.join(sorted(present))}"
+    return [] if robot in present else sorted(present)
+
+
+def is_barred(probe: Probe, robot: str) -> bool:
+    """Return whether the router drops the commands of this certificate, as it seems."""
     serves = probe.alive(keys.live_key(robot, "safety", "*"))
     # Each role that may stop may also do one of these, except fleet.
     topics = (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
     commands = (topic.on(robot, source="*") for topic in topics)
-    if serves and not any(map(probe.has_reader, commands)):
-        return f"not allowed, as it seems: this certificate may have no right to stop robot {robot}"
-    return ""
+    return bool(serves) and not probe.has_reader(*commands)
 
 
 def _order(probe: Probe, robot: str) -> None:

@@ -1,6 +1,7 @@
 """Options, bus session and handling of Ctrl-C that the commands share."""
 
 import argparse
+import shlex
 import signal
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -107,6 +108,18 @@ def settings(options: argparse.Namespace) -> Shared:
     if options.robot and "*" not in options.robot:
         options.sets = [*options.sets, f"robot.id={options.robot}"]
     return load(Shared, sources(options)).config
+
+
+def repeated(options: argparse.Namespace) -> str:
+    """Return the options that name sources of settings, for a command to copy; " --set A=B".
+
+    ``robot.id`` is left out: the command names its robot.
+    """
+    words = [word for file in options.config or () for word in ("--config", str(file))]
+    for each in options.sets:
+        if not each.startswith("robot.id="):
+            words += ["--set", each]
+    return "".join(f" {shlex.quote(word)}" for word in words)
 
 
 @contextmanager

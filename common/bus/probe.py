@@ -98,13 +98,14 @@ class Probe:
         replies = self._session.liveliness().get(expression, timeout=timeout_s)
         return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok)
 
-    def has_reader(self, key: str) -> bool:
-        """Return whether another session subscribes to the key; publishes nothing."""
-        declared = self._publisher(key)
+    def has_reader(self, *of: str) -> bool:
+        """Return whether another session subscribes to one of these keys; publishes nothing."""
+        declared = [self._publisher(key) for key in of]
         try:
-            return _matches(declared)
+            return _matches(*declared)
         finally:
-            declared.undeclare()
+            for each in declared:
+                each.undeclare()
 
     def watch_readers(self, key: str) -> Callable[[], bool]:
         """Return a function that returns whether another session subscribes to the key now."""
@@ -151,10 +152,10 @@ def _opened(where: BusSettings) -> zenoh.Session:
     )
 
 
-def _matches(declared: Any) -> bool:
+def _matches(*declared: Any) -> bool:
     """Return whether a publisher or querier is matched within ``MATCH_TIMEOUT_S``."""
     end_s = time.monotonic() + MATCH_TIMEOUT_S
-    while not declared.matching_status.matching:
+    while not any(each.matching_status.matching for each in declared):
         if time.monotonic() > end_s:
             return False
         time.sleep(POLL_PERIOD_S)

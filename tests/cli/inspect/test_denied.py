@@ -132,18 +132,32 @@ def test_a_driver_drives_and_a_viewer_is_refused(site: Site, join: Callable[...,
         assert len(robot.estops) == 1
 
 
-def test_t2_estop_reports_why_a_robot_does_not_confirm(
-    site: Site, join: Callable[..., Bus]
+def test_t2_estop_reports_the_reason_before_the_advice(
+    site: Site,
+    join: Callable[..., Bus],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def reason(role: str, name: str, robot: str = "001") -> str:
-        with probe(connecting(site.settings(role, name), secured)) as session:
-            return estop.why_unconfirmed(session, robot)
+    def stopped(role: str, name: str, robot: str = "001") -> list[str]:
+        where = connecting(site.settings(role, name), secured)
+        sets = [f"--set=bus.{field}={getattr(where, field)}" for field in CERTIFIED]
+        code = main(["estop", "--robot", robot, *sets, f"--set=bus.connect={secured}"])
+        assert code == 1
+        return capsys.readouterr().err.splitlines()
 
+    monkeypatch.setattr(estop, "TIMEOUT_S", 0.5)
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         on_board(join, onboard)
-        assert reason("viewer", "hall").startswith("not allowed, as it seems")
-        assert reason("driver", "anna") == ""
-        assert reason("driver", "anna", "009").endswith("is at this router; seen: 001")
+        reason, advice = stopped("viewer", "hall")
+        assert reason.startswith(
+            "t2 estop: not allowed: this certificate has no right to stop robot 001 (as it seems: "
+        )
+        assert "USE THE VEHICLE'S OWN SWITCH, then `t2 doctor --robot 001 --set bus.ca=" in advice
+        assert advice.endswith(f" --set bus.connect={secured}`.")
+        (advice,) = stopped("driver", "anna")
+        assert "does not confirm" in advice
+        unknown = "t2 estop: no such robot 009 at this router (seen: 001)"
+        assert stopped("driver", "anna", "009") == [unknown]
 
 
 def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., Bus]) -> None:

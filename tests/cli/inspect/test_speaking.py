@@ -134,4 +134,5 @@ def test_an_unconfirmed_estop(
     pretend(buses, "safety", {keys.SAFETY: state})
     result = tool("estop")
     assert (result.code, result.out) == (1, "")
+    assert f"`t2 doctor --robot {buses.robot} --set bus.connect={tool.endpoint}`" in result.err
     assert "USE THE VEHICLE'S OWN SWITCH" in result.err
