@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import ViewportSize, sync_playwright
 
 from cli.__main__ import main
 from cli.recordings.report.page import clock
@@ -15,6 +16,9 @@ from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
+from verification.harness.dashboard_page import CHROMIUM
+
+PHONE: ViewportSize = {"width": 390, "height": 844}
 
 
 @pytest.fixture
@@ -76,6 +80,29 @@ def test_content_from_the_bus_is_escaped(file: Path) -> None:
     assert "The &lt;b&gt;bumper&lt;/b&gt; was hit." in text
     assert "<i>" not in text
     assert "tel/&lt;i&gt;" in text
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+def test_a_phone_shows_the_whole_text_of_events(file: Path) -> None:
+    main(["report", str(file)])
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport=PHONE)
+        page.goto(file.with_suffix(".html").as_uri())
+        texts = [it.bounding_box() for it in page.locator(".events td:nth-child(4)").all()]
+        assert texts
+        for box in texts:
+            assert box is not None
+            assert box["width"] > 300
+            assert box["x"] + box["width"] <= PHONE["width"]
+        # A table or figure that is wider than the screen has a visible hint.
+        wide = page.locator(".scroll:has(.wide), .scroll:has(svg)")
+        assert page.locator(".hint:visible").count() == wide.count() > 3
+        for each in page.locator(".scroll").all():
+            if each.evaluate("it => it.scrollWidth > it.clientWidth"):
+                assert each.evaluate("it => it.previousElementSibling.className") == "hint"
+        assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+        browser.close()
 
 
 def test_figures_have_unique_ids(file: Path) -> None:
