@@ -195,11 +195,11 @@ def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
     if others:
         due = others[0] in latched(state.latches) and others[0] not in still_present(state.latches)
         return state.latches[others[0]].text + (" Reset first." if due else "")
-    spent = _spent(state, settings)
-    return f"{spent} {BY_HAND}" if spent else ""
+    why = spent(state, settings)
+    return f"{why} {BY_HAND}" if why else ""
 
 
-def _spent(state: State, settings: Safety) -> str:
+def spent(state: State, settings: Safety) -> str:
     """Return why the releases of this contact are used up; empty when they are not."""
     if state.release.unknown:
         return "Safety has restarted: the travel of an earlier release is unknown."

@@ -12,7 +12,7 @@ from services.safety.causes import BARRING, BY_NAME
 from services.safety.inputs import DriveRequest, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
-from services.safety.operator_requests import room
+from services.safety.operator_requests import BY_HAND, room, spent
 from services.safety.policy import Policy
 from services.safety.state import State
 from services.safety.trajectory import OPPOSITE
@@ -22,10 +22,11 @@ MOVING = ("run", "slow")
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
 # What the operator does about a latched cause that is still present, before a reset.
 STILL_PRESENT = {
-    "contact": "It is still pressed: move off first, then reset.",
     "estop": "It is still pressed or requested: release it, then reset.",
     "estop_keepalive": "Start its program again, then reset.",
 }
+MOVE_OFF = "It is still pressed: move off first, then reset."
+RESET_OTHERS = "It is still pressed: reset first, then move off."
 REPEATED_NS = NS_PER_S  # a refusal that comes again within this time is no new event
 
 
@@ -91,15 +92,18 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         source=state.verdict.source,
         limits=_limits(policy, state, now_ns),
         heartbeat=state.heartbeat.number,
-        text=sentence(state),
+        text=sentence(state, by_hand=bool(spent(state, policy.settings))),
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
     )
 
 
-def sentence(state: State) -> str:
-    """Return one sentence: why the vehicle does or does not move."""
+def sentence(state: State, *, by_hand: bool = False) -> str:
+    """Return one sentence: why the vehicle does or does not move.
+
+    ``by_hand`` means that no release may move the vehicle off a pressed bumper any more.
+    """
     names = ordered(state.latches)
     if state.verdict.command is RUN:
         control = _source_text(state.verdict.source)
@@ -111,7 +115,17 @@ def sentence(state: State) -> str:
         return text
     if state.latches[worst].good >= GOOD_SAMPLES:
         return f"{text} Reset to go on."
+    if worst == "contact":
+        return f"{text} {_way_off(state, by_hand=by_hand)}"
     return f"{text} {STILL_PRESENT.get(worst, 'The cause is still present: fix it, then reset.')}"
+
+
+def _way_off(state: State, *, by_hand: bool) -> str:
+    """Return the next step at a pressed bumper, as safety accepts it."""
+    if by_hand:
+        return BY_HAND
+    # A reset clears the others, and only then a release is accepted.
+    return RESET_OTHERS if len(latched(state.latches)) > 1 else MOVE_OFF
 
 
 def signature(state: State) -> tuple[object, ...]:

@@ -136,6 +136,23 @@ def test_a_latched_cause_names_what_is_due_before_a_reset() -> None:
     assert sentence(fixture.state).endswith("The cause is still present: fix it, then reset.")
 
 
+def test_a_pressed_bumper_names_the_step_that_is_accepted() -> None:
+    fixture = hit()
+    forbid: frozenset[Direction] = frozenset({"backward", "forward"})
+    fixture.estop()
+    fixture.tick(50)
+    reset_first = "It is still pressed: reset first, then move off."
+    assert fixture.published().text == f"The bumper was hit. {reset_first}"
+    assert fixture.hold(direction="backward") == "Emergency stop. Reset first."
+    assert fixture.reset() == ""
+    fixture.tick()
+    assert fixture.published().text.endswith("It is still pressed: move off first, then reset.")
+    fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
+    by_hand = "Push the vehicle off by hand, then reset."
+    assert fixture.published().text == f"The bumper was hit. {by_hand}"
+    assert fixture.hold(direction="backward").endswith(by_hand)
+
+
 def test_a_hold_that_frees_the_bumper_is_not_refused() -> None:
     fixture = hit()
     fixture.decide(Hold(True, "backward", fixture.echo))
