@@ -55,6 +55,11 @@ def test_a_driver_who_is_overruled_sees_it_and_must_let_go(
         other.linear = 0.0
         wait_for_text(page, "#driver", "Overruled by teleop")
         wait_for_text(page, "#hold", "Another source drives")
+        wait_for_text(page, "#sentence", "Overruled by teleop. teleop is in control.")
+        assert page.get_attribute("#state", "data-tone") == "slow"  # not as requested
+        page.click("#language")
+        wait_for_text(page, "#sentence", "控制权已被其他来源取得： teleop。teleop 取得控制权。")
+        page.click("#language")
         other.linear = -0.2
         wait_until(lambda: stack.speed() < -0.1, "the other operator backs up")
         other.linear = None

@@ -11,12 +11,14 @@ from sim.requests import Bumper
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_page import (
     BROWSER_MARKS,
+    drive_until_moving,
     open_page,
     reset_all,
     take_control,
     wait_for_text,
 )
 from verification.harness.stack import RunningStack, running_stack
+from verification.harness.waiting import wait_until
 
 pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
 
@@ -82,6 +84,25 @@ def problems(page: Page, width: int, height: int, needed: Sequence[str]) -> list
     return found
 
 
+def uncovered(page: Page) -> list[str]:
+    """Return which notices cover the driving panel, and whether there are more than two."""
+    boxes = page.evaluate(
+        """() => [...document.querySelectorAll('#toasts div, .driving')].map((it) => {
+          const box = it.getBoundingClientRect();
+          return [box.left, box.top, box.right, box.bottom];
+        })"""
+    )
+    panel, *notices = boxes
+    found = [f"{each} covers the driving panel" for each in notices if overlap(each, panel)]
+    return found if len(notices) == 2 else [*found, f"{len(notices)} notices"]
+
+
+NOTICES = """() => import('/t2/notices.js').then((it) => {
+  const text = 'The release was refused: the vehicle still moves. ';
+  for (const end of 'abc') it.toast(text + end, 'error');
+})"""
+
+
 def overlap(one: list[float], other: list[float]) -> bool:
     left, top = max(one[0], other[0]), max(one[1], other[1])
     return left < min(one[2], other[2]) - 1 and top < min(one[3], other[3]) - 1
@@ -93,6 +114,8 @@ def on_all_screens(
     found = {}
     for width, height in SCREENS:
         wrong = problems(page, width, height, needed)
+        if page.locator("#toasts div").count():
+            wrong += uncovered(page)
         page.evaluate("scrollTo(0, 0)")
         page.screenshot(path=pictures / f"{name}-{width}x{height}.png")
         if wrong:
@@ -110,6 +133,13 @@ def test_a_driver_sees_everything(
     stack.control.do(Bumper(pressed=True))
     page.wait_for_selector("#release.due")
     found |= on_all_screens(page, tmp_path, f"release-{language}", (*NEEDED, *RELEASE))
+    page.keyboard.down("b")
+    by_hand = "Push the vehicle off by hand" if language == "en" else "请用手推开车辆"
+    wait_for_text(page, "#sentence", by_hand)
+    page.keyboard.up("b")
+    page.evaluate(NOTICES)
+    found |= on_all_screens(page, tmp_path, f"used-up-{language}", (*NEEDED, *RELEASE))
+    assert page.get_attribute("#reset", "title") == page.text_content("#release-forbidden")
     page.click("#estop")
     wait_for_text(page, "#detail", "Also latched" if language == "en" else "同时锁定")
     found |= on_all_screens(page, tmp_path, f"contact-{language}")
@@ -142,6 +172,56 @@ def test_chinese_notices_and_events_have_the_figures(page: Page, stack: RunningS
     assert "refused" not in page.inner_text("#toasts")
     page.wait_for_selector("#reset.due")
     reset_all(page)
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1024, 700), (844, 390)])
+def test_the_keys_of_the_release_stay_visible_with_all_texts(
+    page: Page, stack: RunningStack, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
+    page.wait_for_timeout(1000)  # a short motion does not count
+    try:
+        stack.control.do(Bumper(pressed=True))
+        page.wait_for_selector("#release.due")
+        page.keyboard.up("w")
+        wait_for_text(page, "#release-free", "Backward is believed free")
+        page.evaluate(NOTICES)
+        assert problems(page, *size, (*NEEDED, *RELEASE)) + uncovered(page) == []
+        page.screenshot(path=tmp_path / "release.png")
+    finally:
+        stack.control.do(Bumper(pressed=False))
+        reset_all(page)
+
+
+def test_a_reset_is_offered_only_where_safety_accepts_it(page: Page, stack: RunningStack) -> None:
+    wait_for_title(page, "Nothing is latched")
+    stack.control.do(Bumper(pressed=True))
+    page.wait_for_selector("#release.due")
+    page.click("#estop")
+    page.wait_for_selector("#reset.due")  # safety refuses a release until the stop is reset
+    wait_for_text(page, "#sentence", "It is still pressed: reset first, then move off.")
+    wait_for_text(page, "#release-forbidden", "Reset first, then move off.")
+    assert page.is_disabled("#release-backward")
+    wait_until(lambda: page.is_enabled("#reset"), "a reset is offered")
+    page.keyboard.press("r")
+    page.wait_for_selector("#release.due")
+    assert page.locator("#reset.due").count() == 0
+    wait_until(lambda: page.is_enabled("#release-backward"), "a release is offered")
+    stack.control.do(Bumper(pressed=False))
+    page.wait_for_selector("#reset.due")
+    reset_all(page)
+    wait_for_title(page, "Nothing is latched")
+    page.click("#language")
+    wait_for_title(page, "没有锁定的原因")
+
+
+def wait_for_title(page: Page, expected: str) -> None:
+    """Wait until the reset is disabled for this reason."""
+    wait_until(
+        lambda: page.is_disabled("#reset") and page.get_attribute("#reset", "title") == expected,
+        f"the reset is disabled: {expected}",
+    )
 
 
 def test_the_next_step_is_the_one_that_is_accepted(page: Page, stack: RunningStack) -> None:

@@ -37,7 +37,7 @@ def test_the_search_finds_known_keys() -> None:
     assert {
         "estop",
         "follow",
-        "text.run",
+        "also_latched",
         "take_first",
         "theme",
         "too_late",

@@ -145,7 +145,8 @@ function draw() {
   drawn = number;
   document.body.classList.toggle("stale", lost());
   stateBar.show(view());
-  driving.show(isDriver(), lost() ? null : fast.driver, stateBar.nextStep(newest()));
+  driving.show(isDriver(), newest());
+  notices.place();
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
@@ -183,8 +184,8 @@ function stop() {
 
 function reset() {
   if (!isDriver()) toast(fast?.driver.may === false ? "view_only_why" : "take_first");
-  else if (stateBar.nextStep(newest()) === "release") toast("release_due", "warning");
-  else if (!$("reset").disabled) send({ k: "reset", n: seen() });
+  else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
+  else send({ k: "reset", n: seen() });
 }
 
 // The drawn snapshot: each command names the snapshot that the operator saw.

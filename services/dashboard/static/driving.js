@@ -1,6 +1,8 @@
 // Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
 // releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
 // as the answer to a snapshot, so that the server can compute its age.
+import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
+
 const DEADZONE = 0.12; // of the stick's range
 const DEADMAN = 4; // left shoulder, in the browser's standard mapping
 const STICKS = { linear: 1, angular: 2 }; // left stick up and down, right stick left and right
@@ -16,6 +18,7 @@ let page = null;
 let stick = null; // { pointer, push }
 let releasing = null; // "forward" or "backward": off a pressed bumper
 let release = null; // safety's report on it, during a contact
+let mustReset = false; // another cause is latched beside the contact: safety refuses a release
 let driving = false; // whether this viewer has the driver lock
 let another = null; // another source that drives
 let sent = false; // whether the server has a hold from here
@@ -55,6 +58,7 @@ function gamepad() {
 
 export function answer(n, isDriver, hold, safety) {
   release = safety?.release ?? null;
+  mustReset = safety?.latched.some((it) => it !== "contact") ?? false;
   // The bumper was pressed during the release: this direction is forbidden.
   if ((driving && !isDriver) || (releasing && refusal(releasing))) letGo();
   driving = isDriver;
@@ -84,8 +88,11 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
-/** Update the driving panel. `driver` is null without a connection; `next` is the next step after a stop. */
-export function show(isDriver, driver, next) {
+/** Update the driving panel; `fast` is null without a connection. */
+export function show(isDriver, fast) {
+  const driver = fast?.driver ?? null;
+  const next = nextStep(fast);
+  const refused = resetRefusal(fast);
   another = driver?.other ?? null;
   const panel = document.querySelector(".driving");
   const hold = driver?.hold ?? "free";
@@ -96,18 +103,22 @@ export function show(isDriver, driver, next) {
   for (const name of ["leave", "lamp"]) disable($(name), !isDriver);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) disable($(name), !isDriver);
   disable($("take"), isDriver);
-  disable($("reset"), !isDriver || next === "release");
-  $("reset").title = next === "release" ? page.t("reset_pressed") : "";
+  disable($("reset"), !isDriver || !!refused);
+  $("reset").title = refused ? page.t(refused) : "";
+  const off = !fast?.connected;
+  $("stick").classList.toggle("disabled", off);
+  $("stick").title = off ? page.t("no_router") : "";
   $("reset").classList.toggle("due", next === "reset");
-  $("release").classList.toggle("due", next === "release");
+  $("release").classList.toggle("due", next === "release" || next === "by_hand");
   showRelease(isDriver);
 }
 
 // Why safety refuses a release in this direction now, as a key; empty if it does not.
 function refusal(direction) {
   if (!release) return "release_no_contact";
+  if (isUsedUp(release)) return "release_by_hand";
   if (release.forbidden.includes(direction)) return `release_forbidden_${direction}`;
-  return release.left > 0 ? "" : "release_used_up";
+  return mustReset ? "release_reset_first" : "";
 }
 
 function showRelease(isDriver) {
@@ -122,7 +133,7 @@ function showRelease(isDriver) {
     it.classList.toggle("free", release?.believed_free === direction);
   }
   if (!release) return;
-  write("release-free", believed());
+  write("release-free", isUsedUp(release) ? "" : believed());
   write("release-left", `${page.t("release_left")}: ${metres(release.left)}`);
   write("release-forbidden", [...reasons].join(" "));
 }

@@ -3,6 +3,7 @@ import { translated } from "./phrases.js";
 
 const ERROR_MS = 20000;
 const NOTICE_MS = 5000;
+const MOST = 2; // at a time: more would cover the page
 const $ = (id) => document.getElementById(id);
 let page = null;
 
@@ -25,7 +26,26 @@ export function toast(text, level = "info", about = "") {
   it.textContent = noticeText(text, about);
   for (const old of [...$("toasts").children]) if (old.textContent === it.textContent) old.remove();
   $("toasts").append(it);
+  while ($("toasts").childElementCount > MOST) $("toasts").firstChild.remove();
+  place();
   setTimeout(() => it.remove(), level === "error" ? ERROR_MS : NOTICE_MS);
+}
+
+/** Place the notices at the bottom, or over the sonar view where they would cover the driving panel. */
+export function place() {
+  const it = $("toasts");
+  if (!it.childElementCount) return;
+  it.removeAttribute("style");
+  const panel = document.querySelector(".driving").getBoundingClientRect();
+  const covers = [...it.children].map((each) => each.getBoundingClientRect()).some((box) =>
+    box.right > panel.left && box.left < panel.right && box.bottom > panel.top && box.top < panel.bottom);
+  if (!covers) return;
+  const sonar = $("sonar-view").getBoundingClientRect();
+  // Upwards from its lower edge: below it may be the release.
+  const bottom = Math.min(innerHeight - sonar.bottom, innerHeight - it.offsetHeight);
+  Object.assign(it.style, {
+    left: `${sonar.left}px`, right: `${document.documentElement.clientWidth - sonar.right}px`, bottom: `${bottom}px`,
+  });
 }
 
 // Not modal: the emergency stop must remain one tap away.

@@ -4,6 +4,7 @@ import { translated } from "./phrases.js";
 
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
 const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
+const MOVING = ["run", "slow"];
 const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
 
@@ -20,11 +21,13 @@ function showState(view) {
   const verdict = !fast ? "lost" : !fast.connected ? "no_router" : safety?.verdict ?? "none";
   const quiet = verdict === "stop" && QUIET.includes(worst?.name);
   set("verdict", t(`verdict.${verdict}`));
-  $("state").dataset.tone = quiet ? "idle" : TONES[verdict] ?? "stop";
+  const overruler = MOVING.includes(verdict) && view.isDriver ? fast.driver.other : null;
+  $("state").dataset.tone = quiet ? "idle" : overruler ? "slow" : TONES[verdict] ?? "stop";
   $("state").dataset.verdict = verdict;
   document.title = `${t(`verdict.${verdict}`)} · ${view.robot} · T2`;
   const known = !WITHOUT_STATE.includes(verdict);
-  set("sentence", known ? sentence(view, worst) : t(`text.${verdict}`));
+  const reason = known ? sentence(view, worst) : t(`text.${verdict}`);
+  set("sentence", overruler ? `${t("overruled_by")} ${overruler}${view.language === "en" ? ". " : "。"}${reason}` : reason);
   set("detail", known ? detail(view, worst) : "");
   set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
@@ -42,20 +45,36 @@ function detail({ fast, t, language, isDriver }, worst) {
   ].filter(Boolean).join(" ");
 }
 
-// The next step: while a pressed bumper is all that is latched, a reset would be refused.
+/** Return the next step that safety accepts: while the bumper is pressed, a reset clears the other causes only. */
 export function nextStep(fast) {
-  const safety = fast?.safety;
+  const safety = fast?.connected ? fast.safety : null;
   if (!safety?.latched.length) return "";
-  const pressed = fast.bumper === true && safety.latched.every((it) => it === "contact");
-  return pressed && safety.release ? "release" : "reset";
+  if (fast.bumper !== true || !safety.release || safety.latched.some((it) => it !== "contact")) return "reset";
+  return isUsedUp(safety.release) ? "by_hand" : "release";
+}
+
+/** Return whether safety refuses a release in either direction until a reset. */
+export const isUsedUp = (release) => release.left <= 0 || release.forbidden.length > 1;
+
+const RESET_REFUSALS = { "": "nothing_latched", release: "reset_pressed", by_hand: "release_by_hand" };
+
+/** Return why safety would refuse a reset, as a key; empty if it does not. */
+export const resetRefusal = (fast) => (fast?.connected ? RESET_REFUSALS[nextStep(fast)] ?? "" : "no_router");
+
+// What is due before driving, at a latched cause.
+function due(fast) {
+  const { safety, bumper } = fast;
+  const step = nextStep(fast);
+  if (step === "by_hand" || (bumper && safety.release && isUsedUp(safety.release))) return "release_by_hand";
+  if (step === "release") return "release_due";
+  return bumper && safety.release ? "reset_first" : "reset_due";
 }
 
 function sentence({ fast, t, language }, worst) {
   const { safety } = fast;
   if (language === "en") return safety.text;
-  if (!worst) return t("text.run");
-  const next = nextStep(fast) === "release" ? t("release_due") : t("reset_due");
-  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? next : "");
+  if (!worst) return translated(safety.text, language); // the source in control
+  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t(due(fast)) : "");
 }
 
 function showHead(view) {
