@@ -86,6 +86,8 @@ def problems(page: Page, width: int, height: int, needed: Sequence[str]) -> list
 
 def uncovered(page: Page) -> list[str]:
     """Return which notices cover the driving panel, and whether there are more than two."""
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(100)
     boxes = page.evaluate(
         """() => [...document.querySelectorAll('#toasts div, .driving')].map((it) => {
           const box = it.getBoundingClientRect();

@@ -9,6 +9,7 @@ let page = null;
 
 export function begin(given) {
   page = given;
+  for (const event of ["scroll", "resize"]) addEventListener(event, place);
 }
 
 // A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
