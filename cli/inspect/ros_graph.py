@@ -102,7 +102,7 @@ def _misses_history(peer: Peer, ours: list[Peer]) -> bool:
 
 
 def _traffic(ours: list[Peer], theirs: list[Peer], cmd_vel: str) -> Iterator[Finding]:
-    """Report who commands, and whether anyone reads."""
+    """Report the nodes that command, and whether anyone reads."""
     topics = {own.topic for own in ours if own.kind == "publisher"}
     readers = {peer.node for peer in theirs if peer.kind == "subscription" and peer.topic in topics}
     if not readers:

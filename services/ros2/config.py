@@ -7,7 +7,7 @@ from msgspec import Meta
 from common import settings
 from services.ros2.names import is_valid
 
-Rate = Annotated[float, Meta(ge=0.1, le=50.0)]  # Hz at most; what arrives slower is passed on so
+Rate = Annotated[float, Meta(ge=0.1, le=50.0)]  # Hz at most; a slower stream keeps its own rate
 Frame = Annotated[str, Meta(pattern=r"^([A-Za-z_][A-Za-z0-9_/]*)?\Z", max_length=60)]
 
 

@@ -148,12 +148,14 @@ class Controller:
     def _yield(self, now_ns: int) -> None:
         """End a hold while another source drives: its end must not resume our motion."""
         contest = self._contest
+        was_lost = contest.is_lost
         contest.tick(self._safety.at(now_ns), requests=self._requested is not None)
         if contest.is_lost and contest.other:
             self._overruled_by = contest.other
             self._controls.cut(now_ns)
-            text = f"overruled by {contest.other}: controls released"
-            self._node.event("overruled", "warning", text)
+            if not was_lost:  # the zeros after the cut are requests, too
+                text = f"overruled by {contest.other}: controls released"
+                self._node.event("overruled", "warning", text)
         elif contest.other is None and not self._controls.is_muted(now_ns):
             self._overruled_by = None
 
@@ -208,7 +210,7 @@ class Controller:
 
     @property
     def _no_estop(self) -> str:
-        # Who may not drive may rarely stop; the router does not tell.
+        # A certificate that may not drive can rarely stop; the router reports neither.
         denied = ", probably not allowed" if self._source.denied else ""
         return f"EMERGENCY STOP NOT CONFIRMED{denied}: use the vehicle's own switch"
 
