@@ -167,3 +167,9 @@ def test_a_bumper_that_is_pressed_without_a_latch_is_no_remaining_contact() -> N
     estop, _ = also(fixture, "estop", "One."), also(fixture, "runaway", "Two.")
     _, reply = called(fixture, Reset(fixture.echo, (estop,)))
     assert (reply.done, reply.text) == (True, "Reset, but still latched: Two.")
+
+
+def test_a_held_release_does_not_creep_once_the_bumper_is_free() -> None:
+    fixture = freed()
+    with_release(fixture, direction="backward", held_ns=fixture.now_ns)
+    assert not creeps(fixture)
