@@ -48,10 +48,12 @@ def server(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Ite
 
 
 @pytest.fixture
-def page(browser: Browser, server: Server) -> Iterator[Page]:
+def page(browser: Browser, server: Server, stack: RunningStack) -> Iterator[Page]:
     page = browser.new_page(locale="en-GB")
     open_page(page, server)
     take_control(page)
+    stack.control.do(Bumper(pressed=False))  # a test that failed may have left it pressed
+    reset_all(page)
     yield page
     page.close()
 
