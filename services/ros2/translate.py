@@ -1,7 +1,7 @@
 """Messages of the bus as messages of ROS 2, in the form of ``cdr``. Pure.
 
-Frames follow REP-103 and REP-105; a stamp is the wall clock of the robot. What is unknown stays
-unknown: no message is made of a value that is None.
+Frames follow REP-103 and REP-105; a stamp is the wall clock of the robot. A range that was not
+measured becomes the value that ROS defines for its reason.
 """
 
 import math
