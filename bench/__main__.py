@@ -6,7 +6,6 @@ Raw samples are stored in ``out/bench``. A benchmark that is not measured again 
 import argparse
 import platform
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -27,6 +26,7 @@ from bench.start import page as start_page
 from bench.target import Target, summary
 from bench.telemetry import measure as telemetry_measure
 from bench.telemetry import page as telemetry_page
+from common import clock
 from common.freshness import NS_PER_S
 from verification.harness.host import StallRecorder, description
 
@@ -129,9 +129,9 @@ def measured(benchmark: Benchmark) -> Measured:
     """Measure, and record the stalls of the host meanwhile."""
     versions = benchmark.versions()
     with StallRecorder() as stalls:
-        begin_ns = time.monotonic_ns()
+        begin_ns = clock.now_ns()
         series = benchmark.measure()
-        seconds = (time.monotonic_ns() - begin_ns) / NS_PER_S
+        seconds = (clock.now_ns() - begin_ns) / NS_PER_S
         stall_ms = 1000 * stalls.worst_s(begin_ns, seconds)
     return Measured(
         where=f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}; "

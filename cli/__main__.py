@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.errors import ConfigError, LinkError, RobotError
+from common.text import printable
 
 GROUPS = {
     "Run": {
@@ -36,7 +37,6 @@ GROUPS = {
         ),
         "health": ("inspect.health", "service health"),
         "ls": ("inspect.ls", "the active keys: type, rate, publisher"),
-        "list": ("inspect.ls", "the same as ls"),
         "echo": ("inspect.echo", "print messages received on a key"),
         "hz": ("inspect.measure", "rate, gaps and losses of a key"),
         "delay": ("inspect.measure", "transport delay of the messages on a key"),
@@ -44,7 +44,6 @@ GROUPS = {
         "pub": ("inspect.pub", "publish on a key of your own"),
         "call": ("inspect.call", "call a service, such as safety/reset"),
         "latency": ("latency", "reaction times of the bridge, hop by hop"),
-        "topic": ("inspect.topic", "as ros2 topic: list, echo, hz, delay, bw, info, pub"),
         "schema": ("inspect.schema", "the fields of a message type"),
     },
     "Record": {
@@ -90,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         code: int = module(options.command).run(options)
         sys.stdout.flush()
     except RobotError as error:
-        print(f"t2 {options.command}: {error}", file=sys.stderr)
+        print(printable(f"t2 {options.command}: {error}", "\n"), file=sys.stderr)
         return EXIT_CODES.get(type(error), 1)
     except KeyboardInterrupt:  # before or after the command's own handling of Ctrl-C
         return 128 + signal.SIGINT

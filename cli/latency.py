@@ -6,14 +6,13 @@ differ by a third.
 """
 
 import argparse
-import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
 from cli.inspect.session import add_output, interruptible, wants_json
-from common import keys, log
+from common import clock, keys, log
 from common.bus.bus import Arrival, Bus
 from common.cli_args import add_sources, sources
 from common.config import load
@@ -82,7 +81,7 @@ class Watch:
         self._loop = loop
         self._show = show
         self._once = once
-        self._received_ns = time.monotonic_ns()
+        self._received_ns = clock.now_ns()
         self.silent = False
 
     def on_health(self, arrival: Arrival[Health]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from common.config import DEFAULT_FILE, Sources
 from common.errors import ConfigError, LinkError, RobotError
+from common.text import printable
 
 # As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
 VERSION = "0.1.0"
@@ -66,7 +67,7 @@ def run_program(
     try:
         return run(parser.parse_args(argv))
     except RobotError as error:
-        print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - logs may not be set up yet
+        print(printable(f"{name}: {error}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
         return EXIT_CODES.get(type(error), 1)
 
 

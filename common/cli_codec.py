@@ -11,6 +11,9 @@ from itertools import count
 
 import msgpack
 
+from common import clock
+from common.text import printable
+
 _BOOT = secrets.randbits(63)
 _seq = count(1)
 
@@ -20,7 +23,7 @@ def decode(key: object, value: bytes) -> str:
     if not value:
         return "null"
     try:
-        return json.dumps(msgpack.unpackb(value), ensure_ascii=False, default=_shown)
+        return printable(json.dumps(msgpack.unpackb(value), ensure_ascii=False, default=_shown))
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
         return json.dumps({"not_msgpack": value.hex()})
 
@@ -36,7 +39,7 @@ def encode(key: str, value: str) -> bytes:
         "seq": next(_seq),
         "boot": _BOOT,
         "t_ns": time.time_ns(),
-        "mono_ns": time.monotonic_ns(),
+        "mono_ns": clock.now_ns(),
     }
     return _packed({**header, **message})
 

@@ -9,12 +9,12 @@ import contextlib
 import selectors
 import socket
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 
 from msgspec import Struct
 
+from common import clock
 from common.freshness import NS_PER_S
 
 AT_ONCE_MAX = 4  # submitted calls that one sender makes; more are the loop's
@@ -82,7 +82,7 @@ class Loop:
 
         Like ``watch``, call it before ``run`` or in a handler; other threads use ``post``.
         """
-        timer = Timer(round(period_s * NS_PER_S), time.monotonic_ns(), handler)
+        timer = Timer(round(period_s * NS_PER_S), clock.now_ns(), handler)
         self._timers.append(timer)
         self._wake()  # the handler that calls this may run in another thread
         return timer
@@ -130,7 +130,7 @@ class Loop:
             if self._error is not None:
                 raise self._error
             for key, _ in ready:
-                key.data(time.monotonic_ns())
+                key.data(clock.now_ns())
             # Calls of other threads first: timers check the age of data.
             self._make(self._posted)
             self._make(self._submitted)
@@ -180,11 +180,11 @@ class Loop:
         if not self._timers:
             return None
         due = min(timer.due_ns for timer in self._timers)
-        return max(0, due - time.monotonic_ns()) / NS_PER_S
+        return max(0, due - clock.now_ns()) / NS_PER_S
 
     def _call_due(self) -> None:
         for timer in self._timers:
-            timer.call(time.monotonic_ns())
+            timer.call(clock.now_ns())
 
     def _wake(self) -> None:
         # A full socket already holds a wake-up; a closed one needs none.

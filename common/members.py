@@ -18,6 +18,7 @@ ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site
 
 # The name of a source, as in ``safety.sources`` and ``safety.limits``.
 SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
+OPERATORS_SOURCES = ("teleop", "web", "checkout")  # of the operator's screens
 # A robot's id, and other parts of a certificate's name: one chunk of a key.
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
 

@@ -14,6 +14,7 @@ from common.timing import Durations as Durations
 from common.timing import Timing as Timing
 from common.verdict import Action as Action
 from common.verdict import Cause as Cause
+from common.verdict import Counts, Few, Name, Text
 from common.verdict import Direction as Direction
 from common.verdict import KeepaliveState as KeepaliveState
 from common.verdict import Limits as Limits
@@ -86,7 +87,7 @@ class Bumper(Message, frozen=True, kw_only=True):
 class Driver(Message, frozen=True, kw_only=True):
     """Faults of one motor driver (manual 2.7)."""
 
-    faults: tuple[str, ...]  # names of the known bits, "bit_N" for reserved ones
+    faults: Annotated[tuple[Name, ...], Few]  # names of the known bits, "bit_N" for reserved ones
     bits: int  # all 32, as the board sent them
 
 
@@ -101,29 +102,28 @@ class Relay(Struct, frozen=True, kw_only=True):
     """The relay between PC and board, by its newest report."""
 
     state: LinkState
-    version: str
-    braking: str  # why it sends BRAKE: start, silent, hit; empty while it passes commands
+    version: Name
+    braking: Name  # why it sends BRAKE: start, silent, hit; empty while it passes commands
     uptime: float  # s
-    counters: dict[str, int]  # datagrams since its start, by what became of them
+    counters: Counts  # datagrams since its start, by what became of them
 
 
 class Link(Message, frozen=True, kw_only=True):
     """State of the link to the board."""
 
     state: LinkState
-    board: str  # address:port
+    board: Name  # address:port
     epoch: int
     armed: bool  # whether the bridge would obey a RUN now
-    waiting: str  # why it would not, as text; empty when armed
-    rates: dict[str, float]  # frames per second by name, over the last second
-    rejected: dict[str, int]  # frames and datagrams refused since start, by reason
+    waiting: Text  # why it would not, as text; empty when armed
+    rates: Annotated[dict[Name, float], Few]  # frames by name, over the last second, Hz
+    rejected: Counts  # frames and datagrams refused since start, by reason
     round_trip: float | None  # s, the median of the last queries
-    latched_by: int | None = (
-        None  # ``boot`` of the safety, or this bridge, whose latch is not reset
-    )
-    ports: dict[str, int] = {}  # our UDP port that each frame is taken from, by the frame's name
+    latched_by: int | None = None  # ``boot`` of the safety or bridge whose latch is not reset
+    ports: Counts = {}  # our UDP port that each frame is taken from, by the frame's name
     send_errors: int = 0  # datagrams that the system refused to send, since start
     relay: Relay | None = None  # None without ``board.relay_port``
+    estop: int | None = None  # receive time, ns, of an emergency stop that safety must still latch
 
 
 # --- tel/odom, tel/safety -------------------------------------------------------------------
@@ -142,23 +142,23 @@ class Odometry(Message, frozen=True, kw_only=True):
     epoch: int  # number of times the pose was set
     residual: float | None  # m, counters less integrated velocity over the last second
     slip: bool
-    frame_id: str = "odom"
-    child_frame_id: str = "base_link"
+    frame_id: Name = "odom"
+    child_frame_id: Name = "base_link"
 
 
 class SafetyState(Message, frozen=True, kw_only=True):
     """Safety's decision and its causes."""
 
     verdict: Verdict
-    latched: tuple[str, ...]  # names of the causes that need a reset
-    causes: tuple[Cause, ...]  # all active ones, the worst first
-    source: str | None  # the driving source
+    latched: Annotated[tuple[Name, ...], Few]  # names of the causes that need a reset
+    causes: Annotated[tuple[Cause, ...], Few]  # all active ones, the worst first
+    source: Name | None  # the driving source
     limits: Limits
     heartbeat: int  # echoed by sources, see ``Drive.echo``
-    text: str  # one sentence: why the vehicle may or may not move
+    text: Text  # one sentence: why the vehicle may or may not move
     release: Release | None = None  # None while there is no contact
-    limit_sources: tuple[LimitState, ...] = ()  # those in the settings
-    estop_keepalives: tuple[KeepaliveState, ...] = ()  # likewise
+    limit_sources: Annotated[tuple[LimitState, ...], Few] = ()  # those in the settings
+    estop_keepalives: Annotated[tuple[KeepaliveState, ...], Few] = ()  # likewise
 
 
 # --- @cmd -----------------------------------------------------------------------------------
@@ -195,11 +195,12 @@ class Motion(Message, frozen=True, kw_only=True):
     command: Command
     linear: float = 0.0  # m/s
     angular: float = 0.0  # rad/s
-    source: str | None = None
+    source: Name | None = None
     judged: int = 0  # ``seq`` of the newest bumper sample in the verdict
     judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
     latched: bool = False  # whether an operator's reset is needed
     predecessor: int | None = None  # the newest ``Link.latched_by`` in the verdict
+    estop: int | None = None  # the newest ``Link.estop`` in the verdict, which has latched it
     # For latency measurement only, on the clock of ``mono_ns``.
     asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
     heard_ns: int = 0  # when safety received that request; 0 when this answers none
@@ -212,20 +213,20 @@ class Motion(Message, frozen=True, kw_only=True):
 class Event(Message, frozen=True, kw_only=True):
     """A transition: contact, stop, release, fault, board restarted, link lost."""
 
-    name: str
+    name: Name
     level: Level
-    text: str
-    about: dict[str, str | int | float | bool | None] = {}
+    text: Text
+    about: Annotated[dict[Name, Text | int | float | bool | None], Few] = {}
 
 
 class Health(Message, frozen=True, kw_only=True):
     """Health of a service, once a second."""
 
-    service: str
-    version: str
+    service: Name
+    version: Name
     uptime: float  # s
-    rates: dict[str, float]  # messages per second by key, in and out, over the last second
-    counters: dict[str, int]  # since start
+    rates: Annotated[dict[Name, float], Few]  # messages by key, in the last second, Hz
+    counters: Counts  # since start
     lateness: float  # s, maximum lateness of the loop's timers in the last second
     rss: int  # bytes
     priority: int = 0  # of SCHED_FIFO; 0 for normal priority
@@ -261,7 +262,7 @@ class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Clear the causes that the operator saw, and no others."""
 
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
-    causes: tuple[int, ...] = ()  # ``Cause.id`` of each
+    causes: Annotated[tuple[int, ...], Few] = ()  # ``Cause.id`` of each
 
 
 class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -284,7 +285,7 @@ class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class Done(Struct, frozen=True, kw_only=True):
     """A call was carried out."""
 
-    text: str
+    text: Text
     boot: int = 0  # of the answering service; 0 if unknown
 
 
@@ -292,4 +293,4 @@ class ResetDone(Done, frozen=True, kw_only=True):
     """The answer to a reset; the next states of safety show its effect."""
 
     heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
-    cleared: tuple[int, ...] = ()  # ``Cause.id`` of each cause that was cleared
+    cleared: Annotated[tuple[int, ...], Few] = ()  # ``Cause.id`` of each cause that was cleared

@@ -9,7 +9,6 @@ a signal that arrives while they run changes nothing.
 import os
 import signal
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from common import keys, log, realtime
+from common import clock, keys, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
 from common.bus.session import ONE_POOL, RUNTIME_ENV
@@ -30,8 +29,10 @@ from common.loop import Loop
 from common.messages import Event, Health, Level, Timing
 from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
+from common.verdict import MAX_TEXT
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
+QUERY_PERIOD_S = 0.02  # one query of each key
 HOLD_TIMEOUT_S = 0.1  # limit for a handler of another thread, before the exit actions
 NICENESS = 10  # of services that do not drive
 
@@ -59,12 +60,14 @@ class Node(Generic[C]):
         self._loaded = loaded
         self._events = self.bus.publisher(keys.EVENTS, service=name)
         self._health = self.bus.publisher(keys.HEALTH, service=name)
-        self._started_ns = self._reported_ns = time.monotonic_ns()
+        self._started_ns = self._reported_ns = clock.now_ns()
         self._counted: Counter[str] = Counter()
 
     def open_bus(self) -> Bus:
         """Return a bus with its own session, not yet open; the first one is ``bus``."""
-        return Bus(self.config.bus, self.config.robot.id, self.loop.post, self._submit)
+        bus = Bus(self.config.bus, self.config.robot.id, self.loop.post, self._submit)
+        self.loop.every(QUERY_PERIOD_S, lambda _: bus.answer_queries())
+        return bus
 
     def open_drive(self, *, listens: bool) -> DriveLink:
         """Create this service's end of the drive link; it opens and closes with ``bus``."""
@@ -73,17 +76,19 @@ class Node(Generic[C]):
         return self.drive
 
     def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
-        """Publish and log an event."""
-        self._events.put(Event(name=name, level=level, text=text, about=about))
+        """Publish and log an event; texts are cut to the length that a message may have."""
+        cut = {key: v[:MAX_TEXT] if isinstance(v, str) else v for key, v in about.items()}
+        self._events.put(Event(name=name, level=level, text=text[:MAX_TEXT], about=cut))
         getattr(self.log, level)(text, event_name=name, **about)
 
     def announce(self) -> None:
         """Declare the liveliness token, the info queryables and the health timer."""
         robot, bus = self.config.robot.id, self.bus
         bus.live(keys.live_key(robot, self.name, f"{bus.boot:x}"))
+        schema, settings = self._schema(), self._settings()  # encoded once
         for part, make in (
-            ("schema", self._schema),
-            ("config", self._settings),
+            ("schema", lambda: schema),
+            ("config", lambda: settings),
             ("last", self._last),
         ):
             bus.answer(keys.info_key(robot, self.name, part), make, "application/json")
@@ -206,7 +211,7 @@ def serve(node: Node[C]) -> int:
 
 
 def _await_stop(node: Node[C]) -> None:
-    deadline_ns = time.monotonic_ns() + round(STOP_TIMEOUT_S * NS_PER_S)
+    deadline_ns = clock.now_ns() + round(STOP_TIMEOUT_S * NS_PER_S)
 
     def check(now_ns: int) -> None:
         if node.is_stopped() or now_ns > deadline_ns:

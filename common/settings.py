@@ -54,7 +54,7 @@ def check_protections(
 class Robot(Section, frozen=True, kw_only=True):
     """Identity of the robot, and scheduling of its processes."""
 
-    id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+\Z")] = "001"
+    id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")] = "001"
     realtime: bool = True  # whether the control chain requests SCHED_FIFO
 
 

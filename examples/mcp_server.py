@@ -45,9 +45,11 @@ async def state() -> dict[str, Any]:
 
 
 @server.tool()
-async def sonars() -> dict[str, float | None]:
-    """Return the distance to the nearest obstacle by direction; null without an echo."""
-    return dict(zip(SONAR_NAMES, (await robots[0].ultrasonic.latest()).ranges, strict=True))
+async def sonars() -> dict[str, float | str]:
+    """Return the nearest obstacle by direction: m, "no_echo", or why it is unknown."""
+    sample = await robots[0].ultrasonic.latest()
+    measured = zip(SONAR_NAMES, sample.ranges, sample.status, strict=True)
+    return {name: r if s == "ok" and r is not None else s for name, r, s in measured}
 
 
 @server.tool()

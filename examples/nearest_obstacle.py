@@ -3,6 +3,7 @@
 python -m examples.nearest_obstacle
 """
 
+import math
 import sys
 
 from common import keys
@@ -13,10 +14,10 @@ from common.settings import Shared
 
 
 def print_nearest(arrival: Arrival[Ultrasonic]) -> None:
-    """Print the shortest range, in metres, and its sonar."""
-    named = zip(arrival.message.ranges, SONAR_NAMES, strict=True)
-    measured = [(range_m, name) for range_m, name in named if range_m is not None]
-    print("{:.2f} m {}".format(*min(measured)) if measured else "nothing near", flush=True)
+    """Print the shortest range, in m, and its sonar; one that cannot measure counts as 0."""
+    named = zip(arrival.message.ranges, arrival.message.status, SONAR_NAMES, strict=True)
+    near, name = min(({"ok": r or 0.0, "no_echo": math.inf}.get(s, 0.0), n) for r, s, n in named)
+    print(f"{near:.2f} m {name}" if near < math.inf else "nothing near", flush=True)
 
 
 def build(node: Node[Shared]) -> None:

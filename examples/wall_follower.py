@@ -7,11 +7,17 @@ import math
 import sys
 
 import t2
-from t2.messages import SONAR_NAMES
+from t2.messages import SONAR_NAMES, Ultrasonic
 
 DISTANCE, TURN_AT = 0.8, 1.2  # m, to the walls on the right and ahead
 SPEED, GAIN, DAMPING, MAX_TURN = 0.25, 0.6, 25.0, 0.4  # m/s, rad/(s m), rad/(s m), rad/s
 FRONT, RIGHT = SONAR_NAMES.index("front"), SONAR_NAMES.index("right")
+
+
+def distance(sample: Ultrasonic, sonar: int) -> float:
+    """Return what a sonar measures, in m; one that cannot measure counts as 0."""
+    measured = {"ok": sample.ranges[sonar] or 0.0, "no_echo": math.inf}
+    return measured.get(sample.status[sonar], 0.0)
 
 
 def follow(endpoint: str) -> None:
@@ -19,11 +25,11 @@ def follow(endpoint: str) -> None:
     with t2.connect("001", endpoint=endpoint) as robot, robot.drive("nav") as drive:
         wall = DISTANCE
         for sample in robot.ultrasonic:
-            if (sample.ranges[FRONT] or math.inf) < TURN_AT:
+            if distance(sample, FRONT) < TURN_AT:
                 drive.turn(math.pi / 2)
                 wall = DISTANCE
                 continue
-            change = min(sample.ranges[RIGHT] or math.inf, 2 * DISTANCE) - wall
+            change = min(distance(sample, RIGHT), 2 * DISTANCE) - wall
             wall += 0.3 * change
             steer = GAIN * (DISTANCE - wall) - DAMPING * change
             drive.velocity(SPEED, max(-MAX_TURN, min(MAX_TURN, steer)), seconds=0.5)

@@ -1,11 +1,11 @@
 """The simulated vehicle as a process: sockets, clock and trace around the simulation."""
 
-import time
 from contextlib import ExitStack, closing
 from pathlib import Path
 
 import msgspec
 
+from common import clock
 from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.log import Logger
@@ -43,7 +43,7 @@ class Process:
     """The whole of ``python -m sim``; the constructor opens the sockets."""
 
     def __init__(self, config: Config, plan: Plan, script: Script, trace: Trace) -> None:
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         self.simulation = Simulation(config, plan, now_ns)
         self._injection = Injection(self.simulation, script, now_ns)
         self._trace = trace
@@ -85,7 +85,7 @@ class Process:
         self._deliver()
 
     def _deliver(self) -> None:
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         for datagram in self.simulation.take_sent(now_ns):
             self._board.send(datagram)
         for line in self.simulation.take_records():

@@ -1,11 +1,11 @@
 """A bus without a router: records what is published and called, and injects messages."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
 from msgspec import Struct
 
+from common import clock
 from common.bus.bus import Arrival, Bus
 from common.keys import Call, Topic
 from common.messages import Message
@@ -49,6 +49,6 @@ class FakeBus(Bus):
     ) -> None:
         """Inject a message, by default now; ``declared`` is the handler's key if it has a *."""
         key = topic.on(self.robot, **names)
-        now_ns = time.monotonic_ns() if received_ns is None else received_ns
+        now_ns = clock.now_ns() if received_ns is None else received_ns
         for handler in self.handlers[declared or key]:
             handler(Arrival(message, key, now_ns, None))

@@ -92,6 +92,8 @@ class SimulatedThread:
 class SimulatedSession:
     """The calls of a Zenoh session that the library makes."""
 
+    info = SimpleNamespace(routers_zid=list)
+
     def __init__(self, stack: SimulatedStack) -> None:
         self._stack = stack
         self._subscribers: dict[str, Callable[[Any], None]] = {}

@@ -52,7 +52,7 @@ class SimulatedStack:
         self._seq: Counter[str] = Counter()
         self._policy = Policy(safety.safety, safety.vehicle)
         self._state = self._policy.start()
-        self._inputs = Inputs(estop_session_up=True, boot=1)
+        self._inputs = Inputs(estop_connection=1, boot=1)
         self._estimator = Estimator(Odom())
         self._do(self._bridge.start())
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 from cli.keys import access
 from cli.keys.access import Rights, Verb
-from cli.keys.profile import OPERATORS_SOURCES
 from common import keys
 from common.bus.probe import includes
+from common.members import OPERATORS_SOURCES
 from services.ros2 import names
 from services.ros2.config import Ros2
 
@@ -15,6 +15,7 @@ MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 ROLES: Mapping[str, Rights] = {
     "viewer": access.viewer(),
     "driver of 001": access.driver((MINE,), OPERATORS_SOURCES),
+    "driver of 001 as nav": access.driver((MINE,), ("nav",)),
     "device lidar of 001": access.device((MINE,), ("lidar",)),
     "fleet": access.fleet(),
     "site's router": access.site(),
@@ -32,7 +33,7 @@ CLASSES: Mapping[str, str] = {
     "events that an operator's dashboard keeps": f"{DASHBOARD}/@adv/pub/1/uhlc/_",
     "any longer key below these": f"{DASHBOARD}/@adv/pub/1/uhlc/_/a/a/a",
     "requests to move": keys.DRIVE.on(MINE, source="teleop"),
-    "requests to move as a source that is not hers": keys.DRIVE.on(MINE, source="nav"),
+    "requests to move as a planner": keys.DRIVE.on(MINE, source="nav"),
     "requests to move another robot": keys.DRIVE.on(OTHER, source="teleop"),
     "speed limits": keys.LIMIT.on(MINE, source="lidar"),
     "speed limits as a source that is not hers": keys.LIMIT.on(MINE, source="person"),
@@ -43,8 +44,11 @@ CLASSES: Mapping[str, str] = {
     "emergency stop": keys.estop_key(MINE),
     "emergency stop of another robot": keys.estop_key(OTHER),
     "emergency stop of all": keys.estop_key("*"),
-    "calls": keys.RESET.on(MINE),
-    "calls of another robot": keys.RESET.on(OTHER),
+    "signs of life of another emergency stop": keys.ESTOP_KEEPALIVE.on(MINE, source="pendant"),
+    "reset": keys.RESET.on(MINE),
+    "release off a pressed bumper": keys.RELEASE.on(MINE),
+    "the board's emergency brakes": keys.SET_SWITCHES.on(MINE),
+    "reset of another robot": keys.RESET.on(OTHER),
     "state and settings that a service returns to a query": keys.info_key(MINE, "safety", "config"),
     "presence of the services on board": keys.live_key(MINE, "safety", "1"),
     "health of an operator's dashboard": keys.HEALTH.on(MINE, service="dashboard"),

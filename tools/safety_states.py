@@ -214,7 +214,7 @@ def _inputs(situation: Situation) -> Inputs:
         right=_new(Driver(faults=(), bits=0), situation),
         switches=_new(Switches(ultrasonic_brake=True, bumper_brake=True), situation),
         link=_new(link, situation),
-        estop_session_up=True,
+        estop_connection=1,
     )
 
 

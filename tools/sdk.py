@@ -8,12 +8,13 @@ from common import keys, messages, timing, verdict
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
 PARTS = (verdict, timing)
-USED = ("Literal", "Struct")  # that messages import themselves
+ALIASES = ("Counts", "Few", "Name", "Text")  # of types, for use inside the messages
+USED = ("Annotated", "Literal", "Meta", "Struct", *ALIASES)  # that messages import themselves
 PARTS_HEAD = '''"""Parts of messages; generated from the stack by ``make docs``, do not edit."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 '''
 HEAD = '''"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
 
@@ -44,7 +45,8 @@ def generated() -> dict[Path, str]:
         if getattr(messages, name, None) is value and not name.startswith("_") and name not in USED
     }
     names = sorted(found, key=str.lower)  # as the linter sorts imports
-    imports = "".join(f"from t2.parts import {name} as {name}\n" for name in names)
+    lines = [", ".join(ALIASES), *(f"{name} as {name}" for name in names)]
+    imports = "".join(f"from t2.parts import {line}\n" for line in sorted(lines, key=str.lower))
     return {
         SDK / "parts.py": _joined(PARTS_HEAD, *map(_body, PARTS)),
         SDK / "messages.py": _joined(HEAD.format(imports=imports), _body(messages)),

@@ -6,12 +6,11 @@ request.
 
 import socket
 import sys
-import time
 from collections.abc import Sequence
 
 from bench.adapters.protocols import Twist, path_adapter, stamped
 from bench.path.vehicle import SPEEDS_MMPS
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.config import Sources, load
 from common.loop import Loop
@@ -24,7 +23,7 @@ from common.source import DriveSource
 def serve(sock: socket.socket, request: Twist) -> None:
     """Send one request for the next datagram."""
     datagram, vehicle = sock.recvfrom(16)
-    requested_ns = time.monotonic_ns()
+    requested_ns = clock.now_ns()
     request(SPEEDS_MMPS[datagram[0]] / 1000, 0.0)
     sock.sendto(stamped(datagram[0], requested_ns), vehicle)
 

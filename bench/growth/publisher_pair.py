@@ -12,6 +12,7 @@ import time
 import zenoh
 
 from bench.load.consumer import plain
+from common import clock
 from verification.harness.child_process import serve
 
 HEAD = struct.Struct("<QQ")  # number and time of sending: the smallest message
@@ -32,7 +33,7 @@ class Receiver:
     def take(self, sample: zenoh.Sample) -> None:
         """Count one message."""
         number, sent_ns = HEAD.unpack_from(sample.payload.to_bytes())
-        self.ages_ns.append(time.monotonic_ns() - sent_ns)
+        self.ages_ns.append(clock.now_ns() - sent_ns)
         self.numbers.append(number)
 
     def end(self) -> object:
@@ -66,7 +67,7 @@ def put(session: zenoh.Session, rest: bytes, hz: float, left: threading.Event) -
     for number in itertools.count():
         if left.wait(max(0.0, due_s - time.monotonic())):
             return
-        head = HEAD.pack(number, time.monotonic_ns())
+        head = HEAD.pack(number, clock.now_ns())
         session.put(KEY, head + rest, congestion_control=zenoh.CongestionControl.DROP)
         due_s += 1 / hz
 

@@ -6,12 +6,12 @@ Plain zenoh and msgpack, in Zenoh's own thread. It records sequence numbers and 
 import json
 import sys
 import threading
-import time
 from typing import Any
 
 import msgpack
 import zenoh
 
+from common import clock
 from verification.harness.child_process import serve
 
 AGES_MAX = 1000  # reported, evenly spread
@@ -37,7 +37,7 @@ class Consumer:
     def take(self, sample: zenoh.Sample) -> None:
         """Count one message."""
         message: dict[str, Any] = msgpack.unpackb(sample.payload.to_bytes())
-        self._ages_ns.append(time.monotonic_ns() - message["mono_ns"])
+        self._ages_ns.append(clock.now_ns() - message["mono_ns"])
         self._seqs.setdefault(str(sample.key_expr), []).append(message["seq"])
 
     def end(self) -> object:

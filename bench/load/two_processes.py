@@ -17,6 +17,7 @@ from typing import Any
 import msgpack
 
 from bench.load.frames import REPORTS, Kinds, framed, motion, read
+from common import clock
 
 RUN, SPEED_MMPS = 1, 300
 MOTION_S = 0.02
@@ -63,7 +64,7 @@ class BoardProcess:
             return
         kind = int.from_bytes(datagram[4:6], "little")  # this board sends one frame per datagram
         for values in read(datagram, KINDS):
-            message = {"kind": kind, "values": values, "mono_ns": time.monotonic_ns()}
+            message = {"kind": kind, "values": values, "mono_ns": clock.now_ns()}
             self._send(msgpack.packb(message))
 
     def send_frame(self, raw: bytes) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from bench.path.processes import robots_python
 from bench.reaction.loop import BREAK, STOP, command
-from common import keys
+from common import clock, keys
 from common.bus.bus import Bus
 from common.loop import Loop
 from verification.harness.bus import bus_on, router_process, running, set_options
@@ -60,7 +60,7 @@ class Site:
 
     def _on_token(self, key: str, alive: bool) -> None:
         if alive:
-            self.appeared.put((key.split("/")[-2], time.monotonic_ns()))
+            self.appeared.put((key.split("/")[-2], clock.now_ns()))
 
 
 @contextlib.contextmanager
@@ -80,7 +80,7 @@ def started(*words: str) -> Iterator[tuple["subprocess.Popen[bytes]", int]]:
     """Start a Python; yield it and its start time; kill it and its children at the end."""
     # Byte code is written, as in every installation, whatever this process is set to.
     environ = {name: text for name, text in os.environ.items() if name != NO_BYTE_CODE}
-    begin_ns = time.monotonic_ns()
+    begin_ns = clock.now_ns()
     process = subprocess.Popen([robots_python(), *words], env=environ, stderr=subprocess.DEVNULL)
     try:
         yield process, begin_ns
@@ -95,7 +95,7 @@ def nothing(_: Site) -> Times:
     """Time an empty Python program."""
     with started("-c", "pass") as (process, begin_ns):
         process.wait()
-        return {NOTHING: time.monotonic_ns() - begin_ns}
+        return {NOTHING: clock.now_ns() - begin_ns}
 
 
 def bare(_: Site) -> Times:
@@ -130,7 +130,7 @@ def router(_: Site) -> Times:
     with started("-m", "cli", "router", *given) as (process, begin_ns):
         while not accepts_connections(port) and process.poll() is None:
             time.sleep(POLL_S)
-        return {ROUTER: time.monotonic_ns() - begin_ns}
+        return {ROUTER: clock.now_ns() - begin_ns}
 
 
 def safety(site: Site) -> Times:
@@ -166,7 +166,7 @@ def first_commands(sock: socket.socket) -> dict[str, int]:
     while FIRST_STOP not in received:
         name = COMMANDS.get(sock.recv(2048))
         if name is not None:
-            received.setdefault(name, time.monotonic_ns())
+            received.setdefault(name, clock.now_ns())
     return received
 
 

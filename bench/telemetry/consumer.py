@@ -7,14 +7,13 @@ Zenoh and MessagePack alone. It sends a stamp of each velocity to the witness's 
 import socket
 import sys
 import threading
-import time
 
 import msgpack
 import zenoh
 
 from bench.adapters.protocols import Twist, path_adapter, stamped
 from bench.reaction.loop import velocity
-from common import keys
+from common import clock, keys
 
 
 def by_frames(port: str, take: Twist) -> None:
@@ -46,7 +45,7 @@ def main(witness: str, *words: str) -> None:
     there = ("127.0.0.1", int(witness))
 
     def take(linear: float, _: float) -> None:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         sock.sendto(stamped(round(1000 * linear), at_ns), there)
 
     match words:

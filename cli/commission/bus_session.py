@@ -4,7 +4,6 @@ Everything runs in one thread. The loop turns only while the session waits. Duri
 operator the loop stands still and so does the vehicle: missing requests are a release.
 """
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -15,7 +14,7 @@ from msgspec import Struct
 from cli.commission.latches import Reset
 from cli.commission.motion import too_fast
 from cli.commission.operator import confirm
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.config import Setting
 from common.errors import LinkError
@@ -64,7 +63,7 @@ class MessageLog:
 
     def mark(self) -> int:
         """Discard everything received until now, queued messages too; return the time."""
-        self._marked_ns = time.monotonic_ns()
+        self._marked_ns = clock.now_ns()
         for log in self._lists:
             log.clear()
         self.frames = self.nonzero = 0
@@ -117,8 +116,8 @@ class CheckoutSession:
 
     def until(self, condition: Callable[[], object], timeout_s: float) -> bool:
         """Run the loop until the condition holds or the timeout expires; return the condition."""
-        end_ns = time.monotonic_ns() + round(timeout_s * NS_PER_S)
-        self._done = lambda: condition() or time.monotonic_ns() > end_ns
+        end_ns = clock.now_ns() + round(timeout_s * NS_PER_S)
+        self._done = lambda: condition() or clock.now_ns() > end_ns
         self.loop.run()
         return bool(condition())
 
@@ -189,7 +188,7 @@ class CheckoutSession:
                 return None
             self._requested = requested
             self.until(lambda: self._must_stop(requested), seconds)
-            released_ns = time.monotonic_ns()
+            released_ns = clock.now_ns()
             self._requested = STILL
             self.until(lambda: self._stands(released_ns), REST_S)
             self.listen(ZEROS_S)

@@ -9,6 +9,7 @@ from typing import Generic, TypeVar
 
 from cli.commission.report import Checked, Verdict
 from common.errors import RobotError
+from common.text import printable
 
 S = TypeVar("S")
 
@@ -24,8 +25,8 @@ class Step(Generic[S]):
 
 
 def show(text: str) -> None:
-    """Print a line without buffering."""
-    print(text, flush=True)
+    """Print lines without buffering."""
+    print(printable(text, "\n"), flush=True)
 
 
 def prompt(question: str) -> str:

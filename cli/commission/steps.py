@@ -1,6 +1,5 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
-import time
 from functools import partial
 
 from cli.commission.bus_session import CheckoutSession
@@ -26,6 +25,7 @@ from cli.commission.sonar import (
     resting_ranges,
     words,
 )
+from common import clock
 from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
 
@@ -113,7 +113,7 @@ def _wait(
             distance = nearest(one.value)
             readings.extend([] if distance is None else [distance])
         log.ultrasonics.clear()
-        return bool(detector.seen) == hand and detector.settled(time.monotonic_ns())
+        return bool(detector.seen) == hand and detector.settled(clock.now_ns())
 
     found = session.until(is_so, timeout_s)
     seen = tuple(sorted(detector.seen, key=SONAR_NAMES.index)) if found else ()

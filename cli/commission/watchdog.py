@@ -20,6 +20,7 @@ from cli.commission.operator import Step, confirm, show
 from cli.commission.report import Verdict, judged
 from cli.commission.watchdog_plan import BRAKE, Sample, WatchdogPlan, judge_watchdog
 from cli.settings import Everything
+from common import clock
 from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
@@ -81,7 +82,7 @@ class BoardMaster:
                 except WireError:
                     continue  # implausible: the header has no CRC
                 twist = Twist(velocity.linear, velocity.angular)
-                yield Latest(twist, time.monotonic_ns())
+                yield Latest(twist, clock.now_ns())
 
     def wait_for_standstill(self) -> str:
         """Brake until the board reports standstill; return the problem, or an empty string."""
@@ -126,18 +127,18 @@ def watchdog(master: BoardMaster) -> Verdict:
 
 
 def _execute(master: BoardMaster, signals: list[int]) -> WatchdogPlan:
-    plan = WatchdogPlan(time.monotonic_ns())
+    plan = WatchdogPlan(clock.now_ns())
     warned = False
     try:
         while plan.phase != "over":
             if signals:
-                plan = plan.end("Ctrl-C", time.monotonic_ns())
-            plan, command = plan.tick(time.monotonic_ns())
+                plan = plan.end("Ctrl-C", clock.now_ns())
+            plan, command = plan.tick(clock.now_ns())
             if command is not None:
                 master.send(command)
             for sample in master.velocities(POLL_S):
                 plan = plan.add(sample)
-            braked_s = (time.monotonic_ns() - (plan.braked_ns or time.monotonic_ns())) / NS_PER_S
+            braked_s = (clock.now_ns() - (plan.braked_ns or clock.now_ns())) / NS_PER_S
             if braked_s > WARN_S and not warned:
                 warned = True
                 show("NO STANDSTILL: use the vehicle's own switch.")

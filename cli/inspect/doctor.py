@@ -31,6 +31,7 @@ from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.sample import Sample
 from common.settings import BusSettings, Shared
+from common.text import printable
 from services.ros2 import names
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
@@ -199,5 +200,5 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
 def as_text(finding: Finding) -> str:
     """Return a finding as text, with its remedy on a second line."""
     mark = output.painted(f"{MARKS[finding.level]:6}", TONES.get(finding.level, ""))
-    text = f"{finding.where:9} {mark} {output.printable(finding.text)}"
-    return f"{text}\n{'':17}-> {finding.todo}" if finding.todo else text
+    text = f"{finding.where:9} {mark} {printable(finding.text)}"
+    return f"{text}\n{'':17}-> {printable(finding.todo)}" if finding.todo else text

@@ -13,6 +13,7 @@ from common.errors import MessageError, RobotError
 from common.freshness import NS_PER_S
 from common.messages import Event
 from common.sample import Sample
+from common.text import printable
 
 FIRST_S = 2.0  # the slowest streams have 1 Hz
 ONCE_S = 10.0  # for --once without --duration
@@ -78,7 +79,7 @@ def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
         output.line(as_json(sample, reading, robot))
     else:
         form = as_line if options.output == "table" else as_text
-        print(form(sample, reading, robot, options.header), flush=True)
+        print(printable(form(sample, reading, robot, options.header), "\n"), flush=True)
 
 
 def field(reading: Reading, sample: Sample, path: str) -> Any:
@@ -118,7 +119,7 @@ def as_line(sample: Sample, reading: Reading, robot: str, header: bool) -> str:
     value = "DELETE" if sample.deleted else output.json(body(reading.value, header))
     complaint = f"  # invalid: {reading.complaint}" if reading.complaint else ""
     head = f"{clock(sample, reading)}  {short(sample.key, robot)}"
-    return f"{head}  {output.printable(value)}{complaint}"
+    return f"{head}  {value}{complaint}"
 
 
 def body(value: Any, header: bool) -> Any:

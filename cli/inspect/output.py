@@ -10,6 +10,8 @@ from typing import Any
 
 import msgspec
 
+from common.text import printable
+
 Row = Mapping[str, Any]
 COLOURS = {"good": 32, "note": 33, "bad": 31}  # of a terminal, by ECMA-48
 
@@ -32,12 +34,12 @@ def painted(text: str, tone: str) -> str:
 
 def warn(text: str) -> None:
     """Print a line to standard error."""
-    print(text, file=sys.stderr)
+    print(printable(text, "\n"), file=sys.stderr)
 
 
 def value(thing: Any, form: str) -> None:
     """Print a value as one JSON line, or as lines ``name: value``; ``form`` is that of ``-o``."""
-    line(thing) if form == "json" else print(fields(thing), flush=True)
+    line(thing) if form == "json" else print(printable(fields(thing), "\n"), flush=True)
 
 
 def rows(
@@ -53,7 +55,7 @@ def rows(
 
 def json(thing: object) -> str:
     """Return one line of JSON; NaN and infinity become null, bytes become hexadecimal."""
-    return msgspec.json.encode(plain(thing)).decode()
+    return printable(msgspec.json.encode(plain(thing)).decode())
 
 
 def plain(thing: Any) -> Any:
@@ -69,13 +71,6 @@ def plain(thing: Any) -> Any:
             return thing
         case _:
             return str(thing)
-
-
-def printable(text: str) -> str:
-    """Return a text from the bus with control characters escaped."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:

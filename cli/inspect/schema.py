@@ -21,7 +21,10 @@ from common import messages
 from common.errors import RobotError
 from common.keys import CALLS, TOPICS
 
-FIELD = re.compile(r"    (?P<name>\w+): (?P<type>.+?)(?: = (?P<default>.+?))?(?:  # (?P<why>.+))?$")
+FIELD = re.compile(
+    r"    (?P<name>\w+): (?:Annotated\[(?=.+, Few\]))?(?P<type>.+?)(?:, Few\])?"
+    r"(?: = (?P<default>.+?))?(?:  # (?P<why>.+))?$"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -21,6 +21,7 @@ from cli.inspect.session import add_options, open_session, wants_json
 from common import keys
 from common.bus.probe import Probe, intersects
 from common.errors import RobotError
+from common.text import printable
 
 # The router of a robot that connects to a site's router is a peer there.
 ADMIN = "@/*/*/*/t2/v1/{robot}/**"
@@ -50,12 +51,12 @@ def run(options: argparse.Namespace) -> int:
     links = edges(found, intersects) + commands
     rows = [as_json(each, found, links, session.robot) for each in found]
     if options.dot:
-        print(dot(found, links, session.robot))
+        print(printable(dot(found, links, session.robot), "\n"))
     elif wants_json(options):
         for row in rows:
             output.line(row)
     else:
-        print("\n\n".join(as_text(row, options.info) for row in rows))
+        print(printable("\n\n".join(as_text(row, options.info) for row in rows), "\n"))
     return 0
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from common import keys
-from common.members import Member
+from common.members import OPERATORS_SOURCES, Member
 from services.ros2 import names
 from services.ros2.config import Ros2
 
@@ -52,6 +52,7 @@ QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 LAPTOP_SERVICES = ("dashboard", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
+PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE)  # without an operator's source
 ROS_TWISTS = ("TwistStamped", "Twist")
 ROS_CALLS = ("hardware/e_stop_trigger", "hardware/e_stop_reset")
 ROS_TOKENS = (7, 11, 12)  # chunks after the domain: of a node, an endpoint, one with backends
@@ -130,10 +131,11 @@ def viewer(services: Sequence[str] = LAPTOP_SERVICES) -> Rights:
 
 
 def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
-    """Return the rights to see everything, and to drive, stop and call the given robots."""
+    """Return the rights to see everything, drive and stop these robots; an operator also resets."""
     own_robots = tuple(robots)
     viewing = viewer(DRIVER_SERVICES)
-    calls = (call.on(each) for each in own_robots for call in keys.CALLS)
+    own_calls = keys.CALLS if {ANY, *OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
+    calls = (call.on(each) for each in own_robots for call in own_calls)
     actuation = (key for each in own_robots for key in actuation_keys(each, sources))
     return {
         **viewing,

@@ -7,9 +7,9 @@ and ``list`` shows them. Guide: docs/keys.md; rights of each role: docs/security
 import argparse
 from pathlib import Path
 
-from cli.keys.profile import DAYS, OPERATORS_SOURCES
+from cli.keys.profile import DAYS
 from common.errors import RobotError
-from common.members import ROLES
+from common.members import OPERATORS_SOURCES, ROLES
 
 FOLDER = Path("keys")
 
@@ -78,7 +78,7 @@ def _add_rights(parser: argparse.ArgumentParser) -> None:
         "--source", action="append", default=[], metavar="NAME",
         help="for a driver or device: allow only this source, as in safety.sources or "
         f"safety.limits; may be repeated; by default {', '.join(OPERATORS_SOURCES)} for a driver, "
-        "NAME for a device",
+        "which may also reset; NAME for a device",
     )  # fmt: skip
 
 

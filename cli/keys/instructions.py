@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from cli.keys.machine_settings import MEMBERS, SETTINGS, connected, endpoints, ros_override
 from cli.keys.profile import EVERY_ROBOT, Profile
-from common.members import Member, Role
+from common.members import OPERATORS_SOURCES, Member, Role
 
 PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
 UNKNOWN = "; its address is not in the member list"
@@ -43,6 +43,8 @@ def certificate_issued(
     if profile.sources:
         verb = "drives" if profile.role == "driver" else f"limits {_robots(profile)}"
         yield f"  {verb} as {' or '.join(profile.sources)}; no other source is allowed"
+        if set(OPERATORS_SOURCES).isdisjoint(profile.sources):
+            yield "  may not reset, release or set the brake switches: no operator's source"
     yield ""
     if profile.listens:
         yield f"1. Copy the folder to the {profile.role}'s computer only:"

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from common.errors import ConfigError, RobotError
-from common.members import Name, Role, SourceName
+from common.members import OPERATORS_SOURCES, Name, Role, SourceName
 
 DAY_S = 86_400
 CA_DAYS = 3650
@@ -27,7 +27,6 @@ LISTENERS: tuple[Role, ...] = ("robot", "site")
 LOCAL = ("localhost", "127.0.0.1")  # for clients on the same host, or through a tunnel
 VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (manual 1 and 1.1)
 EVERY_ROBOT = "*"
-OPERATORS_SOURCES = ("teleop", "web", "checkout")  # the sources of the operator's screens
 LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role and serial too
 NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
 SOURCE_NAMES = (
@@ -83,7 +82,8 @@ def profile(
     for each in (name, *(robot for robot in robots if robot != EVERY_ROBOT)):
         _check(each, Annotated[Name, Meta(max_length=LONGEST)], f"{each!r} is not a name: {NAMES}")
     for address in addresses:
-        _check_address(address)
+        if not is_ip(address) and not HOST.match(address):
+            raise ConfigError(f"--address {address!r} is neither an IP address nor a host name")
     _check_sources(role, robots, sources)
     if role not in LISTENERS and addresses:
         raise ConfigError(f"--address is for routers; a {role} only connects")
@@ -144,8 +144,3 @@ def _check_sources(role: Role, robots: Sequence[str], sources: Sequence[str]) ->
         raise ConfigError(f"--robot and --every are for drivers, devices and ros, not for a {role}")
     if role not in SOURCED and sources:
         raise ConfigError(f"--source is for drivers and devices; a {role} uses no source")
-
-
-def _check_address(address: str) -> None:
-    if not is_ip(address) and not HOST.match(address):
-        raise ConfigError(f"--address {address!r} is neither an IP address nor a host name")

@@ -10,6 +10,7 @@ from cli.inspect.session import add_output, wants_json
 from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.keys import ROOT
+from common.text import printable
 from services.recorder.summary import Note, Summary
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
         if wants_json(options):
             output.line(as_json(reader, summary))
         else:
-            print(*([""] if number else []), as_text(reader, summary), sep="\n")
+            print(*([""] if number else []), printable(as_text(reader, summary), "\n"), sep="\n")
     return 0 if complete else 1
 
 
@@ -118,4 +119,4 @@ def _as_json(note: Note) -> dict[str, Any]:
 
 
 def _as_text(note: Note) -> str:
-    return f"{note.at_s:8.2f} s  {note.level:7}  {note.service}: {note.text}"
+    return f"{note.at_s:8.2f} s  {note.level:7}  {note.service}: {printable(note.text)}"

@@ -1,7 +1,7 @@
 """``t2 install``: install T2's services as systemd units on this computer; needs root.
 
-It writes the units and their user, and creates settings if there are none. It starts nothing. It
-never changes an operator's files: the settings, and drop-ins of `systemctl edit`.
+It writes the units and their user, disables the computer's sleep, and creates missing settings. It
+starts nothing, and never changes an operator's files: the settings, drop-ins of `systemctl edit`.
 """
 
 import argparse
@@ -20,6 +20,7 @@ from common.errors import RobotError
 TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 UNITS = Path("/usr/local/lib/systemd/system")
 USER = Path("/etc/sysusers.d/t2.conf")
+SLEEP = Path("/etc/systemd/sleep.conf.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
 KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; lets laptops connect
 ENABLED = {  # links of `systemctl enable`
@@ -122,7 +123,7 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
     start = "enable --now t2.target"
     if host.has(UNITS / "t2.target"):
         start = "restart t2.target  # while the vehicle stands still"
-    wanted = {USER: template("t2.sysusers")}
+    wanted = {USER: template("t2.sysusers"), SLEEP: template("t2.sleep")}
     options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
     for name in names_here(sim or host.has(UNITS / SIM)):
         text = template(name).replace("@PREFIX@", str(prefix))
@@ -168,7 +169,12 @@ def ours(host: Host) -> set[Path]:
     folder = host.at(UNITS)
     found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
     marked = (path for path in found if path.read_bytes().startswith(MARK.encode()))
-    return {USER, *(UNITS / n for n in names()), *(UNITS / p.relative_to(folder) for p in marked)}
+    return {
+        USER,
+        SLEEP,
+        *(UNITS / n for n in names()),
+        *(UNITS / p.relative_to(folder) for p in marked),
+    }
 
 
 def names_here(sim: bool) -> list[str]:

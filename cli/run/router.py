@@ -4,12 +4,11 @@ import argparse
 import json
 import os
 import signal
-import time
 from pathlib import Path
 
 from cli.keys.access import RouterSettings, access_control
 from cli.run.router_probe import RouterProbe
-from common import log, members, realtime
+from common import clock, log, members, realtime
 from common.bus.session import READERS, RUNTIME_ENV, router, router_config
 from common.cli_args import add_sources, sources
 from common.config import load
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         listen = list(config.bus.listen)
         log.Logger().info("started", listen=listen, open_to=open_to(config.bus))
         # Zenoh routes in its own threads: only an answer proves that they work.
-        probe.run(lambda: systemd.ready(time.monotonic_ns()))
+        probe.run(lambda: systemd.ready(clock.now_ns()))
         systemd.stopping()
     return 0
 

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import msgspec
 
 from cli.run.router_attempts import MISSES, Attempts
-from common import child_process, realtime
+from common import child_process, clock, realtime
 from common import log as logs
 from common.bus.session import RUNTIME_ENV, answers, router_at
 from common.child_process import Backoff
@@ -109,10 +109,10 @@ def main(text: str) -> int:
 
 def watch(parent: int, where: BusSettings) -> bool:
     """Return whether the parent was killed; False if it ended by itself."""
-    attempts = Attempts(time.monotonic_ns(), round(where.probe_deadline * NS_PER_S))
+    attempts = Attempts(clock.now_ns(), round(where.probe_deadline * NS_PER_S))
     ended: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
     while os.getppid() == parent:
-        number = attempts.begin(time.monotonic_ns())
+        number = attempts.begin(clock.now_ns())
         if number is not None:
             threading.Thread(target=attempt, args=(number, where, ended), daemon=True).start()
         try:
@@ -120,7 +120,7 @@ def watch(parent: int, where: BusSettings) -> bool:
                 os.write(sys.stdout.fileno(), b".")
         except queue.Empty:
             pass
-        if attempts.hung(time.monotonic_ns()) and os.getppid() == parent:
+        if attempts.hung(clock.now_ns()) and os.getppid() == parent:
             os.kill(parent, signal.SIGKILL)
             return True
     return False

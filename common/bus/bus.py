@@ -11,7 +11,7 @@ import zenoh
 import zenoh.ext
 from msgspec import Struct
 
-from common import codec, settings
+from common import clock, codec, settings
 from common.bus.calls import Answers, Caller
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Opener, copied
@@ -24,6 +24,8 @@ from common.sample import Sample
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
 R = TypeVar("R", bound=Struct)
+
+QUERIES = 8  # of each key that wait for ``answer_queries``
 
 
 class Arrival(Struct, Generic[M], frozen=True):
@@ -41,8 +43,8 @@ class Bus:
     Declare first, then ``open``: a thread retries until a router answers, and the declarations are
     made as soon as the session is open. Zenoh renews them after a router's restart.
 
-    ``post`` passes a call to the owner's thread. ``submit`` passes it the handling of a sample, a
-    query or an answer, which by default is the same.
+    ``post`` passes a call to the owner's thread. ``submit`` passes it the handling of a sample or
+    an answer, which by default is the same.
     """
 
     def __init__(
@@ -61,7 +63,9 @@ class Bus:
         self.submit = submit or post
         self._declarations: list[Callable[[zenoh.Session], Any]] = []
         self._declared: list[Any] = []  # references keep them alive
+        self._queries: list[tuple[zenoh.Queryable[Any], Callable[[zenoh.Query], None]]] = []
         self._session: zenoh.Session | None = None
+        self._transports = self._opened = 0  # open now; opened since the start
         self._closed = False
         self.where = where
         self.links: list[Bus] = []  # private sessions that open and close with this one
@@ -119,7 +123,7 @@ class Bus:
         """
 
         def take(sample: zenoh.Sample, received_ns: int) -> None:
-            late_ns = time.monotonic_ns() - received_ns
+            late_ns = clock.now_ns() - received_ns
             handler(copied(sample, received_ns, time.time_ns() - late_ns))
 
         self._subscribe(expression, take, depth, history=0)
@@ -159,6 +163,17 @@ class Bus:
             query.drop()
 
         self._queryable(key, take)
+
+    def answer_queries(self) -> None:
+        """Answer one waiting query of each key; the owner's thread calls it periodically.
+
+        Queries wait in Zenoh, and the oldest ones are dropped: a flood of them takes no time from
+        this process.
+        """
+        if not self._closed:
+            for queryable, take in self._queries:
+                if query := queryable.try_recv():
+                    take(query)
 
     def live(self, key: str) -> None:
         """Declare a liveliness token."""
@@ -224,11 +239,14 @@ class Bus:
             bus._opener.start()
 
     @property
+    def connection(self) -> int:
+        """Number of the connection to a router or a drive link's other end, rising; 0: none."""
+        return self._opened if self._session is not None and self._transports else 0
+
+    @property
     def connected(self) -> bool:
-        """Whether a router is connected now."""
-        # A robot's router with an uplink to a site's router is a peer.
-        info = self._session.info if self._session is not None else None
-        return info is not None and bool(info.routers_zid() or info.peers_zid())
+        """Whether there is a connection now."""
+        return self.connection > 0
 
     def close(self) -> None:
         """Close the session; no handler is called after that."""
@@ -243,8 +261,17 @@ class Bus:
     def _adopt(self, session: zenoh.Session) -> None:
         if self._closed:
             return
+        self._declared.append(
+            session.info.declare_transport_events_listener(self._on_transport, history=True)
+        )
         self._declared += [declare(session) for declare in self._declarations]
         self._session = session
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        """Count a transport that was opened or closed, on a thread of Zenoh."""
+        opened = event.kind == zenoh.SampleKind.PUT
+        self._transports += 1 if opened else -1
+        self._opened += opened
 
     def _declare(self, declare: Callable[[zenoh.Session], Any]) -> None:
         self._declarations.append(declare)
@@ -275,7 +302,8 @@ class Bus:
         )
 
     def _queryable(self, key: str, take: Callable[[zenoh.Query], None]) -> None:
-        def queue(query: zenoh.Query) -> None:
-            self._hand_over(lambda: take(query))
+        def declare(session: zenoh.Session) -> None:
+            queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(QUERIES))
+            self._queries.append((queryable, take))
 
-        self._declare(lambda session: session.declare_queryable(key, queue))
+        self._declare(declare)

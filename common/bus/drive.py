@@ -48,11 +48,6 @@ class DriveLink(Bus):
         self._declare(lambda session: publisher.declare(session, first=True))
         return publisher
 
-    @property
-    def connected(self) -> bool:
-        """Whether the other end is connected now."""
-        return self._session is not None and bool(self._session.info.peers_zid())
-
     def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:
         """Return the opener that listens or connects."""
         return DriveOpener(self.where, self.socket, adopt, listens=self._listens)

@@ -14,6 +14,7 @@ from typing import Any
 import zenoh
 import zenoh.ext
 
+from common import clock
 from common.bus.calls import is_timeout
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config, copied
@@ -127,7 +128,7 @@ class Probe:
         return self._session.declare_publisher(key, allowed_destination=elsewhere)
 
     def _queue(self, sample: zenoh.Sample) -> None:
-        received_ns, wall_ns = time.monotonic_ns(), time.time_ns()
+        received_ns, wall_ns = clock.now_ns(), time.time_ns()
         if self._samples.qsize() >= QUEUE_MAX:
             self.left_out += 1
             return

@@ -10,7 +10,7 @@ import msgspec
 import zenoh
 import zenoh.ext
 
-from common import codec
+from common import clock, codec
 from common.keys import ClassOfService, Topic
 from common.messages import Message
 
@@ -63,7 +63,7 @@ class Publisher(Generic[M]):
             seq=self._seq,
             boot=self._boot,
             t_ns=time.time_ns(),
-            mono_ns=time.monotonic_ns(),
+            mono_ns=clock.now_ns(),
             host=self._host,
         )
         self.last = stamped

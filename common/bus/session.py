@@ -38,6 +38,10 @@ RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, on first use
 # Timeout of one connection attempt: five round trips of a bad link. After a change of address, a
 # host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000
+# Zenoh drops a larger received message, and keeps the link. By default any member could fill 1 GiB
+# of memory for each priority. Odometry's path, our largest message, has up to 6 MB. A router also
+# forwards messages of others: an uncompressed image of 1920 x 1080 pixels has 6 MB.
+CLIENT_MAX, ROUTER_MAX = 8 * 2**20, 16 * 2**20
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 # Motions come in bursts, and each takes a batch because it is express. With Zenoh's two batches, up
 # to one in five bursts of eight lost its newest message on a busy machine.
@@ -109,7 +113,7 @@ def client_config(where: BusSettings, turn: int = 0) -> zenoh.Config:
     endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
     connect = {"endpoints": endpoints, "timeout_ms": 1500, "retry": RETRY}
     return zenoh.Config.from_json5(
-        json.dumps(_common(where) | {"mode": "client", "connect": connect})
+        json.dumps(_common(where, {}) | {"mode": "client", "connect": connect})
     )
 
 
@@ -121,7 +125,7 @@ def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Co
         ends["listen"] = {"endpoints": endpoint}
     else:
         ends["connect"] = {"endpoints": endpoint, "retry": REDIAL}
-    whole = _common(where, **BURST) | {"mode": "peer"} | ends
+    whole = _common(where, BURST) | {"mode": "peer"} | ends
     return zenoh.Config.from_json5(json.dumps(whole))
 
 
@@ -147,7 +151,7 @@ def router_config(
     if robot:
         parts |= downsampling_rules(robot, where.laptop_rate)
     full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
-    return _common(where, queue=full) | parts
+    return _common(where, {"queue": full}, ROUTER_MAX) | parts
 
 
 @contextlib.contextmanager
@@ -182,13 +186,16 @@ def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
             raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
 
 
-def _common(where: BusSettings, **sending: object) -> dict[str, object]:
+def _common(
+    where: BusSettings, sending: Mapping[str, object], largest: int = CLIENT_MAX
+) -> dict[str, object]:
     link: dict[str, object] = {
         "tx": {
             "lease": round(where.lease * 1000),
             "keep_alive": 4,
             **sending,
-        }
+        },
+        "rx": {"max_message_size": largest},
     }
     if where.ca:
         link["tls"] = _tls(where)

@@ -1,6 +1,5 @@
 """Subscriber of one key: stamps each sample in Zenoh's thread and passes its handling on."""
 
-import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import zenoh
 import zenoh.ext
 
+from common import clock
 from common.bus.overwriting_queue import OverwritingQueue
 
 Post = Callable[[Callable[[], None]], None]
@@ -38,7 +38,7 @@ class Subscriber:
         """Declare the subscriber; see ``Bus`` for the two ways to pass a call on."""
 
         def queue(sample: zenoh.Sample) -> None:
-            now_ns = time.monotonic_ns()
+            now_ns = clock.now_ns()
             if self._items.add((sample, now_ns)):
                 self._counters["overrun"] += 1
             elif now_ns - self._returned_ns < WAITED_NS:
@@ -46,7 +46,7 @@ class Subscriber:
                 post(self._drain)
             else:
                 submit(self._drain)
-            self._returned_ns = time.monotonic_ns()
+            self._returned_ns = clock.now_ns()
 
         if not self._history:
             return session.declare_subscriber(self._key, queue)

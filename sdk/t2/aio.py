@@ -40,7 +40,7 @@ async def aconnect(
     try:
         yield AsyncRobot(opened)
     finally:
-        await asyncio.to_thread(opened.close)
+        await asyncio.shield(asyncio.to_thread(opened.close))
 
 
 def _close(opening: "asyncio.Task[Robot]") -> None:
@@ -116,6 +116,7 @@ class AsyncDrive:
         try:
             await self._wait(self._drive.__enter__)
         except asyncio.CancelledError:
+            self._drive.end()  # at once: the task may be cancelled again
             await asyncio.to_thread(self._drive.close)
             raise
         return self
@@ -165,8 +166,9 @@ class AsyncDrive:
             await asyncio.shield(task)
         except asyncio.CancelledError:
             self._drive.cancel()
-            with suppress(Exception):
-                await task
+            while not task.done():  # however often this task is cancelled
+                with suppress(Exception, asyncio.CancelledError):
+                    await asyncio.shield(task)
             self._drive.uncancel()  # the motion had ended by itself
             raise
 
@@ -196,17 +198,20 @@ class AsyncRobot:
         linear: float | None = None,
         angular: float | None = None,
         reason: str = "",
-        seconds: float | None = None,
+        *,
+        seconds: float,
     ) -> SpeedLimit:
         """Cap the speed in m/s and rad/s as ``Robot.limit`` does.
 
         >>> async def main():
         ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         limit = await robot.limit("detector", linear=0.3, reason="person ahead")
+        ...         limit = await robot.limit("detector", linear=0.3, seconds=1)
         ...         limit.end()
         >>> asyncio.run(main())
         """
-        return await asyncio.to_thread(self.robot.limit, source, linear, angular, reason, seconds)
+        return await asyncio.to_thread(
+            self.robot.limit, source, linear, angular, reason, seconds=seconds
+        )
 
     async def estop(self) -> None:
         """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts.

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import zenoh
 
 from t2.errors import LinkError
 from t2.robot import Robot
+from t2.stream import CONNECTED, check_process
 
 LOCAL = "tcp/127.0.0.1:7447"
 TIMEOUT_MS = 3_000
@@ -33,6 +35,8 @@ def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None
     if not robot or set(robot) & set("/*$#?"):
         raise LinkError(f"{robot!r} is not the id of one robot, such as 001")
     bus = read(Path(config)) if config else {}
+    check_process()
+    CONNECTED.add(os.getpid())
     endpoints = [endpoint] if endpoint else bus.get("connect") or [LOCAL]
     try:
         session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(endpoints, bus))))

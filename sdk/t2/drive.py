@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, T2Error
+from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
 from t2.messages import Drive as DriveMessage
-from t2.messages import Odometry
-from t2.motion import STILL, Straight, Target, Turn, check_finite
+from t2.messages import Odometry, SafetyState
+from t2.motion import STILL, Straight, Target, Turn, finite
 from t2.publisher import FRESH_S, SourcePublisher
+from t2.stream import check_process
 
 if TYPE_CHECKING:
     from t2.robot import Robot
@@ -26,9 +27,11 @@ OVERRULED_TICKS = 10  # our requests may be on their way for that long
 PATIENCE_S = 3.0  # without progress
 STANDING = 0.02  # m/s and rad/s
 RELEASE = "release"  # the source of a release, which overrules nobody
+CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
+PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
 
 
-OPEN = set[str]()  # keys of the open drives of this program
+OPEN = set[tuple[int, str]]()  # boots and keys of the open drives of this program
 
 
 class Drive:
@@ -42,11 +45,11 @@ class Drive:
 
     def __init__(self, session: zenoh.Session, key: str, source: str, robot: "Robot") -> None:
         self.source = source
-        self._key = key
         self._robot = robot
         self._publisher: SourcePublisher[DriveMessage] = SourcePublisher(
             session, key, "Drive", robot.safety
         )
+        self._key = (self._publisher.boot, key)
         self._target = STILL
         self._sent = 0  # requests
         self._contested = 0  # ticks with a request while another source drives
@@ -64,19 +67,22 @@ class Drive:
     def __enter__(self) -> "Drive":
         """Start with neutral requests; return once safety would let this source drive.
 
-        Raises ``Latched``, ``Overruled``, ``NotAllowed`` and ``NoData``.
+        Raises ``Latched``, ``Stopped``, ``Overruled``, ``NotAllowed`` and ``NoData``.
         """
+        if not self.is_open:
+            raise T2Error(CLOSED)
         state = self._robot.safety.latest()
         if state.latched:
             raise Latched.of(state)
         if self._key in OPEN:
             raise T2Error(f"a drive as {self.source!r} is open in this program; close it first")
         OPEN.add(self._key)
-        self._thread.start()
         try:
+            self._thread.start()
             self._await_control()
         except BaseException:
             self.close()
+            OPEN.discard(self._key)
             raise
         return self
 
@@ -113,9 +119,10 @@ class Drive:
         ...     time.sleep(0.2)  # something else
         ...     drive.check()
         """
+        check_process()
         self._raise()
-        if not self.is_open:
-            raise T2Error("this drive is closed; open another one")
+        if not (self.is_open and self._thread.is_alive()):
+            raise T2Error(CLOSED)
 
     def _raise(self) -> None:
         if self._error is not None:
@@ -123,7 +130,7 @@ class Drive:
             raise self._error
 
     def cancel(self) -> None:
-        """End the motion of another thread with an error, and request zero.
+        """End the motion of another thread, or the next one, with an error, and request zero.
 
         >>> with robot.drive("nav") as drive:
         ...     threading.Timer(0.5, drive.cancel).start()
@@ -153,10 +160,11 @@ class Drive:
         >>> with robot.drive("nav") as drive:
         ...     drive.velocity(-0.1, seconds=0.5)
         """
-        check_finite(linear, angular, 0.0 if seconds is None else seconds)
+        end_s = math.inf if seconds is None else time.monotonic() + finite(seconds)
+        target = Target(finite(linear), finite(angular), end_s)
         self.check()
-        end_s = math.inf if seconds is None else time.monotonic() + seconds
-        self._target = Target(linear, angular, end_s)
+        self._end_cancelled()
+        self._target = target
 
     def stop(self) -> None:
         """Request zero and wait until the vehicle stands.
@@ -190,8 +198,7 @@ class Drive:
 
     def _go(self, motion: "Straight | Turn", patience: float) -> None:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
-        check_finite(patience)
-        least, progress_s = math.inf, time.monotonic()
+        patience, least, progress_s = finite(patience), math.inf, time.monotonic()
 
         def arrived(pose: Odometry) -> bool:
             nonlocal least, progress_s
@@ -201,7 +208,8 @@ class Drive:
             if left < least - motion.near:
                 least, progress_s = left, time.monotonic()
             elif time.monotonic() - progress_s > patience:
-                raise self._blocked()
+                state = self._robot.safety.latest()
+                raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
             self.velocity(*motion.velocity(pose, left))
             return False
 
@@ -218,9 +226,7 @@ class Drive:
         with stream.reading(queue):
             while True:
                 pose = stream.after(queue, 1.0)
-                if self._cancelled:
-                    self.uncancel()
-                    raise T2Error("the motion was cancelled")
+                self._end_cancelled()
                 self.check()
                 if pose is None:
                     self._target = STILL
@@ -231,9 +237,10 @@ class Drive:
                 if arrived(pose):
                     return
 
-    def _blocked(self) -> Blocked:
-        state = self._robot.safety.latest()
-        return Blocked(f"the vehicle does not get on: {state.text}", state.causes)
+    def _end_cancelled(self) -> None:
+        if self._cancelled:
+            self.uncancel()
+            raise T2Error("the motion was cancelled")
 
     # --- requests -----------------------------------------------------------------------------
 
@@ -245,11 +252,14 @@ class Drive:
             if asked_at is None and self._sent >= NEUTRAL:
                 asked_at = state.seq
             # An older state may name the source for requests of an earlier program.
-            if asked_at is not None and state.seq > asked_at + 1 and state.source == self.source:
+            is_answer = asked_at is not None and state.seq > asked_at + 1
+            if is_answer and state.source == self.source and not is_stopped(state):
                 return
             time.sleep(PERIOD_S)
         if state.source not in (None, self.source):
             raise Overruled(str(state.source))
+        if state.source == self.source:
+            raise Stopped(state.text, state.causes)
         raise NotAllowed(
             f"safety takes no requests of {self.source!r}: is it one of safety.sources? "
             f"Safety's state: {state.text} See `t2 doctor`"
@@ -262,11 +272,12 @@ class Drive:
             for _ in range(ZEROS):
                 self._put(0.0, 0.0)
                 time.sleep(PERIOD_S)
-        except zenoh.ZError as error:  # the session was closed
-            self._error = self._error or T2Error(f"the drive has ended: {error}")
+        except Exception as error:  # the session was closed, for example
+            ended = T2Error(f"the drive has ended: {error!r}")
+            self._error = self._error or ended.with_traceback(error.__traceback__)
         self._ended.set()
-        self._publisher.close()
         OPEN.discard(self._key)
+        self._publisher.close()
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target
@@ -294,7 +305,14 @@ class Drive:
                 f"robot {self._robot.name} as this source; see `t2 keys list`"
             )
         other = state.source not in (None, RELEASE, self.source)
+        if target.moves and not other and is_stopped(state):
+            return Stopped(f"{state.text} Open another drive to go on.", state.causes)
         self._contested = self._contested + 1 if other and target.moves else 0
         if self._contested >= OVERRULED_TICKS:
             return Overruled(str(state.source))
         return None
+
+
+def is_stopped(state: SafetyState) -> bool:
+    """Return whether a cause stops the vehicle that wants a neutral request in the end."""
+    return any(each.action != "slow" and each.name not in PASSING for each in state.causes)

@@ -33,10 +33,8 @@ class Straight:
     near = NEAR
 
     def __init__(self, start: Odometry, distance: float, speed: float) -> None:
-        check_finite(distance)
-        check_positive(speed)
-        self._start, self._speed = start, speed
-        self._distance, self._sign = abs(distance), math.copysign(1.0, distance)
+        self._start, self._speed = start, positive(speed)
+        self._distance, self._sign = abs(finite(distance)), math.copysign(1.0, distance)
 
     def left(self, pose: Odometry) -> float:
         """Return the distance that is left, m."""
@@ -58,9 +56,8 @@ class Turn:
     near = NEAR_TURN
 
     def __init__(self, start: Odometry, angle: float, speed: float) -> None:
-        check_finite(angle)
-        check_positive(speed)
-        self._angle, self._sign, self._speed = abs(angle), math.copysign(1.0, angle), speed
+        self._angle, self._sign = abs(finite(angle)), math.copysign(1.0, angle)
+        self._speed = positive(speed)
         self._heading, self._turned = start.heading, 0.0
 
     def left(self, pose: Odometry) -> float:
@@ -79,15 +76,17 @@ def slowing(left: float, speed: float, deceleration: float, slowest: float) -> f
     return max(slowest, min(speed, math.sqrt(2 * deceleration * max(left, 0.0))))
 
 
-def check_finite(*numbers: float) -> None:
-    """Raise ``ValueError`` for a number that is not finite."""
-    if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"only finite numbers can be driven, not {', '.join(map(str, numbers))}")
+def finite(number: float) -> float:
+    """Return a number, of NumPy for example, as a float; raise ``ValueError`` or ``TypeError``."""
+    if not math.isfinite(number):
+        raise ValueError(f"only finite numbers are possible, not {number}")
+    return float(number)
 
 
-def check_positive(speed: float) -> None:
-    """Raise ``ValueError`` for a speed that is not positive."""
+def positive(speed: float) -> float:
+    """Return a speed likewise; raise ``ValueError`` for one that is not positive, too."""
     if not 0 < speed < math.inf:
         raise ValueError(
             f"speed must be positive, not {speed}; a negative distance drives backward"
         )
+    return finite(speed)

@@ -1,10 +1,10 @@
 """Publishing to safety: header, echo, and what the router tells about who receives it."""
 
-import os
 import time
 from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
+from secrets import randbits
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -16,8 +16,9 @@ from t2.stream import Stream
 M = TypeVar("M", bound=SourceMessage)
 
 UNMATCHED_MAX = 10  # messages in a row without a receiver, while safety's state arrives
-# A program is one publisher: safety would take the next drive of a source for a second one.
-BOOT = int.from_bytes(os.urandom(7), "big")
+# A program is one publisher at a router: safety would take the next drive of a source for a second
+# one. Made on first use: forks that connect afterwards are publishers of their own.
+BOOTS: defaultdict[str, int] = defaultdict(lambda: randbits(56))  # by router
 SEQS: defaultdict[str, Iterator[int]] = defaultdict(lambda: count(1))  # by key
 FRESH_S = 0.5  # age of safety's state; older, and safety counts as silent
 QOS: dict[str, Any] = {
@@ -37,6 +38,7 @@ class SourcePublisher(Generic[M]):
     ) -> None:
         safety.open()
         self._safety = safety
+        self.boot = BOOTS[str(session.info.routers_zid())]
         self._seqs = SEQS[key]
         self._unmatched = 0
         self._encoder = msgspec.msgpack.Encoder()
@@ -57,7 +59,7 @@ class SourcePublisher(Generic[M]):
         filled = msgspec.structs.replace(
             message,
             seq=next(self._seqs),
-            boot=BOOT,
+            boot=self.boot,
             t_ns=time.time_ns(),
             mono_ns=time.monotonic_ns(),
             echo=state.heartbeat if state else 0,

@@ -12,7 +12,8 @@ from t2.drive import Drive
 from t2.errors import NoData, NotConfirmed, Refused, T2Error
 from t2.keys import CALLS, ROOT, TOPICS
 from t2.limit import SpeedLimit
-from t2.stream import Stream
+from t2.motion import finite
+from t2.stream import Stream, check_process
 
 A = TypeVar("A", bound=msgspec.Struct)
 
@@ -61,6 +62,7 @@ class Robot:
         >>> other = t2.connect("001", endpoint=ENDPOINT)
         >>> other.close()
         """
+        check_process()
         for drive in self._drives:
             drive.close()
         for limit in self._limits.values():
@@ -90,22 +92,24 @@ class Robot:
         linear: float | None = None,
         angular: float | None = None,
         reason: str = "",
-        seconds: float | None = None,
+        *,
+        seconds: float,
     ) -> SpeedLimit:
         """Cap the speed in m/s and rad/s as this source, until the limit's ``end`` or another call.
 
-        Zero is a protective stop, None no cap; ``reason`` is shown to operators. With ``seconds``
-        it is repeated that long at most: a program that hangs then falls silent, which safety's
-        setting ``silence`` for this source can treat as a stop.
-        ``safety.limits`` must list the source. Raises ``NotAllowed`` and ``ValueError``.
+        Zero is a protective stop, None no cap; ``reason`` is shown to operators. A thread repeats
+        it for ``seconds`` at most: a program that hangs then falls silent, which safety's setting
+        ``silence`` for this source can treat as a stop. Returns once safety's state shows the
+        limit. ``safety.limits`` must list the source. Raises ``NotAllowed``, ``ValueError``,
+        ``TypeError``, and ``NoData`` without safety.
 
-        >>> limit = robot.limit("detector", linear=0.3, reason="person ahead")
+        >>> limit = robot.limit("detector", linear=0.3, reason="person ahead", seconds=1)
         >>> limit.end()
         """
         if source not in self._limits or self._limits[source].has_ended:
             key = self._key("limit", source=source)
             self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
-        self._limits[source].set(linear, angular, reason, seconds)
+        self._limits[source].set(linear, angular, reason, seconds=seconds)
         return self._limits[source]
 
     # --- stopping -----------------------------------------------------------------------------
@@ -141,6 +145,7 @@ class Robot:
         >>> time.sleep(1)  # look at the vehicle
         >>> _ = robot.reset()
         """
+        check_process()
         self._session.put(
             f"{ROOT}/{self.name}/estop",
             b"",
@@ -217,10 +222,11 @@ class Robot:
         >>> robot.set_pose(x=1.0)
         """
         echo = self.safety.latest().heartbeat
-        request = m.PoseRequest(x=x, y=y, heading=heading, echo=echo)
+        request = m.PoseRequest(x=finite(x), y=finite(y), heading=finite(heading), echo=echo)
         self._call("odom/reset", request, m.Done)
 
     def _call(self, path: str, request: msgspec.Struct, reply: type[A]) -> A:
+        check_process()
         key = f"{ROOT}/{self.name}/{CALLS[path]}"
         payload = msgspec.msgpack.encode(request)
         for answer in self._session.get(

@@ -1,6 +1,7 @@
 """Streams: the newest message of a topic, never a backlog."""
 
 import logging
+import os
 import threading
 import time
 from collections import deque
@@ -11,7 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import msgspec
 import zenoh
 
-from t2.errors import NoData
+from t2.errors import LinkError, NoData
 from t2.keys import ROOT
 from t2.messages import Message
 
@@ -21,6 +22,13 @@ T = TypeVar("T", contravariant=True)
 LIVE_S = 0.5  # for the list of robots
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
 logger = logging.getLogger(__name__)
+CONNECTED = set[int]()  # this process, or the one that it was forked from, once it has connected
+
+
+def check_process() -> None:
+    """Raise ``LinkError`` in a fork: Zenoh has no threads there, so that it hangs or is mute."""
+    if CONNECTED - {os.getpid()}:
+        raise LinkError("no connection survives a fork: connect in the new process only")
 
 
 class Queue(Protocol[T]):
@@ -143,6 +151,7 @@ class Stream(Generic[M]):
 
     def open(self) -> None:
         """Subscribe, once."""
+        check_process()
         with self._changed:
             if self._subscriber is None and not self.closed:
                 self._subscriber = self._session.declare_subscriber(self.key, self._on_sample)

@@ -5,11 +5,10 @@ published, before the rest of its datagram is read. Receive timestamps and react
 measured here, after all of that.
 """
 
-import time
 from functools import partial
 from typing import Any
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
@@ -38,8 +37,8 @@ class Bridge:
         self._sockets = Sockets(node.config.board, inherited.sockets if inherited else ())
         self._heartbeat = Heartbeat(inherited.heartbeat, self._on_no_guard) if inherited else None
         self._timings = Timings()
-        self._core = Core(node.config, node.bus.boot, node.counters, time.monotonic_ns())
-        self._ticked_ns = time.monotonic_ns()
+        self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
+        self._ticked_ns = clock.now_ns()
         self._unsent: Send | None = None  # the BRAKE that the system did not send
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
@@ -54,6 +53,9 @@ class Bridge:
         self._do(self._core.start())
         drive.subscribe(keys.MOTION, self._on_motion, depth=MOTIONS)
         node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
+        # Safety receives it, too, unless it hangs, restarts or is cut off.
+        estop_key = keys.estop_key(node.config.robot.id)
+        node.bus.on_any(estop_key, lambda received_ns: self._do(self._core.estop(received_ns)))
         node.bus.serve(keys.SET_SWITCHES, self._on_switches)
         node.bus.serve(keys.SET_LED, self._on_led)
         self._begin()
@@ -97,10 +99,10 @@ class Bridge:
 
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
         motion = arrival.message
-        out = self._core.motion(motion, arrival.received_ns, time.monotonic_ns())
+        out = self._core.motion(motion, arrival.received_ns, clock.now_ns())
         self._do(out)
         if out.obeyed:
-            sent_ns, shared = time.monotonic_ns(), self._node.bus.shares_clock(motion)
+            sent_ns, shared = clock.now_ns(), self._node.bus.shares_clock(motion)
             self._timings.on_motion(motion, shared, arrival.received_ns, sent_ns)
             if out.acked:
                 self._timings.on_acked(motion, shared, arrival.received_ns, sent_ns)
@@ -109,10 +111,10 @@ class Bridge:
         self._core.operator.on_safety(arrival.message, arrival.received_ns)
 
     def _on_switches(self, request: m.SwitchesRequest, caller: Caller[m.Switches]) -> None:
-        self._do(self._core.switches(request, caller, time.monotonic_ns()))
+        self._do(self._core.switches(request, caller, clock.now_ns()))
 
     def _on_led(self, request: m.LedRequest, caller: Caller[m.Done]) -> None:
-        self._do(self._core.led(request, caller, time.monotonic_ns()))
+        self._do(self._core.led(request, caller, clock.now_ns()))
 
     def _on_tick(self, now_ns: int) -> None:
         if now_ns - self._ticked_ns > self._late_ns:
@@ -168,7 +170,7 @@ class Bridge:
         """
         sent = self._sockets.send(brake.datagram, brake.port, BRAKE_ATTEMPTS)
         self._unsent = None if sent else brake
-        return time.monotonic_ns()
+        return clock.now_ns()
 
     # --- counters ---------------------------------------------------------------------------
 
@@ -201,11 +203,11 @@ class Bridge:
 
     def _is_stopped(self) -> bool:
         """Stop the vehicle; return True at standstill, or after one second."""
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         self._do(self._core.stop(now_ns))
         return self._core.motions.is_stopped(now_ns)
 
     def _on_exit(self) -> None:
-        self._do(self._core.exit(time.monotonic_ns()))
+        self._do(self._core.exit(clock.now_ns()))
         if self._heartbeat is not None:
             self._heartbeat.end()

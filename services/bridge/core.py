@@ -7,6 +7,7 @@ reflex     each datagram, first               BRAKE, when it holds a new bumper 
 hit        that hit, once BRAKE is sent       the bumper message; an event
 datagram   the same datagram                  messages; answers of calls; events
 motion     each message on ``@cmd/motion``    the frame that the lease allows
+estop      an emergency stop                  BRAKE
 switches   an operator's call; likewise led   frames; the board's echo answers them later
 tick       every 20 ms                        queries; STOP or BRAKE if due; events
 second     once a second                      the switches' message; rates for the link message
@@ -230,6 +231,12 @@ class Core:
         """Process a motion message of safety."""
         out = Output()
         self.motions.on_motion(motion, received_ns, now_ns, out)
+        return out
+
+    def estop(self, received_ns: int) -> Output:
+        """Process an emergency stop."""
+        out = Output()
+        self.motions.on_estop(received_ns, out)
         return out
 
     def switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Output:

@@ -27,7 +27,7 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
-from common import child_process
+from common import child_process, clock
 from common.child_process import Backoff
 from common.cli_args import NO_RESTART
 from common.log import Logger
@@ -77,7 +77,7 @@ class Guard:
 
     def brake(self) -> None:
         """Send BRAKE as the bridge does, and report to the watchdog."""
-        self._systemd.beat(time.monotonic_ns())
+        self._systemd.beat(clock.now_ns())
         self._sockets.send(self._brake, self._port, BRAKE_ATTEMPTS)
 
     def _run_bridge(self) -> int:
@@ -124,7 +124,7 @@ class Guard:
                 if not beats:
                     return
                 self._port = beats[-1]
-                self._systemd.ready(time.monotonic_ns())
+                self._systemd.ready(clock.now_ns())
                 timeout_ms, missed, hangs = self._missed_ms, 0, HANG_BRAKES_MAX
             else:
                 self.brake()

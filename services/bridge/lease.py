@@ -13,6 +13,8 @@ neutral      start, not ready, lease over,   a STOP, BRAKE or RUN of 0 from the 
              a new authority                 ready: no motion on reconnect alone
 acked        a bumper hit (the reflex: BRAKE a motion message whose ``judged`` covers that hit:
              at once)                        a RUN that was already sent must not undo the BRAKE
+latched      an emergency stop: BRAKE at     a motion message whose ``estop`` names that stop: a
+             once                            safety that hangs or restarts does not lose it
 standstill   0.05 m or 0.05 rad away from a  a motion message with safety's latch for this:
              standstill while the lease was  its ``predecessor`` is the bridge itself
              over: BRAKE at once
@@ -73,6 +75,7 @@ class Lease(Struct, frozen=True):
     ready: bool = False
     neutral: bool = False
     hit: int | None = None  # ``seq`` of the bumper sample to be acknowledged
+    estop: int | None = None  # receive time of the emergency stop to be acknowledged
     sent_ns: int = 0
     # Owner of the latch that was not reset: an authority, or the bridge.
     latched_by: int | None = None
@@ -82,15 +85,21 @@ class Lease(Struct, frozen=True):
     @property
     def braking(self) -> bool:
         """Whether BRAKE continues, even at standstill."""
-        return self.hit is not None or self.uncommanded or self.braked
+        return not self.acked or self.uncommanded or self.braked
+
+    @property
+    def acked(self) -> bool:
+        """Whether safety has acknowledged the last hit and the last emergency stop."""
+        return self.hit is None and self.estop is None
 
     @property
     def waiting(self) -> str:
         """Why a RUN would be refused, as text; empty if it would be obeyed."""
         if not self.ready:
             return "the board is not ready"
-        if self.hit is not None:
-            return "safety has not acknowledged the bumper hit"
+        if not self.acked:
+            what = "bumper hit" if self.estop is None else "emergency stop"
+            return f"safety has not acknowledged the {what}"
         if self.uncommanded:
             return "the vehicle moved without a command: safety has not latched that yet"
         if self.latched_by not in (None, self.boot):
@@ -116,6 +125,8 @@ def on_motion(
     lease = replace(lease, seq=motion.seq, renewed_ns=received_ns, over_since_ns=None)
     if motion.judged_boot == own_boot and lease.hit is not None and motion.judged >= lease.hit:
         lease = replace(lease, hit=None)
+    if motion.estop == lease.estop:
+        lease = replace(lease, estop=None)
     latched_by = _latched_by(lease, motion)
     uncommanded = lease.uncommanded and latched_by == own_boot
     lease = replace(lease, latched_by=latched_by, uncommanded=uncommanded)
@@ -150,8 +161,8 @@ def _latched_by(lease: Lease, motion: Motion) -> int | None:
 
 
 def _order(lease: Lease, motion: Motion) -> tuple[Command, Refusal | None]:
-    if lease.hit is not None or lease.uncommanded:
-        refusal = Refusal.NOT_LATCH_OWNER if lease.hit is None else Refusal.NOT_ACKED
+    if not lease.acked or lease.uncommanded:
+        refusal = Refusal.NOT_LATCH_OWNER if lease.acked else Refusal.NOT_ACKED
         return BRAKE, refusal if motion.command is RUN else None
     if motion.command is not RUN:
         return motion.command, None
@@ -167,6 +178,13 @@ def _order(lease: Lease, motion: Motion) -> tuple[Command, Refusal | None]:
 def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
     """Brake for the first sample of a bumper hit: the reflex."""
     return replace(lease, hit=seq, sent_ns=now_ns), BRAKE
+
+
+def on_estop(lease: Lease, received_ns: int) -> tuple[Lease, Command | None]:
+    """Brake for an emergency stop; another one is the same until safety has latched it."""
+    if lease.estop is not None:
+        return lease, None
+    return replace(lease, estop=received_ns, sent_ns=received_ns), BRAKE
 
 
 def on_uncommanded(lease: Lease, now_ns: int, own_boot: int) -> tuple[Lease, Command | None]:

@@ -56,6 +56,7 @@ class LinkReport:
             ports={name: numbers[port] for name, port in self._ports.by_name().items()},
             send_errors=send_errors,
             relay=self._readiness.relay.message(),
+            estop=self._motions.lease.estop,
         )
         out.publish("link", message)
 

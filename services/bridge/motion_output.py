@@ -89,6 +89,12 @@ class MotionOutput:
         """Process a hit, in the sample that will be published as ``seq``."""
         self.lease, _ = lease.on_hit(self.lease, seq, now_ns)
 
+    def on_estop(self, received_ns: int, out: Output) -> None:
+        """Process an emergency stop."""
+        self.lease, order = lease.on_estop(self.lease, received_ns)
+        if order is not None:
+            self.order(order, out)
+
     def on_ready(self, ready: bool) -> None:
         """Set whether the board may be driven."""
         self.lease = lease.on_ready(self.lease, ready and self._stopping_ns is None)

@@ -12,6 +12,7 @@ import msgspec
 
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.verdict import Few, Name
 from services.bridge.output import Output
 
 SILENCE_NS = NS_PER_S // 2  # five reports
@@ -20,10 +21,10 @@ SILENCE_NS = NS_PER_S // 2  # five reports
 class Report(msgspec.Struct, frozen=True):
     """A report, as ``services/relay`` sends it in JSON."""
 
-    version: str
-    braking: str
+    version: Name
+    braking: Name
     uptime: float
-    counters: dict[str, Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]]
+    counters: Annotated[dict[Name, Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]], Few]
 
 
 class RelayStatus:

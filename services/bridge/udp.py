@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
+from common import clock
 from common.errors import LinkError
 from common.settings import Board
 from services.bridge.rx_timestamp import (
@@ -67,7 +68,7 @@ class Sockets:
                 if source == self._relay:
                     self._relay_report = datagram
                 elif source == self._board or (self._any_port and source[0] == self._board[0]):
-                    yield port, datagram, ancillary, time.monotonic_ns()
+                    yield port, datagram, ancillary, clock.now_ns()
                 else:
                     self.refused += 1
                     self.last_foreign_source = source
@@ -76,7 +77,7 @@ class Sockets:
 
     def receipt(self, ancillary: Ancillary, read_ns: int) -> Receipt:
         """Return the receive times of a datagram read with this ancillary data."""
-        before_ns, wall_ns, now_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        before_ns, wall_ns, now_ns = clock.now_ns(), time.time_ns(), clock.now_ns()
         self.wall.update(before_ns, wall_ns, now_ns)
         stamp_ns = kernel_timestamp(ancillary)
         kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)

@@ -7,14 +7,13 @@ they are to show. A snapshot is encoded once and sent to all viewers of its robo
 import re
 import secrets
 import threading
-import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 
 import msgspec
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.messages import Level, SafetyState
@@ -29,6 +28,7 @@ from services.dashboard.snapshot import fast_snapshot, slow_snapshot
 PERIOD_S = 0.05
 SLOW_TICKS = 10  # between two slow snapshots
 IDLE_S = 30.0  # after which a robot without viewers is closed
+KNOWN_MAX = 100  # robots; beyond these, one that leaves is forgotten
 ROBOTS_MAX = 16  # open at the same time; each has a session of its own
 
 # Takes the viewers, the text, and whether it replaces an older one that still waits.
@@ -41,7 +41,7 @@ class Viewer:
 
     name: str
     robot: str
-    events_sent: int = -1  # the robot's event count when they were last sent
+    events_sent: int = -1  # the robot's event count when they were last sent; -1: none were
     has_trail: bool = False
 
 
@@ -89,7 +89,7 @@ class Fleet:
             return
         robot = self._robot_of(viewer)
         if isinstance(message, client.Alive):
-            robot.keep_alive(viewer, message.n, time.monotonic_ns())
+            robot.keep_alive(viewer, message.n, clock.now_ns())
         elif isinstance(message, client.Take):
             self._take(viewer, robot, message.force)
         elif robot.driver_lock.driver == viewer:
@@ -106,7 +106,7 @@ class Fleet:
     # --- called by the server in its own thread -------------------------------------------------
 
     def knows(self, robot: str) -> bool:
-        """Return whether the robot is in the settings, was alive before, or has viewers."""
+        """Return whether the robot is in the settings, was alive, or has viewers."""
         return robot in self._alive or robot in self._robots
 
     # --- the loop -------------------------------------------------------------------------------
@@ -157,9 +157,10 @@ class Fleet:
 
     def _send_events(self, here: dict[str, Viewer], robot: Robot) -> None:
         count = robot.telemetry.event_count
-        late = [key for key, viewer in here.items() if viewer.events_sent != count]
-        if late:
-            self._send(late, {"k": "events", "lines": list(robot.telemetry.events)})
+        for sent in {viewer.events_sent for viewer in here.values()} - {count}:
+            lines = [line for line in robot.telemetry.events if line.n > sent]
+            late = [key for key, viewer in here.items() if viewer.events_sent == sent]
+            self._send(late, {"k": "events", "lines": lines, "all": sent < 0})
             for key in late:
                 here[key].events_sent = count
 
@@ -220,7 +221,7 @@ class Fleet:
         lock = robot.driver_lock
         match message:
             case client.Hold(n, x, y, release):
-                lock.hold(viewer, n, Push(x, y, release), time.monotonic_ns())
+                lock.hold(viewer, n, Push(x, y, release), clock.now_ns())
             case client.Free():
                 lock.let_go(viewer)
             case client.Leave():
@@ -245,7 +246,7 @@ class Fleet:
     def _seen(self, viewer: str, robot: Robot, number: int) -> SafetyState | None:
         """Return the state of safety that the viewer saw; refuse a late command with a notice."""
         limit_s = self._settings.call_round_trip
-        seen = robot.driver_lock.seen(number, time.monotonic_ns(), limit_s)
+        seen = robot.driver_lock.seen(number, clock.now_ns(), limit_s)
         if seen is None:
             self._notify(viewer, "warning", "too_late")
         return seen
@@ -279,7 +280,7 @@ class Fleet:
             broadcast = partial(self._broadcast, name)
             self._robots[name] = Robot(bus, self._settings, broadcast, self._notify)
             bus.open()
-        self._robots[name].used_ns = time.monotonic_ns()
+        self._robots[name].used_ns = clock.now_ns()
         return self._robots[name]
 
     def _close(self, name: str, robot: Robot) -> None:
@@ -295,3 +296,5 @@ class Fleet:
             return  # no viewer could select it
         tokens = self._alive.setdefault(robot, set())
         (tokens.add if alive else tokens.discard)(key)
+        if not tokens and len(self._alive) > KNOWN_MAX and robot != self._node.config.robot.id:
+            del self._alive[robot]

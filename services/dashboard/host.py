@@ -8,10 +8,9 @@ import signal
 import ssl
 import sys
 import threading
-import time
 from pathlib import Path
 
-from common import log
+from common import clock, log
 from common.config import Loaded
 from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
@@ -70,7 +69,7 @@ class Host:
 
     def _alive(self) -> None:
         """Notify systemd through both loops, the server's and the node's: both must work."""
-        self._node.loop.post(lambda: self._systemd.ready(time.monotonic_ns()))
+        self._node.loop.post(lambda: self._systemd.ready(clock.now_ns()))
 
     def _serve(self) -> None:
         try:

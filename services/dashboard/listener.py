@@ -8,12 +8,12 @@ import asyncio
 import contextlib
 import itertools
 import socket
-import time
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from common import clock
 from services.dashboard.admission import (
     Admission,
     Place,
@@ -89,7 +89,7 @@ class Connection(socket.socket):
         self._on_close()
 
     def _meter(self, count: int) -> None:
-        if self._bytes.take(time.monotonic_ns(), count) is not Verdict.ACCEPTED:
+        if self._bytes.take(clock.now_ns(), count) is not Verdict.ACCEPTED:
             self._counters["connections_aborted"] += 1
             raise ConnectionAbortedError("too many bytes")
 

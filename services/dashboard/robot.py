@@ -3,13 +3,12 @@
 Each robot has a bus session of its own, which opens when the first viewer selects the robot.
 """
 
-import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import msgspec
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.codec import finite
@@ -146,7 +145,7 @@ class Robot:
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
-        state = self.telemetry.newest(keys.SAFETY, time.monotonic_ns())
+        state = self.telemetry.newest(keys.SAFETY, clock.now_ns())
         is_latched = state is not None and "estop" in state.latched  # a page repeats its requests
         if not self._estop.is_pending and not is_latched:
             self._log.warning("emergency stop", requested_by=requested_by)

@@ -14,6 +14,7 @@ from common import keys
 from common.freshness import NS_PER_S, Latest, fresh
 from common.keys import Topic
 from common.messages import Event, Message
+from common.text import printable
 
 M = TypeVar("M", bound=Message)
 
@@ -32,6 +33,7 @@ POINTS = 4000
 class EventLine(Struct, frozen=True):
     """An event as the browsers show it."""
 
+    n: int  # rises with each event that was received
     t: float  # s, the sender's wall clock
     service: str
     name: str
@@ -88,11 +90,12 @@ class TelemetryCache:
 
     def add_event(self, service: str, event: Event) -> None:
         """Store an event, sorted by the sender's time."""
-        line = EventLine(event.t_ns / 1e9, service, event.name, event.level, event.text)
+        self.event_count += 1
+        t, text = event.t_ns / 1e9, printable(event.text)
+        line = EventLine(self.event_count, t, service, event.name, event.level, text)
         ordered = sorted([*self.events, line], key=lambda line: line.t)
         self.events.clear()
         self.events.extend(ordered)
-        self.event_count += 1
 
     def update_liveliness(self, key: str, alive: bool) -> None:
         """Handle a liveliness token that appeared or disappeared."""

@@ -9,7 +9,6 @@ handled before all calls that wait.
 import asyncio
 import contextlib
 import itertools
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection
 from functools import partial
@@ -17,6 +16,7 @@ from functools import partial
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from common import clock
 from services.dashboard.admission import RateLimit, Verdict
 from services.dashboard.client_messages import AnyMessage, Estop
 from services.dashboard.fleet import Fleet
@@ -145,7 +145,7 @@ class WebSocketHub:
         with contextlib.suppress(WebSocketDisconnect, KeyError):  # a binary message has no text
             while True:
                 text = await socket.receive_text()
-                verdict = limit.take(time.monotonic_ns())
+                verdict = limit.take(clock.now_ns())
                 if verdict is Verdict.ACCEPTED or ESTOP in text:
                     message = self._decode(text)
                     if message is None:

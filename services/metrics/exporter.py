@@ -4,7 +4,6 @@ The web server handles a scrape in its own thread and lets the node's loop make 
 loop hangs, the scrape fails; it never returns old values.
 """
 
-import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from pathlib import Path
@@ -15,7 +14,7 @@ from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from common import keys, members
+from common import clock, keys, members
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.errors import ConfigError, LinkError
@@ -73,7 +72,7 @@ class Exporter(Collector):
 
     def _on_live(self, key: str, alive: bool) -> None:
         service, instance = key.split("/")[-2:]
-        self._robot(key).on_live(service, instance, alive, time.monotonic_ns())
+        self._robot(key).on_live(service, instance, alive, clock.now_ns())
 
     def _robot(self, key: str) -> RobotState:
         return self._robots.setdefault(key.split("/")[2], RobotState())
@@ -93,7 +92,7 @@ class Exporter(Collector):
     def _families(self) -> list[Metric]:
         return metric_families(
             {n: robot for n, robot in self._robots.items() if n == self._own or robot.is_robot},
-            time.monotonic_ns(),
+            clock.now_ns(),
             connected=self._bus.connected,
             certificates=self._certificates,
         )

@@ -4,11 +4,9 @@ Each counter sample is followed by an estimate. While counters are missing, each
 Zenoh sends nothing to the router without a subscriber.
 """
 
-import time
-
 import msgspec
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
@@ -71,7 +69,7 @@ class Odometer:
         self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
 
     def _on_set_pose(self, request: m.PoseRequest, caller: Caller[m.Done]) -> None:
-        late = self._echoes.refusal(request.echo, time.monotonic_ns())
+        late = self._echoes.refusal(request.echo, clock.now_ns())
         if late:
             caller.refuse(late)
             return
@@ -79,14 +77,14 @@ class Odometer:
             caller.refuse("x, y and heading must be finite, not NaN or infinity")
             return
         pose = Pose(request.x, request.y, request.heading)
-        self._estimator.place(pose, time.monotonic_ns())
+        self._estimator.place(pose, clock.now_ns())
         self._trajectory.clear()
         text = f"pose set to x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
         self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
         caller.reply(m.Done(text=text, boot=self._node.bus.boot))
 
     def _estimate(self) -> None:
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         odometry = self._estimator.estimate(now_ns)
         if odometry is None:
             return

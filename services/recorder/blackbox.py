@@ -1,13 +1,15 @@
 """The black box: buffers the last minutes and writes them when safety latches a cause. Pure.
 
-Theory of operation: a ring buffer holds the newest samples. A latch copies them to a dump, and the
-dump also takes the samples of the next seconds (``recorder.tail``). A dump holds work for some
-seconds, so it is written in slices and the event loop continues in between.
+Theory of operation: a ring buffer holds the newest samples. A latch starts a dump of them and of
+the samples of the next seconds (``recorder.tail``). A dump takes some seconds, so it is written in
+slices and the event loop continues in between. What waits for it stays in the buffer.
 """
 
-from collections import deque
-from collections.abc import Callable
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
+from math import inf
 from typing import TYPE_CHECKING
 
 from common.freshness import NS_PER_S
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
     from services.recorder.writer import RecordingWriter
 
 SLICE = 400  # samples written at once: about 30 ms of work
-# Python's memory for a sample besides its bytes, with key and encoding: 380 B by tracemalloc.
-OVERHEAD = 400
+# Python's memory for a sample besides its bytes, with key and encoding: 450 B by tracemalloc.
+OVERHEAD = 470
 
 # Opens a recording for its first sample and a reason; raises OSError.
 OpenRecording = Callable[[Sample, str], "RecordingWriter"]
@@ -28,27 +30,44 @@ CloseRecording = Callable[["RecordingWriter"], None]
 
 
 class RingBuffer:
-    """The newest samples, bounded in time and in bytes; the oldest are dropped first."""
+    """The newest samples, bounded in time and in bytes: the largest key loses its oldest first."""
 
     def __init__(self, span_ns: int, size_max: int) -> None:
         self.size = 0  # bytes, estimated
-        self._span_ns = span_ns
-        self._size_max = size_max
-        self._samples: deque[Sample] = deque()
+        self._span_ns, self._size_max = span_ns, size_max
+        self._samples: dict[int, Sample] = {}  # by number, in the order of reception
+        self._first = self._next = 0  # numbers of the oldest sample and of the next one
+        self._numbers: defaultdict[str, deque[int]] = defaultdict(deque)  # by key
+        self._sizes: Counter[str] = Counter()  # bytes by key
 
-    def add(self, sample: Sample) -> None:
-        """Add a sample; drop what exceeds the time span or the size."""
-        self._samples.append(sample)
+    def add(self, sample: Sample, unwritten: float = inf) -> None:
+        """Add a sample; drop what exceeds the size, or the time span before ``unwritten``."""
+        self._samples[self._next] = sample
+        self._numbers[sample.key].append(self._next)
+        self._next += 1
+        self._sizes[sample.key] += sample.size + OVERHEAD
         self.size += sample.size + OVERHEAD
-        oldest_ns = sample.received_ns - self._span_ns
-        while self._samples[0].received_ns < oldest_ns or self.size > self._size_max:
-            self.size -= self._samples.popleft().size + OVERHEAD
-            if not self._samples:
-                return
+        since_ns = sample.received_ns - self._span_ns
+        while self._first < unwritten and self._samples[self._first].received_ns < since_ns:
+            self._drop(self._samples[self._first].key)
+        while self.size > self._size_max:
+            self._drop(max(self._sizes, key=self._sizes.__getitem__))
 
-    def samples(self) -> list[Sample]:
-        """Return all samples, the oldest first."""
-        return list(self._samples)
+    def since(self, number: int, until_ns: float = inf) -> Iterator[tuple[int, Sample]]:
+        """Yield the samples from this number to this time, with their numbers."""
+        for each in range(max(number, self._first), self._next):
+            if each in self._samples and self._samples[each].received_ns <= until_ns:
+                yield each, self._samples[each]
+
+    def _drop(self, key: str) -> None:
+        """Drop the oldest sample of a key."""
+        sample = self._samples.pop(self._numbers[key].popleft())
+        while self._first < self._next and self._first not in self._samples:
+            self._first += 1
+        self._sizes[key] -= sample.size + OVERHEAD
+        self.size -= sample.size + OVERHEAD
+        if not self._numbers[key]:
+            del self._numbers[key], self._sizes[key]
 
 
 class LatchDetector:
@@ -73,7 +92,7 @@ class Dump:
     """A black-box file in progress."""
 
     reason: str
-    pending: deque[Sample]
+    number: int  # of the next sample in the buffer
     until_ns: int  # samples up to this time belong to the file
     limit_ns: int  # the latest value of until_ns, whatever else latches
     recording: "RecordingWriter | None" = None
@@ -93,27 +112,24 @@ class BlackBox:
         self._dump: Dump | None = None
 
     def add(self, sample: Sample) -> None:
-        """Buffer a sample, and add it to the dump in progress."""
-        self._buffer.add(sample)
-        if self._dump is not None and sample.received_ns <= self._dump.until_ns:
-            self._dump.pending.append(sample)
+        """Buffer a sample, also for the dump in progress."""
+        self._buffer.add(sample, self._dump.number if self._dump else inf)
 
     def trigger(self, causes: list[str], now_ns: int) -> None:
         """Start a dump, or extend the one in progress."""
         until_ns = now_ns + self._tail_ns
         if self._dump is None:
-            buffered = deque(self._buffer.samples())
-            self._dump = Dump("-".join(causes), buffered, until_ns, now_ns + self._span_ns)
+            self._dump = Dump("-".join(causes), 0, until_ns, now_ns + self._span_ns)
         else:
             self._dump.until_ns = min(until_ns, self._dump.limit_ns)
 
     def write(self, now_ns: int) -> None:
         """Write a slice of the pending samples; close the file when it is complete."""
-        if self._dump is None:
-            return
-        self._write(self._dump, SLICE)
-        if not self._dump.pending and now_ns > self._dump.until_ns:
-            self._finish(self._dump)
+        if self._dump is not None:
+            self._write(self._dump, SLICE)
+            left = self._buffer.since(self._dump.number, self._dump.until_ns)
+            if now_ns > self._dump.until_ns and not any(left):
+                self.finish()
 
     def flush(self) -> None:
         """Hand all written samples to the operating system."""
@@ -123,23 +139,18 @@ class BlackBox:
     def close(self) -> None:
         """Write all pending samples and close the file, when the process ends."""
         if self._dump is not None:
-            self._write(self._dump, len(self._dump.pending))
-            self._finish(self._dump)
+            self._write(self._dump, None)
+            self.finish()
 
-    def abort(self) -> None:
-        """Discard the pending samples and close the file, after a disk error."""
-        if self._dump is not None:
-            self._dump.pending.clear()
-            self._finish(self._dump)
+    def finish(self) -> None:
+        """Close the file without the pending samples, also after a disk error."""
+        dump, self._dump = self._dump, None
+        if dump is not None and dump.recording is not None:
+            self._close_recording(dump.recording)
 
-    def _write(self, dump: Dump, limit: int) -> None:
-        for _ in range(min(limit, len(dump.pending))):
-            sample = dump.pending.popleft()
+    def _write(self, dump: Dump, limit: int | None) -> None:
+        for number, sample in islice(self._buffer.since(dump.number, dump.until_ns), limit):
+            dump.number = number + 1
             if dump.recording is None:
                 dump.recording = self._open_recording(sample, f"latch-{dump.reason}")
             dump.recording.write(sample)
-
-    def _finish(self, dump: Dump) -> None:
-        self._dump = None
-        if dump.recording is not None:
-            self._close_recording(dump.recording)

@@ -1,11 +1,10 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from common import codec, keys
+from common import clock, codec, keys
 from common.cli_args import VERSION
 from common.errors import MessageError
 from common.messages import SafetyState
@@ -40,7 +39,7 @@ class Recorder:
         self._rolling = RollingWriter(settings, *files) if settings.everything else None
         self._black_box = BlackBox(settings, *files)
         node.counters.update(recorded=0, not_recorded=0, removed=0)
-        self._check_storage(time.monotonic_ns())
+        self._check_storage(clock.now_ns())
         for each in EVERYTHING:
             node.bus.tap(f"{keys.ROOT}/{node.bus.robot}/{each}", self._on_sample, depth=DEPTH)
         node.loop.every(
@@ -110,7 +109,7 @@ class Recorder:
     def _stop(self) -> None:
         text = f"no room for recordings: {self._storage.problem}"
         self._node.event("disk_full", "error", text, folder=str(self._storage.folder))
-        for close in (self._black_box.abort, self._rolling.close if self._rolling else None):
+        for close in (self._black_box.finish, self._rolling.close if self._rolling else None):
             try:
                 if close is not None:
                     close()
@@ -122,7 +121,7 @@ class Recorder:
         try:
             write()
         except OSError as error:
-            self._storage.on_error(error, time.monotonic_ns())
+            self._storage.on_error(error, clock.now_ns())
             self._stop()
 
     def _open_recording(self, first: Sample, reason: str) -> RecordingWriter:

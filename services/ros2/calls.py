@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.operator import reset_request
@@ -45,7 +45,7 @@ class Calls:
             answer((False, "Too many calls wait for their stop."))
             return
         self._node.bus.estop()
-        self._stops.append((answer, time.monotonic_ns()))
+        self._stops.append((answer, clock.now_ns()))
 
     def _confirm(self, now_ns: int) -> None:
         """Repeat an emergency stop until it is confirmed, or too old."""
@@ -81,7 +81,7 @@ class Calls:
         )
 
     def _fresh(self) -> m.SafetyState | None:
-        return self._state(time.monotonic_ns() - FRESH_NS)
+        return self._state(clock.now_ns() - FRESH_NS)
 
     def _switch(self, name: str) -> Serve:
         def handle(about: Attachment, request: Value, answer: Answer) -> None:

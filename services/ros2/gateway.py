@@ -1,8 +1,8 @@
 """The gateway: connects the robot's bus with one node of ROS 2."""
 
-import time
 from functools import partial
 
+from common import clock
 from common.service import Node
 from common.source import DriveSource
 from services.ros2 import names, translate
@@ -25,7 +25,7 @@ class Gateway:
     def __init__(self, node: Node[Ros2Config]) -> None:
         settings = node.config.ros2
         self._node, self._namespace = node, settings.namespace
-        self._commands, self._diagnostics = Commands(), Diagnostics(time.monotonic_ns)
+        self._commands, self._diagnostics = Commands(), Diagnostics(clock.now_ns)
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
         self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
         ros = names.Node(settings.domain, "", settings.namespace, NODE)
@@ -44,7 +44,7 @@ class Gateway:
     def _take(self, stamped: bool, about: Attachment, message: Value, received_ns: int) -> None:
         """Pass on a command, or refuse it."""
         twist = Twist(*(message[1] if stamped else message))
-        decided = self._commands.judge(about, twist, received_ns, time.monotonic_ns())
+        decided = self._commands.judge(about, twist, received_ns, clock.now_ns())
         if isinstance(decided, Refusal):
             self._refuse(decided, about.gid)
             return

@@ -91,7 +91,8 @@ class Streams:
     def _statuses(self) -> None:
         self._note(keys.SAFETY, translate.safety_status)
         self._note(keys.LINK, translate.link_status)
-        self._note(keys.HEALTH, translate.health_status, service="*")
+        for name in keys.SERVICES:  # anybody can invent a name
+            self._note(keys.HEALTH, partial(translate.health_status, name), service=name)
         for side in SIDES:
             self._note(keys.DRIVER, partial(translate.driver_status, side), side=side)
         array = self._publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")

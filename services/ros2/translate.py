@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Mount, Vehicle
+from common.text import printable
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2
 
@@ -95,8 +96,8 @@ def sonar_range(
 
 def status(level: int, name: str, text: str, values: Mapping[str, object]) -> Value:
     """Return a diagnostic_msgs/DiagnosticStatus of this robot."""
-    pairs = tuple((key, str(value)) for key, value in values.items())
-    return level, f"t2: {name}", text, "t2", pairs
+    pairs = tuple((printable(key), printable(str(value))) for key, value in values.items())
+    return level, f"t2: {printable(name)}", printable(text), "t2", pairs
 
 
 def safety_status(state: m.SafetyState) -> Value:
@@ -126,7 +127,7 @@ def driver_status(side: str, driver: m.Driver) -> Value:
     return status(ERROR if faults else OK, f"{side} motor driver", text, {"bits": driver.bits})
 
 
-def health_status(health: m.Health) -> Value:
+def health_status(service: str, health: m.Health) -> Value:
     """Return the status of a service by its health message."""
     values = {"version": health.version, "uptime": f"{health.uptime:.0f} s", **health.counters}
-    return status(OK, f"service {health.service}", "It runs.", values)
+    return status(OK, f"service {service}", "It runs.", values)

@@ -4,8 +4,8 @@ The reasons of refusals are those of ``channel.py``.
 
 The fresh source of the highest priority is in control. A source is fresh while its last request is
 younger than its lease; it gives up control by silence. A source may move the vehicle only after a
-*neutral* request (zero): after its own start, after every cause that requires it, and after a
-source of higher priority was in control.
+*neutral* request (zero): after its own start, after every cause that requires it, after a source of
+higher priority was in control, and when its lease has been over for ``LAPSE_S``.
 """
 
 from collections.abc import Mapping
@@ -17,6 +17,8 @@ from common.motion import STILL, Twist
 from services.safety.channel import Admission, Channel
 from services.safety.config import Source
 from services.safety.inputs import DriveRequest
+
+LAPSE_S = 1.0  # without a valid request: a neutral one is due again
 
 
 class DriveChannel(Channel, frozen=True, kw_only=True):
@@ -41,9 +43,12 @@ class Arbiter(Struct, frozen=True):
         if refused or drive is None:
             return self, refused
         before, lease_s = self.channels.get(name, DriveChannel()), self.sources[name].lease
-        channel, refused = before.accept(drive, request.received_ns, lease_s)
+        channel, refused = before.accept(drive, request.received_ns, lease_s, admission.max_age_ns)
         if not refused:
             channel = replace(channel, requested=Twist(drive.linear, drive.angular))
+            # A program that was suspended must not drive on by itself.
+            if not before.is_fresh(request.received_ns, lease_s + LAPSE_S):
+                channel = replace(channel, neutral=False)
         return replace(self, channels={**self.channels, name: channel}), refused
 
     def in_control(self, now_ns: int) -> str | None:
@@ -55,9 +60,10 @@ class Arbiter(Struct, frozen=True):
         """Return whether any source requests motion."""
         return any(not self.channels[name].requested.is_zero for name in self._fresh(now_ns))
 
-    def conflicts(self, now_ns: int) -> list[str]:
-        """Return the names of sources with two publishers."""
-        return [name for name, one in self.channels.items() if one.in_conflict(now_ns)]
+    def conflict(self, now_ns: int) -> list[str]:
+        """Return the source in control if it has two publishers; others are stopped anyway."""
+        leader = self.in_control(now_ns)
+        return [leader] if leader and self.channels[leader].in_conflict(now_ns) else []
 
     def disarmed(self) -> "Arbiter":
         """Return the arbiter with a neutral request due on every source."""

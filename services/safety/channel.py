@@ -9,10 +9,13 @@ not_a_request    payload of the wrong type
 not_finite       NaN or infinity
 late             the echo is unknown or too old, see ``common/heartbeat.py``
 second_publisher another ``boot`` while the lease of the first one lives; also stops the vehicle
-seq_not_rising   a repeated or an older sequence number
+seq_not_rising   a repeated or an older number, until the last message is older than ``max_age_ns``
 ================ =============================================================================
 
 A lease counts from the reception of a message, so time in the queue is part of it.
+
+After ``max_age_ns`` a number that does not rise belongs to a copy of the publisher, such as a fork
+or a restored snapshot: all earlier messages echo a heartbeat that is too old by then.
 """
 
 from collections.abc import Container
@@ -52,18 +55,20 @@ class Channel(Struct, frozen=True, kw_only=True):
         window_ns = max(CONFLICT_NS, lease_s * NS_PER_S)
         return self.conflict_ns is not None and now_ns - self.conflict_ns < window_ns
 
-    def accept(self: C, message: SourceMessage, received_ns: int, lease_s: float) -> tuple[C, str]:
+    def accept(
+        self: C, message: SourceMessage, received_ns: int, lease_s: float, max_age_ns: int
+    ) -> tuple[C, str]:
         """Return the channel after a message, and the reason of its refusal; empty if accepted.
 
         A new publisher starts with the defaults of all further fields.
         """
-        channel = self
+        rises = message.boot == self.boot and message.seq > self.seq
         if message.boot != self.boot:
             if self.is_fresh(received_ns, lease_s):
                 return replace(self, conflict_ns=received_ns), "second_publisher"
-            channel = type(self)(boot=message.boot, conflict_ns=self.conflict_ns)
-        elif message.seq <= self.seq:
+        elif not rises and self.is_fresh(received_ns, max_age_ns / NS_PER_S):
             return self, "seq_not_rising"
+        channel = self if rises else type(self)(boot=message.boot, conflict_ns=self.conflict_ns)
         return replace(channel, seq=message.seq, received_ns=received_ns), ""
 
 

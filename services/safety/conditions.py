@@ -19,6 +19,8 @@ MOVED_ALONE = "The vehicle moved without a command while safety was absent."
 # Of the polls of the last 0.2 s, ten at the full rate: this many lost ones can hide a hit of 60 ms.
 LOST_POLLS = 3
 FEW_POLLS = 1  # hysteresis: the cause clears at this number
+# A shorter stall loses no emergency stop: it waits in the session, or the session is opened again.
+STALL_S = 1.0
 
 
 def observe_inputs(
@@ -28,12 +30,10 @@ def observe_inputs(
     tick = (0, now_ns)
     acked = state.verdict.acked if state.verdict.acked != (0, 0) else None
     yield _contact(inputs, tick)
-    yield Observation("estop", isinstance(inputs.event, Estop), tick)
+    yield Observation("estop", _estop_received(inputs, state), tick)
     if state.keepalives.names:
         yield state.keepalives.observation(now_ns)
-    yield Observation(
-        "estop_reader", state.estop_session_was_up and not inputs.estop_session_up, tick
-    )
+    yield _estop_reader(inputs, state, now_ns)
     yield _driver("left", inputs.left, tick)
     yield _driver("right", inputs.right, tick)
     yield Observation("leaving", inputs.leaving, tick)
@@ -42,7 +42,7 @@ def observe_inputs(
     yield _switches(inputs, settings, tick)
     yield _bumper(inputs, settings, acked, now_ns)
     yield _bumper_lossy(inputs, "bumper_lossy" in state.latches, tick)
-    yield _silent(inputs, settings, state.decided_ns, now_ns)
+    yield _silent(inputs, settings, state, now_ns)
 
 
 def _contact(inputs: Inputs, tick: Token) -> Observation:
@@ -51,6 +51,26 @@ def _contact(inputs: Inputs, tick: Token) -> Observation:
         return Observation("contact", False, tick)
     sample = bumper.value
     return Observation("contact", sample.pressed, (sample.boot, sample.seq))
+
+
+def _estop_received(inputs: Inputs, state: State) -> bool:
+    """Return whether an emergency stop was received, by safety or since then by the bridge."""
+    waiting = inputs.link.value.estop if inputs.link else None
+    return waiting not in (None, state.estop) or isinstance(inputs.event, Estop)
+
+
+def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation:
+    """Observe whether an emergency stop may have been missed."""
+    tick = (0, now_ns)
+    if _stalled(state, STALL_S, now_ns):
+        text = "Safety was stalled: an emergency stop may have been missed."
+        return Observation("estop_reader", True, tick, text)
+    lost = state.estop_connection not in (0, inputs.estop_connection)
+    return Observation("estop_reader", lost, tick)
+
+
+def _stalled(state: State, age_s: float, now_ns: int) -> bool:
+    return state.decided_ns is not None and now_ns - state.decided_ns > age_s * NS_PER_S
 
 
 def _driver(side: str, latest: Latest[Driver] | None, tick: Token) -> Observation:
@@ -75,7 +95,7 @@ def _starting(inputs: Inputs, settings: Safety, keepalives: list[str], tick: Tok
     if settings.require_switches:
         needed["switches"] = inputs.switches
     missing = [name for name, latest in needed.items() if latest is None]
-    if not inputs.estop_session_up:
+    if not inputs.estop_connection:
         missing.append("emergency stop")
     missing += [f"emergency stop keepalive of {name}" for name in keepalives]
     text = f"Waiting for the first sample of: {', '.join(missing)}."
@@ -128,9 +148,9 @@ def _bumper_lossy(inputs: Inputs, held: bool, tick: Token) -> Observation:
     return Observation("bumper_lossy", lossy, tick, text)
 
 
-def _silent(inputs: Inputs, settings: Safety, decided_ns: int | None, now_ns: int) -> Observation:
+def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Observation:
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
-    if decided_ns is not None and now_ns - decided_ns > settings.bumper_age * NS_PER_S:
+    if _stalled(state, settings.bumper_age, now_ns):
         text = "Safety was stalled: samples received meanwhile may be old."
         return Observation("silent", True, (0, now_ns), text)
     too_old = {

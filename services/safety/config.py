@@ -10,6 +10,7 @@ from common.members import SourceName
 
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
+Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``verdict.Text``
 
 # A setting outside these limits removes a protection. It is refused unless ``unsafe_overrides``
 # names it. Zero never means "off".
@@ -84,10 +85,10 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     """When and how fast the vehicle may move; SI units."""
 
     unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
-    sources: dict[str, Source] = msgspec.field(default_factory=_sources)
-    estop_keepalive: tuple[SourceName, ...] = ()  # names that must be received
+    sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
+    estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()  # names that must be received
     estop_keepalive_timeout: Seconds = 1.0
-    limits: dict[SourceName, LimitSource] = msgspec.field(default_factory=dict)
+    limits: Annotated[dict[SourceName, LimitSource], Sources] = msgspec.field(default_factory=dict)
 
     max_linear: Positive = 1.0  # m/s
     max_angular: Positive = 1.0  # rad/s

@@ -80,7 +80,7 @@ class Inputs(Struct, frozen=True):
     right: Latest[Driver] | None = None
     switches: Latest[Switches] | None = None
     link: Latest[Link] | None = None
-    estop_session_up: bool = False  # whether the emergency stop's own session has a router
+    estop_connection: int = 0  # number of its own session's connection to a router; 0 without one
     # This service's own state, received back through the router on that session.
     estop_path: Latest[SafetyState] | None = None
     leaving: bool = False  # whether this service is shutting down

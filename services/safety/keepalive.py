@@ -37,7 +37,7 @@ class Keepalives(Struct, frozen=True):
         broken = before.boot is not None and (
             before.boot != message.boot or not before.is_fresh(now_ns, self.timeout_s)
         )
-        channel, refused = before.accept(message, now_ns, self.timeout_s)
+        channel, refused = before.accept(message, now_ns, self.timeout_s, admission.max_age_ns)
         if broken:
             channel = replace(channel, conflict_ns=now_ns)
         if not refused:

@@ -60,7 +60,7 @@ class SpeedLimits(Struct, frozen=True):
         if refused or limit is None:
             return self, refused
         before, lease_s = self.channels.get(name, LimitChannel()), self.sources[name].lease
-        channel, refused = before.accept(limit, request.received_ns, lease_s)
+        channel, refused = before.accept(limit, request.received_ns, lease_s, admission.max_age_ns)
         if not refused:
             channel = replace(
                 channel,

@@ -101,11 +101,15 @@ class Policy:
         state = self._arm(state, now_ns)
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
         verdict = replace(verdict, refused=refused, reply=reply)
-        stop_distance = self._stop_distance(state, inputs, verdict, now_ns)
-        return (
-            replace(state, decided_ns=now_ns, verdict=verdict, stop_distance=stop_distance),
-            verdict,
+        state = replace(
+            state,
+            decided_ns=now_ns,
+            verdict=verdict,
+            stop_distance=self._stop_distance(state, inputs, verdict, now_ns),
+            estop_connection=inputs.estop_connection or state.estop_connection,
+            estop=inputs.link.value.estop if inputs.link else None,
         )
+        return state, verdict
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         event, settings = inputs.event, self.settings
@@ -150,7 +154,6 @@ class Policy:
             standstill=self._standstill(state, inputs, known, now_ns),
             release=release,
             trajectory=trajectory,
-            estop_session_was_up=state.estop_session_was_up or inputs.estop_session_up,
         )
 
     def _standstill(
@@ -173,7 +176,7 @@ class Policy:
         settle_ns = round(self.settings.settle * NS_PER_S)
         tick = (0, now_ns)
         bad_s = max(state.linear.bad_s, state.angular.bad_s)
-        names = state.arbiter.conflicts(now_ns) + state.speed_limits.conflicts(now_ns)
+        names = state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns)
         conflicts = ", ".join(names)
         seen = [
             *observe_inputs(inputs, self.settings, state, now_ns),

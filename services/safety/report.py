@@ -51,6 +51,7 @@ def motion_message(state: State, inputs: Inputs) -> Motion:
         judged_boot=verdict.acked[0],
         latched=bool(latched(state.latches)),
         predecessor=inputs.link.value.latched_by if inputs.link else None,
+        estop=state.estop,
     )
 
 

@@ -3,13 +3,12 @@
 All decisions are made by ``Policy``.
 """
 
-import time
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from msgspec.structs import replace
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
 from common.errors import MessageError
@@ -26,6 +25,7 @@ from common.messages import (
     ReleaseRequest,
     ResetDone,
     ResetRequest,
+    SafetyState,
 )
 from common.service import Node
 from services.safety.conditions import LOST_SAMPLES
@@ -114,7 +114,7 @@ class SafetyService:
         bus.serve(keys.RESET, self._on_reset)
         bus.serve(keys.RELEASE, self._on_release)
         self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
-        self._estop_bus.subscribe(keys.SAFETY, self._store("estop_path"))
+        self._estop_bus.subscribe(keys.SAFETY, self._on_estop_path)
 
     def _announce(self, topic: Topic[M], sources: Iterable[str]) -> None:
         """Announce the key of each source.
@@ -149,6 +149,10 @@ class SafetyService:
                 self._decide()
 
         return store
+
+    def _on_estop_path(self, arrival: Arrival[SafetyState]) -> None:
+        if arrival.message.boot == self._node.bus.boot:  # not of a second safety
+            self._store("estop_path")(arrival)
 
     def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
         bumper, before = arrival.message, self._inputs.bumper
@@ -210,9 +214,9 @@ class SafetyService:
     def _decide(
         self, event: Event | None = None, answer: Callable[[Reply], None] | None = None
     ) -> None:
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         self._decision_timer.defer(now_ns)
-        inputs = replace(self._inputs, estop_session_up=self._estop_bus.connected, event=event)
+        inputs = replace(self._inputs, estop_connection=self._estop_bus.connection, event=event)
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)
         motion = motion_message(self._state, inputs)

@@ -15,8 +15,10 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static
 
+from common import clock
 from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
+from common.text import printable
 from services.teleop import motion_panel, panels
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
@@ -36,7 +38,9 @@ class Panel(Static):
     shown: Text | None = None
 
     def show(self, text: Text) -> None:
-        """Draw the text, unless it is already shown."""
+        """Draw the text, unless it is already shown; with control characters, without styles."""
+        if (plain := printable(text.plain, "\n")) != text.plain:
+            text = Text(plain, no_wrap=True)
         if text != self.shown or text.spans != getattr(self.shown, "spans", None):
             self.shown = text
             self.update(text, layout=False)  # the layout sets the size, not the text
@@ -57,7 +61,7 @@ class TeleopApp(App[None]):
         post: Post,
         ended: Callable[[], bool],
         hold: Teleop,
-        clock: Callable[[], int] = time.monotonic_ns,
+        clock: Callable[[], int] = clock.now_ns,
     ) -> None:
         super().__init__()
         self._clock = clock

@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from common import settings
+from common.members import SourceName
 
 Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
 Hold = Annotated[float, Meta(ge=0.1, le=1.0)]  # s
@@ -19,7 +20,7 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
     """Settings of keys, gears and gamepad; slow by default."""
 
     unsafe_overrides: tuple[str, ...] = ()  # protective settings outside of their limits, by intent
-    source: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")] = "teleop"
+    source: SourceName = "teleop"
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     turbo_linear: Speed = 1.0  # m/s

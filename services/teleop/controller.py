@@ -4,9 +4,7 @@ The screen runs in another thread. It posts key presses to this loop and reads `
 terminal can therefore delay a key, but never a zero request.
 """
 
-import time
-
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.messages import Event, SafetyState
@@ -67,7 +65,7 @@ class Controller:
         self._left = LatestTopic(bus, keys.DRIVER, SLOW_S, side="left")
         self._right = LatestTopic(bus, keys.DRIVER, SLOW_S, side="right")
         bus.subscribe(keys.EVENTS, self._on_event, depth=LINES, service="*")
-        self.view = self._make_view(time.monotonic_ns())
+        self.view = self._make_view(clock.now_ns())
         node.loop.every(PERIOD_S, self.tick)
 
     # --- called by the screen and by __main__ -------------------------------------------------

@@ -11,6 +11,8 @@ from dataclasses import replace
 from common import log
 from common.messages import Level
 from common.settings import Log, LogLevel
+from common.text import printable
+from common.verdict import MAX_TEXT
 from services.teleop.view import Line
 
 CAPACITY = 100
@@ -29,7 +31,8 @@ class EventLog:
 
         An answer of safety comes twice, to the call ("reset refused: ...") and as an event.
         """
-        line = Line(time.time_ns() if t_ns is None else t_ns, service, level, text)
+        text = printable(text)[:MAX_TEXT]
+        line = Line(time.time_ns() if t_ns is None else t_ns, printable(service), level, text)
         with self._lock:
             last = self._lines[-1] if self._lines else None
             if last and (last.service, last.level) == (service, level):

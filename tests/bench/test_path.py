@@ -4,7 +4,6 @@ import itertools
 import shutil
 import socket
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from bench.series import Series
 from bench.telemetry import measure as telemetry
 from bench.telemetry.page import AGE, STREAMS, ages
 from bench.telemetry.page import blocks as telemetry_blocks
+from common import clock
 
 BENCHMARKS = {"command": command.ROWS, "telemetry": telemetry.ROWS}
 LOST = -1
@@ -88,7 +88,7 @@ def consume(sock: socket.socket, witness: int) -> None:
         if kind == 1 and not early and not missed:
             missed = True
         else:
-            sock.sendto(stamped(kind, time.monotonic_ns()), ("127.0.0.1", witness))
+            sock.sendto(stamped(kind, clock.now_ns()), ("127.0.0.1", witness))
 
 
 @wants_cc

@@ -16,6 +16,7 @@ NOW = 100 * NS_PER_S
 
 ARMED = Lease(boot=1, seq=10, renewed_ns=NOW, over_since_ns=None, ready=True, neutral=True)
 HIT = replace(ARMED, hit=5)
+STOPPED = replace(ARMED, estop=NOW)
 MOVED = replace(ARMED, uncommanded=True, latched_by=OWN_BOOT)
 OWED = replace(ARMED, latched_by=3)  # by one that has ended
 
@@ -28,6 +29,7 @@ def run(
     boot: int = 1,
     judged: int = 0,
     judged_boot: int = 0,
+    estop: int | None = None,
 ) -> Motion:
     return Motion(
         command=Command.RUN,
@@ -37,6 +39,7 @@ def run(
         boot=boot,
         judged=judged,
         judged_boot=judged_boot,
+        estop=estop,
     )
 
 

@@ -14,6 +14,7 @@ from services.bridge.lease import (
     SEQ_STEP_MAX,
     Lease,
     Refusal,
+    on_estop,
     on_hit,
     on_motion,
     on_ready,
@@ -30,6 +31,7 @@ from tests.bridge.motions import (
     NOW,
     OWED,
     OWN_BOOT,
+    STOPPED,
     brake,
     obey,
     run,
@@ -47,6 +49,7 @@ def test_at_first_nobody_may_drive() -> None:
         ready=False,
         neutral=False,
         hit=None,
+        estop=None,
         sent_ns=0,
         latched_by=None,
         braked=False,
@@ -73,6 +76,11 @@ def test_at_first_nobody_may_drive() -> None:
         (replace(ARMED, neutral=False), run(0.0, 0.1), Command.STOP, Refusal.NOT_NEUTRAL),
         (replace(ARMED, neutral=False), run(0.0, 0.0), Command.RUN, None),
         (replace(ARMED, neutral=False), brake(), Command.BRAKE, None),
+        # an emergency stop that safety has not latched: BRAKE, whatever is asked
+        (STOPPED, run(), Command.BRAKE, Refusal.NOT_ACKED),
+        (STOPPED, run(estop=NOW - 1), Command.BRAKE, Refusal.NOT_ACKED),
+        (STOPPED, run(estop=NOW), Command.RUN, None),
+        (STOPPED, stop(), Command.BRAKE, None),
         # an unjudged hit: BRAKE, whatever is asked
         (HIT, run(), Command.BRAKE, Refusal.NOT_ACKED),
         (HIT, stop(), Command.BRAKE, None),
@@ -203,17 +211,31 @@ def test_the_reflex_breaks_at_once_and_holds_while_time_passes() -> None:
     assert on_tick(over, NOW + 60 * MS, LEASE, COAST, True)[1] is Command.BRAKE
 
 
+def test_an_emergency_stop_brakes_at_once_and_holds_until_safety_has_latched_it() -> None:
+    lease, order = on_estop(ARMED, NOW)
+    assert (lease, order) == (replace(ARMED, estop=NOW, sent_ns=NOW), Command.BRAKE)
+    assert on_estop(lease, NOW + MS) == (lease, None)  # repeated until it is confirmed
+    over = NOW + LEASE + MS
+    lease, order = on_tick(lease, over, LEASE, COAST, True)
+    assert order is Command.BRAKE
+    lease, order, _ = obey(lease, run(estop=None), over)
+    assert order is Command.BRAKE
+    lease, order, _ = obey(lease, Motion(command=Command.BRAKE, seq=12, boot=1, estop=NOW), over)
+    assert (order, lease.estop) == (Command.BRAKE, None)
+
+
 def test_it_says_what_it_waits_for() -> None:
     assert ARMED.waiting == ""
     texts = [
         replace(ARMED, ready=False).waiting,
         HIT.waiting,
+        STOPPED.waiting,
         replace(ARMED, neutral=False).waiting,
         OWED.waiting,
         replace(MOVED, neutral=False).waiting,
     ]
     assert all(texts)
-    assert len(set(texts)) == 5
+    assert len(set(texts)) == 6
     assert replace(ARMED, latched_by=1).waiting == ""
 
 

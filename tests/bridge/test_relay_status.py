@@ -102,6 +102,7 @@ def test_the_link_message_has_the_newest_report() -> None:
         b'{"x":' + b"[" * 2000,
         report(counters={"hit": 2**64}),
         report(counters={"hit": -1}),
+        report(braking="x" * 201),  # as part of the link message it would stop the vehicle
     ],
 )
 def test_an_invalid_report_is_refused(datagram: bytes) -> None:

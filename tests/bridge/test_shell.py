@@ -1,11 +1,11 @@
 """The bridge's shell in this process: sockets that refuse or fail, and what it observes."""
 
 import errno
-import time
 from collections.abc import Iterator
 
 import pytest
 
+from common import clock
 from common.bus.bus import Arrival
 from common.config import Sources, load
 from common.messages import Link, Motion
@@ -51,7 +51,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     made.say_bytes(HIT)
 
     def brakes() -> bool:
-        bridge._read(time.monotonic_ns(), 0, 1)
+        bridge._read(clock.now_ns(), 0, 1)
         return made.motions[-1:] != [] and made.motions[-1].kind is MotionKind.BREAK
 
     wait_until(brakes, "BRAKE")
@@ -61,7 +61,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     boot = bridge._node.bus.boot
     for seq in (1, 2):
         motion = Motion(command=Command.BRAKE, seq=seq, boot=1, judged=99, judged_boot=boot)
-        bridge._on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
+        bridge._on_motion(Arrival(motion, "k", clock.now_ns(), None))
     timing = bridge._node.timing()
     assert timing is not None
     assert sum(timing.durations["judged_stop"].counts) == 1
@@ -120,12 +120,12 @@ def refusing(bridge: Bridge, times: int) -> Refusing:
 def receive_motion(bridge: Bridge, command: Command, seq: int = 1) -> None:
     """Receive this command from safety."""
     motion = Motion(command=command, seq=seq, boot=1)
-    bridge._on_motion(Arrival(motion, "k", time.monotonic_ns(), None))
+    bridge._on_motion(Arrival(motion, "k", clock.now_ns(), None))
 
 
 def ticks(bridge: Bridge) -> None:
     """Tick while the lease lives."""
-    bridge._on_tick(time.monotonic_ns())
+    bridge._on_tick(clock.now_ns())
 
 
 @pytest.mark.parametrize("times", [0, 1, 3])
@@ -161,7 +161,7 @@ def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
     for seq in (1, 2, 3):
         receive_motion(bridge, Command.STOP, seq)
     bridge._on_second(0)
-    bridge._on_link(time.monotonic_ns())
+    bridge._on_link(clock.now_ns())
     assert bridge._node.counters["send_errors"] == 3
     link = bridge._publishers["link"].last
     assert isinstance(link, Link)

@@ -4,7 +4,6 @@ import io
 import json
 import subprocess
 import sys
-import time
 from typing import Any
 
 import pytest
@@ -13,7 +12,7 @@ from rich.console import Console
 from cli import latency
 from cli.__main__ import main
 from cli.latency import SILENCE, Watch, figures, print_line, table
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival
 from common.cli_args import EXIT_LINK
 from common.freshness import NS_PER_S
@@ -121,7 +120,7 @@ def arrival(received_ns: int) -> Arrival[Health]:
 
 def test_silence_is_shown_once_after_each_health_message() -> None:
     watch, loop, shown = watched(once=False)
-    begin_ns = time.monotonic_ns()
+    begin_ns = clock.now_ns()
     watch.on_health(arrival(begin_ns))
     for seconds in (1, 4.9, 5.1, 6, 7):
         watch.check(begin_ns + round(seconds * NS_PER_S))
@@ -135,7 +134,7 @@ def test_silence_is_shown_once_after_each_health_message() -> None:
 
 def test_once_stops_without_output_if_the_bridge_is_silent() -> None:
     watch, loop, shown = watched(once=True)
-    watch.check(time.monotonic_ns() + 6 * NS_PER_S)
+    watch.check(clock.now_ns() + 6 * NS_PER_S)
     loop.run()  # returns: it was stopped before
     assert (watch.silent, shown) == (True, [])
     loop.close()

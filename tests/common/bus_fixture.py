@@ -67,6 +67,7 @@ class BusFixture:
     def opened(self, bus: Bus) -> Bus:
         """Open a bus that has its declarations; it is connected on return."""
         bus.open()
+        self.loop.post(lambda: self.loop.every(0.01, lambda _: bus.answer_queries()))
         self._stack.callback(bus.close)
         wait_until(lambda: bus.connected, "a session with the router")
         return bus

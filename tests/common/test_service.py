@@ -8,13 +8,15 @@ import msgspec
 import pytest
 import zenoh
 
-from common import keys
+from common import codec, keys
 from common.bus.bus import Bus
 from common.bus.session import router
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
+from common.config import Sources, load
 from common.messages import Event, Health
 from common.service import Node, resident_bytes, run
 from common.settings import Shared
+from common.verdict import MAX_TEXT
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
 from verification.harness.bus import listening
@@ -53,6 +55,15 @@ def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
     with program(SPECIMEN, "refused", *on(shared_router, "refused")) as it:
         assert it.code() == EXIT_LINK == 69
         assert it.events() == ["port 4002 is taken"]
+
+
+def test_a_long_text_of_an_event_is_cut() -> None:
+    node = Node("odom", load(Shared, Sources(environ={})))
+    node.event("lost", "error", "x" * 5000, folder="y" * 5000)
+    (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
+    assert codec.decode(codec.encode(sent), Event) == sent
+    assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})
+    node.loop.close()
 
 
 # --- on a router --------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 import time
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -60,13 +60,13 @@ class Peer:
 
     def wait_for_silence(self) -> None:
         """Wait until no stop was received for a second."""
-        count, since_ns = len(self.estops), time.monotonic_ns()
+        count, since_ns = len(self.estops), clock.now_ns()
 
         def over() -> bool:
             nonlocal count, since_ns
             if len(self.estops) != count:
-                count, since_ns = len(self.estops), time.monotonic_ns()
-            return time.monotonic_ns() - since_ns > NS_PER_S
+                count, since_ns = len(self.estops), clock.now_ns()
+            return clock.now_ns() - since_ns > NS_PER_S
 
         wait_until(over, "no more stops")
 

@@ -1,11 +1,10 @@
 """Call servers of safety and bridge with configured answers."""
 
 import contextlib
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.loop import Loop
@@ -48,7 +47,7 @@ class CallServers:
         if self.is_effective:
             self.peer.latched, self.peer.causes = (), ()
         done = ResetDone(
-            text="Reset.", boot=self.boot, heartbeat=time.monotonic_ns(), cleared=request.causes
+            text="Reset.", boot=self.boot, heartbeat=clock.now_ns(), cleared=request.causes
         )
         caller.reply(done)
 

@@ -129,7 +129,7 @@ def test_a_repeated_estop_is_logged_once(
     fixture.robot.estop("a page")
     fixture.latched = ("estop",)
     fixture.ticks(3, None)
-    monkeypatch.setattr("time.monotonic_ns", lambda: fixture.now_ns)
+    monkeypatch.setattr("common.clock.now_ns", lambda: fixture.now_ns)
     fixture.robot.estop("a page")
     assert [record.getMessage() for record in caplog.records].count("emergency stop") == 1
     fixture.ticks(1, None)

@@ -157,7 +157,7 @@ def test_the_events() -> None:
     telemetry.add_event(
         "safety", Event(name="stop", level="warning", text="Stopped.", t_ns=2 * NS_PER_S)
     )
-    assert list(telemetry.events) == [EventLine(2.0, "safety", "stop", "warning", "Stopped.")]
+    assert list(telemetry.events) == [EventLine(1, 2.0, "safety", "stop", "warning", "Stopped.")]
 
 
 def test_the_fast_snapshot_is_small() -> None:

@@ -58,6 +58,18 @@ def test_the_package_reports_a_certificate_that_may_not_drive(secured: Secured) 
         pass
 
 
+def test_the_package_reports_a_certificate_that_may_not_limit(secured: Secured) -> None:
+    for member in ("viewer.screen", "driver.planner"):
+        with (
+            t2.connect("001", config=secured.bus_toml(member)) as robot,
+            pytest.raises(t2.NotAllowed, match="safety does not show the limit of 'detector'"),
+        ):
+            robot.limit("detector", linear=0.1, seconds=60)
+    with t2.connect("001", config=secured.bus_toml("device.detector")) as robot:
+        robot.limit("detector", linear=0.1, seconds=60)
+        assert secured.integrator.limit().linear == 0.1
+
+
 def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     """It drives the simulated vehicle, with settings for the stalls of this host."""
     save_files(PAGE, tmp_path)

@@ -1,16 +1,19 @@
 """The examples as documented, with a real router and a fake robot."""
 
+import math
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from common import keys
-from common.bus.bus import Bus
+from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Limit, Odometry, Ultrasonic
+from examples import limit_speed, nearest_obstacle
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -78,3 +81,25 @@ def test_a_limit_slows_before_the_nearest_obstacle(robot: str) -> None:
             process.kill()
     limit = LIMITS[-1]
     assert (limit.linear, limit.angular, limit.reason) == (0.2, None, "something at 0.62 m")
+
+
+@pytest.mark.parametrize(
+    ("range_m", "status", "distance"),
+    [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
+)
+def test_a_front_sonar_that_cannot_measure_counts_as_0(
+    range_m: float | None, status: Any, distance: float
+) -> None:
+    clear: list[Any] = ["no_echo"] * 8
+    clear[2] = status
+    ranges: list[float | None] = [None] * 8
+    ranges[2] = range_m
+    sample = Ultrasonic(ranges=tuple(ranges), status=tuple(clear))
+    assert limit_speed.front(sample) == distance
+
+
+def test_the_consumer_with_t2_counts_a_fault_as_0(capsys: pytest.CaptureFixture[str]) -> None:
+    status: Any = ("ok", "ok", "ok", "fault", "ok", "no_echo", "too_near", "ok")
+    sample = Ultrasonic(ranges=RANGES, status=status)
+    nearest_obstacle.print_nearest(Arrival(sample, "", 0, b""))
+    assert capsys.readouterr().out == "0.00 m front_right\n"

@@ -21,7 +21,9 @@ from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
-from sim.requests import Bumper
+from examples import wall_follower
+from sim.requests import Bumper, Sonar
+from t2.messages import Ultrasonic
 from tests.sdk.library_robot import ready
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -32,7 +34,7 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "sdk")}
 SETS = ("safety.sources.agent={priority=1, lease=0.3, operator=false}",)
-LONGEST = {"mcp_server.py": 79}  # lines
+LONGEST = {"mcp_server.py": 81, "wall_follower.py": 44}  # lines
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +106,9 @@ def test_the_notebook_plots_while_it_drives(
     assert float(speed) > 0.2
 
 
-def test_the_agent_reads_and_drives_and_stops_but_never_resets(robot: t2.Robot) -> None:
+def test_the_agent_reads_and_drives_and_stops_but_never_resets(
+    robot: t2.Robot, stack: RunningStack
+) -> None:
     server = StdioServerParameters(
         command=sys.executable,
         args=[str(EXAMPLES / "mcp_server.py"), robot.endpoint],
@@ -122,7 +126,10 @@ def test_the_agent_reads_and_drives_and_stops_but_never_resets(robot: t2.Robot) 
             driven = (await call(client, "drive", distance=0.3)).structured_content
             way = math.dist((before["x"], before["y"]), (driven["x"], driven["y"]))
             assert way == pytest.approx(0.3, abs=0.1)
-            assert len((await call(client, "sonars")).structured_content) == 8
+            stack.control.do(Sonar(name="rear", fault=True))
+            wait_until(lambda: "fault" in robot.ultrasonic.latest().status, "the fault")
+            sonars = (await call(client, "sonars")).structured_content
+            assert (len(sonars), sonars["rear"]) == (8, "fault")
             await call(client, "stop")
             refused = await call(client, "drive", turn=90.0)
             assert refused.is_error
@@ -131,6 +138,7 @@ def test_the_agent_reads_and_drives_and_stops_but_never_resets(robot: t2.Robot) 
             assert any("mergency stop" in incident for incident in seen), seen
 
     asyncio.run(asyncio.wait_for(session(), 100.0))
+    stack.control.do(Sonar(name="rear"))
     wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
 
 
@@ -163,6 +171,17 @@ def reset(robot: t2.Robot) -> bool:
     except t2.Refused:
         return False
     return True
+
+
+@pytest.mark.parametrize(
+    ("range_m", "status", "distance"),
+    [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
+)
+def test_a_sonar_of_the_wall_follower_that_cannot_measure_counts_as_0(
+    range_m: float | None, status: Any, distance: float
+) -> None:
+    sample = Ultrasonic(ranges=(range_m,) * 8, status=(status,) * 8)
+    assert wall_follower.distance(sample, wall_follower.FRONT) == distance
 
 
 def test_the_wall_follower_approaches_the_wall(stack: RunningStack) -> None:

@@ -152,11 +152,14 @@ class FaultRules(RuleBasedStateMachine):
         self.stack.kill(name, ms)
         self.stack.run(60)
 
-    @rule(ms=SHORT | LONG)
-    def stall_safety(self, ms: int) -> None:
-        """Stall safety."""
+    @rule(ms=SHORT | LONG, estop_ms=st.none() | SHORT)
+    def stall_safety(self, ms: int, estop_ms: int | None) -> None:
+        """Stall safety; perhaps press the emergency stop meanwhile."""
         self.stack.stall("safety", ms)
         self.stack.run(60)
+        if estop_ms is not None:
+            self.stack.run(estop_ms)
+            self.stack.estop()
 
     @rule(ms=st.sampled_from([50, 120, 180]))
     def stall_bridge(self, ms: int) -> None:
@@ -172,6 +175,11 @@ class FaultRules(RuleBasedStateMachine):
         self.stack.run(ms)
         self.stack.router(True)
         self.stack.run(5)
+
+    @rule()
+    def blink(self) -> None:
+        """Take the router away between two decisions."""
+        self.router(0)
 
     @rule(route=BUS, disturbance=ON_BUS, ms=SHORT)
     def bus_disturbance(self, route: str, disturbance: Disturbance, ms: int) -> None:

@@ -17,7 +17,7 @@ from services.bridge import lease as leases
 from services.bridge import readiness
 from services.bridge.core import Core
 from services.bridge.lease import Lease
-from services.bridge.output import Send
+from services.bridge.output import Output, Send
 from services.bridge.readiness import Readiness
 from services.bridge.reflex import Hit
 from verification.invariants.net import Disturbance, Envelope
@@ -93,6 +93,7 @@ def still_armed(lease: Lease, ready: bool) -> Lease:
 
 def safety_dies_latched(stack: Stack) -> None:
     stack.estop()
+    stack.run(100)  # the bridge forgets what safety has acknowledged
     stack.kill("safety", 20)
     stack.run(1500)
     stack.sticks["teleop"].requested = (0.0, 0.0)
@@ -105,6 +106,7 @@ def successor(
 ) -> None:
     """Kill safety with a latched emergency stop; ``deliver`` passes the link to its successor."""
     stack.estop()
+    stack.run(100)
     stack.kill("safety", 20)
     stack.run(25)
     (subscription,) = [
@@ -147,6 +149,26 @@ def successor_hears_of_no_latch(stack: Stack) -> None:
     stack.sticks["teleop"].requested = (0.0, 0.0)
     stack.run(1500)
     stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def safety_hangs(stack: Stack) -> None:
+    """Stop while safety hangs so long that it loses its session; then reset, and drive."""
+    stack.stall("safety", 1500)
+    stack.run(700)
+    stack.estop()
+    stack.run(1500)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(700)
+    seen = stack.seen
+    assert seen is not None
+    causes = tuple(one for one in seen.causes if one.name != "estop")
+    stack.reset(replace(seen, causes=causes))
+    stack.run(300)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def unacknowledged(lease: Lease, received_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=received_ns), Command.BRAKE
 
 
 def overwritten(lease: Lease, motion: m.Motion) -> int | None:
@@ -216,6 +238,12 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "a hit needs no judgement": (
         leases, "on_hit", unjudged, hit_while_a_run_is_under_way, "bridge knows of contact",
+    ),
+    "an emergency stop needs no acknowledgement": (
+        leases, "on_estop", unacknowledged, safety_hangs, "bridge knows of estop",
+    ),
+    "the bridge does not brake for an emergency stop": (
+        Core, "estop", lambda *_: Output(), safety_hangs, "without a BRAKE",
     ),
     "the drive link takes messages of the router": (
         DriveEnd, "subscribe", from_anybody, authority_is_copied, "a RUN that no safety sent",

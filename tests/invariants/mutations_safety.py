@@ -5,7 +5,7 @@ from typing import Any
 from common import messages as m
 from common.motion import Twist
 from common.wire.frame import Side
-from services.safety import causes, conditions, latches, policy
+from services.safety import arbiter, causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
 from services.safety.channel import Admission
 from services.safety.inputs import Inputs
@@ -15,6 +15,7 @@ from services.safety.limits import SpeedLimits
 from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
+from services.safety.state import State
 from services.safety.zones import Zones
 from tests.invariants.mutations import Mutation
 from verification.invariants.limits import IGNORED, NEEDED
@@ -147,6 +148,40 @@ def pendant_is_held(stack: Stack) -> None:
     stack.pendant.put(m.EstopKeepalive(echo=echo))
 
 
+def router_blinks(stack: Stack) -> None:
+    """Lose the router and find it again between two decisions; then drive on."""
+    stack.router(False)
+    stack.router(True)
+    drives_on(stack)
+
+
+def safety_stalls(stack: Stack) -> None:
+    """Stall for longer than any session lasts; reset what a pendant has latched, and drive on."""
+    stack.stall("safety", 1500)
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(2500)
+    assert stack.reset()
+    drives_on(stack)
+
+
+def drives_on(stack: Stack) -> None:
+    stack.sticks["teleop"].requested = (0.0, 0.0)
+    stack.run(1500)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def program_is_suspended(stack: Stack) -> None:
+    """Silence a source for longer than its lease and a second; then it drives on."""
+    stack.sticks["teleop"].requested = None
+    stack.run(1500)
+    stack.sticks["teleop"].requested = (0.5, 0.0)
+
+
+def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
+    lost = state.estop_connection > 0 and not inputs.estop_connection
+    return Observation("estop_reader", lost, (0, now_ns))
+
+
 KEEP = SafetyService._store
 
 SAFETY_MUTATIONS: dict[str, Mutation] = {
@@ -201,6 +236,15 @@ SAFETY_MUTATIONS: dict[str, Mutation] = {
     "a held sign of life counts from its reception": (
         Admission, "sent_ns", lambda self, _: self.now_ns, pendant_is_held,
         "safety knows of estop_keepalive",
+    ),
+    "a connection that was lost in between does not latch": (
+        conditions, "_estop_reader", only_if_down, router_blinks, "safety knows of estop_reader",
+    ),
+    "a stall of safety does not latch": (
+        conditions, "_estop_reader", only_if_down, safety_stalls, "safety knows of estop_reader",
+    ),
+    "a suspended program drives on": (
+        arbiter, "LAPSE_S", 1e9, program_is_suspended, "was not neutral",
     ),
     "an override does not hold": (
         Arbiter, "overruled", lambda self, _: self, nav_goes_on, "nav was not neutral",

@@ -1,20 +1,24 @@
 """Ring buffer, latch detection and dumps of the black box."""
 
+import pytest
+from msgspec.structs import replace
+
 from common.freshness import NS_PER_S
 from services.recorder.blackbox import OVERHEAD, SLICE, BlackBox, LatchDetector, RingBuffer
+from services.recorder.config import MB
 from tests.recorder import samples
 from tests.recorder.files_fixture import SETTINGS, Files, at, ns
 from tests.recorder.samples import bare
 
 
 def kept(buffer: RingBuffer) -> list[bytes]:
-    return [each.payload for each in buffer.samples()]
+    return [each.payload for _, each in buffer.since(0)]
 
 
 def test_old_samples_are_dropped() -> None:
     buffer = RingBuffer(2 * NS_PER_S, 1_000_000)
     for second in range(5):
-        buffer.add(bare("tel/x", b"%d" % second, at_s=second))
+        buffer.add(bare("tel/x" if second else "tel/y", b"%d" % second, at_s=second))
     assert kept(buffer) == [b"2", b"3", b"4"]
     assert buffer.size == 3 * (1 + OVERHEAD)
 
@@ -23,7 +27,7 @@ def test_the_oldest_samples_are_dropped_above_the_size_limit() -> None:
     buffer = RingBuffer(100 * NS_PER_S, 3 * (OVERHEAD + 10))
     for number in range(9):
         buffer.add(bare("tel/x", b"12345", raw=b"%05d" % number))
-    assert [each.raw for each in buffer.samples()] == [b"00006", b"00007", b"00008"]
+    assert [each.raw for _, each in buffer.since(0)] == [b"00006", b"00007", b"00008"]
 
 
 def test_a_sample_larger_than_the_buffer_is_dropped() -> None:
@@ -34,12 +38,48 @@ def test_a_sample_larger_than_the_buffer_is_dropped() -> None:
     assert kept(buffer) == [bytes(10)]
 
 
-def test_returned_samples_do_not_change() -> None:
-    buffer = RingBuffer(100 * NS_PER_S, 1_000_000)
-    buffer.add(bare("tel/x", b"1"))
-    given = buffer.samples()
-    buffer.add(bare("tel/x", b"2"))
-    assert len(given) == 1
+@pytest.mark.parametrize("count", [1, 100])
+def test_a_flood_on_one_key_removes_no_sample_of_the_others(files: Files, count: int) -> None:
+    """It also stays within the size limit while a dump waits to be written."""
+    limit = 1_000_000
+    buffer = RingBuffer(100 * NS_PER_S, limit)
+    flood = [bare("tel/flood", bytes(limit // count), at_s=15) for _ in range(5 * count)]
+    box = BlackBox(replace(SETTINGS, black_box_size=limit / MB), files.open, files.close)
+    before, after = [at(second) for second in range(10, 16)], at(16)
+    for each in (*before, *flood, after):
+        buffer.add(each)
+        box.add(each)
+        box.trigger(["contact"], ns(15))
+    assert buffer.size <= limit
+    own = [each for _, each in buffer.since(0) if each.key != flood[0].key]
+    assert own == [*before, after]
+    box.close()
+    ((*times,),) = files.read()
+    assert files.closed[0].stat().st_size < 2 * limit
+    assert [each for each in times if each != 15.0] == [10.0, 11.0, 12.0, 13.0, 14.0, 16.0]
+
+
+def test_after_a_huge_sample_the_next_largest_key_loses_samples() -> None:
+    buffer = RingBuffer(100 * NS_PER_S, 10 * (OVERHEAD + 10))
+    for number in range(9):
+        buffer.add(bare("tel/x", b"%010d" % number))
+    buffer.add(bare("tel/y", bytes(10)))
+    buffer.add(bare("tel/huge", bytes(10 * (OVERHEAD + 10))))
+    buffer.add(bare("evt/y", bytes(10)))
+    assert kept(buffer) == [*(b"%010d" % number for number in range(1, 9)), bytes(10), bytes(10)]
+
+
+def test_a_slow_disk_loses_no_sample_of_a_dump(files: Files) -> None:
+    box = BlackBox(SETTINGS, files.open, files.close)
+    box.add(at(0))
+    box.trigger(["contact"], ns(0))
+    for second in range(1, 30):  # the buffer holds 10 s
+        box.add(at(second))
+    box.write(ns(30))
+    assert files.read() == [[0.0, 1.0, 2.0]]
+    assert len(list(box._buffer.since(0))) == 30
+    box.add(at(30))
+    assert len(list(box._buffer.since(0))) == 11
 
 
 def test_only_new_latches_are_reported() -> None:
@@ -109,14 +149,14 @@ def test_close_writes_all_pending_samples(files: Files) -> None:
     assert files.closed[0].name.endswith("-latch-estop-contact.mcap")
 
 
-def test_abort_discards_pending_samples(files: Files) -> None:
+def test_finish_discards_pending_samples(files: Files) -> None:
     box = BlackBox(SETTINGS, files.open, files.close)
-    box.abort()
+    box.finish()
     for _ in range(SLICE + 5):
         box.add(at(0))
     box.trigger(["contact"], ns(0))
     box.write(ns(0))
-    box.abort()
+    box.finish()
     assert [len(each) for each in files.read()] == [SLICE]
     box.write(ns(9))
     assert len(files.closed) == 1

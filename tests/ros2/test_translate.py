@@ -133,10 +133,10 @@ def test_the_status_of_a_driver() -> None:
 
 def test_the_status_of_a_service() -> None:
     health = m.Health(
-        service="odom", version="1.2", uptime=60.4, rates={}, counters={"resets": 3},
+        service="any", version="1.2", uptime=60.4, rates={}, counters={"resets": 3},
         lateness=0.0, rss=1,
     )  # fmt: skip
-    made = translate.health_status(health)
+    made = translate.health_status("odom", health)
     assert made[:3] == (0, "t2: service odom", "It runs.")
     assert dict(made[4]) == {"version": "1.2", "uptime": "60 s", "resets": "3"}
 

@@ -92,7 +92,7 @@ def does_not_stop(fixture: PolicyFixture) -> None:
 
 
 def nobody_hears(fixture: PolicyFixture) -> None:
-    fixture.estop_session_up = False
+    fixture.estop_connection = 0
 
 
 def not_kept_alive(fixture: PolicyFixture) -> None:
@@ -152,7 +152,7 @@ def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: 
         )  # fmt: skip
     arbiter = replace(state.arbiter, channels=channels)
     fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)
-    fixture.estop_session_up = True
+    fixture.estop_connection = 1
     fixture.inputs = replace(fixture.inputs, leaving=False)
     fixture.seq = state.verdict.acked[1]  # no bumper sample was lost
     fixture.feed()

@@ -90,11 +90,11 @@ class PolicyFixture:
         self.left_bits, self.right_bits = 0, 0
         self.switches = Switches(ultrasonic_brake=True, bumper_brake=True)
         self.link = link()
-        self.estop_session_up = True
+        self.estop_connection = 1
         self.decide()  # a service decides before anything has come
 
     def decide(self, event: Event | None = None) -> Verdict:
-        inputs = replace(self.inputs, estop_session_up=self.estop_session_up, event=event)
+        inputs = replace(self.inputs, estop_connection=self.estop_connection, event=event)
         self.state, self.verdict = self.policy.decide(self.state, inputs, self.now_ns)
         return self.verdict
 

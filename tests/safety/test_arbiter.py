@@ -84,14 +84,34 @@ def test_a_second_boot_waits_for_the_first_lease_to_end() -> None:
     arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
     refused, reason = request(arbiter, lease_ns, boot=2)
     assert reason == "second_publisher"
-    assert refused.conflicts(lease_ns + CONFLICT_NS - 1) == ["teleop"]
-    assert refused.conflicts(lease_ns + CONFLICT_NS) == []
+    assert refused.conflict(lease_ns) == ["teleop"]
+    assert refused.conflict(lease_ns + 1) == []  # not in control any more
     taken, reason = request(arbiter, lease_ns + 1, boot=2)
     assert reason == ""
     assert not taken.channels["teleop"].neutral  # a new start has to be neutral first
     taken, reason = request(refused, lease_ns + 1, boot=2)
     assert reason == ""
-    assert taken.conflicts(lease_ns + CONFLICT_NS - 1) == ["teleop"]  # the first may still be there
+    assert taken.conflict(lease_ns + 1) == ["teleop"]  # the first may still be there
+    taken, _ = request(taken, lease_ns + CONFLICT_NS, boot=2, seq=2)
+    assert taken.conflict(lease_ns + CONFLICT_NS) == []
+
+
+@pytest.mark.parametrize("seq", [4, 5])
+def test_a_lower_seq_of_a_known_boot_is_a_new_publisher_after_the_age(seq: int) -> None:
+    arbiter = request(Arbiter(SOURCES), 0, seq=5)[0].armed(0)
+    arbiter, _ = request(arbiter, 1, boot=2)  # a conflict, which a copy does not end
+    beat = BEAT.beat(AGE_NS)
+    copy = DriveRequest("teleop", Drive(linear=0.1, angular=0.0, echo=42, seq=seq, boot=1), AGE_NS)
+    assert arbiter.accept(copy, Admission(beat, AGE_NS, AGE_NS)) == (arbiter, "seq_not_rising")
+    later_ns = AGE_NS + 1
+    copy, admission = replace(copy, received_ns=later_ns), Admission(beat, AGE_NS, later_ns)
+    taken, reason = arbiter.accept(copy, admission)
+    assert reason == ""
+    assert not taken.channels["teleop"].neutral
+    assert (taken.channels["teleop"].seq, taken.conflict(later_ns)) == (seq, ["teleop"])
+    assert copy.drive
+    replayed = replace(copy, drive=replace(copy.drive, echo=41))  # as before the last request
+    assert arbiter.accept(replayed, admission) == (arbiter, "late")
 
 
 @pytest.mark.parametrize("seq", [0, 1, 9])
@@ -115,12 +135,24 @@ def test_the_wish_is_what_was_asked_for() -> None:
         assert arbiter.requests_motion(0)
 
 
-def test_all_rivals_are_named() -> None:
-    arbiter = Arbiter(SOURCES)
-    for source in ("teleop", "web"):
-        arbiter = accepted(arbiter, 0, source)
-        arbiter, _ = request(arbiter, 0, source=source, boot=2)
-    assert arbiter.conflicts(0) == ["teleop", "web"]
+def test_two_publishers_bar_only_their_own_source() -> None:
+    arbiter = accepted(Arbiter(SOURCES), 0, "web")
+    arbiter, _ = request(arbiter, 0, source="web", boot=2)
+    assert arbiter.conflict(0) == ["web"]
+    assert accepted(arbiter, 0, "teleop").conflict(0) == []
+    assert accepted(arbiter, 0, "nav").conflict(0) == ["web"]
+
+
+@pytest.mark.parametrize(("gap_s", "neutral"), [(1.0, True), (1.1, False)])
+def test_a_source_that_was_suspended_is_due_a_neutral_request(gap_s: float, neutral: bool) -> None:
+    """An SDK program after SIGSTOP and SIGCONT."""
+    arbiter = accepted(Arbiter(SOURCES), 0).armed(0)
+    at_ns = round((SOURCES["teleop"].lease + gap_s) * NS_PER_S)
+    drive = Drive(linear=0.5, angular=0.0, echo=42, seq=2, boot=1)
+    now = Admission(BEAT.beat(at_ns), AGE_NS, at_ns)
+    arbiter, refused = arbiter.accept(DriveRequest("teleop", drive, at_ns), now)
+    assert refused == ""
+    assert arbiter.channels["teleop"].neutral is neutral
 
 
 def test_a_source_starts_without_requests() -> None:
@@ -133,7 +165,7 @@ def test_a_source_starts_without_requests() -> None:
 
 def test_an_absent_driver_is_none() -> None:
     assert Arbiter(SOURCES).in_control(0) is None
-    assert Arbiter(SOURCES).conflicts(0) == []
+    assert Arbiter(SOURCES).conflict(0) == []
 
 
 def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
@@ -162,7 +194,7 @@ def test_a_lease_counts_from_the_reception() -> None:
     arbiter, refused = arbiter.accept(
         DriveRequest("teleop", other, 6), Admission(BEAT, AGE_NS, late_ns)
     )
-    assert (refused, arbiter.conflicts(6 + CONFLICT_NS)) == ("second_publisher", [])
+    assert (refused, arbiter.conflict(6)) == ("second_publisher", ["teleop"])
     _, refused = arbiter.accept(
         DriveRequest("teleop", other, 6 + lease_ns), Admission(BEAT, AGE_NS, 7)
     )

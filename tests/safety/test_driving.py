@@ -93,7 +93,7 @@ def test_a_higher_source_takes_control_without_further_conditions() -> None:
     fixture = PolicyFixture().ready()
     fixture.tick(20)
     fixture.drive(source="nav")
-    fixture.drive(0.2, source="nav", seconds=1.0)
+    fixture.drive(0.2, source="nav", seconds=0.5)
     assert fixture.drive(0.2, source="teleop", seconds=0.04).command == "run"
     assert fixture.verdict.source == "teleop"
 

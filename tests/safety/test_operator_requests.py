@@ -17,7 +17,7 @@ BY_HAND = "Push the vehicle off by hand, then reset."
 
 
 def inputs_of(fixture: PolicyFixture, event: Event | None = None) -> Inputs:
-    return replace(fixture.inputs, estop_session_up=True, event=event)
+    return replace(fixture.inputs, estop_connection=1, event=event)
 
 
 def creeps(fixture: PolicyFixture) -> bool:

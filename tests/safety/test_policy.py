@@ -7,10 +7,12 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Limits, SafetyState, Switches
+from common.messages import Drive, Limits, SafetyState, Switches
 from services.safety.causes import BY_NAME, Clears
 from services.safety.config import Safety
+from services.safety.inputs import DriveRequest
 from services.safety.latches import FAILURES, latched
+from services.safety.report import motion_message
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, link
 
 
@@ -18,7 +20,7 @@ def test_a_start_waits_for_every_input() -> None:
     fixture = PolicyFixture()
     assert fixture.decide().name == "inhibited"
     assert fixture.state.latches["starting"].text.count(",") == 6
-    fixture.estop_session_up = False
+    fixture.estop_connection = 0
     fixture.decide()
     assert "emergency stop" in fixture.state.latches["starting"].text
 
@@ -60,7 +62,7 @@ def _set(name: str, value: object) -> Trip:
 LATCHING: list[tuple[str, str, Trip, Trip]] = [
     ("contact", "brake", _set("pressed", True), _set("pressed", False)),
     ("estop", "brake", lambda fixture: (fixture.estop(), None)[1], lambda fixture: None),
-    ("estop_reader", "brake", _set("estop_session_up", False), _set("estop_session_up", True)),
+    ("estop_reader", "brake", _set("estop_connection", 0), _set("estop_connection", 1)),
     ("driver_left", "stop", _set("left_bits", 1), _set("left_bits", 0)),
     ("driver_right", "stop", _set("right_bits", 1 << 31), _set("right_bits", 0)),
     ("runaway", "brake", _set("linear", 0.9), _set("linear", None)),
@@ -273,6 +275,50 @@ def test_every_cause_of_the_table_can_be_reported() -> None:
     for rule in BY_NAME.values():
         assert rule.text.endswith(".")
         assert rule.action != "slow" or rule.clears is Clears.AT_ONCE
+
+
+def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowledged() -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.link = replace(fixture.link, estop=77)
+    assert fixture.tick().command == "brake"
+    assert latched(fixture.state.latches) == ("estop",)
+    assert motion_message(fixture.state, fixture.inputs).estop == 77
+    fixture.linear = 0.0
+    fixture.tick(60)
+    assert fixture.reset() == ""  # also before the bridge has received the acknowledgement
+    fixture.tick()
+    assert motion_message(fixture.state, fixture.inputs).estop == 77
+    fixture.link = replace(fixture.link, estop=78)
+    assert fixture.tick().command == "brake"
+
+
+def test_a_connection_that_was_lost_between_two_decisions_latches() -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.estop_connection += 1
+    assert fixture.tick().command == "brake"
+    assert latched(fixture.state.latches) == ("estop_reader",)
+    fixture.linear = 0.0
+    fixture.tick(60)
+    assert fixture.reset() == ""
+
+
+@pytest.mark.parametrize(("stall_s", "names"), [(1.0, ()), (1.01, ("estop_reader",))])
+def test_a_stall_in_which_an_emergency_stop_may_be_missed_latches(
+    stall_s: float, names: tuple[str, ...]
+) -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.now_ns += round((stall_s - TICK_S) * NS_PER_S)
+    fixture.tick()
+    assert latched(fixture.state.latches) == names
+
+
+def test_two_publishers_of_a_source_that_is_not_in_control_stop_nothing() -> None:
+    fixture = PolicyFixture().running(0.3)
+    for boot in (1, 2, 1, 2):
+        drive = Drive(linear=0.0, angular=0.0, echo=fixture.echo, seq=boot, boot=boot)
+        fixture.decide(DriveRequest("nav", drive, fixture.now_ns))
+        assert fixture.drive(0.3, seconds=0.1).command == "run"
+    assert fixture.drive(0.3).source == "teleop"
 
 
 def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_request() -> None:

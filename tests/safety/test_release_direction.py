@@ -146,6 +146,7 @@ def test_a_contact_after_an_hour_reports_the_age_and_nothing_moves_by_itself() -
     fixture.drive(0.0, seconds=2)
     fixture.now_ns += 3600 * NS_PER_S
     fixture.tick(60)
+    assert fixture.reset() == ""  # an emergency stop may have been missed
     fixture.pressed = True
     fixture.tick(40)
     release = fixture.published().release

@@ -24,9 +24,9 @@ def test_who_stands_on_the_bumper_gets_off_by_himself_whatever_else_was_latched(
     elif cause == "driver_left":
         blink(fixture, "left_bits")
     elif cause == "estop_reader":
-        fixture.estop_session_up = False
+        fixture.estop_connection = 0
         fixture.tick()
-        fixture.estop_session_up = True
+        fixture.estop_connection = 1
     else:
         for _ in range(5):
             fixture.muted = {"velocity"}

@@ -1,11 +1,15 @@
 """Reports: texts, causes, limits, and events on transitions only."""
 
 import pytest
+from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
+from common.codec import decode, encode
 from common.freshness import NS_PER_S
-from common.messages import Direction, Drive, Limits
+from common.messages import MAX_REASON, Direction, Drive, Limits, SafetyState
 from common.operator import BUMPER_FREE
+from common.verdict import MAX_TEXT
+from services.safety.config import LimitSource, Safety, Source
 from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
 from services.safety.report import (
     Repetition,
@@ -286,3 +290,36 @@ def test_a_text_that_comes_again_at_once_is_a_repetition() -> None:
         False, True, True, True, False,
     ]  # fmt: skip
     assert not refusal.continues("another", round(3.85 * NS_PER_S))
+
+
+def test_the_longest_state_decodes() -> None:
+    names = [f"source{number:02d}{'x' * 24}" for number in range(16)]
+    largest = Safety(
+        sources={name: Source(priority=n, lease=0.5) for n, name in enumerate(names)},
+        limits={f"l{name[1:]}": LimitSource(lease=0.5, silence="stop") for name in names},
+        estop_keepalive=tuple(f"k{name[1:]}" for name in names),
+    )
+    fixture = PolicyFixture(largest)
+    fixture.left_bits = fixture.right_bits = 2**32 - 1
+    fixture.link = replace(fixture.link, armed=False, waiting="x" * 500)
+    fixture.tick()
+    fixture.estop()
+    for boot in (1, 2):  # two publishers of each source
+        fixture.driver_boot = fixture.limit_boot = boot
+        for name in names:
+            fixture.request(source=name)
+            fixture.limit(0.0, reason="急" * MAX_REASON, source=f"l{name[1:]}")
+    state = fixture.published()
+    texts = {cause.name: cause.text for cause in state.causes}
+    assert {"starting", "two_publishers", "limit_stop", "driver_left", "unarmed"} <= texts.keys()
+    for name in names:
+        assert f"limit l{name[1:]}" in texts["two_publishers"]
+        assert f"l{name[1:]}: two publishers" in texts["limit_stop"]
+        assert f"k{name[1:]}" in texts["starting"]
+    assert decode(encode(state), SafetyState) == state
+    everything = " ".join(texts[name] for name in state.latched)
+    assert len(f"Reset, but still latched: {everything}") < max(map(len, texts.values())) < MAX_TEXT
+    longer = {**largest.sources, "one_more": Source(priority=99, lease=0.5)}
+    for wrong in ({"sources": longer}, {"estop_keepalive": ["x" * 33]}):
+        with pytest.raises(ValidationError, match=r"length <= 16|matching regex"):
+            convert(wrong, Safety)

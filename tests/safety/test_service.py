@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import pytest
 import zenoh
+from msgspec.structs import replace
 
 from common import codec, keys, realtime
 from common.bus.bus import Arrival, Bus
@@ -27,6 +28,7 @@ from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService, source_of
+from tests.factories import safety_state
 from verification.harness.bus import at, bus_on, running
 from verification.harness.waiting import wait_until
 
@@ -194,6 +196,16 @@ def test_an_estop_by_delete_latches(endpoint: str) -> None:
             lambda: seen.states and "estop" in seen.states[-1].latched,
             "a latched emergency stop",
         )
+
+
+def test_only_its_own_state_shows_that_an_emergency_stop_would_arrive(endpoint: str) -> None:
+    node = make_node(endpoint)
+    with contextlib.closing(node.loop):
+        service = SafetyService(node, node.open_bus())
+        for boot, counts in ((node.bus.boot + 1, False), (node.bus.boot, True)):
+            state = replace(safety_state(), boot=boot)
+            service._on_estop_path(Arrival(state, "", 1, None))
+            assert (service._inputs.estop_path is not None) is counts
 
 
 @pytest.mark.parametrize("who", ["berlin-007", "berlin-$*", "*"])

@@ -77,7 +77,7 @@ def later(fixture: PolicyFixture, raised: set[str]) -> None:
     )
     wished = {"teleop": replace(state.arbiter.channels["teleop"], received_ns=fixture.now_ns)}
     fixture.state = replace(state, arbiter=replace(state.arbiter, channels=wished))
-    fixture.estop_session_up = True
+    fixture.estop_connection = 1
     fixture.inputs = replace(fixture.inputs, leaving=False)
     fixture.feed()
     verdict = fixture.decide()

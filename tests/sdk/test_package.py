@@ -38,7 +38,7 @@ def test_a_module_is_python_3_10_and_imports_nothing_of_the_stack(file: Path) ->
 
 def test_hand_written_code_is_short() -> None:
     written = [file for file in FILES if file not in sdk.generated()]
-    assert sum(len(code_lines(file)) for file in written) < 930
+    assert sum(len(code_lines(file)) for file in written) < 990
 
 
 def code_lines(file: Path) -> set[int]:

@@ -122,7 +122,7 @@ def test_a_release_beside_another_latch_is_refused(robot: t2.Robot) -> None:
 
 
 def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
-    limit = robot.limit("detector", linear=0.1, reason="person ahead")
+    limit = robot.limit("detector", linear=0.1, reason="person ahead", seconds=60)
 
     def is_shown() -> bool:
         return any(each.reason == "person ahead" for each in robot.safety.latest().limit_sources)
@@ -133,7 +133,7 @@ def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
         wait_until(lambda: robot.safety.latest().verdict == "slow", "the verdict")
         limit.end()
         wait_until(lambda: robot.safety.latest().verdict == "run", "the end of the limit")
-        again = robot.limit("detector", linear=0.1)
+        again = robot.limit("detector", linear=0.1, seconds=60)
         wait_until(lambda: robot.safety.latest().verdict == "slow", "the next limit")
         again.end()
 
@@ -146,7 +146,7 @@ def test_a_limit_is_repeated_for_some_seconds_at_most(robot: t2.Robot) -> None:
 
     wait_until(is_held, "the limit")
     wait_until(lambda: not is_held(), "its end")
-    limit.set(0.1)
+    limit.set(0.1, seconds=60)
     wait_until(is_held, "the limit again")
     limit.end()
 
@@ -161,7 +161,7 @@ def test_the_error_of_an_unknown_robot_names_the_others(stack: RunningStack) -> 
 
 def test_an_unknown_source_is_told_so(robot: t2.Robot) -> None:
     with pytest.raises(t2.NotAllowed, match="it lists detector"):
-        robot.limit("stranger", linear=0.1)
+        robot.limit("stranger", linear=0.1, seconds=1)
     with (
         pytest.raises(t2.NotAllowed, match=r"'stranger'.*safety\.sources"),
         robot.drive("stranger"),
@@ -204,7 +204,7 @@ def test_invalid_numbers_are_refused(robot: t2.Robot) -> None:
         with pytest.raises(ValueError, match="speed must be positive"):
             drive.forward(1.0, speed=-0.3)
     with pytest.raises(ValueError, match="not negative"):
-        robot.limit("detector", linear=-1.0)
+        robot.limit("detector", linear=-1.0, seconds=1)
     robot.led(channel=1, mode=1)
 
 
@@ -246,8 +246,8 @@ def test_a_cancel_before_a_motion_ends_it(robot: t2.Robot) -> None:
 
 
 def test_an_ended_limit_is_not_set(robot: t2.Robot) -> None:
-    limit = robot.limit("detector", linear=0.3)
+    limit = robot.limit("detector", linear=0.3, seconds=1)
     limit.end()
     limit.end()
     with pytest.raises(t2.T2Error, match="has ended"):
-        limit.set(0.1)
+        limit.set(0.1, seconds=1)

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 import pytest
+from msgspec.structs import replace
 from textual.events import AppBlur, Key
 from textual.pilot import Pilot
 
@@ -137,4 +138,15 @@ def test_quitting_twice_does_not_wait(screen: Screen) -> None:
         await pilot.press("q")
         await until(lambda: not screen.app.is_running, "the screen to leave")
 
+    play(screen, act)
+
+
+def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
+    async def act(_: Pilot[None]) -> None:
+        screen.node.fake.deliver(keys.SAFETY, hostile, screen.now_ns)
+        screen.controller.tick(screen.now_ns)
+        screen.app.draw()
+        assert "Stopped.\\u001b[2J\\u009b31m" in screen.text_of("safety")
+
+    hostile = replace(contact_state(), text="Stopped.\x1b[2J\x9b31m", release=None)
     play(screen, act)

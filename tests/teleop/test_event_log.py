@@ -4,6 +4,7 @@ import pytest
 
 from common.log import Logger
 from common.settings import Log
+from common.verdict import MAX_TEXT
 from services.teleop.event_log import ANSWER_NS, CAPACITY, EventLog
 from services.teleop.view import Line
 
@@ -62,3 +63,12 @@ def test_an_answer_that_also_comes_as_an_event_is_one_line() -> None:
     assert (line.t_ns, line.text) == (3, "reset refused: contact")
     event_log.add("safety", "warning", "contact", 2 * ANSWER_NS)  # of another operator
     assert [line.text for line in event_log.last(9)] == ["reset refused: contact", "contact"]
+
+
+def test_control_characters_of_an_event_are_escaped() -> None:
+    event_log = EventLog()
+    event_log.add("odom\x1b", "info", "\x1b]0;title\x07\x1b[2J\u202e急停\n" * 500, t_ns=1)
+    (line,) = event_log.last(1)
+    assert line.service == "odom\\u001b"
+    assert line.text.startswith("\\u001b]0;title\\u0007\\u001b[2J\\u202e急停\\n")
+    assert len(line.text) == MAX_TEXT

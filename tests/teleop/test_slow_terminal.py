@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -61,7 +61,7 @@ def hold(it: Terminal, seconds: float, done: Callable[[], bool] = lambda: False)
     while time.monotonic() < end and not done():
         it.type("w")
         time.sleep(REPEAT_S)
-    return time.monotonic_ns()
+    return clock.now_ns()
 
 
 def ready(it: Terminal, listener: Listener) -> None:

@@ -1,10 +1,10 @@
 """Killed, hanging and disconnected services while driving: STOP in time, and recovery."""
 
 import signal
-import time
 from collections.abc import Callable
 from functools import partial
 
+from common import clock
 from common.freshness import NS_PER_S
 from verification.containers.engine import docker
 from verification.containers.stack_fixture import StackFixture, held_run_s
@@ -20,7 +20,7 @@ STILL = 0.001  # m/s
 # script prints its time by the host's monotonic clock, because `docker exec` takes some time.
 KILL_ALL = """
 import os, time
-print(time.monotonic_ns(), flush=True)
+print(time.clock_gettime_ns(time.CLOCK_BOOTTIME), flush=True)
 os.kill(-1, 9)
 """
 SIGNAL = """
@@ -29,7 +29,7 @@ for entry in pathlib.Path("/proc").iterdir():
     if entry.name.isdigit() and int(entry.name) not in (1, os.getpid()):
         words = (entry / "cmdline").read_bytes().decode().split("\\0")
         if {module!r} in words:
-            print(time.monotonic_ns(), flush=True)
+            print(time.clock_gettime_ns(time.CLOCK_BOOTTIME), flush=True)
             os.kill(int(entry.name), {number})
 """
 
@@ -54,7 +54,7 @@ def optional_container_is_killed(service: str, fixture: StackFixture) -> str:
     fixture.driver.push(fixture.speed)
     before = fixture[service].began
     killed_ns = kill_all(fixture, service)
-    wait_until(lambda: time.monotonic_ns() - killed_ns > NS_PER_S, "a second")
+    wait_until(lambda: clock.now_ns() - killed_ns > NS_PER_S, "a second")
     assert fixture.holds() == "run", fixture.holds()
     stop(fixture)
     wait_until(lambda: fixture[service].began != before, f"{service} is restarted", RESTART_S)
@@ -66,9 +66,9 @@ def container_is_paused(service: str, fixture: StackFixture) -> str:
     """Pause a container: it disappears from the bus without closing a connection."""
     fixture.driver.push(fixture.speed)
     container = fixture[service]
-    stalls, paused_ns = StallRecorder(), time.monotonic_ns()
+    stalls, paused_ns = StallRecorder(), clock.now_ns()
     docker("pause", container.id)
-    docker_s = (time.monotonic_ns() - paused_ns) / NS_PER_S  # the pause began within this time
+    docker_s = (clock.now_ns() - paused_ns) / NS_PER_S  # the pause began within this time
     try:
         took_s, allowed_s = stands(fixture, paused_ns, stalls, REST_S + docker_s)
     finally:
@@ -83,9 +83,9 @@ def laptop_network_is_cut(fixture: StackFixture) -> str:
     fixture.driver.push(fixture.speed)
     router = fixture["router"]
     network = next(iter(router.about["NetworkSettings"]["Networks"]))
-    stalls, cut_ns = StallRecorder(), time.monotonic_ns()
+    stalls, cut_ns = StallRecorder(), clock.now_ns()
     docker("network", "disconnect", network, router.id)
-    docker_s = (time.monotonic_ns() - cut_ns) / NS_PER_S
+    docker_s = (clock.now_ns() - cut_ns) / NS_PER_S
     try:
         extra_s = fixture.config.safety.sources["teleop"].lease + REST_S + docker_s
         took_s, allowed_s = stands(fixture, cut_ns, stalls, extra_s)

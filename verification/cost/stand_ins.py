@@ -10,12 +10,13 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, cast
 from unittest.mock import patch
 
 import zenoh
 
-from common import codec
+from common import clock, codec
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -36,7 +37,7 @@ class Clock:
 
     def install(self) -> None:
         """Replace the clocks of this process."""
-        time.monotonic_ns = lambda: self.now_ns
+        clock.now_ns = lambda: self.now_ns  # type: ignore[assignment]
         time.time_ns = lambda: WALL_NS + self.now_ns
 
 
@@ -60,13 +61,11 @@ class Session:
         with patch("zenoh.ext.declare_advanced_publisher", Session.declare_publisher):
             bus._adopt(cast("zenoh.Session", self))
 
-    def routers_zid(self) -> list[str]:
-        """Return the router's id."""
-        return ["router"]
-
-    def peers_zid(self) -> list[str]:
-        """Return the id of the drive link's other end."""
-        return ["peer"]
+    def declare_transport_events_listener(
+        self, opened: Callable[[Any], None], *, history: bool
+    ) -> None:
+        """Report one open transport."""
+        opened(SimpleNamespace(kind=zenoh.SampleKind.PUT))
 
     def declare_publisher(self, key: str, **_: object) -> "Sink":
         """Return a publisher."""
@@ -76,8 +75,9 @@ class Session:
         """Store the callback."""
         self._queues[key] = queue
 
-    def declare_queryable(self, key: str, queue: Callable[[Any], None]) -> None:
-        """Ignore it: there are no queries."""
+    def declare_queryable(self, key: str, channel: object) -> SimpleNamespace:
+        """Return a queryable without queries."""
+        return SimpleNamespace(try_recv=lambda: None)
 
     def deliver(self, key: str, message: Message, subscription: str) -> None:
         """Deliver a message as Zenoh's thread does while the loop sleeps: it is handled soon."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any
 
+from common import clock
 from verification.faults.stack_fixture import StackFixture
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.dashboard_abuse import FLOODS, flooded, half_open
@@ -38,7 +39,7 @@ def estop_while(abuse: Abuse) -> Callable[[StackFixture], int]:
             request = urllib.request.Request(
                 f"{server.url}estop/001", method="POST", headers={"Origin": server.url.rstrip("/")}
             )
-            at_ns = time.monotonic_ns()
+            at_ns = clock.now_ns()
             with urllib.request.urlopen(request, timeout=10):
                 time.sleep(0.1)
         return at_ns

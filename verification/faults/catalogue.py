@@ -271,6 +271,8 @@ DASHBOARD = [
 DRIVE_LINK = [
     Fault("safety hangs, then contact", forgery.hit_while_safety_hangs, RESET, within(0.02),
           injectors.go_on("safety")),
+    Fault("safety hangs for 2 s, then estop", forgery.estop_while_safety_hangs, RESET,
+          within(0.02), injectors.go_on("safety"), stops=("brake",)),
     *(
         Fault(what, forgery.forged(forge), ON, None, harmless=True)
         for what, forge in {

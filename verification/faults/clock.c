@@ -1,9 +1,9 @@
 /* A separate time of day for a process: preload this library, T2_CLOCK names the file with the step.
  *
- * Only the time of day changes. Waits, timers and the monotonic clock stay the machine's; no T2
- * process waits until a time of day.
- * The file holds one int64 in nanoseconds, in the machine's byte order. It is mapped: a write steps
- * the clock of all processes that use it, at once.
+ * The time of day changes, and the clock since boot, as if the machine had slept. Waits, timers and
+ * the monotonic clock stay the machine's; no T2 process waits until a time of day.
+ * The file holds two int64 in nanoseconds, in the machine's byte order: the step of the time of day,
+ * and the sleep. It is mapped: a write steps the clocks of all processes that use it, at once.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -14,8 +14,8 @@
 #include <sys/time.h>
 #include <time.h>
 
-static const int64_t none = 0, S = 1000000000;
-static const volatile int64_t *step_ns = &none;
+static const int64_t none[2] = {0, 0}, S = 1000000000;
+static const volatile int64_t *step_ns = none;
 static int (*machine)(clockid_t, struct timespec *);
 
 __attribute__((constructor)) static void begin(void) {
@@ -32,8 +32,9 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
     if (!machine) /* called by another library's constructor */
         machine = dlsym(RTLD_NEXT, "clock_gettime");
     int error = machine(clock, now);
-    if (!error && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) {
-        int64_t ns = now->tv_sec * S + now->tv_nsec + *step_ns;
+    int is_of_day = clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE;
+    if (!error && (is_of_day || clock == CLOCK_BOOTTIME)) {
+        int64_t ns = now->tv_sec * S + now->tv_nsec + step_ns[!is_of_day];
         *now = (struct timespec){ns / S, ns % S};
     }
     return error;

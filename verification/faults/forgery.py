@@ -8,7 +8,7 @@ from collections.abc import Callable
 import zenoh
 from msgspec.structs import replace
 
-from common import codec, keys
+from common import clock, codec, keys
 from common.bus.session import client_config
 from common.messages import Bumper, Motion, Velocity
 from common.motion import Command
@@ -20,6 +20,7 @@ from verification.harness.waiting import becomes_true
 LASTS_S = 0.6
 AHEAD = 1000
 BACKWARD_MPS = -0.5  # no driver of the campaign requests it
+LOST_S = 2.0  # twice the lease of a session
 HUNG_S = 0.05  # the vehicle still moves: the lease is 0.2 s
 
 
@@ -38,8 +39,8 @@ def forged(make: Callable[[Motion, Bumper], dict[str, bytes]]) -> Callable[[Stac
             becomes_true(lambda: len(newest) == len(subscribers), 2.0)
             command = codec.decode(newest[motion], Motion)
             sample = codec.decode(newest[bumper], Bumper)
-            at_ns = time.monotonic_ns()
-            while time.monotonic_ns() - at_ns < LASTS_S * 1e9:
+            at_ns = clock.now_ns()
+            while clock.now_ns() - at_ns < LASTS_S * 1e9:
                 command = replace(command, seq=command.seq + AHEAD)
                 sample = replace(sample, seq=sample.seq + AHEAD)
                 for key, payload in make(command, sample).items():
@@ -77,3 +78,10 @@ def hit_while_safety_hangs(fixture: StackFixture) -> int:
     os.kill(injectors.pid_of(fixture, "safety"), signal.SIGSTOP)
     time.sleep(HUNG_S)
     return injectors.hit(0.3)(fixture)
+
+
+def estop_while_safety_hangs(fixture: StackFixture) -> int:
+    """Send SIGSTOP to safety for longer than its session lasts, and one emergency stop."""
+    os.kill(injectors.pid_of(fixture, "safety"), signal.SIGSTOP)
+    time.sleep(LOST_S)
+    return injectors.estop(fixture)

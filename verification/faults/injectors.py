@@ -12,7 +12,7 @@ import msgpack
 import msgspec
 import zenoh
 
-from common import keys
+from common import clock, keys
 from common.bus.session import client_config
 from common.freshness import NS_PER_S
 from common.operator import release_request, reset_request
@@ -50,11 +50,11 @@ def kill(name: str, number: signal.Signals) -> Callable[[StackFixture], int]:
 
     def inject(fixture: StackFixture) -> int:
         process = os.pidfd_open(pid_of(fixture, name))
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         signal.pidfd_send_signal(process, number)
         if number == signal.SIGKILL:
             select.select([process], [], [], DEATH_S)
-            fixture.death_s = (time.monotonic_ns() - at_ns) / NS_PER_S
+            fixture.death_s = (clock.now_ns() - at_ns) / NS_PER_S
         os.close(process)
         return at_ns
 
@@ -70,7 +70,7 @@ def do(*requests: Asked) -> Callable[[StackFixture], int]:
     """Send requests to the simulated vehicle."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         for request in requests:
             fixture.running.control.do(request)
         return at_ns
@@ -147,7 +147,7 @@ def ignored(_: object) -> None:
 
 def estop(fixture: StackFixture) -> int:
     """Publish an E-STOP as the T2 tools do."""
-    at_ns = time.monotonic_ns()
+    at_ns = clock.now_ns()
     fixture.bus.estop()
     return at_ns
 
@@ -158,7 +158,7 @@ def estop_by(put: Callable[[zenoh.Session, str], None]) -> Callable[[StackFixtur
     def inject(fixture: StackFixture) -> int:
         with zenoh.open(client_config(at(fixture.running.endpoint))) as session:
             time.sleep(0.1)  # until the router knows the session
-            at_ns = time.monotonic_ns()
+            at_ns = clock.now_ns()
             put(session, keys.estop_key("001"))
             time.sleep(0.1)
         return at_ns
@@ -170,7 +170,7 @@ def second(*words: str) -> Callable[[StackFixture], int]:
     """Start a second instance of a process, or a module, beside the stack."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         command = (
             [*fixture.running.commands[words[0]]] if len(words) == 1 else [sys.executable, *words]
         )
@@ -237,7 +237,7 @@ def publish(payload: bytes, encoding: str = "application/msgpack") -> Callable[[
 
     def inject(fixture: StackFixture) -> int:
         with zenoh.open(client_config(at(fixture.running.endpoint))) as session:
-            at_ns = time.monotonic_ns()
+            at_ns = clock.now_ns()
             for key in topic_keys:
                 session.put(key, payload, encoding=encoding,
                             congestion_control=zenoh.CongestionControl.BLOCK)  # fmt: skip
@@ -273,7 +273,7 @@ def stall_terminal(seconds: float, held_s: float = 0.3) -> Callable[[StackFixtur
     """Stall the operator's terminal; the key is released meanwhile, its repeats arrive later."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         fixture.send_line(b"stall %f" % seconds)
         time.sleep(held_s)
         fixture.request(0.0)

@@ -92,7 +92,8 @@ def clock(file: Path) -> dict[str, str]:
     return env
 
 
-def step_clock(file: Path, seconds: int) -> None:
-    """Set the shift of the time of day of all processes that use this file."""
+def step_clock(file: Path, seconds: int, slept: int = 0) -> None:
+    """Set the shift of the time of day of all processes that use this file, and their sleep."""
     with file.open("r+b" if file.exists() else "wb") as it:  # in place: it is mapped
-        it.write((seconds * NS_PER_S).to_bytes(8, sys.byteorder, signed=True))
+        for shift in (seconds, slept):
+            it.write((shift * NS_PER_S).to_bytes(8, sys.byteorder, signed=True))

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Literal
 
 from cli.settings import Everything
+from common import clock
 from verification.harness.network_hosts import ip
 from verification.harness.process_stats import children
 
@@ -63,7 +64,7 @@ def pc_pids(fixture: "StackFixture") -> list[int]:
 
 def stop_pc(fixture: "StackFixture") -> int:
     """Stop all processes of the PC, as when its kernel hangs."""
-    at_ns = time.monotonic_ns()
+    at_ns = clock.now_ns()
     for pid in pc_pids(fixture):
         os.kill(pid, signal.SIGSTOP)
     return at_ns
@@ -89,7 +90,7 @@ def cut(side: Side, seconds: float) -> Callable[["StackFixture"], int]:
     """Cut one of the two cables for some time."""
 
     def inject(_: "StackFixture") -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         ip("link", "set", f"cable-{side}", "down")
         time.sleep(seconds)
         ip("link", "set", f"cable-{side}", "up")

@@ -18,13 +18,13 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 import uuid
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
 
+from common import clock
 from common.bus.publisher import BOOT_ID
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
@@ -74,7 +74,7 @@ class Link:
                     self._execute(line)
 
     def _forward(self, source: int, cable: Cable, sink: int) -> None:
-        now_ns = time.monotonic_ns()
+        now_ns = clock.now_ns()
         for packet in _waiting(source):
             cable.put(Datagram(packet, 0), now_ns)
         for datagram in cable.take(now_ns):
@@ -96,7 +96,7 @@ class Link:
 
     def _wait_s(self) -> float:
         due = [cable.due_ns for cable in (self.to_far, self.to_near) if cable.due_ns is not None]
-        return max(0.0, (min(due) - time.monotonic_ns()) / NS_PER_S) if due else IDLE_S
+        return max(0.0, (min(due) - clock.now_ns()) / NS_PER_S) if due else IDLE_S
 
 
 def net(port: int) -> str:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from common import clock
 from sim.requests import Wire
 from verification.faults.injectors import hit, pid_of
 from verification.faults.namespaces import MEMORY, step_clock
@@ -23,7 +24,7 @@ def network(faults: Wire) -> Callable[[StackFixture], int]:
     """Disturb the packets between the driver and the robot."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         fixture.disturb_network(faults)
         return at_ns
 
@@ -34,7 +35,7 @@ def cut_and_let_go(seconds: float) -> Callable[[StackFixture], int]:
     """Cut the driver's network and release the stick meanwhile; then deliver what was queued."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         fixture.disturb_network(Wire(drop=1.0))
         time.sleep(LET_GO_S)  # the driver still requests motion
         fixture.request(0.0)
@@ -55,7 +56,7 @@ def step_time_of_day(whose: str, seconds: int) -> Callable[[StackFixture], int]:
     """Step the time of day of the ``robot`` or of the ``driver``."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         step_clock(fixture.folder / whose, seconds)
         return at_ns
 
@@ -116,9 +117,9 @@ def _exhaust_memory(group: Path, pid: int) -> int:
         [sys.executable, "-c", hungry],
         preexec_fn=lambda: (group / "cgroup.procs").write_text(str(os.getpid())),
     ) as eater:
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         while not select.select([victim], [], [], 0.0005)[0]:
-            at_ns = time.monotonic_ns()  # still alive
+            at_ns = clock.now_ns()  # still alive
         eater.kill()
     os.close(victim)
     return at_ns

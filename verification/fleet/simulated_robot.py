@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 import zenoh
 
-from common import keys
+from common import clock, keys
 from common.bus.publisher import Publisher
 from common.bus.session import client_config
 from common.messages import Message, SafetyState
@@ -39,7 +39,7 @@ class Robot:
 
     def __init__(self, session: zenoh.Session, name: str, all_streams: Sequence[Stream]) -> None:
         self.stopped = False
-        self._boot = time.monotonic_ns()
+        self._boot = clock.now_ns()
         self._streams = all_streams
         self._sent: Counter[str] = Counter()
         self._publishers: list[Publisher[Message]] = []

@@ -8,7 +8,7 @@ from collections import Counter
 import msgspec
 import zenoh
 
-from common import keys
+from common import clock, keys
 from common.bus.session import client_config
 from common.messages import Message
 from verification.harness.bus import at
@@ -50,7 +50,7 @@ class MessageCounter:
         self._lost += max(0, head.seq - before - 1)
         self._newest[key] = head.seq
         if self._count % AGE_EVERY == 0:
-            self._ages_s.append((time.monotonic_ns() - head.mono_ns) / 1e9)
+            self._ages_s.append((clock.now_ns() - head.mono_ns) / 1e9)
 
     def end(self) -> object:
         """Return the counts; ``lost`` includes messages that downsampling dropped."""

@@ -80,6 +80,7 @@ def joined(
     bus = Bus(where, robot, loop.post)
     declare(bus)
     bus.open()
+    loop.post(lambda: loop.every(0.01, lambda _: bus.answer_queries()))
     try:
         wait_until(lambda: bus.connected, "a session with the router")
         yield bus

@@ -14,10 +14,10 @@ from common.freshness import NS_PER_S
 PERIOD_S = 0.002  # that the recording process sleeps
 SLEEPER = """
 import time
-last = time.monotonic_ns()
+last = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 while True:
     time.sleep(0.002)
-    now = time.monotonic_ns()
+    now = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     if now - last > 4_000_000:
         print(last, now, flush=True)
     last = now

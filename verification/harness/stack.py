@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from cli.demo import host_stalls
 from cli.demo.score import Trace, read
 from cli.run.up import commands
 from cli.settings import Everything
+from common import clock
 from common.config import Sources, load
 from sim.sockets import Control
 from verification.harness.bus import set_options
@@ -51,7 +51,7 @@ class RunningStack:
     def kill(self, name: str) -> int:
         """Kill a process with SIGKILL; return the time, in monotonic nanoseconds."""
         process = self.processes[name]
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         process.send_signal(signal.SIGKILL)
         process.wait()
         return at_ns

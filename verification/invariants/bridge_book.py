@@ -29,7 +29,8 @@ class BridgeBook:
     # both, and a copy is no second sample.
     clear: dict[int, tuple[int, int]] = field(default_factory=dict)
     published: int = 0  # bumper samples
-    brake_due: bool = False  # whether a hit was delivered and no BRAKE has been sent yet
+    braked: bool = False  # whether the last frame was BRAKE
+    brake_due: bool = False  # whether a hit or a stop was delivered, and no BRAKE sent yet
 
     def on_report(self, frame: Frame, port: int, now_ns: int) -> bool:
         """Record a frame of the board; return whether a hit begins with it."""

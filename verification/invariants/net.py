@@ -43,6 +43,7 @@ class Owner(Protocol):
 
     boot: int
     alive: bool
+    cut: bool
 
     @property
     def stalled(self) -> bool:
@@ -77,7 +78,8 @@ class Subscription:
 
     def hand_over(self, envelope: Envelope) -> None:
         """Deliver to the owner, now or after its stall."""
-        if not self.owner.alive:
+        lost = self.owner.stalled and self.owner.cut and not self.private
+        if lost or not self.owner.alive:
             return
         self.waiting.append(envelope)
         while len(self.waiting) > self.depth:
@@ -112,11 +114,17 @@ class Net:
     def __init__(self, now_ns: int) -> None:
         self.now_ns = now_ns
         self.up = True
+        self.connections = 1  # since the start
         self.disturbances: dict[str, Disturbance] = {}
         self.subscriptions: list[Subscription] = []
         self._under_way: list[tuple[int, int, Subscription | None, Callable[[], None]]] = []
         self._counts: Counter[tuple[str, str]] = Counter()
         self._order = 0
+
+    @property
+    def connection(self) -> int:
+        """Number of the connection to the router; 0 without one."""
+        return self.connections if self.up else 0
 
     def put(self, envelope: Envelope) -> None:
         """Send an envelope to all matching subscriptions."""

@@ -24,6 +24,7 @@ from verification.invariants.safety_book import FAST_S, SafetyBook
 # The bridge's lease and tick; the guard needs less.
 BUDGET_NS = 230 * MS
 STEP_NS = 5 * MS
+STALL_NS = 1030 * MS  # of safety: an emergency stop may be lost
 
 
 @dataclass(eq=False, slots=True)
@@ -33,6 +34,7 @@ class Trip:
     name: str
     holders: set[int]
     bridge: tuple[int, int] | None = None  # boot, and the bumper's ``seq`` that will report it
+    message: m.Message | None = None  # that tripped it, at each process that receives it
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +82,8 @@ class Oracle(Watch):
     def on_delivery(self, process: Process, envelope: Envelope) -> None:
         """Record a message before its receiver handles it."""
         book, bridge_book = self.safety_books.get(process.boot), self.bridge_books.get(process.boot)
+        if envelope.key.endswith("/estop"):
+            self._on_estop(process.boot, envelope.message)
         if bridge_book is not None and isinstance(envelope.message, m.Motion):
             record = self._records.get((envelope.message.boot, envelope.message.seq))
             if bridge_book.on_motion(envelope.message, self.now_ns) and record is not None:
@@ -92,19 +96,33 @@ class Oracle(Watch):
         if isinstance(message, m.SourceMessage):
             if book.on_source(name, message, self.now_ns):
                 self.trip("estop_keepalive", book.boot)
-        elif name == "estop":
-            self.trip("estop", book.boot)
-        else:
+        elif name != "estop":
             book.on_sample(name, message, self.now_ns)
         if isinstance(message, m.Bumper) and message.pressed:
             self._on_pressed(book, message)
         if isinstance(message, m.Driver) and message.bits:
             self.trip("driver", book.boot)
         if isinstance(message, m.Link):
-            trips = self._links.get((message.boot, message.seq), ())
-            if message.latched_by not in (None, book.boot):
-                book.operators.on_trip("predecessor", self.now_ns)
-            self._inform(trips, book.boot)
+            self._on_link(book, message)
+
+    def _on_link(self, book: SafetyBook, message: m.Link) -> None:
+        if message.latched_by not in (None, book.boot):
+            book.operators.on_trip("predecessor", self.now_ns)
+        if message.estop is not None:
+            book.operators.on_trip("estop", self.now_ns)
+        self._inform(self._links.get((message.boot, message.seq), ()), book.boot)
+
+    def _on_estop(self, boot: int, message: m.Message) -> None:
+        """Record an emergency stop that a process receives: one trip, at all of them."""
+        if boot in self.bridge_books:
+            self.bridge_books[boot].brake_due = not self.bridge_books[boot].braked
+        known = [trip for trip in self.trips if trip.message is message]
+        self._inform(known, boot)
+        if not known:
+            self.trip("estop", boot)
+            self.trips[-1].message = message
+        elif boot in self.safety_books:
+            self.safety_books[boot].operators.on_trip("estop", self.now_ns)
 
     def _on_pressed(self, book: SafetyBook, message: m.Bumper) -> None:
         for trip in self.trips:
@@ -121,6 +139,13 @@ class Oracle(Watch):
                 self.trip(
                     "contact", bridge_book.boot, (bridge_book.boot, bridge_book.published + 1)
                 )
+
+    def on_router(self, up: bool) -> None:
+        """Record that the router is gone or back."""
+        self.estop_session_up = up
+        for book in self.safety_books.values():
+            if book.estop_session_was_up and not up:
+                self.trip("estop_reader", book.boot)
 
     def on_reset(self, process: Process, request: m.ResetRequest) -> None:
         """Record a granted reset; trips that it must not clear stay."""
@@ -186,8 +211,9 @@ class Oracle(Watch):
     # --- decisions --------------------------------------------------------------------------
 
     def _on_verdict(self, book: SafetyBook, motion: m.Motion) -> None:
-        if book.estop_session_was_up and not self.estop_session_up:
+        if self.now_ns - (book.decided_ns or self.now_ns) > STALL_NS:
             self.trip("estop_reader", book.boot)
+        book.decided_ns = self.now_ns
         book.estop_session_was_up = book.estop_session_was_up or self.estop_session_up
         if book.fast_ns is not None and self.now_ns - book.fast_ns > FAST_S * NS_PER_S:
             self.trip("runaway", book.boot)
@@ -224,8 +250,9 @@ class Oracle(Watch):
             if not isinstance(part.frame, MotionCommand):
                 continue
             if bridge_book.brake_due and part.frame.kind is not MotionKind.BREAK:
-                self.violations.append("a hit without a BRAKE at once")
+                self.violations.append("a hit or an emergency stop without a BRAKE at once")
             bridge_book.brake_due = False
+            bridge_book.braked = part.frame.kind is MotionKind.BREAK
             if part.frame.kind is MotionKind.RUN and moves_vehicle(part.frame):
                 return tuple(self._of_frame(bridge_book, process.taking, part.frame))
         return ()
@@ -271,7 +298,7 @@ class Oracle(Watch):
             self.violations.append(f"a RUN is held for more than {budget_ns / MS:.0f} ms")
         for bridge_book in self.bridge_books.values():
             if bridge_book.brake_due:
-                self.violations.append("a hit without a BRAKE at once")
+                self.violations.append("a hit or an emergency stop without a BRAKE at once")
 
 
 def moves(motion: m.Motion) -> bool:

@@ -11,9 +11,10 @@ from common.bus.bus import Arrival
 from common.keys import Call, Topic
 from common.loop import Timer
 from common.messages import Message
-from verification.invariants.net import Caller, Envelope, Net, Subscription
+from verification.invariants.net import MS, Caller, Envelope, Net, Subscription
 
 ROBOT = "001"
+SESSION_LEASE_MS = 1000
 M = TypeVar("M", bound=Message)
 
 
@@ -113,6 +114,8 @@ class Process:
         self.robot = ROBOT
         self.alive = True
         self.stalled_until_ns = 0
+        self.cut = False  # whether the router has ended its session for a long stall
+        self._reconnections = 0
         self.taking: Envelope | None = None  # the envelope being handled
         self.bus = self
         self.drive = DriveEnd(self)
@@ -131,9 +134,15 @@ class Process:
         return self.net.now_ns < self.stalled_until_ns
 
     @property
-    def connected(self) -> bool:
-        """Whether there is a router."""
-        return self.net.up
+    def connection(self) -> int:
+        """Number of the connection to the router; 0 without one."""
+        return self.net.connection and self.net.connection + self._reconnections
+
+    def stall(self, duration_ms: int) -> None:
+        """Stall; a session that is silent for the bus's lease ends, and is opened again."""
+        self.stalled_until_ns = self.net.now_ns + duration_ms * MS
+        self.cut = duration_ms > SESSION_LEASE_MS
+        self._reconnections += self.cut
 
     def shares_clock(self, message: Message) -> bool:
         """Return whether a message was stamped on this host."""

@@ -34,6 +34,7 @@ LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES, ECHO_AGE_S, SETTLE_S, RIVAL_S = 3, 0.4, 0.5, 0.5
+LAPSE_S = 1.0  # after its lease a source is as new
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
 OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
@@ -79,6 +80,7 @@ class SafetyBook:
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
+    decided_ns: int | None = None
     standstill: StandstillBook = field(default_factory=StandstillBook)
     keepalive: KeepaliveBook = field(default_factory=KeepaliveBook)
     limits: LimitBook = field(default_factory=LimitBook)
@@ -110,6 +112,8 @@ class SafetyBook:
             return
         if drive.linear == 0 == drive.angular:
             self.zeros[source] = now_ns
+        if old is not None and now_ns - old.at_ns > (LEASES_S[source] + LAPSE_S) * NS_PER_S:
+            self.neutral.pop(source, None)  # a program that was suspended
         since_ns = old.still_ns if old is not None and old.still else now_ns
         self.requests[source] = SourceRequest(
             drive.boot, drive.seq, now_ns, drive.linear, drive.angular, since_ns
@@ -265,7 +269,7 @@ class SafetyBook:
             yield f"{better} go before {source}"
         if source not in self.neutral:
             yield f"{source} was not neutral since the last cause"
-        if any(now_ns - at_ns < RIVAL_S * NS_PER_S for at_ns in self.rivals.values()):
+        if now_ns - self.rivals.get(source, -now_ns) < RIVAL_S * NS_PER_S:
             yield "two publishers on one source"
 
     def _of_release(self, motion: Motion, now_ns: int) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """The real shells of bridge and safety, a vehicle and operators, in simulated time."""
 
-import sys
-import time as real_time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -25,7 +23,7 @@ from verification.invariants.limits import IGNORED, LEASE_S, NEEDED, Limiter
 from verification.invariants.net import MS, Envelope, Net
 from verification.invariants.oracle import STEP_NS, Oracle
 from verification.invariants.process import ROBOT, Process
-from verification.invariants.stand_ins import Clock, Sockets
+from verification.invariants.stand_ins import Sockets
 from verification.invariants.vehicle import Complaints, OnMotion, Vehicle
 
 START_NS = 100 * NS_PER_S
@@ -100,12 +98,6 @@ class Chain(Generic[V]):
         self.oracle = Oracle(START_NS)
         self.vehicle = make_vehicle(self.net, self.oracle.on_board)
         self._step_ns = step_ns
-        # The modules of the services that look at the clock.
-        self._timed = [
-            module
-            for name, module in sys.modules.items()
-            if name.startswith("services.") and getattr(module, "time", None) is real_time
-        ]
         self._boots = 1000
         self._brake_ns: int | None = None  # when the guard brakes next
         self._starts: dict[str, int] = {}
@@ -197,7 +189,7 @@ class Chain(Generic[V]):
 
     def stall(self, name: str, duration_ms: int) -> None:
         """Stall a process for this time."""
-        getattr(self, name).stalled_until_ns = self.net.now_ns + duration_ms * MS
+        getattr(self, name).stall(duration_ms)
 
     def power_cycle(self, duration_ms: int) -> None:
         """Restart the board."""
@@ -208,7 +200,9 @@ class Chain(Generic[V]):
 
     def router(self, up: bool) -> None:
         """Take the router away, or bring it back."""
-        self.net.up = self.oracle.estop_session_up = up
+        self.net.connections += up and not self.net.up
+        self.net.up = up
+        self.oracle.on_router(up)
 
     # --- people -----------------------------------------------------------------------------
 
@@ -262,15 +256,8 @@ class Chain(Generic[V]):
     @contextmanager
     def time(self) -> Iterator[None]:
         """Replace the services' clock by the simulated time; contexts may be nested."""
-        before = [(module, module.time) for module in self._timed]
-        clock = Clock(self.net)
-        try:
-            for module in self._timed:
-                module.time = clock  # type: ignore[attr-defined]
+        with patch("common.clock.now_ns", lambda: self.net.now_ns):
             yield
-        finally:
-            for module, time in before:
-                module.time = time  # type: ignore[attr-defined]
 
 
 class Stack(Chain[Vehicle]):

@@ -1,4 +1,4 @@
-"""Stand-ins for the bridge's sockets and for the services' clock."""
+"""Stand-in for the bridge's sockets."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -7,7 +7,6 @@ from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from services.bridge.rx_timestamp import Receipt, WallClock
 from services.bridge.udp import Ancillary
-from verification.invariants.net import Net
 from verification.invariants.process import Process
 
 if TYPE_CHECKING:
@@ -51,14 +50,3 @@ class Sockets:
         complaints = self._stack.oracle.on_leaving(self._process, datagram)
         self._stack.vehicle.receive(datagram, port, complaints)
         return True
-
-
-class Clock:
-    """Stands for the module ``time``."""
-
-    def __init__(self, net: Net) -> None:
-        self._net = net
-
-    def monotonic_ns(self) -> int:
-        """Return the simulated time."""
-        return self._net.now_ns

@@ -12,6 +12,8 @@ from typing import Any, Self
 import msgpack
 import zenoh
 
+from common import clock
+
 ROOT = "t2/v1/001"
 STATE, LINK = "tel/safety/state", "tel/bridge/link"
 PERIOD_S = 0.05
@@ -34,7 +36,7 @@ def session(endpoint: str, mode: str = "client") -> "zenoh.Session":
 
 def header(seq: int, boot: int) -> Map:
     """Return the header of every message."""
-    now = {"t_ns": time.time_ns(), "mono_ns": time.monotonic_ns()}
+    now = {"t_ns": time.time_ns(), "mono_ns": clock.now_ns()}
     return {"seq": seq, "boot": boot, "host": 0, **now}
 
 

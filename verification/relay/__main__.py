@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
+from common import clock
 from common.freshness import NS_PER_S
 from services.relay.wire import BRAKE, BUMPER, frame
 from verification.harness.bus import set_options
@@ -55,12 +56,12 @@ class Board:
             self.sock.sendto(CLEAR, self._to)
             time.sleep(QUIET_S / 4)
         self.drain()
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         self.sock.sendto(HIT, self._to)
         found: list[float] = []
         while len(found) < brakes:
             if self.sock.recv(2048) == BRAKE:
-                found.append((time.monotonic_ns() - at_ns) / NS_PER_S)
+                found.append((clock.now_ns() - at_ns) / NS_PER_S)
         return found
 
 

@@ -9,9 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from common import clock
 from common.settings import BusSettings
 from sim.requests import Wire
-from verification.faults.namespaces import clock, step_clock
+from verification.faults.namespaces import clock as shifted
+from verification.faults.namespaces import step_clock
 from verification.faults.remote_host import net
 from verification.faults.stack_fixture import QUICK, StackFixture, driven
 from verification.harness.certificates import Site as Keys
@@ -56,7 +58,7 @@ class TwoHosts:
 
     def received(self, path: str, since_ns: int) -> list[Entry]:
         """Return the messages that the laptop received on a key since then."""
-        entries = self.on_laptop(since_ns, time.monotonic_ns())
+        entries = self.on_laptop(since_ns, clock.now_ns())
         return [entry for entry in entries if entry.key == path]
 
     def press_again(self, speed: float) -> None:
@@ -81,7 +83,7 @@ def two_hosts(
         keys = Keys(folder / "keys")
         robots = keys.member("robot", "001", "--address", f"{net(port)}.1")
         laptops = certificate_sets(keys.member("driver", "anna", "--robot", "001"))
-    env = clock(folder / "laptop")
+    env = shifted(folder / "laptop")
     step_clock(folder / "laptop", AHEAD_S)
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
     sets = [*QUICK, *certificate_sets(robots), *([] if downsampled else [EVERYTHING])]
@@ -103,7 +105,7 @@ def two_hosts(
         words += ["dashboard" if dashboard else "alone", *laptops]
         with driven(stack, folder, words, env) as fixture:
             it = TwoHosts(fixture, robot, laptop)
-            began_ns = time.monotonic_ns()
+            began_ns = clock.now_ns()
             wait_until(lambda: it.received("tel/safety/state", began_ns), "the laptop", DASHBOARD_S)
             yield it
 

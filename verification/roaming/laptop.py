@@ -10,12 +10,11 @@ import contextlib
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from common import keys
+from common import clock, keys
 from common.bus.publisher import Publisher
 from common.config import Sources, load
 from common.freshness import NS_PER_S
@@ -52,14 +51,14 @@ class Operator:
         self._message_log.subscribe(node.bus, keys.SAFETY)
         self._message_log.subscribe(node.bus, keys.ODOMETRY)
         self._message_log.subscribe(node.bus, keys.BUMPER)
-        self._press(FIFTH_GEAR, time.monotonic_ns())
+        self._press(FIFTH_GEAR, clock.now_ns())
         node.loop.every(REPEAT_S, self._hold)
         node.loop.every(POLL_S, self._log_request)
 
     def take(self, line: str) -> None:
         """Execute a line."""
         if line == "e":
-            self._press("e", time.monotonic_ns())
+            self._press("e", clock.now_ns())
         else:
             self.held = float(line) > 0
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from common import clock
 from common.freshness import NS_PER_S
 from sim.requests import Wire
 from verification.faults.remote_host import Address
@@ -64,9 +65,9 @@ def steady(it: TwoHosts, condition: Condition, seconds: float) -> DriveResult:
     hold(it, SETTLE_S)
     it.fixture.frames.forget()
     carried = it.carried()
-    began_m, since_ns = it.fixture.running.control.truth().distance, time.monotonic_ns()
+    began_m, since_ns = it.fixture.running.control.truth().distance, clock.now_ns()
     presses = hold(it, seconds)
-    until_ns, ended_m = time.monotonic_ns(), it.fixture.running.control.truth().distance
+    until_ns, ended_m = clock.now_ns(), it.fixture.running.control.truth().distance
     carried = it.carried() - carried
     commands = list(it.fixture.frames.follow().commands)
     braked_s, confirmed_s = estop(it)
@@ -103,7 +104,7 @@ def hold(it: TwoHosts, seconds: float) -> int:
 def estop(it: TwoHosts) -> tuple[float | None, float | None]:
     """Press E; return the time to the board, and to the confirmation on the laptop."""
     it.fixture.frames.forget()
-    pressed_ns = time.monotonic_ns()
+    pressed_ns = clock.now_ns()
     it.fixture.send_line(b"e")
 
     def braked() -> list[int]:
@@ -136,16 +137,16 @@ def outage(it: TwoHosts, what: Outage, address: int) -> OutageResult:
     it.fixture.ready()
     time.sleep(0.3)
     it.fixture.frames.forget()
-    cut_ns = time.monotonic_ns()
+    cut_ns = clock.now_ns()
     if what.seconds:
         it.disturb(Wire(drop=1.0))
         time.sleep(what.seconds)
     if what.moves:
         it.fixture.send_line(msgspec.json.encode(Address(address)))
-    back_ns = time.monotonic_ns()
+    back_ns = clock.now_ns()
     it.disturb()
     drove_s, presses = _drives_again(it, back_ns)
-    until_ns = time.monotonic_ns()
+    until_ns = clock.now_ns()
     time.sleep(LATE_S)
     commands = it.fixture.frames.commands
     received = [entry.at_ns for entry in it.received(STATE, back_ns) if entry.sent_ns > back_ns]

@@ -18,7 +18,7 @@ from typing import Any
 
 import zenoh
 
-from common import child_process
+from common import child_process, clock
 from common.bus.bus import Bus
 from common.bus.session import client_config
 from common.loop import Loop
@@ -132,7 +132,7 @@ def measured(
             sent = {}
             for number in range(requests):
                 speed = round(0.1 + 0.002 * (number % 50), 3) * (-1) ** (number // 50)
-                sent[speed] = time.monotonic_ns()
+                sent[speed] = clock.now_ns()
                 request(speed)
                 time.sleep(PERIOD_S)
                 if number % 50 == 49:

@@ -4,13 +4,12 @@ import contextlib
 import json
 import os
 import subprocess
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cli.settings import Everything
-from common import child_process, keys
+from common import child_process, clock, keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Health, SafetyState
@@ -119,7 +118,7 @@ class Robot:
 
     def killed(self, process: "subprocess.Popen[str]") -> int:
         """Kill a peer with SIGKILL; return the time, in monotonic nanoseconds."""
-        at_ns = time.monotonic_ns()
+        at_ns = clock.now_ns()
         process.kill()
         process.communicate()
         return at_ns

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
+from common import clock
 from verification.ros2.driving import FORWARD, driver, moves, plain_peer, reset_if_latched
 from verification.ros2.fixture import MARGIN_S, PATIENCE_S, STILL_M, Robot
 from verification.ros2.plain_peer import Twist
@@ -22,7 +23,7 @@ def commands(robot: Robot) -> str:
         moves(robot, driving)
         before = robot.counters.get("cmd_vel_held_back", 0)
         with proxy.hold():
-            since_ns = time.monotonic_ns()
+            since_ns = clock.now_ns()
             driving.twist = Twist()  # what safety wants before motion
             time.sleep(HELD_S / 4)
             driving.twist = FORWARD

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from cli.run.supervisor import Child, Supervisor
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
@@ -64,7 +63,7 @@ class SoakRunner:
         self._fault: Fault | None = None
         self._held: Child | None = None  # not restarted until the fault is over
         self._budget_s = budget_s
-        self._began_ns = time.monotonic_ns()
+        self._began_ns = clock.now_ns()
         self._next_ns = self._began_ns + round(FIRST_S * NS_PER_S)
         self._since_ns = 0
         self._end_ns = 0
@@ -94,7 +93,7 @@ class SoakRunner:
     def _begin(self, fault: Fault, now_ns: int) -> None:
         if fault.begin is not None and not self._do(fault.begin):
             return
-        since_ns = time.monotonic_ns()
+        since_ns = clock.now_ns()
         name, held = self._kill(fault.kills) if fault.kills else (fault.name, True)
         fault = replace(fault, name=name, still=fault.still and held)
         seconds = fault.seconds + (self._budget_s if fault.still else 0.0)
@@ -124,7 +123,7 @@ class SoakRunner:
         self._update_lateness()
         self._read_trace()
         from_ns = self._since_ns + round((self._budget_s + self._late_s) * NS_PER_S)
-        window = Window(fault.name, from_ns, time.monotonic_ns())
+        window = Window(fault.name, from_ns, clock.now_ns())
         self._record.windows.append(window)
         self._record.moved += too_late(self._runs, window)
 
@@ -158,7 +157,7 @@ class SoakRunner:
     def sample(self) -> None:
         """Take one sample of all processes and files."""
         record = self._record
-        record.seconds = self._at_s(time.monotonic_ns())
+        record.seconds = self._at_s(clock.now_ns())
         self._update_lateness()
         pids = self._pids()
         for name, pid in pids:

@@ -50,6 +50,7 @@ def installs(m: Machine) -> str:
     m.write(SETTINGS, m.run("cat", SETTINGS) + "\n[sim]\ncontrol_port = 4009\n")
     m.write("/etc/systemd/system/t2-sim.service.d/trace.conf", TRACE)
     m.run("systemd-sysusers")
+    assert "AllowSuspend=no" in m.run("systemd-analyze", "cat-config", "systemd/sleep.conf")
     m.run("systemctl", "daemon-reload")
     size = m.run("sh", "-c", "du -smL /opt/t2/current | cut -f 1").strip()
     return f"in {took_s:.0f} s, {size} MB; the second run changes nothing"

@@ -86,7 +86,7 @@ class Walk:
         self.policy = Policy(Safety(), vehicle)
         self.state = self.policy.start()
         self.translator = Translator(Wire(), vehicle, 1.0, 1.0)
-        self.inputs = Inputs(estop_session_up=True)
+        self.inputs = Inputs(estop_connection=1)
         self.now_ns, self.ticks = 10 * NS_PER_S, 0
         self.distance = self.turn = self.metres = 0.0
         self.before = deque([self.pose], maxlen=BACK_TICKS)

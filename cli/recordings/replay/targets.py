@@ -12,7 +12,7 @@ from cli.inspect.addressing import topic_of
 from cli.inspect.pub import check_permission
 from cli.inspect.session import BusSession
 from cli.recordings.replay.plan import refusal
-from common import codec, keys
+from common import clock, codec, keys
 from common.bus.publisher import host_id
 from common.errors import LinkError, MessageError, RobotError
 from common.messages import Drive, SafetyState
@@ -90,7 +90,7 @@ class SimulatorTarget(BusTarget):
         self._seq += 1
         drive = replace(
             request, echo=self._newest_heartbeat(), seq=self._seq, boot=self._boot, host=self._host,
-            t_ns=time.time_ns(), mono_ns=time.monotonic_ns(),
+            t_ns=time.time_ns(), mono_ns=clock.now_ns(),
         )  # fmt: skip
         self._put(path, codec.encode(drive), codec.encoding(Drive), None)
         return True

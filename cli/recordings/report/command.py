@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cli.recordings.info import open_recording
 from common.errors import RobotError
+from common.text import printable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +45,7 @@ def write_report(file: Path, out: Path) -> Path:
         timeline = timeline_of(reader)
         if timeline.began_ns is None:
             raise RobotError(f"{file}: contains no messages of the bus")
-        text = page(timeline, reader)
+        text = printable(page(timeline, reader), "\n")
     try:
         out.write_text(text, encoding="utf-8")
     except OSError as error:

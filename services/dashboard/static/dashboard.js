@@ -27,6 +27,7 @@ let fast = null; // the newest snapshots
 let fastAt = -Infinity;
 let aliveN = -2; // the snapshot that was last answered with a sign of life
 let slow = null;
+const EVENTS_MAX = 80;
 let events = [];
 let hello = null;
 let robot = null; // the selected one
@@ -118,7 +119,7 @@ const HANDLERS = {
     showRobots();
   },
   events(message) {
-    events = message.lines;
+    events = [...(message.all ? [] : events), ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
     panels.showEvents(events, t, language);
   },
   path: (message) => trail.begin(message.points),

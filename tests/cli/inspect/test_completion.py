@@ -50,8 +50,6 @@ def offered(shell_script: str, *words: str) -> set[str]:
         (("echo", "odometry", "--fi"), {"--field"}),
         (("call", "safety/r"), {"safety/reset", "safety/release"}),
         (("schema", "Odo"), {"Odometry"}),
-        (("topic", "li"), {"list"}),
-        (("topic", "echo", "tel/bridge/b"), {"tel/bridge/bumper"}),
         (("wire", "dec"), {"decode"}),
         (("echo", "--config", "pyproject.t"), {"pyproject.toml"}),
         (("wire", "decode", "pyproject.t"), {"pyproject.toml"}),

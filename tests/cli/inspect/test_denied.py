@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -15,9 +16,17 @@ from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.bus.session import client_config
 from common.loop import Loop
-from common.messages import Drive, ResetDone, ResetRequest
+from common.messages import (
+    Done,
+    Drive,
+    EstopKeepalive,
+    ReleaseRequest,
+    ResetDone,
+    ResetRequest,
+    SwitchesRequest,
+)
 from common.settings import BusSettings as Where
-from common.source import DriveSource
+from common.source import DriveSource, KeepalivePublisher
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site, connecting
@@ -33,10 +42,20 @@ class OnBoard:
         self.received: list[Arrival[Drive]] = []
         self.estops: list[int] = []
         bus.subscribe(keys.DRIVE, self.received.append, source="*")
-        for source in ("teleop", "web", "nav"):  # as safety does for each configured source
+        for source in (
+            "teleop",
+            "web",
+            "nav",
+            "pendant",
+        ):  # as safety does for each in its settings
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
+            bus.on_any(keys.ESTOP_KEEPALIVE.on(bus.robot, source=source), lambda _: None)
+        self.kept_alive: list[Arrival[EstopKeepalive]] = []
+        bus.subscribe(keys.ESTOP_KEEPALIVE, self.kept_alive.append, depth=16, source="*")
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
         bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="reset")))
+        bus.serve(keys.RELEASE, lambda _, caller: caller.reply(Done(text="release")))
+        bus.serve(keys.SET_SWITCHES, lambda _, caller: caller.refuse("switches"))
         bus.live(keys.live_key(bus.robot, "safety", "1"))
         self.state = bus.publisher(keys.SAFETY)
 
@@ -51,10 +70,14 @@ class Member:
 
     def reset(self) -> str:
         """Request a reset, and return the answer."""
+        return self.call(keys.RESET, ResetRequest())
+
+    def call(self, call: keys.Call[Any, Any], request: Any) -> str:
+        """Make a call, and return the text of the answer."""
         self.answers.clear()
         self.bus.call(
-            keys.RESET, ResetRequest(), lambda done: self.answers.append(done.text),
-            self.answers.append, timeout_s=1.0,
+            call, request, lambda done: self.answers.append(done.text), self.answers.append,
+            timeout_s=1.0,
         )  # fmt: skip
         return wait_until(lambda: self.answers, "an answer")[0]
 
@@ -207,6 +230,41 @@ def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
         assert not drives(anna, robot)
         assert stolen.source.denied
         assert anna.source.denied
+
+
+def test_a_programs_certificate_drives_and_stops_and_cannot_reset_or_keep_a_pendant_alive(
+    site: Site, join: Callable[..., Bus]
+) -> None:
+    names = ("pendant", "teleop", "nav")
+    made: list[KeepalivePublisher] = []
+
+    def declare(bus: Bus) -> None:
+        made.extend(KeepalivePublisher(bus, name) for name in names)
+
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        robot = on_board(join, onboard)
+        where = connecting(site.settings("driver", "planner"), secured)
+        planner = member(join, where, source="nav")
+        assert drives(planner, robot)
+        anna = member(join, connecting(site.settings("driver", "anna"), secured))
+        join(where, "001", declare)
+
+        def passed() -> bool:
+            for each in made:
+                each.beat()
+            return any(arrival.key.endswith("/nav") for arrival in robot.kept_alive)
+
+        wait_until(passed, "the planner's own name")
+        assert {arrival.key.rpartition("/")[2] for arrival in robot.kept_alive} == {"nav"}
+        for call, request, answer in (
+            (keys.RESET, ResetRequest(), "reset"),
+            (keys.RELEASE, ReleaseRequest(), "release"),
+            (keys.SET_SWITCHES, SwitchesRequest(), "switches"),
+        ):
+            assert anna.call(call, request) == answer
+            assert "does not answer" in planner.call(call, request)
+        planner.bus.estop()
+        wait_until(lambda: robot.estops, "the planner's stop")
 
 
 def test_members_reach_their_own_robots_through_the_sites_router(

@@ -13,8 +13,8 @@ def test_a_table_is_aligned_with_numbers_to_the_right() -> None:
 
 
 def test_control_characters_are_escaped() -> None:
-    assert output.table(["a"], [["\x1b[2Jgone\n"]]) == "a\n\\x1b[2Jgone\\n"
-    assert output.fields({"text": "急停\x07"}) == "text: 急停\\x07"
+    assert output.table(["a"], [["\x1b[2Jgone\n"]]) == "a\n\\u001b[2Jgone\\n"
+    assert output.fields({"text": "急停\x07"}) == "text: 急停\\u0007"
 
 
 def test_an_empty_table() -> None:

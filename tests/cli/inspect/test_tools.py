@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
+import msgspec
 import pytest
 from msgspec import structs
 
-from cli.inspect import measure, topic
+from cli.inspect import measure
 from cli.inspect.echo import clock
 from cli.inspect.payload import Reading
 from common import codec, keys
@@ -99,6 +101,19 @@ def test_echo_shows_invalid_messages(buses: BusFixture, tool: Tool) -> None:
     assert "DELETE" in shown
 
 
+def test_echo_escapes_control_characters(buses: BusFixture, tool: Tool) -> None:
+    hostile = "\x1b]0;title\x07\x1b[2J\x9b31m\u202e"
+    payload = msgspec.msgpack.encode({f"a{hostile}": {f"b{hostile}": hostile}})
+    put = partial(buses.session().put, f"t2/v1/{buses.robot}/tel/x{hostile[:4]}", payload)
+    buses.loop.post(lambda: buses.loop.every(0.1, lambda _: put()))
+    for form in ("--text", "--json", "-otable"):
+        shown = tool("echo", "tel/*", "--once", form).out
+        assert shown.replace("\n", "").isprintable(), shown
+        assert "\\u001b[2J\\u0" in shown
+    (line,) = tool("echo", "tel/*", "--once").lines
+    assert line["message"] == {f"a{hostile}": {f"b{hostile}": hostile}}
+
+
 def test_echo_shows_earlier_events(buses: BusFixture, tool: Tool) -> None:
     def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
@@ -143,7 +158,6 @@ def test_measured_fields(word: str, fields: set[str], bridge: Bus, tool: Tool) -
     assert line.keys() == fields | {"key"}
     assert line["key"] == "tel/bridge/bumper"
     assert all(line[name] is not None for name in fields)
-    assert "tel/bridge/bumper" in tool("topic", word, "bumper", "--count", "3", "--text").out
 
 
 def test_the_delay_is_by_the_host_s_own_clock_where_it_is_shared(bridge: Bus, tool: Tool) -> None:
@@ -173,7 +187,7 @@ def test_ls_names_type_rate_and_publisher(buses: BusFixture, bridge: Bus, tool: 
     assert row["publishers"] == ["bridge"]
     assert row["hz"] > 1
     assert (found["tel/bridge/velocity"]["hz"], found["tel/x"]["expected_hz"]) == (None, None)
-    shown = tool("list", "bumper", "--duration", "0.5", "--text").out.splitlines()
+    shown = tool("ls", "bumper", "--duration", "0.5", "--text").out.splitlines()
     assert shown[0].split() == ["key", "type", "Hz", "of", "publisher"]
     assert shown[1].split()[::4] == ["tel/bridge/bumper", "bridge"]
     every = tool("ls", "bumper", "--duration", "0.5", robot="*").lines
@@ -184,20 +198,6 @@ def test_ls_without_keys(tool: Tool) -> None:
     result = tool("ls", "--duration", "0.2")
     assert (result.code, result.out) == (1, "")
     assert "t2 doctor" in result.err
-
-
-def test_topic_info(bridge: Bus, buses: BusFixture, tool: Tool) -> None:
-    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
-    (row,) = tool("topic", "info", "/tel/bridge/bumper").lines
-    assert (row["type"], row["hz"], row["class"]) == ("Bumper", 50, "fast")
-    assert row["publishers"] == ["bridge"]
-    assert len(row["readers"]) == 1
-
-
-def test_topic_info_of_an_unknown_key(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic, "LISTEN_S", 0.1)
-    result = tool("topic", "info", "tel/none")
-    assert (result.code, result.lines[0]["publishers"]) == (1, [])
 
 
 # --- services, schema -------------------------------------------------------------------------

@@ -64,6 +64,20 @@ def test_a_driver_is_limited_to_its_sources() -> None:
         assert may(rights(bo, ROUTER), "write", keys.estop_key(MINE)), "a driver can stop"
 
 
+@pytest.mark.parametrize(
+    ("sources", "wanted"),
+    [(("nav",), False), (("nav", "ros2"), False), (("nav", "teleop"), True), (("web",), True),
+     (("checkout",), True), ((), True)],
+)  # fmt: skip
+def test_only_operators_sources_may_reset(sources: tuple[str, ...], wanted: bool) -> None:
+    given = rights(replace(member("driver", "bo", (MINE,)), sources=sources), ROUTER)
+    for call in keys.CALLS:
+        assert may(given, "ask", call.on(MINE)) is (wanted or call in (keys.SET_LED, keys.SET_POSE))
+    for source in sources:
+        assert may(given, "write", keys.ESTOP_KEEPALIVE.on(MINE, source=source))
+        assert not may(given, "write", keys.ESTOP_KEEPALIVE.on(MINE, source="pendant"))
+
+
 def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> None:
     given = rights(replace(member("device", "lidar", (MINE,)), sources=("lidar",)), ROUTER)
     assert given == ROLES["device lidar of 001"]

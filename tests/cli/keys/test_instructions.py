@@ -70,6 +70,7 @@ def test_a_drivers_sources() -> None:
         )
     )
     assert "  drives as nav; no other source is allowed" in printed
+    assert "  may not reset, release or set the brake switches: no operator's source" in printed
     printed = list(
         instructions.certificate_issued(
             ANNA, member("driver", "anna"), "other/driver.anna", [ROBOT]

@@ -37,6 +37,7 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, 
     certified = {
         "viewer": site.member("viewer", "hall"),
         "driver of 001": site.member("driver", "anna", "--robot", MINE),
+        "driver of 001 as nav": site.member("driver", "nav", "--robot", MINE, "--source", "nav"),
         "device lidar of 001": site.member("device", "lidar", "--robot", MINE),
         "fleet": site.member("fleet", "room"),
         "site's router": site.member("site", "berlin", "--address", "127.0.0.1"),

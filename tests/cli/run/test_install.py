@@ -45,6 +45,7 @@ def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFi
         f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"
         in (written[f"{UNITS}/t2-safety.service"])
     )
+    assert "AllowSuspend=no" in written["etc/systemd/sleep.conf.d/t2.conf"]
     assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
     message = capsys.readouterr().out
     assert "write   /etc/t2/t2.toml" in message

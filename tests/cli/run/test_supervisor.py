@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from cli.run import supervisor as module
-from cli.run.supervisor import Child, Supervisor
+from cli.run.supervisor import WATCHDOG_S, Child, Supervisor
 from common.child_process import BACKOFF_S
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from tests.cli.processes import alive, running, wait_gone
@@ -30,6 +30,7 @@ def supervised() -> Iterator[list[Supervisor]]:
             if child.process is not None:
                 child.process.kill()
                 child.process.wait()
+        supervisor.end()
 
 
 def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]:
@@ -88,6 +89,36 @@ def test_a_killed_process_is_restarted(supervised: list[Supervisor]) -> None:
     assert supervisor.look(1.0) == 0
     assert child.process is not None
     assert child.process.pid != first
+
+
+def test_a_safety_that_hangs_is_killed_and_restarted(
+    supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As systemd does by WatchdogSec; one that has never notified is left alone."""
+    monkeypatch.setenv("WATCHDOG_PID", "1")  # of a unit that runs the supervisor
+    notify = (
+        "import time; from common.systemd import Systemd\n"
+        "Systemd().beat(0); time.sleep(1000)"  # none, if it believes to be another process
+    )
+    supervisor = Supervisor([("safety", [sys.executable, "-c", notify]), ("odom", SLEEP)])
+    supervised.append(supervisor)
+    supervisor.look(0.0)
+    safety, odom = supervisor.children
+    pids = [child.process.pid for child in (safety, odom) if child.process]
+
+    def notified() -> bool:
+        supervisor.look(100.0)
+        return safety.beat_s == 100.0
+
+    wait_until(notified, "its notification")
+    supervisor.look(100.0 + WATCHDOG_S)
+    assert [c.process and c.process.pid for c in (safety, odom)] == pids
+    supervisor.look(100.1 + WATCHDOG_S)  # killed
+    supervisor.look(100.1 + WATCHDOG_S)  # started, at once the first time
+    assert safety.process is not None
+    assert (safety.process.pid != pids[0], safety.beat_s) == (True, None)
+    assert odom.process is not None
+    assert odom.process.pid == pids[1]
 
 
 def test_a_stopped_supervisor_starts_nothing(supervised: list[Supervisor]) -> None:

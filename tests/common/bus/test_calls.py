@@ -1,5 +1,7 @@
 """Calls over a real router: replies, refusals, and the words when nobody answers."""
 
+import time
+
 import msgpack
 import pytest
 import zenoh
@@ -12,6 +14,9 @@ from common.messages import Done, LedRequest, ReleaseRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
+
+FLOOD = 50  # queries
+ARRIVES_S = 0.5
 
 
 class Server:
@@ -88,6 +93,20 @@ def test_a_call_is_replied_to(client: Client) -> None:
     wait_until(lambda: client.answers, "an answer")
     assert client.replies == [Done(text="held")]
     assert client.refusals == []
+
+
+def test_a_flood_of_queries_is_answered_one_at_a_time(
+    buses: BusFixture, client: Client, server: Server
+) -> None:
+    """Those that waited too long are dropped, the newest are answered."""
+    server.asked.clear()
+    with buses.stalled():
+        for _ in range(FLOOD):
+            client.request()
+        time.sleep(ARRIVES_S)
+    wait_until(lambda: client.answers == FLOOD, "an end of each query")
+    assert 0 < len(client.replies) == len(server.asked) < FLOOD / 2
+    assert set(client.refusals) == {"safety does not answer; run `t2 doctor`"}
 
 
 def test_a_reply_may_come_later(client: Client, server: Server) -> None:

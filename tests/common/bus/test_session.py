@@ -12,11 +12,11 @@ from common import keys, settings
 from common.bus import session as session_module
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
-from common.bus.session import client_config, router
+from common.bus.session import CLIENT_MAX, ROUTER_MAX, client_config, router
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
-from verification.harness.bus import Lines, at, listening
+from verification.harness.bus import Lines, at, listening, router_process
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -167,3 +167,35 @@ def test_a_router_on_a_unix_socket(buses: BusFixture, tmp_path: Path) -> None:
         sender = buses.bus().publisher(keys.BUMPER)
         until_received(lambda: sender.put(Bumper(pressed=True)), lambda: received, "a bumper")
         receiver.close()
+
+
+def test_a_larger_message_is_dropped_and_its_link_stays() -> None:
+    endpoint = nowhere()
+    outside = {"mode": "client", "connect": {"endpoints": [endpoint]}}
+    outside |= {"scouting": {"multicast": {"enabled": False}}}
+    plain = zenoh.Config.from_json5(json.dumps(outside))
+    with (
+        router_process(endpoint) as process,
+        zenoh.open(client_config(at(endpoint))) as ours,
+        zenoh.open(plain) as sender,
+        zenoh.open(plain) as plain_reader,
+    ):
+        received: list[int] = []
+        forwarded: list[int] = []
+        kept = (
+            ours.declare_subscriber("x", lambda sample: received.append(len(sample.payload))),
+            plain_reader.declare_subscriber("x", lambda got: forwarded.append(len(got.payload))),
+        )
+        until_received(lambda: sender.put("x", b"1"), lambda: received and forwarded, "a sample")
+        links = sender.info.zid(), [str(zid) for zid in sender.info.routers_zid()]
+        block = zenoh.CongestionControl.BLOCK
+        sizes = (CLIENT_MAX - 1000, CLIENT_MAX + 1000, ROUTER_MAX - 1000, ROUTER_MAX + 1000, 10**8)
+        for size in (*sizes, 2):
+            sender.put("x", bytes(size), congestion_control=block)
+        wait_until(lambda: received[-1] == forwarded[-1] == 2, "the last one, on the same links")
+        assert [size for size in received if size > 1] == [sizes[0], 2]
+        assert [size for size in forwarded if size > 1] == [*sizes[:3], 2]
+        assert links == (sender.info.zid(), [str(zid) for zid in sender.info.routers_zid()])
+        status = Path(f"/proc/{process.pid}/status").read_text("utf-8")
+        assert int(status.partition("VmHWM:")[2].split()[0]) < 150_000  # kB
+        del kept

@@ -12,6 +12,7 @@ import msgspec
 import pytest
 
 from cli.run.supervisor import Supervisor
+from common import clock
 from common.errors import LinkError
 from common.freshness import NS_PER_S
 from common.motion import Command
@@ -64,14 +65,14 @@ class SoakFixture:
     def begin(self, fault: Fault) -> None:
         """Select this fault as the next one, and begin it."""
         self.runner._faults.next = lambda kills: fault  # type: ignore[method-assign]
-        self.runner.disturb(time.monotonic_ns() + round(FIRST_S * NS_PER_S), kills=True)
+        self.runner.disturb(clock.now_ns() + round(FIRST_S * NS_PER_S), kills=True)
 
     def finish(self) -> None:
-        self.runner.disturb(time.monotonic_ns() + NS_PER_S, kills=True)
+        self.runner.disturb(clock.now_ns() + NS_PER_S, kills=True)
 
     def runs(self) -> None:
         """Append a motion command to the trace of the board, dated now."""
-        line = t.Command(mono_ns=time.monotonic_ns(), kind=Command.RUN, linear=0.5, angular=0.0)
+        line = t.Command(mono_ns=clock.now_ns(), kind=Command.RUN, linear=0.5, angular=0.0)
         with self.trace.open("ab") as file:
             file.write(msgspec.json.encode(line) + b"\n")
 
@@ -88,7 +89,7 @@ def soak(tmp_path: Path) -> Iterator[SoakFixture]:
 
 
 def test_a_fault_is_done_and_undone(soak: SoakFixture) -> None:
-    soak.runner.disturb(time.monotonic_ns(), kills=True)
+    soak.runner.disturb(clock.now_ns(), kills=True)
     assert soak.record.faults == [], "not before its time"
     soak.begin(DRIVER_FAULT)
     assert soak.vehicle.done == [FAULT_BIT]

@@ -9,6 +9,7 @@ import time
 import msgpack
 import zenoh
 
+from common import clock
 from verification.outside.clients import ROOT, Map, header, session
 from verification.outside.testbed import Result, Testbed, scenario, seconds
 
@@ -30,7 +31,7 @@ def rogue(bed: Testbed, times: int, bus: "zenoh.Session | None" = None, **fields
     for number in range(times):
         judged = bed.observer.last("tel/bridge/bumper").get("seq", 0)
         message |= {"seq": message["seq"] + 1, "judged": judged}
-        message["t_ns"], message["mono_ns"] = time.time_ns(), time.monotonic_ns()
+        message["t_ns"], message["mono_ns"] = time.time_ns(), clock.now_ns()
         (bus or bed.bus).put(MOTION, msgpack.packb(message), encoding=ENCODING)
         if number < times - 1:
             time.sleep(0.02)
@@ -106,7 +107,7 @@ def forge(bed: Testbed, key: str, ended: threading.Event, fields: Map) -> None:
     seen = bed.observer.last(key)
     encoding = f"application/msgpack;t2.v1.{key.rpartition('/')[2].capitalize()}"
     for number in itertools.count(100_000):
-        message = {**seen, **fields, "seq": seen["seq"] + number, "mono_ns": time.monotonic_ns()}
+        message = {**seen, **fields, "seq": seen["seq"] + number, "mono_ns": clock.now_ns()}
         bed.bus.put(f"{ROOT}/{key}", msgpack.packb(message), encoding=encoding)
         if ended.wait(0.01):
             return

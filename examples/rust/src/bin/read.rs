@@ -15,6 +15,7 @@ struct Odometry {
 #[derive(Deserialize)]
 struct Ultrasonic {
     ranges: Vec<Option<f64>>, // m; None: no echo, too near, or a fault
+    status: Vec<String>,
 }
 
 fn main() -> Result<(), Failure> {
@@ -29,13 +30,25 @@ fn main() -> Result<(), Failure> {
             println!("no data for 0.5 s");
             continue;
         };
-        let nearest = sonars.ranges.iter().flatten().copied().reduce(f64::min);
         println!(
-            "x {:.2} m  y {:.2} m  heading {:.2} rad  nearest {}",
+            "x {:.2} m  y {:.2} m  heading {:.2} rad  nearest {:.2} m",
             pose.x,
             pose.y,
             pose.heading,
-            nearest.map_or("-".into(), |range| format!("{range:.2} m")),
+            nearest(&sonars),
         );
     }
+}
+
+/// Return the distance to the nearest obstacle; a sonar that cannot measure counts as 0.
+fn nearest(sonars: &Ultrasonic) -> f64 {
+    let measured = sonars.ranges.iter().zip(&sonars.status);
+    measured.fold(f64::INFINITY, |nearest, (range, status)| {
+        let unknown = if status == "no_echo" {
+            f64::INFINITY
+        } else {
+            0.0
+        };
+        nearest.min(range.unwrap_or(unknown))
+    })
 }

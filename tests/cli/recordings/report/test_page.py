@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
     for key, message, at_ns in drive():
         payload, encoding = codec.encode(message), codec.encoding(type(message))
         made.write(Sample(key, payload, encoding, False, None, at_ns, at_ns))
-    made.write(Sample(f"{ROOT}/001/tel/<i>", b"\xc1", "", False, None, BEGIN_NS, BEGIN_NS))
+    made.write(Sample(f"{ROOT}/001/tel/<i>\u202e", b"\xc1", "", False, None, BEGIN_NS, BEGIN_NS))
     made.close()
     return made.path
 
@@ -79,7 +79,8 @@ def test_content_from_the_bus_is_escaped(file: Path) -> None:
     text = file.with_suffix(".html").read_text()
     assert "The &lt;b&gt;bumper&lt;/b&gt; was hit." in text
     assert "<i>" not in text
-    assert "tel/&lt;i&gt;" in text
+    assert "tel/&lt;i&gt;\\u202e" in text
+    assert text.replace("\n", "").isprintable()
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
