@@ -36,7 +36,7 @@ CLONE_NEWNS, CLONE_NEWTIME, CLONE_NEWNET = 0x00020000, 0x00000080, 0x40000000  #
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PACKET_MAX = 2048
 IDLE_S = 0.1
-AHEAD_S = 86_400  # of the remote host's monotonic clock: it booted a day earlier
+AHEAD_S = 86_400  # of the remote host's clocks since boot: it booted a day earlier
 OFFSETS = Path("/proc/self/timens_offsets")
 
 
@@ -139,7 +139,7 @@ def _enter_namespaces() -> None:
         raise OSError(ctypes.get_errno(), "cannot create the remote host's namespaces")
     set_congestion_control()
     if timed:
-        OFFSETS.write_text(f"monotonic {AHEAD_S} 0\n")
+        OFFSETS.write_text(f"monotonic {AHEAD_S} 0\nboottime {AHEAD_S} 0\n")
     subprocess.run(["mount", "--make-rprivate", "/"], check=True)
     with tempfile.NamedTemporaryFile() as boot:
         Path(boot.name).write_text(f"{uuid.uuid4()}\n")
