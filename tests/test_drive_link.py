@@ -144,51 +144,6 @@ def test_a_copied_authority_moves_nothing(stack: RunningStack, observer: Observe
     assert stack.last() == "brake"
 
 
-@pytest.mark.campaign
-def test_a_number_far_ahead_does_not_lock_safety_out(
-    stack: RunningStack, observer: Observer
-) -> None:
-    armed(observer)
-    with rogue(stack) as put:
-        time.sleep(0.2)
-        put(keys.MOTION, copied(observer, LOCK_OUT))
-        time.sleep(0.5)
-    observer.linear = 0.3
-    wait_until(lambda: stack.speed() > 0.1, "the vehicle moves")
-    observer.bus.estop()
-    wait_until(lambda: stack.last() == "brake", "BRAKE at the board")
-
-
-@pytest.mark.campaign
-def test_copied_measurements_are_no_inputs_of_safety(
-    stack: RunningStack, observer: Observer
-) -> None:
-    armed(observer)
-    with rogue(stack) as put:
-        time.sleep(0.2)
-        for _ in range(50):
-            bumper = observer.newest["tel/bridge/bumper"]
-            put(keys.BUMPER, replace(bumper, seq=bumper.seq + AHEAD, pressed=True))
-            velocity = observer.newest["tel/bridge/velocity"]
-            put(keys.VELOCITY, replace(velocity, seq=velocity.seq + AHEAD, linear=3.0))
-            time.sleep(0.01)
-    assert observer.latched() == ()
-    armed(observer)
-
-
-@pytest.mark.campaign
-def test_an_observer_at_the_router_sees_each_motion_once(
-    stack: RunningStack, observer: Observer
-) -> None:
-    armed(observer)
-    observer.motions.clear()
-    time.sleep(LASTS_S)
-    seqs = [motion.seq for motion in observer.motions]
-    assert len(seqs) > LASTS_S * 40
-    assert seqs == sorted(set(seqs))
-    assert len(seqs) > 0.95 * (seqs[-1] - seqs[0])  # a busy machine may drop one
-
-
 def test_without_a_router_it_brakes_until_a_reset(stack: RunningStack, observer: Observer) -> None:
     armed(observer)
     observer.linear = 0.3

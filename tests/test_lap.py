@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 from cli.demo.driver import Driver
-from cli.demo.lap import PATIENT, QUICK, Pace, drive_lap
+from cli.demo.lap import QUICK, drive_lap
 from cli.demo.record import LapRecord
 from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
@@ -17,11 +17,11 @@ from tests.simulated_stack import SimulatedStack
 
 
 @cache
-def driven(pace: Pace) -> tuple[SimulatedStack, LapRecord]:
+def driven() -> tuple[SimulatedStack, LapRecord]:
     """Drive a lap; return the stack and the record after it."""
     stack, record = SimulatedStack(), LapRecord()
     with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
-        drive_lap(Driver(robot, record, threading.Event()), pace)
+        drive_lap(Driver(robot, record, threading.Event()), QUICK)
     record.finished = True
     record.odometry = [as_client(pose, Odometry) for pose in stack.odometry]
     return stack, record
@@ -35,9 +35,8 @@ def trace_of(stack: SimulatedStack) -> Trace:
     )
 
 
-@pytest.mark.parametrize("pace", [QUICK, pytest.param(PATIENT, marks=pytest.mark.campaign)])
-def test_the_lap_is_driven_as_it_should_be(pace: Pace) -> None:
-    stack, record = driven(pace)
+def test_the_lap_is_driven_as_it_should_be() -> None:
+    stack, record = driven()
     trace = trace_of(stack)
     rows = results(trace, record, fast=False)
     assert good(rows), rows
@@ -49,7 +48,7 @@ def test_the_lap_is_driven_as_it_should_be(pace: Pace) -> None:
 
 
 def test_safety_answers_as_the_steps_expect() -> None:
-    stack, record = driven(QUICK)
+    stack, record = driven()
     answers = [(kind, done) for kind, done, _ in stack.answers]
     first_reset = answers.index(("Reset", False))
     first_hold = answers.index(("Hold", True))
@@ -60,6 +59,6 @@ def test_safety_answers_as_the_steps_expect() -> None:
 
 
 def test_the_same_lap_twice_is_the_same() -> None:
-    first = driven(QUICK)[0].records
+    first = driven()[0].records
     driven.cache_clear()
-    assert driven(QUICK)[0].records == first
+    assert driven()[0].records == first

@@ -24,7 +24,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from services.dashboard.listener import RESERVE
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.dashboard import Client, Server, connected, dashboard
-from verification.harness.dashboard_abuse import FLOODS, flooded, half_open, is_closed
+from verification.harness.dashboard_abuse import half_open, is_closed
 from verification.harness.waiting import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst
@@ -67,21 +67,6 @@ def said(server: Server) -> None:
         it.send("estop")
 
 
-@pytest.mark.timed
-@pytest.mark.campaign
-@pytest.mark.parametrize("message", FLOODS.values(), ids=FLOODS)
-def test_a_flood_of_messages_does_not_delay_an_emergency_stop(
-    server: Server, peer: Peer, message: bytes
-) -> None:
-    with flooded(server, message):
-        time.sleep(1.0)
-        by_request = worst_s(peer, lambda: posted(server))
-        by_message = worst_s(peer, lambda: said(server))
-    report(f"E-STOP at worst: {by_request:.3f} s by request, {by_message:.3f} s by message")
-    assert by_request < ESTOP_S
-    assert by_message < ESTOP_S
-
-
 def test_requests_that_never_end_are_ended(endpoint: str, peer: Peer, tmp_path: Path) -> None:
     with dashboard(endpoint, tmp_path) as server:
         resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
@@ -102,7 +87,6 @@ def status_of(server: Server) -> int:
             return error.code
 
 
-@pytest.mark.campaign
 def test_beyond_the_limit_only_an_emergency_stop_is_served(
     endpoint: str, peer: Peer, tmp_path: Path
 ) -> None:

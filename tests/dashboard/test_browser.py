@@ -1,6 +1,6 @@
 """The page in a real browser, with the whole stack and the simulated vehicle."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page
@@ -58,7 +58,6 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     assert problems == []
 
 
-@pytest.mark.campaign
 def test_the_content_of_the_page(page: Page, stack: RunningStack) -> None:
     wait_for_text(page, "#verdict", "STOP")
     wait_for_text(page, "#sentence", "No source requests motion.")
@@ -116,22 +115,6 @@ def test_driving_by_keyboard_and_a_lost_focus(page: Page, stack: RunningStack) -
     page.keyboard.up("s")
 
 
-@pytest.mark.campaign
-def test_a_lost_key_up_releases(page: Page, stack: RunningStack) -> None:
-    take_control(page)
-    ways: tuple[Callable[[], None], ...] = (
-        lambda: page.keyboard.press("Meta"),
-        lambda: page.click("h2", button="right"),
-    )
-    for lose in ways:
-        drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
-        lose()
-        wait_for_text(page, "#hold", "Released")
-        wait_for_standstill(stack)
-        page.keyboard.press("Escape")
-        page.keyboard.up("w")
-
-
 PAD = """() => {
   const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
   window.pad = {
@@ -144,7 +127,6 @@ PAD = """() => {
 }"""
 
 
-@pytest.mark.campaign
 def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     def deadman(down: bool) -> None:
         page.evaluate("down => { window.pad.buttons[4].pressed = down; }", down)
@@ -177,7 +159,6 @@ def test_a_page_in_the_background_releases(page: Page, stack: RunningStack) -> N
     page.keyboard.up("w")
 
 
-@pytest.mark.campaign
 def test_driving_by_touch_and_a_stop_from_another_viewer(
     browser: Browser, page: Page, server: Server, stack: RunningStack
 ) -> None:
@@ -205,7 +186,6 @@ def test_driving_by_touch_and_a_stop_from_another_viewer(
     wait_for_text(page, "#driver", "No driver")
 
 
-@pytest.mark.campaign
 def test_a_second_finger_stops(browser: Browser, server: Server) -> None:
     context, phone, finger = phone_of(browser, server, "en-GB")
     take_control(phone)
@@ -220,15 +200,6 @@ def test_a_second_finger_stops(browser: Browser, server: Server) -> None:
     context.close()
 
 
-def test_one_tap_stops(page: Page, stack: RunningStack) -> None:
-    page.click("#estop")
-    wait_for_text(page, "#causes", "Emergency stop.")
-    wait_for_text(page, "#sentence", "Emergency stop.")
-    take_control(page)
-    reset_all(page)
-
-
-@pytest.mark.campaign
 def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: RunningStack) -> None:
     take_control(page)
     drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))

@@ -24,7 +24,7 @@ from verification.harness.dashboard_page import (
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
-pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
+pytestmark = BROWSER_MARKS
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import contextlib
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser
 
 from verification.harness.bus import router_process
@@ -12,7 +11,7 @@ from verification.harness.dashboard_page import BROWSER_MARKS, take_control, wai
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
-pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
+pytestmark = BROWSER_MARKS
 
 WHY = "No connection to the router"
 

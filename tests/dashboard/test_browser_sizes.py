@@ -19,7 +19,7 @@ from verification.harness.dashboard_page import (
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
-pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
+pytestmark = BROWSER_MARKS
 
 SCREENS = ((1440, 900), (1024, 700), (844, 390), (360, 640))
 NEEDED = ("#estop", "#verdict", "#sentence", "#speed", "#sonar-view", "#stick")

@@ -11,7 +11,6 @@ from playwright.sync_api import Browser, Page
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.dashboard import dashboard
 from verification.harness.dashboard_page import BROWSER_MARKS, take_control, wait_for_text
-from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 pytestmark = BROWSER_MARKS
@@ -74,18 +73,3 @@ def test_camera_map_and_recordings(page: Page, camera: str, tmp_path: Path) -> N
     page.screenshot(path=tmp_path / "slots.png", full_page=True)
     page.evaluate(f"document.querySelector('#camera img').src = '{camera}/none'")
     wait_for_text(page, "#camera", "The camera does not answer.")
-
-
-def test_slots_that_do_not_answer(
-    browser: Browser, endpoint: str, peer: Peer, tmp_path: Path
-) -> None:
-    sets = [f"dashboard.{slot}=http://127.0.0.1:{free_port()}/" for slot in ("camera", "embed")]
-    with dashboard(endpoint, tmp_path, *sets) as server:
-        page = browser.new_page(locale="en-GB")
-        page.goto(server.url)
-        wait_for_text(page, "#camera", "The camera does not answer.")
-        wait_for_text(page, "#embed", "The embedded page does not answer.")
-        assert page.is_hidden("#embed iframe")
-        page.click("#language")
-        wait_for_text(page, "#embed", "嵌入页面无响应")
-        page.close()

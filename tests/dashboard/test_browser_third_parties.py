@@ -19,14 +19,14 @@ from verification.harness.dashboard_page import (
 )
 from verification.harness.stack import RunningStack, running_stack
 
-pytestmark = [*BROWSER_MARKS, pytest.mark.campaign]
+pytestmark = BROWSER_MARKS
 
 SETS = ('safety.limits.lidar={lease=1.0, silence="ignore"}', 'safety.estop_keepalive=["web"]')
 
 
-@pytest.fixture
-def stack(tmp_path: Path) -> Iterator[RunningStack]:
-    with running_stack(tmp_path, sets=SETS) as it:
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("stack"), sets=SETS) as it:
         yield it
 
 

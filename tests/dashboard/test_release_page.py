@@ -64,7 +64,6 @@ def test_the_operator_chooses_the_direction(page: Page, calls: CallServers) -> N
     wait_until(lambda: not calls.releases[-1].held, "the end of them")
 
 
-@pytest.mark.campaign
 def test_a_forbidden_direction_is_released_and_disabled(page: Page, calls: CallServers) -> None:
     take_control(page)
     page.keyboard.down("b")
@@ -84,15 +83,6 @@ def test_a_forbidden_direction_is_released_and_disabled(page: Page, calls: CallS
     assert calls.releases == []
 
 
-@pytest.mark.campaign
-def test_a_watcher_cannot_release(page: Page, calls: CallServers) -> None:
-    page.keyboard.press("b")
-    wait_for_text(page, "#toasts", "Take control first.")
-    assert page.is_disabled("#release-backward")
-    assert calls.releases == []
-
-
-@pytest.mark.campaign
 def test_a_reset_answers_what_is_on_the_screen(page: Page, calls: CallServers) -> None:
     take_control(page)
     calls.boot += 1

@@ -69,7 +69,6 @@ def hold_a_hand(stack: RunningStack, it: OperatorProcess) -> None:
         stack.control.do(Sonar(name=name))  # type: ignore[arg-type]
 
 
-@pytest.mark.campaign
 def test_a_complete_checkout(stack: RunningStack, tmp_path: Path) -> None:
     report = tmp_path / "out" / "report.md"
     with checkout(report, *at(stack)) as it:
@@ -101,7 +100,6 @@ def test_a_complete_checkout(stack: RunningStack, tmp_path: Path) -> None:
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
 
 
-@pytest.mark.campaign
 def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
     stack: RunningStack, tmp_path: Path
 ) -> None:

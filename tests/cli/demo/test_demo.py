@@ -35,7 +35,6 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.timed
-@pytest.mark.campaign
 @pytest.mark.timeout(LAP_S + 40)
 def test_a_lap(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"
@@ -119,7 +118,6 @@ def test_ctrl_c_before_anything_runs(
 # --- failures --------------------------------------------------------------------------
 
 
-@pytest.mark.campaign
 def test_a_process_that_cannot_run_ends_it_and_names_the_log(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))

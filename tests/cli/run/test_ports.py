@@ -129,7 +129,6 @@ def test_a_failed_claim_releases_the_others() -> None:
 # --- a whole stack -------------------------------------------------------------------------------
 
 
-@pytest.mark.campaign
 def test_a_second_stack_starts_nothing(tmp_path: Path) -> None:
     log, words = tmp_path / "log", [*own_ports(), "log.format=json"]
     words = sets(*words, f"recorder.folder={tmp_path}")

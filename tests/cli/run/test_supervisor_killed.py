@@ -84,21 +84,13 @@ def kill_session(leader: int) -> None:
 
 WAYS: dict[str, Callable[[int], None]] = {
     "the supervisor": lambda pid: os.kill(pid, signal.SIGKILL),
-    "its group": lambda pid: os.killpg(pid, signal.SIGKILL),
     "its session": kill_session,
-    "the guard's session": lambda pid: kill_session(children(pid)["bridge"]),
 }
 
 
 @pytest.mark.timed
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
-@pytest.mark.parametrize(
-    "way",
-    [
-        "the supervisor",
-        *(pytest.param(way, marks=pytest.mark.campaign) for way in list(WAYS)[1:]),
-    ],
-)
+@pytest.mark.parametrize("way", WAYS)
 def test_no_run_after_a_kill_of(way: str, tmp_path: Path) -> None:
     with driven(tmp_path) as (pid, frames):
         frames.forget()

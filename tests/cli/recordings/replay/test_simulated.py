@@ -4,15 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from verification.harness.stack import running_stack
 from verification.harness.waiting import wait_until
 
 LAP = Path(__file__).parents[3] / "recorder" / "lap.mcap"
 MOVING_MPS = 0.1
-
-pytestmark = pytest.mark.campaign
 
 
 def test_a_simulated_vehicle_repeats_the_drive(tmp_path: Path) -> None:
