@@ -1,0 +1,128 @@
+"""Plain Zenoh clients, written from ``docs/bus.md`` alone: they import nothing of the project."""
+
+import itertools
+import json
+import random
+import threading
+import time
+from typing import Any
+
+import msgpack
+import zenoh
+
+ROOT = "t2/v1/001"
+STATE, LINK, HEALTH = "tel/safety/state", "tel/bridge/link", "tel/safety/health"
+ODOMETRY, BUMPER, MOTION = "tel/odom/odometry", "tel/bridge/bumper", "@cmd/motion"
+PERIOD_S = 0.05
+Map = dict[str, Any]
+
+
+def session(endpoint: str, mode: str = "client") -> "zenoh.Session":
+    """Open a session with the router."""
+    config = {
+        "mode": mode,
+        "connect": {"endpoints": [endpoint], "timeout_ms": 1500},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+    }
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+
+
+class Client:
+    """An operator's program: reads what the services publish, stops, calls."""
+
+    def __init__(self, bus: "zenoh.Session") -> None:
+        self.bus = bus
+        self.newest: dict[str, bytes] = {}  # by key
+        self._subscribers = [
+            bus.declare_subscriber(f"{ROOT}/{key}", self._on_sample)
+            for key in (STATE, LINK, HEALTH, ODOMETRY, BUMPER, MOTION)
+        ]
+
+    def _on_sample(self, sample: "zenoh.Sample") -> None:
+        key = str(sample.key_expr).removeprefix(f"{ROOT}/")
+        self.newest[key] = sample.payload.to_bytes()
+
+    def last(self, key: str) -> Map:
+        """Return the newest message of a key; empty before the first one."""
+        return dict(msgpack.unpackb(self.newest.get(key, b"\x80")))
+
+    @property
+    def state(self) -> Map:
+        """The newest state of safety."""
+        return self.last(STATE)
+
+    @property
+    def latched(self) -> list[str]:
+        """The causes that need a reset."""
+        return list(self.state.get("latched", ()))
+
+    def put(self, key: str, payload: bytes = b"") -> float:
+        """Publish on a key of the robot; return the time."""
+        self.bus.put(f"{ROOT}/{key}", payload)
+        return time.monotonic()
+
+    def call(self, name: str, request: Map) -> str:
+        """Make a call; return the refusal, empty when it was done."""
+        payload = msgpack.packb(request)
+        for reply in self.bus.get(f"{ROOT}/srv/{name}", payload=payload, timeout=2.0):
+            if reply.ok is not None:
+                return ""
+            if reply.err is not None:
+                return reply.err.payload.to_bytes().decode()
+        return "no answer"
+
+    def reset_request(self) -> Map:
+        """Return a reset of all that is latched now."""
+        state = self.state
+        causes = [one["id"] for one in state["causes"] if one["name"] in state["latched"]]
+        return {"echo": state["heartbeat"], "causes": causes}
+
+    def reset(self) -> bool:
+        """Reset until nothing is latched, as an operator who tries again."""
+        for _ in range(20):
+            if not self.latched:
+                return True
+            self.call("safety/reset", self.reset_request())
+            time.sleep(0.2)
+        return False
+
+
+class Source:
+    """A program that repeats a message with header and echo at 20 Hz, once it has content."""
+
+    def __init__(self, client: Client, key: str) -> None:
+        self.key = key
+        self._client = client
+        self._boot, self._seq = random.getrandbits(48), itertools.count(1)
+        self._content: Map | None = None
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the messages."""
+        self._ended.set()
+        self._thread.join()
+
+    def repeat(self, **content: object) -> None:
+        """Repeat a message with these fields from now on."""
+        self._content = content
+
+    def silence(self) -> float:
+        """End the messages; return the time."""
+        self._content = None
+        return time.monotonic()
+
+    def put(self, **content: object) -> bytes:
+        """Publish one message; the fields replace header and echo, too."""
+        echo = self._client.state.get("heartbeat", 0)
+        message = {"seq": next(self._seq), "boot": self._boot, "echo": echo, **content}
+        payload: bytes = msgpack.packb(message)
+        self._client.put(self.key, payload)
+        return payload
+
+    def _run(self) -> None:
+        while not self._ended.wait(PERIOD_S):
+            content = self._content
+            if content is not None:
+                self.put(**content)
