@@ -12,6 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
+from verification.faults import black_box
+from verification.faults.black_box_scenarios import SCENARIOS
 from verification.faults.catalogue import FAULTS, GROUPS
 from verification.faults.fault import Fault
 from verification.faults.namespaces import Requirement, enter, missing
@@ -45,8 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = _arguments()
     options = parser.parse_args(argv)
     faults = [f for f in FAULTS if not options.only or any(o in f.name for o in options.only)]
-    if not faults:
-        names = "\n  ".join(fault.name for fault in FAULTS)
+    scenarios = [s for s in SCENARIOS if not options.only or any(o in s.name for o in options.only)]
+    if not faults and not scenarios:
+        names = "\n  ".join([*(f.name for f in FAULTS), *(s.name for s in SCENARIOS)])
         parser.error(f"no fault is named {' or '.join(options.only)}; there are:\n  {names}")
     lacking = missing(enter())
     left_out = [
@@ -56,17 +59,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     started_s = time.monotonic()
     with StallRecorder() as stalls, tempfile.TemporaryDirectory() as folder:
         rows = campaign(faults, options.repeat, Path(folder), stalls)
+        outcomes = [(scenario, black_box.tried(scenario, stalls)) for scenario in scenarios]
     took_s = time.monotonic() - started_s
     text = report(rows, left_out, took_s)
-    print(text)
+    print(text + black_box.section(outcomes))
     if options.out:
         again = options.only and options.out.exists()
         old = options.out.read_text(encoding="utf-8") if again else ""
-        options.out.write_text(renewed(old, rows, today()) if old else text, encoding="utf-8")
-    for row in rows:
-        for fault in row.faults[:3]:
-            print(f"{row.name}: {fault}", file=sys.stderr)
-    return int(any(row.faults for row in rows))
+        old, heading, old_section = old.partition(black_box.HEADING)
+        page = renewed(old, rows, today()) if old and rows else old or text
+        page += black_box.section(outcomes, heading + old_section)
+        options.out.write_text(page, encoding="utf-8")
+    wrong = [(row.name, fault) for row in rows for fault in row.faults[:3]]
+    wrong += [(scenario.name, error) for scenario, error in outcomes if error]
+    for name, what in wrong:
+        print(f"{name}: {what}", file=sys.stderr)
+    return int(bool(wrong))
 
 
 def campaign(
