@@ -148,7 +148,6 @@ INTERFACES = (
         (
             "common/wire/",
             "tests/common/wire/",
-            "verification/outside/",
             "docs/adr/",
             "docs/checkout.md",
             "docs/safety.md",
