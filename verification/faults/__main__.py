@@ -62,13 +62,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         outcomes = [(scenario, black_box.tried(scenario, stalls)) for scenario in scenarios]
     took_s = time.monotonic() - started_s
     text = report(rows, left_out, took_s)
-    print(text + black_box.section(outcomes))
+    print(text + black_box.section(outcomes, today()))
     if options.out:
         again = options.only and options.out.exists()
         old = options.out.read_text(encoding="utf-8") if again else ""
         old, heading, old_section = old.partition(black_box.HEADING)
         page = renewed(old, rows, today()) if old and rows else old or text
-        page += black_box.section(outcomes, heading + old_section)
+        page += black_box.section(outcomes, today(), heading + old_section)
         options.out.write_text(page, encoding="utf-8")
     wrong = [(row.name, fault) for row in rows for fault in row.faults[:3]]
     wrong += [(scenario.name, error) for scenario, error in outcomes if error]

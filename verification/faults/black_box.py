@@ -28,7 +28,7 @@ An independent board and plain Zenoh clients, written from the manual and [bus.m
 import nothing of this project. Each row has its own stack with the shipped limits. BRAKE in time is
 BRAKE within 0.1 s.
 """
-HEAD = ["scenario", "given", "when", "then", ""]
+HEAD = ["scenario", "given", "when", "then", "on", ""]
 
 TRIES, STALL_S = 3, 0.06
 BRAKE_S = 0.1
@@ -184,11 +184,11 @@ def tried(one: Scenario, stalls: StallRecorder) -> str:
     return error
 
 
-def section(found: Sequence[tuple[Scenario, str]], old: str = "") -> str:
+def section(found: Sequence[tuple[Scenario, str]], date: str, old: str = "") -> str:
     """Return the part of the document; rows that did not run keep their old result."""
     rows = {line.split(" | ")[0]: line for line in old.splitlines() if line.startswith("| ")}
     new = table(HEAD, [
-        [one.name, one.given, one.when, one.then, "WRONG" if error else "ok"]
+        [one.name, one.given, one.when, one.then, date, "WRONG" if error else "ok"]
         for one, error in found
     ])  # fmt: skip
     rows |= {line.split(" | ")[0]: line for line in new.splitlines()}

@@ -113,6 +113,7 @@ def test_the_document_keeps_the_rows_that_did_not_run() -> None:
     def other_row(box: BlackBox) -> None: ...
 
     some, other = (Scenario("a", "b", "c", run, ()) for run in (some_row, other_row))
-    first = section([(some, ""), (other, "late")])
+    first = section([(some, ""), (other, "late")], "2026-01-01")
     assert first.startswith(HEADING)
-    assert section([(other, "")], first) == first.replace("WRONG", "ok")
+    renewed = first.replace("| 2026-01-01 | WRONG |", "| 2026-01-02 | ok |")
+    assert section([(other, "")], "2026-01-02", first) == renewed
