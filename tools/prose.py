@@ -140,7 +140,7 @@ INTERFACES = (
     ),
     Interface(
         "not heard",
-        ("verification/faults/catalogue.py", "tests/verification/faults/test_core.py"),
+        ("verification/faults/catalogue.py", "tests/verification/faults/test_campaign.py"),
         "name of a fault in docs/faults.md",
     ),
     Interface(

@@ -23,8 +23,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from services.dashboard.listener import RESERVE
 from tests.dashboard.bus_fixture import Peer
-from verification.harness.dashboard import Client, Server, connected, dashboard
-from verification.harness.dashboard_abuse import half_open, is_closed
+from verification.harness.dashboard import (
+    Client,
+    Server,
+    connected,
+    dashboard,
+    half_open,
+    is_closed,
+)
 from verification.harness.waiting import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst

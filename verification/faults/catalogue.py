@@ -1,63 +1,39 @@
 """The catalogue of faults, with the reaction that ``docs/safety.md`` allows for each."""
 
 import signal
-from collections.abc import Callable
-from typing import get_args
 
 from msgspec.structs import replace
 from zenoh import CongestionControl
 
 from common.motion import Command
-from sim.requests import (
-    Driver,
-    Firmware,
-    Flood,
-    Freeze,
-    Lose,
-    Mute,
-    PowerCycle,
-    Sonar,
-    SonarName,
-    Wire,
-)
-from verification.faults import browser, forgery, injectors, operator_faults, relay_faults
-from verification.faults.fault import (
-    BUMPER_AGE,
-    HEARTBEAT,
-    KEEPALIVE,
-    LIMIT_LEASE,
-    MOTION_LEASE,
-    REQUEST_LEASE,
-    SILENCE,
-    ULTRASONIC_AGE,
-    VELOCITY_AGE,
-    ZEROS,
-    Budget,
-    Fault,
-    Outcome,
-    by_limit,
-    within,
-)
-from verification.faults.injectors import do, kill, second
+from sim.requests import Driver, Firmware, Flood, Freeze, Lose, Mute, PowerCycle, Sonar, Wire
+from verification.faults import environment, injectors
+from verification.faults.fault import NOTICE_S, Budget, Fault, Outcome, by_limit, within
+from verification.faults.injectors import Injector, do, estop_by, hit, in_sequence, kill, second
 from verification.faults.namespaces import Requirement
-from verification.faults.stack_fixture import StackFixture
-from verification.faults.surroundings import (
-    cut_and_let_go,
-    empty_disk,
-    fill_disk,
-    network,
-    restore_clocks,
-    restore_network,
-    starve,
-    step_time_of_day,
-)
-
-HOLD_S, FREEZE_S, OFF_S = 0.6, 0.5, 0.3
+from verification.faults.stack_fixture import LIMIT_LEASE_S
+from verification.harness.dashboard import FLOODS, flooded, half_open
 
 ON: tuple[Outcome, ...] = ("drives on",)
 ITSELF: tuple[Outcome, ...] = ("by itself",)
 NEUTRAL: tuple[Outcome, ...] = ("after a neutral",)
 RESET: tuple[Outcome, ...] = ("after a reset",)
+
+MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
+HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
+SILENCE = by_limit(lambda config: config.bridge.silence)
+BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
+VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
+ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
+REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
+KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
+LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
+# Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
+ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
+# A key is held at most so long without a repeat; then its request has its lease.
+LAST_KEY = by_limit(
+    lambda config: config.teleop.hold_first + 0.15 + config.safety.sources["teleop"].lease
+)
 
 
 def signals(
@@ -70,50 +46,57 @@ def signals(
 ) -> list[Fault]:
     """Return SIGKILL, SIGSTOP and SIGTERM of a process; ``terminated`` is the budget of SIGTERM."""
     return [
-        Fault(f"{name} SIGKILL", kill(name, signal.SIGKILL), then, budget, hold_s=HOLD_S,
-              needs=needs),
+        Fault(f"{name} SIGKILL", kill(name), then, budget, needs=needs),
         Fault(f"{name} SIGSTOP", kill(name, signal.SIGSTOP), then, budget, injectors.go_on(name),
-              hold_s=HOLD_S, needs=needs),
+              needs=needs),
         Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, terminated or budget,
-              hold_s=HOLD_S, needs=needs),
+              needs=needs),
     ]  # fmt: skip
 
 
-def wire(**what: float) -> Callable[[StackFixture], int]:
+def wire(**faults: float) -> Injector:
     """Disturb the datagrams from the board."""
-    return do(replace(Wire(direction="to_pc"), **what))
+    return do(replace(Wire(direction="to_pc"), **faults))
 
-
-FORWARD: tuple[SonarName, ...] = ("front_left", "front", "front_right")
-ELSEWHERE = tuple(name for name in get_args(SonarName) if name not in FORWARD)
 
 MILLISECONDS = [
-    Fault("contact", injectors.hit(0.3), RESET, within(0.02)),
-    Fault("contact in one sample", injectors.hit(0.0), RESET, within(0.02)),
+    Fault("contact", hit(0.3), RESET, within(0.02)),
+    Fault("contact in one sample", hit(0.0), RESET, within(0.02)),
     Fault("estop", injectors.estop, RESET, within(0.02)),
-    Fault("estop by anybody's DELETE", injectors.estop_by(lambda session, key: session.delete(key)),
+    Fault("estop by anybody's DELETE", estop_by(lambda session, key: session.delete(key)),
           RESET, within(0.02)),
-    Fault("estop of all, garbage in it", injectors.estop_by(
+    Fault("estop of all, garbage in it", estop_by(
         lambda session, _: session.put("t2/v1/*/estop", b"\xc1", encoding="text/plain")),
           RESET, within(0.02)),
-    Fault("bridge SIGKILL", kill("bridge", signal.SIGKILL), NEUTRAL, within(0.01)),
+    Fault("bridge SIGKILL", kill("bridge"), NEUTRAL, within(0.01)),
     Fault("settings spoilt, bridge SIGKILL", injectors.spoil_config, NEUTRAL, within(0.01),
           injectors.restore_config),
 ]  # fmt: skip
 
+CLOCKS = [
+    *(
+        Fault(f"{whose}'s clock stepped by {hours:+d} h",
+              environment.step_time_of_day(whose, 3600 * hours), ON, None,
+              environment.restore_clocks, hold_s=1.5, needs="separate clocks")
+        for whose in environment.CLOCKS
+        for hours in (1, -1)
+    ),
+]  # fmt: skip
+
 PROCESSES = [
-    Fault("bridge SIGSTOP", kill("bridge", signal.SIGSTOP), NEUTRAL, HEARTBEAT, hold_s=HOLD_S),
-    Fault("bridge SIGTERM", kill("bridge", signal.SIGTERM), NEUTRAL, within(0.05), hold_s=HOLD_S),
-    Fault("guard SIGKILL", kill("guard", signal.SIGKILL), NEUTRAL, within(0.05), hold_s=HOLD_S),
+    Fault("bridge SIGSTOP", kill("bridge", signal.SIGSTOP), NEUTRAL, HEARTBEAT),
+    Fault("bridge SIGTERM", kill("bridge", signal.SIGTERM), NEUTRAL, within(0.05)),
+    Fault("guard SIGKILL", kill("guard"), NEUTRAL, within(0.05)),
     Fault("guard SIGSTOP", kill("guard", signal.SIGSTOP), ON, None, injectors.go_on("guard")),
-    Fault("guard SIGTERM", kill("guard", signal.SIGTERM), NEUTRAL, within(0.05), hold_s=HOLD_S),
+    Fault("guard SIGTERM", kill("guard", signal.SIGTERM), NEUTRAL, within(0.05)),
     # A safety that was stopped could not receive an emergency stop; its latches outlive it.
     *signals("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
     # Without the bus safety cannot receive an emergency stop: it latches that.
     *signals("router", (*NEUTRAL, *RESET), MOTION_LEASE),
-    Fault("router gone for 5 s", kill("router", signal.SIGKILL), RESET, MOTION_LEASE, hold_s=5.0),
+    Fault("router gone for 5 s", kill("router"), RESET, MOTION_LEASE, hold_s=5.0,
+          stops=("brake",)),
     # With Zenoh's default congestion control (drop) the sender drops a message of this size.
-    Fault("estop with 1 MB in it", injectors.estop_by(
+    Fault("estop with 1 MB in it", estop_by(
         lambda session, key: session.put(
             key, b"x" * 1_000_000, congestion_control=CongestionControl.BLOCK)),
           RESET, within(0.1)),
@@ -121,37 +104,52 @@ PROCESSES = [
     *signals("driver", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
     # The real teleop in a terminal with W held; ``driver`` above only sends its requests.
     *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, terminated=ZEROS, needs="teleop"),
+    # Late keys move nothing: the hold of the last key in time ends, also when it is a first press.
+    *(
+        Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
+              injectors.stall_terminal(seconds), NEUTRAL,
+              LAST_KEY,
+              hold_s=seconds + 1.0, needs="teleop")
+        for seconds in (0.8, 3.0)
+    ),
     *signals("odom", ON, None),
     # Its silence stops the vehicle, by the settings of this stack.
-    Fault("limit source SIGKILL, silence = stop", kill("limiter", signal.SIGKILL), NEUTRAL,
-          LIMIT_LEASE, needs="third parties"),
-    Fault("pendant SIGKILL", kill("pendant", signal.SIGKILL), RESET, KEEPALIVE, hold_s=1.5,
+    Fault("limit source SIGKILL, silence = stop", kill("limiter"), NEUTRAL, LIMIT_LEASE,
           needs="third parties"),
-    Fault("a second bridge", second("bridge"), ON, None, injectors.end_others, hold_s=HOLD_S),
+    Fault("pendant SIGKILL", kill("pendant"), RESET, KEEPALIVE, hold_s=1.5,
+          needs="third parties"),
+    Fault("a second bridge", second("bridge"), ON, None, injectors.end_others),
     # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect.
-    Fault("a second safety", second("safety"), (*ON, *ITSELF), None,
-          injectors.end_others, hold_s=1.5),
+    Fault("a second safety", second("safety"), (*ON, *ITSELF), None, injectors.end_others,
+          hold_s=1.5),
     Fault("a second driver of one name", injectors.second_driver, (*ON, *ITSELF), None,
           injectors.end_others, hold_s=1.5),
     # Log lines that cannot be written are lost; no service waits for the disk.
-    Fault("disk full, then contact", fill_disk, RESET, within(0.05), empty_disk, harmless=True,
-          needs="small disk"),
+    Fault("disk full, then contact", environment.fill_disk, RESET, within(0.05),
+          environment.empty_disk, harmless=True, needs="small disk"),
+    # Delayed calls have no effect: no frame moves the vehicle, and the latch stays.
+    Fault("contact, then 20 resets 1.3 s late", injectors.late_resets, RESET, within(0.02)),
+    Fault("contact, then 20 releases 1.3 s late", injectors.late_releases, RESET, within(0.02)),
 ]  # fmt: skip
 
 NETWORK = [
-    Fault("driver's network cut for 3 s", network(Wire(drop=1.0)), (*ITSELF, *NEUTRAL),
-          REQUEST_LEASE, restore_network, hold_s=3.0, needs="remote driver"),
+    Fault("driver's network cut for 3 s", environment.network(Wire(drop=1.0)),
+          (*ITSELF, *NEUTRAL), REQUEST_LEASE, environment.restore_network, hold_s=3.0,
+          needs="remote driver"),
     # The stick was released meanwhile: no earlier request may move the vehicle any more.
     *(
-        Fault(f"driver's network cut for {seconds:g} s, then the burst", cut_and_let_go(seconds),
-              NEUTRAL, REQUEST_LEASE, restore_network, hold_s=seconds + 1.0, needs="remote driver")
+        Fault(f"driver's network cut for {seconds:g} s, then the burst",
+              environment.cut_and_let_go(seconds), NEUTRAL, REQUEST_LEASE,
+              environment.restore_network, hold_s=seconds + 1.0, needs="remote driver")
         for seconds in (0.8, 3.0)
     ),
-    Fault("all from the driver 1 s late", network(Wire(direction="to_pc", delay=1.0)),
-          (*ITSELF, *NEUTRAL), REQUEST_LEASE, restore_network, hold_s=2.0, needs="remote driver"),
+    Fault("all from the driver 1 s late", environment.network(Wire(direction="to_pc", delay=1.0)),
+          (*ITSELF, *NEUTRAL), REQUEST_LEASE, environment.restore_network, hold_s=2.0,
+          needs="remote driver"),
     *(
-        Fault(f"driver's network: {what}", network(faults), (*ON, *ITSELF, *NEUTRAL), None,
-              restore_network, hold_s=1.5, needs="remote driver")
+        Fault(f"driver's network: {what}", environment.network(faults),
+              (*ON, *ITSELF, *NEUTRAL), None, environment.restore_network, hold_s=1.5,
+              needs="remote driver")
         for what, faults in {
             "1 % lost": Wire(drop=0.01),
             "10 % lost": Wire(drop=0.1),
@@ -162,20 +160,14 @@ NETWORK = [
     ),
 ]  # fmt: skip
 
-# A step of 0 h is the control: a separate clock alone changes nothing.
-CLOCKS = [
-    Fault(f"{whose}'s clock stepped by {hours:+d} h", step_time_of_day(whose, 3600 * hours), ON,
-          None, restore_clocks, hold_s=1.5, needs="separate clocks")
-    for whose in ("robot", "driver")
-    for hours in (0, 1, -1)
-]  # fmt: skip
-
 BOARD = [
     # A frozen board reads its queue when it continues; the newest command in it is STOP.
-    Fault("board freeze of 0.5 s", do(Freeze(seconds=FREEZE_S)), NEUTRAL, within(FREEZE_S + 0.05),
-          hold_s=HOLD_S),
-    Fault("board restart in 0.3 s", do(PowerCycle(seconds=OFF_S)), (*NEUTRAL, *RESET),
-          within(OFF_S + 0.1), hold_s=HOLD_S),
+    Fault("board freeze of 0.5 s", do(Freeze(seconds=0.5)), NEUTRAL, within(0.55)),
+    *(
+        Fault(f"board restart in {seconds:g} s", do(PowerCycle(seconds=seconds)),
+              (*NEUTRAL, *RESET), within(seconds + 0.1))
+        for seconds in (0.3, 0.12)
+    ),
     Fault("board not heard", wire(drop=1.0), NEUTRAL, SILENCE),
     Fault("board answers 0.5 s late", wire(delay=0.5), NEUTRAL, SILENCE, hold_s=1.0),
     Fault("board's datagrams from elsewhere", wire(foreign=1.0), NEUTRAL, SILENCE),
@@ -185,109 +177,105 @@ BOARD = [
           (*ON, *ITSELF, *NEUTRAL), None),
     Fault("left driver fault", do(Driver(side="left", bits=1)), RESET, within(0.1)),
     Fault("right driver fault", do(Driver(side="right", bits=1 << 3)), RESET, within(0.1)),
-    *(
-        Fault(f"{name} sonar faulty", do(Sonar(name=name, fault=True)), ITSELF, within(0.15),
-              injectors.restore_sonar(name))
-        for name in FORWARD
-    ),
+    # The sonars of the direction of travel stop the vehicle; the others do not.
+    Fault("front sonar faulty", do(Sonar(name="front", fault=True)), ITSELF, within(0.15)),
+    Fault("rear sonar faulty", do(Sonar(name="rear", fault=True)), ON, None, hold_s=0.8),
     # Suspect after 0.5 m without a change: the speed limit drops.
-    *(
-        Fault(f"{name} sonar stuck", do(Sonar(name=name, range=3.0)), ON, None,
-              injectors.restore_sonar(name), hold_s=1.3)
-        for name in FORWARD
-    ),
-    *(
-        Fault(f"{name} sonar {what}", do(sonar), ON, None, injectors.restore_sonar(name),
-              hold_s=0.8)
-        for name in ELSEWHERE
-        for what, sonar in {
-            "faulty": Sonar(name=name, fault=True), "stuck": Sonar(name=name, range=3.0),
-        }.items()
-    ),
+    Fault("front sonar stuck", do(Sonar(name="front", range=3.0)), ON, None, hold_s=1.3),
+    Fault("rear sonar stuck", do(Sonar(name="rear", range=3.0)), ON, None, hold_s=0.8),
     # One frame reports all eight.
     Fault("sonars silent", do(Mute(reports=("ultrasonic",))), ITSELF, ULTRASONIC_AGE),
     Fault("bumper silent", do(Mute(reports=("bumper",))), NEUTRAL, BUMPER_AGE),
     Fault("velocity silent", do(Mute(reports=("velocity",))), NEUTRAL, VELOCITY_AGE),
     # The vehicle drives further than the largest accepted step of the counters.
     Fault("mileage silent for 4 s", injectors.silent("mileage", 4.0), ON, None, hold_s=4.8),
-]  # fmt: skip
-
-# Other firmware behaviour.
-FIRMWARE = [
+    # Other firmware behaviour.
     Fault("contact while every third answer is lost",
-          injectors.in_sequence(do(Lose(reports=("bumper",))), injectors.hit(0.06)), RESET,
-          within(0.02)),
+          in_sequence(do(Lose(reports=("bumper",))), hit(0.06)), RESET, within(0.02)),
     Fault("contact reported on the other port",
-          injectors.in_sequence(do(Firmware(hits="second")), injectors.hit(0.3)), RESET,
-          within(0.02)),
+          in_sequence(do(Firmware(hits="second")), hit(0.3)), RESET, within(0.02)),
     # The bridge changes to the other port after 0.1 s without an answer.
     Fault("board answers on the other port", do(Firmware(answers="second")),
           (*ON, *ITSELF, *NEUTRAL), None),
-    Fault("board restart in 0.12 s", do(PowerCycle(seconds=0.12)), (*NEUTRAL, *RESET),
-          within(0.12 + 0.1), hold_s=HOLD_S),
     # While safety is dead only the bridge detects that STOP has no effect.
     Fault("safety SIGKILL, the board ignores STOP",
-          injectors.in_sequence(
-              do(Firmware(ignores=(Command.STOP,))), kill("safety", signal.SIGKILL)),
+          in_sequence(do(Firmware(ignores=(Command.STOP,))), kill("safety")),
           (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
           hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 
 GREEDY = [
-    Fault("bridge out of memory", starve("bridge"), NEUTRAL, within(0.01), hold_s=1.0,
-          needs="memory cgroup"),
-    *(
-        Fault(f"{name} out of memory", starve(name), then, budget, hold_s=HOLD_S,
-              needs="memory cgroup")
-        for name, then, budget in (
-            ("guard", NEUTRAL, within(0.05)),
-            ("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
-            ("router", (*NEUTRAL, *RESET), MOTION_LEASE),
-            ("driver", NEUTRAL, REQUEST_LEASE),
-            ("odom", ON, None),
-        )
-    ),
-    Fault("a stranger\'s 20 000 datagrams/s", injectors.flood, ON, None,
-          injectors.end_others, hold_s=1.0),
+    Fault("a stranger's 20 000 datagrams/s", injectors.flood, ON, None, injectors.end_others,
+          hold_s=1.0),
     Fault("board's 20 000 datagrams/s of garbage", do(Flood(seconds=0.9, garbage=True)),
           (*ON, *NEUTRAL), None, hold_s=1.0, harmless=True),
     # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), None, hold_s=1.0, harmless=True),
-]  # fmt: skip
-
-HOSTILE = [
-    Fault(f"{what} on every key", publish, (*ON, *ITSELF, *NEUTRAL, *RESET), None, harmless=True)
-    for what, publish in injectors.HOSTILE.items()
-]  # fmt: skip
-
-DASHBOARD = [
     Fault("browser's estop while a viewer sends 50 000 messages/s",
-          browser.estop_while(browser.flood), RESET, within(0.3)),
+          injectors.browser_estop(lambda server: flooded(server, FLOODS["look"])), RESET,
+          within(0.3)),
     Fault("browser's estop while 500 requests do not end",
-          browser.estop_while(browser.unfinished), RESET, within(0.3)),
+          injectors.browser_estop(lambda server: half_open(server, 500)), RESET, within(0.3)),
 ]  # fmt: skip
 
-DRIVE_LINK = [
-    Fault("safety hangs, then contact", forgery.hit_while_safety_hangs, RESET, within(0.02),
-          injectors.go_on("safety")),
-    Fault("safety hangs for 2 s, then estop", forgery.estop_while_safety_hangs, RESET,
-          within(0.02), injectors.go_on("safety"), stops=("brake",)),
+BUS = [
     *(
-        Fault(what, forgery.forged(forge), ON, None, harmless=True)
+        Fault(f"{what} on every key", publish, (*ON, *ITSELF, *NEUTRAL, *RESET), None,
+              harmless=True)
+        for what, publish in injectors.HOSTILE.items()
+    ),
+    Fault("safety hangs, then contact", injectors.hung("safety", injectors.HUNG_S, hit(0.3)),
+          RESET, within(0.02), injectors.go_on("safety")),
+    Fault("safety hangs for 2 s, then estop",
+          injectors.hung("safety", injectors.LOST_S, injectors.estop), RESET, within(0.02),
+          injectors.go_on("safety"), stops=("brake",)),
+    *(
+        Fault(what, injectors.forged(forge), ON, None, harmless=True)
         for what, forge in {
-            "safety's authority copied": forgery.authority,
-            "safety's number overtaken": forgery.lock_out,
-            "bridge's measurements copied": forgery.measurements,
+            "safety's authority copied": injectors.authority,
+            "safety's number overtaken": injectors.lock_out,
+            "bridge's measurements copied": injectors.measurements,
         }.items()
     ),
 ]  # fmt: skip
 
-# Groups that run in parallel, the most sensitive to host load first.
-GROUPS = [
-    [*MILLISECONDS, *CLOCKS],
-    [*GREEDY, *DASHBOARD],
-    [*PROCESSES, *NETWORK, *BOARD, *FIRMWARE, *HOSTILE, *operator_faults.TERMINAL, *DRIVE_LINK,
-     *operator_faults.CALLS, *relay_faults.RELAY],
+# The driver is a client of the site's router, to which the robot's router connects.
+SITE = [
+    *signals("site router", (*NEUTRAL, *ITSELF), REQUEST_LEASE, needs="site"),
+    Fault("site: estop of all", estop_by(lambda session, _: session.put("t2/v1/*/estop", b"")),
+          RESET, within(0.05), needs="site"),
+    Fault("site: flood of another robot", injectors.flood_of_another_robot, ON, None, hold_s=1.5,
+          harmless=True, needs="site"),
 ]  # fmt: skip
+
+RELAY_LEASE = within(0.2 + 0.05)
+RELAY = [
+    Fault("relay: everything on the PC killed", environment.kill_pc, (*NEUTRAL, *RESET),
+          RELAY_LEASE, needs="relay"),
+    Fault("relay: everything on the PC stopped", environment.stop_pc, (*NEUTRAL, *RESET),
+          RELAY_LEASE, environment.continue_pc, needs="relay"),
+    Fault("relay: everything on the PC killed in a flood of the board",
+          in_sequence(do(Flood(seconds=0.9)), environment.kill_pc), (*NEUTRAL, *RESET),
+          RELAY_LEASE, hold_s=1.0, needs="relay"),
+    Fault("relay: the PC's cable cut for 0.5 s", environment.cut_cable("pc", 0.5),
+          (*NEUTRAL, *RESET), RELAY_LEASE, hold_s=1.0, needs="relay"),
+    # Here the board holds the last RUN until its cable, or the relay, is back: 0.2 s until the
+    # address is resolved, 0.5 s until the program has started.
+    Fault("relay: the board's cable cut for 0.5 s", environment.cut_cable("board", 0.5),
+          (*NEUTRAL, *RESET), within(0.5 + 0.2), hold_s=1.0, needs="relay"),
+    Fault("relay SIGKILL, started again after 0.3 s", environment.restart_relay(0.3),
+          (*NEUTRAL, *RESET), within(0.3 + 0.5), hold_s=1.2, needs="relay"),
+    # The relay's own BRAKE, and one of the bridge that crosses it.
+    Fault("relay: contact", hit(0.3), RESET, within(0.02), needs="relay"),
+    Fault("relay: estop", injectors.estop, RESET, within(0.02), needs="relay"),
+    Fault("relay: bridge SIGKILL", kill("bridge"), NEUTRAL, within(0.01), needs="relay"),
+]  # fmt: skip
+
+# Groups in sequence, the most sensitive to host load first.
+GROUPS = (
+    [*MILLISECONDS, *CLOCKS],
+    GREEDY,
+    [*PROCESSES, *NETWORK, *BOARD, *BUS, *SITE, *RELAY],
+)
 FAULTS = [fault for group in GROUPS for fault in group]

@@ -11,7 +11,6 @@ from typing import Literal
 from cli.settings import Everything
 from verification.faults.namespaces import Requirement
 from verification.faults.stack_fixture import StackFixture
-from verification.faults.third_party import LIMIT_LEASE_S
 
 # How the vehicle drives again, by rising effort.
 Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
@@ -25,11 +24,12 @@ class Fault:
     """One kind of fault."""
 
     name: str
-    inject: Callable[[StackFixture], int]  # returns its time, in ns of the monotonic clock
+    # Returns the time of the fault, in ns of the monotonic clock; None: the time of the call.
+    inject: Callable[[StackFixture], int | None]
     outcome: tuple[Outcome, ...]  # allowed by docs/safety.md
     budget: Budget | None = None  # None where the vehicle may drive on
     restore: Callable[[StackFixture], None] = lambda fixture: fixture.restore()
-    hold_s: float = 0.5  # how long requests go on after the fault
+    hold_s: float = 0.6  # how long requests go on after the fault
     harmless: bool = False  # no process may end because of it
     needs: Requirement = "none"
     stops: tuple[str, ...] = ("stop", "brake")  # commands that count as a reaction
@@ -43,16 +43,3 @@ def by_limit(limit: Callable[[Everything], float]) -> Budget:
 def within(seconds: float) -> Budget:
     """Return a fixed budget."""
     return lambda _: seconds
-
-
-MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
-HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
-SILENCE = by_limit(lambda config: config.bridge.silence)
-BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
-VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
-ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
-REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
-LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
-KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
-# Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
-ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)

@@ -1,35 +1,53 @@
-"""Fault injectors: processes, the simulated board, the bus."""
+"""Fault injectors for processes, the simulated board, the operator's calls and the bus.
 
+An injector returns the time of the fault when that is not the time of its call.
+"""
+
+import contextlib
 import os
 import select
 import signal
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any
 
 import msgpack
 import msgspec
 import zenoh
+from msgspec.structs import replace
 
-from common import clock, keys
+from common import clock, codec, keys
 from common.bus.session import client_config
 from common.freshness import NS_PER_S
+from common.messages import Bumper as BumperSample
+from common.messages import Motion, Velocity
+from common.motion import Command
 from common.operator import release_request, reset_request
-from sim.requests import Asked, Bumper, Mute, ReportName, Sonar, SonarName
-from verification.faults.stack_fixture import StackFixture
+from sim.requests import Asked, Bumper, Mute, ReportName
+from verification.faults.stack_fixture import PROGRAMS, StackFixture, operators_endpoint
 from verification.harness.bus import at
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.process_stats import children
 from verification.harness.stack import SETTINGS_FILE
 from verification.harness.waiting import becomes_true, wait_until
 
+Injector = Callable[[StackFixture], int | None]
+
 LATE_S = 1.3  # a reset may be 1.0 s old, a held release 0.4 s
 DEATH_S = 1.0  # longer than a kernel needs to end a process
+HUNG_S = 0.05  # the vehicle still moves: the lease is 0.2 s
+LOST_S = 2.0  # twice the lease of a session
+FORGED_S = 0.6
+AHEAD = 1000
+BACKWARD_MPS = -0.5  # no driver of the campaign requests it
+SETTLE_S = 1.0  # until an abuse takes effect
 
 
-def child(pid: int) -> int:
-    """Wait for a child of a process and return it."""
-    return wait_until(lambda: children(pid), f"a child of {pid}", 5.0)[0]
+# --- processes ------------------------------------------------------------------------------------
 
 
 def pid_of(fixture: StackFixture, name: str) -> int:
@@ -37,12 +55,14 @@ def pid_of(fixture: StackFixture, name: str) -> int:
 
     ``guard`` is the parent of the bridge; ``teleop`` is a child of the driver process.
     """
+    parents = {"bridge": "bridge", "guard": "bridge", "teleop": "driver"}
+    pid = fixture.running.processes[parents.get(name, name)].pid
     if name in ("bridge", "teleop"):
-        return child(fixture.running.processes["bridge" if name == "bridge" else "driver"].pid)
-    return fixture.running.processes["bridge" if name == "guard" else name].pid
+        return wait_until(lambda: children(pid), f"a child of {pid}", 5.0)[0]
+    return pid
 
 
-def kill(name: str, number: signal.Signals) -> Callable[[StackFixture], int]:
+def kill(name: str, number: signal.Signals = signal.SIGKILL) -> Injector:
     """Send a signal to a process of the stack; measure how long the kernel takes to end it.
 
     The kernel frees the memory before it closes the pipes, by which other processes notice.
@@ -66,35 +86,89 @@ def go_on(name: str) -> Callable[[StackFixture], None]:
     return lambda fixture: os.kill(pid_of(fixture, name), signal.SIGCONT)
 
 
-def do(*requests: Asked) -> Callable[[StackFixture], int]:
+def hung(name: str, seconds: float, inject: Injector) -> Injector:
+    """Stop a process, and inject another fault after some time."""
+
+    def inject_both(fixture: StackFixture) -> int | None:
+        os.kill(pid_of(fixture, name), signal.SIGSTOP)
+        time.sleep(seconds)
+        return inject(fixture)
+
+    return inject_both
+
+
+def second(name: str) -> Injector:
+    """Start a second instance of a process of the stack."""
+    return lambda fixture: _start(fixture, fixture.running.commands[name])
+
+
+def second_driver(fixture: StackFixture) -> None:
+    """Start a second driver under the same source name."""
+    endpoint = fixture.running.endpoint
+    _start(fixture, [sys.executable, "-m", PROGRAMS, endpoint, "driver"], b"0.8\n")
+
+
+def flood(fixture: StackFixture) -> None:
+    """Send 20 000 datagrams a second to the bridge's first port, from a foreign address."""
+    address = f"127.0.0.1:{fixture.running.config.board.listen_ports[0]}"
+    _start(fixture, [sys.executable, "-m", PROGRAMS, address, "flood"])
+
+
+def _start(fixture: StackFixture, command: list[str], line: bytes = b"") -> None:
+    with fixture.running.log.open("ab") as log:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log)
+    fixture.running.others.append(process)
+    assert process.stdin is not None
+    process.stdin.write(line)
+    process.stdin.flush()
+
+
+def end_others(fixture: StackFixture) -> None:
+    """End the processes that were started beside the stack."""
+    while fixture.running.others:
+        process = fixture.running.others.pop()
+        process.terminate()
+        process.communicate(timeout=20)
+
+
+def spoil_config(fixture: StackFixture) -> int | None:
+    """Write an invalid settings file, and kill the bridge."""
+    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'endless'\n")
+    return kill("bridge")(fixture)
+
+
+def restore_config(fixture: StackFixture) -> None:
+    """Restore the settings file."""
+    becomes_true(lambda: fixture.running.processes["bridge"].poll() is not None, 10.0)
+    (fixture.folder / SETTINGS_FILE).write_text("")
+    fixture.restore()
+
+
+# --- the simulated board --------------------------------------------------------------------------
+
+
+def do(*requests: Asked) -> Injector:
     """Send requests to the simulated vehicle."""
 
-    def inject(fixture: StackFixture) -> int:
-        at_ns = clock.now_ns()
+    def inject(fixture: StackFixture) -> None:
         for request in requests:
             fixture.running.control.do(request)
-        return at_ns
 
     return inject
 
 
-def in_sequence(*injectors: Callable[[StackFixture], int]) -> Callable[[StackFixture], int]:
+def in_sequence(*injectors: Injector) -> Injector:
     """Inject several faults in sequence; the time of the last one counts."""
-
-    def inject(fixture: StackFixture) -> int:
-        return [inject(fixture) for inject in injectors][-1]
-
-    return inject
+    return lambda fixture: [inject(fixture) for inject in injectors][-1]
 
 
-def silent(report: ReportName, seconds: float) -> Callable[[StackFixture], int]:
+def silent(report: ReportName, seconds: float) -> Injector:
     """Suppress a report of the board for some time, then restore it."""
 
-    def inject(fixture: StackFixture) -> int:
-        at_ns = do(Mute(reports=(report,)))(fixture)
+    def inject(fixture: StackFixture) -> None:
+        fixture.running.control.do(Mute(reports=(report,)))
         time.sleep(seconds)
         fixture.running.control.do(Mute())
-        return at_ns
 
     return inject
 
@@ -113,36 +187,7 @@ def hit(held_s: float) -> Callable[[StackFixture], int]:
     return inject
 
 
-def late_resets(fixture: StackFixture) -> int:
-    """Press the bumper; 20 reset calls that the operator made then arrive too late."""
-    at_ns = hit(0.1)(fixture)
-    becomes_true(fixture.latched, 2.0)
-    assert fixture.state is not None
-    late = reset_request(fixture.state)
-    fixture.request(0.0)  # safety refuses a reset while motion is requested
-    time.sleep(LATE_S)
-    for _ in range(20):
-        fixture.bus.call(keys.RESET, late, ignored, ignored, 1.0)
-    time.sleep(0.3)
-    return at_ns
-
-
-def late_releases(fixture: StackFixture) -> int:
-    """Keep the bumper pressed; 20 calls of a held release arrive too late."""
-    fixture.frames.hits.clear()
-    fixture.running.control.do(Bumper(pressed=True))
-    becomes_true(lambda: fixture.frames.follow().hits and fixture.latched(), 2.0)
-    late = release_request(fixture.state, "backward", held=True)
-    time.sleep(LATE_S)
-    for _ in range(20):
-        fixture.bus.call(keys.RELEASE, late, ignored, ignored, 1.0)
-        time.sleep(0.02)
-    fixture.running.control.do(Bumper(pressed=False))
-    return fixture.frames.hits[0].mono_ns
-
-
-def ignored(_: object) -> None:
-    """Ignore an answer; the frames at the board decide."""
+# --- the operator ---------------------------------------------------------------------------------
 
 
 def estop(fixture: StackFixture) -> int:
@@ -152,11 +197,80 @@ def estop(fixture: StackFixture) -> int:
     return at_ns
 
 
-def estop_by(put: Callable[[zenoh.Session, str], None]) -> Callable[[StackFixture], int]:
+def late_resets(fixture: StackFixture) -> int:
+    """Press the bumper; 20 reset calls that the operator made then arrive too late."""
+    at_ns = hit(0.1)(fixture)
+    becomes_true(fixture.latched, 2.0)
+    assert fixture.state is not None
+    fixture.request(0.0)  # safety refuses a reset while motion is requested
+    _call_late(fixture, keys.RESET, reset_request(fixture.state))
+    return at_ns
+
+
+def late_releases(fixture: StackFixture) -> int:
+    """Keep the bumper pressed; 20 calls of a held release arrive too late."""
+    fixture.frames.hits.clear()
+    fixture.running.control.do(Bumper(pressed=True))
+    becomes_true(lambda: fixture.frames.follow().hits and fixture.latched(), 2.0)
+    _call_late(fixture, keys.RELEASE, release_request(fixture.state, "backward", held=True))
+    fixture.running.control.do(Bumper(pressed=False))
+    return fixture.frames.hits[0].mono_ns
+
+
+def _call_late(fixture: StackFixture, call: keys.Call[Any, Any], request: msgspec.Struct) -> None:
+    time.sleep(LATE_S)
+    for _ in range(20):
+        fixture.bus.call(call, request, _ignore, _ignore, 1.0)
+        time.sleep(0.02)
+
+
+def _ignore(_: object) -> None:
+    """Ignore an answer; the frames at the board decide."""
+
+
+def stall_terminal(seconds: float, held_s: float = 0.3) -> Injector:
+    """Stall the operator's terminal; the key is released meanwhile, its repeats arrive later."""
+
+    def inject(fixture: StackFixture) -> None:
+        fixture.send_line(b"stall %f" % seconds)
+        time.sleep(held_s)
+        fixture.request(0.0)
+
+    return inject
+
+
+def browser_estop(abuse: Callable[[Server], AbstractContextManager[Any]]) -> Injector:
+    """Press E-STOP in the browser while another client abuses the dashboard."""
+
+    def inject(fixture: StackFixture) -> int:
+        with contextlib.ExitStack() as stack:
+            server = stack.enter_context(dashboard(fixture.running.endpoint, fixture.folder))
+            stack.enter_context(abuse(server))
+            time.sleep(SETTLE_S)
+            request = urllib.request.Request(
+                f"{server.url}estop/001", method="POST", headers={"Origin": server.url.rstrip("/")}
+            )
+            at_ns = clock.now_ns()
+            with urllib.request.urlopen(request, timeout=10):
+                time.sleep(0.1)
+        return at_ns
+
+    return inject
+
+
+# --- the bus --------------------------------------------------------------------------------------
+
+
+def plain_client(fixture: StackFixture) -> zenoh.Session:
+    """Return a session with the operators' router that knows nothing of T2."""
+    return zenoh.open(client_config(at(operators_endpoint(fixture.running.config))))
+
+
+def estop_by(put: Callable[[zenoh.Session, str], None]) -> Injector:
     """Publish an E-STOP as a program does that knows only the key."""
 
     def inject(fixture: StackFixture) -> int:
-        with zenoh.open(client_config(at(fixture.running.endpoint))) as session:
+        with plain_client(fixture) as session:
             time.sleep(0.1)  # until the router knows the session
             at_ns = clock.now_ns()
             put(session, keys.estop_key("001"))
@@ -166,117 +280,104 @@ def estop_by(put: Callable[[zenoh.Session, str], None]) -> Callable[[StackFixtur
     return inject
 
 
-def second(*words: str) -> Callable[[StackFixture], int]:
-    """Start a second instance of a process, or a module, beside the stack."""
-
-    def inject(fixture: StackFixture) -> int:
-        at_ns = clock.now_ns()
-        command = (
-            [*fixture.running.commands[words[0]]] if len(words) == 1 else [sys.executable, *words]
-        )
-        with fixture.running.log.open("ab") as log:
-            fixture.running.others.append(
-                subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log)
-            )
-        return at_ns
-
-    return inject
-
-
-def end_others(fixture: StackFixture) -> None:
-    """End the processes that were started beside the stack."""
-    while fixture.running.others:
-        process = fixture.running.others.pop()
-        process.terminate()
-        process.communicate(timeout=20)
-
-
-def second_driver(fixture: StackFixture) -> int:
-    """Start a second driver under the same source name."""
-    at_ns = second("-m", "verification.faults.driver", fixture.running.endpoint)(fixture)
-    pipe = fixture.running.others[-1].stdin
-    assert pipe is not None
-    pipe.write(b"0.8\n")
-    pipe.flush()
-    return at_ns
-
-
-def flood(fixture: StackFixture) -> int:
-    """Send 20 000 datagrams a second to the bridge's first port, from a foreign address."""
-    port = fixture.running.config.board.listen_ports[0]
-    return second("-m", "verification.faults.flood", str(port))(fixture)
-
-
-def spoil_config(fixture: StackFixture) -> int:
-    """Write an invalid settings file, and kill the bridge."""
-    (fixture.folder / SETTINGS_FILE).write_text("[bridge]\nlease = 'endless'\n")
-    return kill("bridge", signal.SIGKILL)(fixture)
-
-
-def restore_config(fixture: StackFixture) -> None:
-    """Restore the settings file."""
-    becomes_true(lambda: fixture.running.processes["bridge"].poll() is not None, 10.0)
-    (fixture.folder / SETTINGS_FILE).write_text("")
-    fixture.restore()
-
-
-def restore_sonar(name: SonarName) -> Callable[[StackFixture], None]:
-    """Restore a sonar."""
-
-    def restore(fixture: StackFixture) -> None:
-        fixture.running.control.do(Sonar(name=name))
-
-    return restore
-
-
-def publish(payload: bytes, encoding: str = "application/msgpack") -> Callable[[StackFixture], int]:
+def publish(payload: bytes, encoding: str = "application/msgpack") -> Injector:
     """Publish a payload once on every subscribed key except the E-STOP key, and with every call."""
-    topic_keys = [
-        topic.on("001", source="teleop", service="safety", side="left") for topic in keys.TOPICS
-    ]
+    names = {"source": "teleop", "service": "safety", "side": "left"}
 
-    def inject(fixture: StackFixture) -> int:
-        with zenoh.open(client_config(at(fixture.running.endpoint))) as session:
-            at_ns = clock.now_ns()
-            for key in topic_keys:
-                session.put(key, payload, encoding=encoding,
-                            congestion_control=zenoh.CongestionControl.BLOCK)  # fmt: skip
+    def inject(fixture: StackFixture) -> None:
+        with plain_client(fixture) as session:
+            for topic in keys.TOPICS:
+                session.put(
+                    topic.on("001", **names), payload, encoding=encoding,
+                    congestion_control=zenoh.CongestionControl.BLOCK,
+                )  # fmt: skip
             for call in keys.CALLS:
                 session.get(call.on("001"), payload=payload, timeout=0.2)
             time.sleep(0.2)
-        return at_ns
 
     return inject
 
 
 MOTION = {"command": "run", "linear": 0.5, "angular": 0.0, "echo": 0, "seq": 1, "boot": 1}
+
+
+def motion(**fields: float) -> Injector:
+    """Publish a motion with unusual numbers on every key."""
+    return publish(msgpack.packb(MOTION | fields))
+
+
 HOSTILE = {
     "no MessagePack": publish(b"\xc1" * 20),
     "nothing": publish(b""),
     "1 MB": publish(msgpack.packb({"text": "x" * 1_000_000})),
     "deep nesting": publish(b"\x81\xa1x" + b"\x91" * 100_000),
     "wrong types": publish(msgpack.packb({name: [] for name in MOTION})),
-    "NaN": publish(msgpack.packb(MOTION | {"linear": float("nan"), "angular": float("nan")})),
-    "infinity": publish(msgpack.packb(MOTION | {"linear": float("inf")})),
-    "negative zero": publish(msgpack.packb(MOTION | {"linear": -0.0, "angular": -0.0})),
-    "huge integers": publish(msgpack.packb(MOTION | {"linear": 2**63, "seq": 2**64 - 1})),
-    "too fast": publish(msgpack.packb(MOTION | {"linear": 50.0, "seq": 2**62})),
+    "NaN": motion(linear=float("nan"), angular=float("nan")),
+    "infinity": motion(linear=float("inf")),
+    "negative zero": motion(linear=-0.0, angular=-0.0),
+    "huge integers": motion(linear=2**63, seq=2**64 - 1),
+    "too fast": motion(linear=50.0, seq=2**62),
     "JSON": publish(msgspec.json.encode(MOTION), "application/json"),
     "an encoding of text": publish(msgpack.packb(MOTION), "text/plain"),
-    "an encoding nobody knows": publish(
-        msgpack.packb(MOTION), "x" * 200
-    ),  # the longest that Zenoh can send
+    # The longest that Zenoh can send.
+    "an encoding nobody knows": publish(msgpack.packb(MOTION), "x" * 200),
 }
 
 
-def stall_terminal(seconds: float, held_s: float = 0.3) -> Callable[[StackFixture], int]:
-    """Stall the operator's terminal; the key is released meanwhile, its repeats arrive later."""
+def forged(make: Callable[[Motion, BumperSample], dict[str, bytes]]) -> Injector:
+    """Publish forgeries of the newest motion and bumper sample, at 50 Hz for ``FORGED_S``."""
 
     def inject(fixture: StackFixture) -> int:
-        at_ns = clock.now_ns()
-        fixture.send_line(b"stall %f" % seconds)
-        time.sleep(held_s)
-        fixture.request(0.0)
+        newest: dict[str, bytes] = {}
+        wanted = keys.MOTION.on("001"), keys.BUMPER.on("001")
+
+        def take(sample: zenoh.Sample) -> None:
+            newest[str(sample.key_expr)] = sample.payload.to_bytes()
+
+        with plain_client(fixture) as session:
+            subscribers = [session.declare_subscriber(key, take) for key in wanted]
+            becomes_true(lambda: len(newest) == len(subscribers), 2.0)
+            command = codec.decode(newest[wanted[0]], Motion)
+            sample = codec.decode(newest[wanted[1]], BumperSample)
+            at_ns = clock.now_ns()
+            while clock.now_ns() - at_ns < FORGED_S * NS_PER_S:
+                command = replace(command, seq=command.seq + AHEAD)
+                sample = replace(sample, seq=sample.seq + AHEAD)
+                for key, payload in make(command, sample).items():
+                    session.put(key, payload)
+                time.sleep(0.02)
         return at_ns
 
     return inject
+
+
+def authority(command: Motion, _: BumperSample) -> dict[str, bytes]:
+    """Forge a motion command of safety."""
+    run = replace(command, command=Command.RUN, linear=BACKWARD_MPS)
+    return {keys.MOTION.on("001"): codec.encode(run)}
+
+
+def lock_out(command: Motion, _: BumperSample) -> dict[str, bytes]:
+    """Forge a motion with a sequence number above all that safety will use."""
+    return {keys.MOTION.on("001"): codec.encode(replace(command, seq=2**62))}
+
+
+def measurements(_: Motion, bumper: BumperSample) -> dict[str, bytes]:
+    """Forge a contact and a runaway velocity of the bridge."""
+    velocity = Velocity(linear=3.0, angular=0.0, seq=bumper.seq, boot=bumper.boot)
+    return {
+        keys.BUMPER.on("001"): codec.encode(replace(bumper, pressed=True)),
+        keys.VELOCITY.on("001"): codec.encode(velocity),
+    }
+
+
+def flood_of_another_robot(fixture: StackFixture) -> None:
+    """Publish another robot's velocities for 1 s as fast as a program can, to one reader."""
+    key = keys.VELOCITY.on("002")
+    payload = codec.encode(Velocity(linear=0.5, angular=0.0, seq=1, boot=1))
+    with plain_client(fixture) as reader, plain_client(fixture) as robot:
+        reader.declare_subscriber(key, _ignore)
+        time.sleep(0.1)  # until the router knows the subscriber
+        end_s = time.monotonic() + 1.0
+        while time.monotonic() < end_s:
+            robot.put(key, payload)

@@ -1,4 +1,4 @@
-"""Namespaces for faults of network, disk, clock and memory.
+"""Namespaces for faults of network, disk and clock.
 
 The campaign moves into its own network and mount namespaces, so that it can cut the network and
 fill a disk without affecting the machine. Faults whose requirement is not available are left out,
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from common.freshness import NS_PER_S
+from verification.harness.network_hosts import ip
 
 Requirement = Literal[
     "none",
@@ -25,15 +26,17 @@ Requirement = Literal[
     "third parties",
     "small disk",
     "separate clocks",
-    "memory cgroup",
     "relay",
+    "site",
 ]
 
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
-MEMORY = Path("/sys/fs/cgroup/memory")
 TUN = Path("/dev/net/tun")
 CLOCK = Path(__file__).with_name("clock.c")
 SMALL = "256k"
+RELAY_HOST = f"t2relay{os.getpid()}"
+# Of each cable of the relay: the address of the PC or the board, then the relay's.
+RELAY_CABLES = {"pc": ("10.7.6.2", "10.7.6.1"), "board": ("10.7.5.224", "10.7.5.220")}
 
 
 def enter() -> str:
@@ -48,13 +51,12 @@ def enter() -> str:
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNS | CLONE_NEWNET):
         return f"cannot create a network namespace: {os.strerror(ctypes.get_errno())}"
     subprocess.run(["mount", "--make-rprivate", "/"], check=True)
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+    ip("link", "set", "lo", "up")
     return ""
 
 
 def missing(outside: str) -> Mapping[Requirement, str]:
     """Return the missing requirements with reasons; ``outside`` is the reason of ``enter``."""
-    writable = os.access(MEMORY, os.W_OK) and (MEMORY / "memory.limit_in_bytes").exists()
     reasons: dict[Requirement, str] = {
         "remote driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
         "small disk": outside,
@@ -62,7 +64,6 @@ def missing(outside: str) -> Mapping[Requirement, str]:
         "separate clocks": ""
         if shutil.which("cc")
         else "no C compiler (Debian: apt-get install gcc libc6-dev)",
-        "memory cgroup": "" if writable else "cannot create a memory cgroup (version 1)",
     }
     return {need: reason for need, reason in reasons.items() if reason}
 
@@ -74,10 +75,8 @@ def small_disk(folder: Path) -> Iterator[None]:
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={SMALL}", "t2", str(folder)], check=True)
     try:
         yield
-    finally:
-        subprocess.run(
-            ["umount", "--lazy", str(folder)], check=True
-        )  # a bridge may still be ending
+    finally:  # lazy: a bridge may still be ending
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 def clock(file: Path) -> dict[str, str]:
@@ -97,3 +96,25 @@ def step_clock(file: Path, seconds: int, slept: int = 0) -> None:
     with file.open("r+b" if file.exists() else "wb") as it:  # in place: it is mapped
         for shift in (seconds, slept):
             it.write((shift * NS_PER_S).to_bytes(8, sys.byteorder, signed=True))
+
+
+@contextlib.contextmanager
+def relay_host() -> Iterator[None]:
+    """Make the relay's host with a cable to the PC and one to the board.
+
+    PC and board share the campaign's namespace: each has its own address and cable there, and all
+    their datagrams cross the relay.
+    """
+    ip("netns", "add", RELAY_HOST)
+    try:
+        ip("-n", RELAY_HOST, "link", "set", "lo", "up")
+        for side, (there, ours) in RELAY_CABLES.items():
+            end = ("peer", "name", side, "netns", RELAY_HOST)
+            ip("link", "add", f"cable-{side}", "type", "veth", *end)
+            ip("address", "add", f"{there}/24", "dev", f"cable-{side}")
+            ip("link", "set", f"cable-{side}", "up")
+            ip("-n", RELAY_HOST, "address", "add", f"{ours}/24", "dev", side)
+            ip("-n", RELAY_HOST, "link", "set", side, "up")
+        yield
+    finally:
+        ip("netns", "del", RELAY_HOST)

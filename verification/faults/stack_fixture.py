@@ -6,21 +6,29 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Self
 
 import msgspec
 
+from cli.settings import Everything
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Done, SafetyState
 from common.operator import reset_request
-from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Wire
-from verification.faults import relay
-from verification.faults.namespaces import Requirement, clock, small_disk
-from verification.faults.third_party import PARTIES, SETS
+from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Sonar, Wire
+from verification.faults.namespaces import (
+    RELAY_CABLES,
+    RELAY_HOST,
+    Requirement,
+    clock,
+    relay_host,
+    small_disk,
+)
 from verification.harness.bus import bus_on, running
+from verification.harness.ports import free_port
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
 from verification.harness.waiting import becomes_true
@@ -31,11 +39,16 @@ QUICK = [
     "safety.linear_acceleration=5",
     "sim.drive.acceleration=10",
 ]
-OPEN = ["bus.insecure=true"]  # for a driver on another host, without certificates
 ROOM_M = 900.0  # from here the vehicle is put back to the origin
 READY_S = 30.0
 SPEED_MPS = 0.8  # of every fault
-DRIVER = "verification.faults.driver"
+LIMIT_LEASE_S = 0.5
+PROGRAMS = "verification.faults.programs"
+(PC, RELAY_TO_PC), (BOARD, RELAY_TO_BOARD) = RELAY_CABLES.values()
+RELAY_PORT = 4010  # of its reports
+SIM_BEHIND_RELAY = [
+    f"board.address={BOARD}", f"board.listen_address={RELAY_TO_BOARD}", "board.relay_port=0",
+]  # fmt: skip
 
 
 class StackFixture:
@@ -87,10 +100,8 @@ class StackFixture:
 
     def ended(self) -> tuple[str, ...]:
         """Return the processes that have ended."""
-        ended = [
-            name for name, process in self.running.processes.items() if process.poll() is not None
-        ]
-        return tuple(ended)
+        processes = self.running.processes
+        return tuple(name for name, process in processes.items() if process.poll() is not None)
 
     def restart_ended(self) -> Self:
         """Restart processes that have ended, as a supervisor does."""
@@ -160,15 +171,60 @@ class StackFixture:
 
     def restore(self) -> None:
         """Remove all faults of the simulated board; put a distant vehicle back to the origin."""
-        self.running.control.do(Wire())
-        self.running.control.do(Mute())
-        self.running.control.do(Firmware())
-        self.running.control.do(Lose())
-        self.running.control.do(Bumper(pressed=False))
-        for side in ("left", "right"):
-            self.running.control.do(Driver(side=side, bits=0))
+        normal = (
+            Wire(), Mute(), Firmware(), Lose(), Bumper(pressed=False),
+            Driver(side="left", bits=0), Driver(side="right", bits=0),
+            Sonar(name="front"), Sonar(name="rear"),
+        )  # fmt: skip
+        for request in normal:
+            self.running.control.do(request)
         if abs(self.running.control.truth().x) > ROOM_M:
             self.running.control.do(Place(x=0.0, y=0.0))
+
+
+def operators_endpoint(config: Everything) -> str:
+    """Return the router where operators connect: the site's if there is one."""
+    return (*config.bus.uplink, *config.bus.endpoints)[0]
+
+
+def _settings(need: Requirement) -> list[str]:
+    """Return the settings that a requirement adds."""
+    return {
+        "remote driver": ["bus.insecure=true"],  # another host, without certificates
+        "third parties": [
+            f'safety.limits.lidar={{lease = {LIMIT_LEASE_S}, silence = "stop"}}',
+            'safety.estop_keepalive=["pendant"]',
+        ],
+        "relay": [
+            f"board.address={RELAY_TO_PC}", f"board.listen_address={PC}",
+            f"board.relay_port={RELAY_PORT}",
+        ],
+        "site": [f"bus.uplink=tcp/127.0.0.1:{free_port()}"],
+    }.get(need, [])  # fmt: skip
+
+
+def _beside(need: Requirement, config: Everything) -> dict[str, list[str]]:
+    """Return the commands of the processes that a requirement adds."""
+    python = [sys.executable, "-m"]
+    if need == "third parties":
+        program = [*python, PROGRAMS, config.bus.endpoints[0]]
+        return {name: [*program, name] for name in ("limiter", "pendant")}
+    if need == "relay":
+        words = ["--board-port", str(config.board.port), "--ports"]
+        words += map(str, config.board.listen_ports)
+        return {"relay": ["ip", "netns", "exec", RELAY_HOST, *python, "services.relay", *words]}
+    if need == "site":
+        listen = f"bus.listen={operators_endpoint(config)}"
+        return {"site router": [*python, "cli", "router", "--set", listen]}
+    return {}
+
+
+def _driver(need: Requirement, config: Everything) -> list[str]:
+    """Return the driver's module and its words."""
+    endpoint = operators_endpoint(config)
+    if need == "remote driver":
+        return ["verification.faults.remote_host", endpoint, PROGRAMS, "driver"]
+    return [PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
 
 
 @contextlib.contextmanager
@@ -176,36 +232,26 @@ def stack_fixture(
     folder: Path, *, shipped: bool = True, need: Requirement = "none"
 ) -> Iterator[StackFixture]:
     """Run a stack fixture that meets the requirement of a fault."""
-    remote, others, clocks, disk, behind = (
-        need == one
-        for one in ("remote driver", "third parties", "separate clocks", "small disk", "relay")
-    )
+    clocks = need == "separate clocks"
     with contextlib.ExitStack() as stack:
-        if disk:
+        if need == "small disk":
             stack.enter_context(small_disk(folder / "disk"))
-        if behind:
-            stack.enter_context(relay.cables())
+        if need == "relay":
+            stack.enter_context(relay_host())
         made = stack.enter_context(
             running_stack(
-                folder, shipped=shipped,
-                sets=[*QUICK, *OPEN * remote, *SETS * others, *relay.PC_SETS * behind],
-                sim_sets=relay.SIM_SETS if behind else (), beside=relay.command if behind else None,
-                log="disk/log.jsonl" if disk else "log.jsonl",
-                listen=f"tcp/{'0.0.0.0' if remote else '127.0.0.1'}:{{port}}",
+                folder,
+                shipped=shipped,
+                sets=[*QUICK, *_settings(need)],
+                sim_sets=SIM_BEHIND_RELAY if need == "relay" else (),
+                beside=partial(_beside, need),
+                log="disk/log.jsonl" if need == "small disk" else "log.jsonl",
+                listen=f"tcp/{'0.0.0.0' if need == 'remote driver' else '127.0.0.1'}:{{port}}",
                 env=clock(folder / "robot") if clocks else None,
             )
-        )  # fmt: skip
-        for name in PARTIES if others else ():
-            made.commands[name] = [
-                sys.executable, "-m", "verification.faults.third_party", name, made.endpoint,
-            ]  # fmt: skip
-            made.start(name)
-        driver = {
-            "remote driver": ["verification.faults.remote_host", made.endpoint, DRIVER],
-            "teleop": ["verification.faults.keyboard", made.endpoint],
-        }.get(need, [DRIVER, made.endpoint])
+        )
         env = clock(folder / "driver") if clocks else os.environ
-        yield stack.enter_context(driven(made, folder, driver, env))
+        yield stack.enter_context(driven(made, folder, _driver(need, made.config), env))
 
 
 @contextlib.contextmanager

@@ -3,32 +3,19 @@
 import random
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from common import clock
 from sim.trace import Command
 from verification.faults.fault import Fault, Outcome
 from verification.faults.stack_fixture import SPEED_MPS, StackFixture
+from verification.faults.table import Sample
 from verification.harness.trace import first_stop_s, last_move_s, moves
 from verification.harness.waiting import becomes_true
 
-HOLD_ON_S = (
-    0.7  # after the fault, with motion still requested: the vehicle may only drive on by itself
-)
+# After the fault, with motion still requested: the vehicle may only drive on by itself.
+HOLD_ON_S = 0.7
 REARM_S = 2.5
 LATCHED_S = 0.3
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """The result of a trial."""
-
-    stopped_s: float | None  # until the first STOP or BRAKE
-    moved_s: float  # until the last command that moves the vehicle, while the fault lasted
-    outcome: Outcome | None  # None: it does not drive again
-    fault_ns: int
-    unrequested: bool = False  # a motion command that no driver requested
-    ended: tuple[str, ...] = ()  # processes that had to survive
-    death_s: float = 0.0  # that the kernel took to end the killed process
 
 
 def unrequested(commands: Sequence[Command]) -> bool:
@@ -44,20 +31,19 @@ def run_trial(fixture: StackFixture, fault: Fault) -> Sample:
     fixture.ready()
     time.sleep(random.random() * 0.06)  # at a random phase of the requests
     fixture.death_s = 0.0
-    fault_ns = fault.inject(fixture)
-    end_s = fault_ns / 1e9 + fault.hold_s
-    time.sleep(max(0.0, end_s - time.monotonic()))
+    called_ns = clock.now_ns()
+    fault_ns = fault.inject(fixture) or called_ns
+    time.sleep(max(0.0, fault.hold_s - (clock.now_ns() - fault_ns) / 1e9))
     fixture.frames.follow()
     commands = list(fixture.frames.commands)
     moving = fixture.moving()
     ended = fixture.ended() if fault.harmless else ()
     fault.restore(fixture)
-    stopped = first_stop_s(commands, fault_ns, fault.stops)
-    outcome = "drives on" if moving and stopped is None else _outcome(fixture)
-    moved_s = last_move_s(commands, fault_ns)
+    stopped_s = first_stop_s(commands, fault_ns, fault.stops)
+    outcome = "drives on" if moving and stopped_s is None else _outcome(fixture)
     return Sample(
-        stopped,
-        moved_s,
+        stopped_s,
+        last_move_s(commands, fault_ns),
         outcome,
         fault_ns,
         unrequested(fixture.frames.commands),

@@ -49,7 +49,8 @@ def driven(folder: Path) -> Iterator[tuple[int, TraceFollower]]:
         start([sys.executable, "-m", "sim", "--world", "empty", "--trace", str(trace), *words])
         up = start(t2("up", "--no-sim", *words))
         driver = start(
-            [sys.executable, "-m", "verification.faults.driver", endpoint], stdin=subprocess.PIPE
+            [sys.executable, "-m", "verification.faults.programs", endpoint, "driver"],
+            stdin=subprocess.PIPE,
         )
         frames = TraceFollower(trace)
         assert driver.stdin is not None
