@@ -28,10 +28,6 @@ class Board:
         self.leds: list[commands.LedSet] = []
         self.silent = False
         self.to_ports = [0, 1]  # indices of the destination ports
-        self.answers_to: list[int] | None = None  # for answers; None: the same
-        self.hits_to: list[int] | None = None  # for a pressed bumper; None: as answers
-        self.lose_every = 0  # drop every n-th bumper answer; 0: none
-        self.bumper_asks = 0
         self.times: list[float] = []  # reception time of each of ``motions``
         self.pressed = False
         self.distance_mm = 1000
@@ -63,13 +59,11 @@ class Board:
         """Send a frame to the bridge's ports, as the board or from another socket."""
         self.say_bytes(self._framing.pack(frame), sock)
 
-    def say_bytes(
-        self, datagram: bytes, sock: socket.socket | None = None, ports: list[int] | None = None
-    ) -> None:
+    def say_bytes(self, datagram: bytes, sock: socket.socket | None = None) -> None:
         """Send any bytes to the bridge's ports."""
         if self.silent:
             return
-        for port in self.to_ports if ports is None else ports:
+        for port in self.to_ports:
             (sock or self.sock).sendto(datagram, ("127.0.0.1", self.ports[port]))
 
     def last(self) -> MotionCommand | None:
@@ -95,17 +89,8 @@ class Board:
             if self.led_done is not None:
                 self.say(reports.LedReport(self.led_done))
         else:
-            for answer in () if self._is_lost(frame) else self._answers(frame):
-                hit = answer == reports.BumperReport(True) and self.hits_to is not None
-                self.say_bytes(
-                    self._framing.pack(answer), ports=self.hits_to if hit else self.answers_to
-                )
-
-    def _is_lost(self, frame: Frame) -> bool:
-        if not isinstance(frame, commands.BumperQuery):
-            return False
-        self.bumper_asks += 1
-        return self.lose_every > 0 and self.bumper_asks % self.lose_every == 0
+            for answer in self._answers(frame):
+                self.say(answer)
 
     def _answers(self, frame: Frame) -> Iterator[Frame]:
         if isinstance(frame, commands.BumperQuery):

@@ -19,7 +19,7 @@ from common import clock
 from common.config import Sources, load
 from sim.sockets import Control
 from verification.harness.bus import set_options
-from verification.harness.ports import free_port
+from verification.harness.ports import free_port, udp_ports
 from verification.harness.waiting import wait_until
 
 BESIDE_OTHERS_S = 0.3  # stalls to expect while other tests run
@@ -92,29 +92,14 @@ def running_stack(
 ) -> Iterator[RunningStack]:
     """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
-    ``shipped`` keeps the shipped limits on any host; ``sets`` are additional settings, and stay as
-    they are on such a host. ``listen``
-    is where the router listens, the endpoint of the services first; ``log`` is a file in the
-    folder. ``route`` returns the command of another router, zenohd, for these settings.
-    ``sim_sets`` are settings of the simulator alone. ``beside`` returns the commands of further
-    processes that are not services.
+    ``shipped`` keeps the shipped limits on any host, and ``sets``, additional settings, stay as
+    they are. ``listen`` is where the router listens, the endpoint of the services first; ``log`` is
+    a file in the folder. ``route`` returns the command of another router, zenohd, for these
+    settings. ``sim_sets`` are settings of the simulator alone. ``beside`` returns the commands of
+    further processes, which are not waited for.
     """
-    beside_others = "PYTEST_XDIST_WORKER" in os.environ  # other tests may stall it later
-    holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
-    board, first, second, control = (free_port(socket.SOCK_DGRAM) for _ in range(4))
-    port = free_port()
-    own = {one.partition("=")[0] for one in sets if ".unsafe_overrides" not in one}
-    relaxed = [one for one in host_stalls.settings(holdup_s) if one.partition("=")[0] not in own]
-    sets = host_stalls.with_accepted_joined(
-        [
-            *sets,
-            f"board.port={board}",
-            f"board.listen_ports=[{first}, {second}]",
-            f"bus.listen={listen.format(port=port)}",
-            f"sim.control_port={control}",
-            *relaxed,
-        ]
-    )
+    control = free_port(socket.SOCK_DGRAM)
+    sets = _all_settings(sets, shipped, listen, control)
     config = load(Everything, Sources(sets=sets)).config
     files = [file for file in (folder / SETTINGS_FILE,) if file.exists()]
     options = Namespace(no_sim=False, world=world, config=files, sets=sets)
@@ -123,20 +108,37 @@ def running_stack(
         made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file), *set_options(*sim_sets)]
-    endpoint = config.bus.endpoints[0]
+    services = sum(command[0] == sys.executable for command in made.values())
     made |= beside(config) if beside else {}
-    it = RunningStack(endpoint, trace_file, Control(control), made, folder / log, config, env)
+    it = RunningStack(
+        config.bus.endpoints[0], trace_file, Control(control), made, folder / log, config, env
+    )
     for name in made:
         it.start(name)
     try:
-        wait_until(lambda: _is_up(it), f"all processes up: {it.log}", UP_S)
+        wait_until(lambda: _is_up(it, services), f"all processes up: {it.log}", UP_S)
         yield it
     finally:
         it.end()
 
 
-def _is_up(it: RunningStack) -> bool:
+def _all_settings(sets: Sequence[str], shipped: bool, listen: str, control: int) -> Sequence[str]:
+    """Return settings with free ports, and with limits that fit the host."""
+    beside_others = "PYTEST_XDIST_WORKER" in os.environ  # other tests may stall it later
+    holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
+    own = {one.partition("=")[0] for one in sets if ".unsafe_overrides" not in one}
+    relaxed = [one for one in host_stalls.settings(holdup_s) if one.partition("=")[0] not in own]
+    board, *listen_ports = udp_ports(3)
+    ports = [
+        f"board.port={board}",
+        f"board.listen_ports={listen_ports}",
+        f"bus.listen={listen.format(port=free_port())}",
+        f"sim.control_port={control}",
+    ]
+    return host_stalls.with_accepted_joined([*sets, *ports, *relaxed])
+
+
+def _is_up(it: RunningStack, services: int) -> bool:
     ended = [name for name, process in it.processes.items() if process.poll() is not None]
     assert not ended, f"{ended} ended: {it.log.read_text()}"
-    ours = [command for command in it.commands.values() if command[0] == sys.executable]
-    return it.log.read_text().count('"event": "started"') >= len(ours)
+    return it.log.read_text().count('"event": "started"') >= services

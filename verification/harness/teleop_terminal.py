@@ -25,11 +25,7 @@ TELEOP = (*STRICT, *PATIENT)
 # Teleop's query of the cursor position.
 QUERY = re.compile(rb"\x1b\[(\d+);(\d+)H\x1b\[6n")
 POLL_S = 0.005
-MULTIPLEXERS = (
-    "TMUX",
-    "STY",
-    "ZELLIJ",
-)  # of the test's terminal, removed from teleop's environment
+MULTIPLEXERS = ("TMUX", "STY", "ZELLIJ")  # of the test's terminal; not in teleop's environment
 
 
 class DelayLine:
