@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     faults = _chosen(FAULTS, options.only)
     scenarios = _chosen(SCENARIOS, options.only)
     if not faults and not scenarios:
-        names = "\n  ".join(one.name for one in [*FAULTS, *SCENARIOS])
+        names = "\n  ".join([*(one.name for one in FAULTS), *(one.name for one in SCENARIOS)])
         parser.error(f"no fault is named {' or '.join(options.only)}; there are:\n  {names}")
     lacking = missing(enter())
     left_out = [f"{f.name}: {lacking[f.needs]}" for f in faults if f.needs in lacking]

@@ -1,17 +1,27 @@
 """The catalogue of faults, with the reaction that ``docs/safety.md`` allows for each."""
 
 import signal
+from dataclasses import replace
+from functools import partial
 
-from msgspec.structs import replace
 from zenoh import CongestionControl
 
 from common.motion import Command
 from sim.requests import Driver, Firmware, Flood, Freeze, Lose, Mute, PowerCycle, Sonar, Wire
-from verification.faults import environment, injectors
+from verification.faults import injectors
 from verification.faults.fault import NOTICE_S, Budget, Fault, Outcome, by_limit, within
-from verification.faults.injectors import Injector, do, estop_by, hit, in_sequence, kill, second
+from verification.faults.injectors import (
+    do,
+    estop_by,
+    hit,
+    hung,
+    in_sequence,
+    kill,
+    network,
+    second,
+)
 from verification.faults.namespaces import Requirement
-from verification.faults.stack_fixture import LIMIT_LEASE_S
+from verification.faults.stack_fixture import CLOCKS, LIMIT_LEASE_S
 from verification.harness.dashboard import FLOODS, flooded, half_open
 
 ON: tuple[Outcome, ...] = ("drives on",)
@@ -39,25 +49,23 @@ LAST_KEY = by_limit(
 def signals(
     name: str,
     then: tuple[Outcome, ...],
-    budget: Budget | None,
-    *,
+    budget: Budget | None = None,
     terminated: Budget | None = None,
-    needs: Requirement = "none",
 ) -> list[Fault]:
     """Return SIGKILL, SIGSTOP and SIGTERM of a process; ``terminated`` is the budget of SIGTERM."""
     return [
-        Fault(f"{name} SIGKILL", kill(name), then, budget, needs=needs),
-        Fault(f"{name} SIGSTOP", kill(name, signal.SIGSTOP), then, budget, injectors.go_on(name),
-              needs=needs),
-        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, terminated or budget,
-              needs=needs),
-    ]  # fmt: skip
+        Fault(f"{name} SIGKILL", kill(name), then, budget),
+        Fault(f"{name} SIGSTOP", kill(name, signal.SIGSTOP), then, budget),
+        Fault(f"{name} SIGTERM", kill(name, signal.SIGTERM), then, terminated or budget),
+    ]
 
 
-def wire(**faults: float) -> Injector:
-    """Disturb the datagrams from the board."""
-    return do(replace(Wire(direction="to_pc"), **faults))
+def needing(need: Requirement, *faults: Fault) -> list[Fault]:
+    """Return the faults with a requirement."""
+    return [replace(fault, needs=need) for fault in faults]
 
+
+to_pc = partial(Wire, direction="to_pc")
 
 MILLISECONDS = [
     Fault("contact", hit(0.3), RESET, within(0.02)),
@@ -69,25 +77,20 @@ MILLISECONDS = [
         lambda session, _: session.put("t2/v1/*/estop", b"\xc1", encoding="text/plain")),
           RESET, within(0.02)),
     Fault("bridge SIGKILL", kill("bridge"), NEUTRAL, within(0.01)),
-    Fault("settings spoilt, bridge SIGKILL", injectors.spoil_config, NEUTRAL, within(0.01),
-          injectors.restore_config),
-]  # fmt: skip
-
-CLOCKS = [
-    *(
+    Fault("settings spoilt, bridge SIGKILL", injectors.spoil_config, NEUTRAL, within(0.01)),
+    *needing("separate clocks", *(
         Fault(f"{whose}'s clock stepped by {hours:+d} h",
-              environment.step_time_of_day(whose, 3600 * hours), ON, None,
-              environment.restore_clocks, hold_s=1.5, needs="separate clocks")
-        for whose in environment.CLOCKS
+              injectors.step_time_of_day(whose, 3600 * hours), ON, hold_s=1.5)
+        for whose in CLOCKS
         for hours in (1, -1)
-    ),
+    )),
 ]  # fmt: skip
 
 PROCESSES = [
     Fault("bridge SIGSTOP", kill("bridge", signal.SIGSTOP), NEUTRAL, HEARTBEAT),
     Fault("bridge SIGTERM", kill("bridge", signal.SIGTERM), NEUTRAL, within(0.05)),
     Fault("guard SIGKILL", kill("guard"), NEUTRAL, within(0.05)),
-    Fault("guard SIGSTOP", kill("guard", signal.SIGSTOP), ON, None, injectors.go_on("guard")),
+    Fault("guard SIGSTOP", kill("guard", signal.SIGSTOP), ON),
     Fault("guard SIGTERM", kill("guard", signal.SIGTERM), NEUTRAL, within(0.05)),
     # A safety that was stopped could not receive an emergency stop; its latches outlive it.
     *signals("safety", (*NEUTRAL, *RESET), MOTION_LEASE),
@@ -103,62 +106,55 @@ PROCESSES = [
     # A continued driver still requests motion: its next request counts.
     *signals("driver", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
     # The real teleop in a terminal with W held; ``driver`` above only sends its requests.
-    *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, terminated=ZEROS, needs="teleop"),
-    # Late keys move nothing: the hold of the last key in time ends, also when it is a first press.
-    *(
-        Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
-              injectors.stall_terminal(seconds), NEUTRAL,
-              LAST_KEY,
-              hold_s=seconds + 1.0, needs="teleop")
-        for seconds in (0.8, 3.0)
+    *needing("teleop",
+        *signals("teleop", (*NEUTRAL, *ITSELF), REQUEST_LEASE, ZEROS),
+        # Late keys move nothing: the hold of the last key in time ends, also of a first press.
+        *(
+            Fault(f"teleop's terminal stalled for {seconds:g} s, then the burst",
+                  injectors.stall_terminal(seconds), NEUTRAL, LAST_KEY, hold_s=seconds + 1.0)
+            for seconds in (0.8, 3.0)
+        ),
     ),
-    *signals("odom", ON, None),
+    *signals("odom", ON),
     # Its silence stops the vehicle, by the settings of this stack.
-    Fault("limit source SIGKILL, silence = stop", kill("limiter"), NEUTRAL, LIMIT_LEASE,
-          needs="third parties"),
-    Fault("pendant SIGKILL", kill("pendant"), RESET, KEEPALIVE, hold_s=1.5,
-          needs="third parties"),
-    Fault("a second bridge", second("bridge"), ON, None, injectors.end_others),
+    *needing("third parties",
+        Fault("limit source SIGKILL, silence = stop", kill("limiter"), NEUTRAL, LIMIT_LEASE),
+        Fault("pendant SIGKILL", kill("pendant"), RESET, KEEPALIVE, hold_s=1.5),
+    ),
+    Fault("a second bridge", second("bridge"), ON),
     # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect.
-    Fault("a second safety", second("safety"), (*ON, *ITSELF), None, injectors.end_others,
-          hold_s=1.5),
-    Fault("a second driver of one name", injectors.second_driver, (*ON, *ITSELF), None,
-          injectors.end_others, hold_s=1.5),
+    Fault("a second safety", second("safety"), (*ON, *ITSELF), hold_s=1.5),
+    Fault("a second driver of one name", injectors.second_driver, (*ON, *ITSELF), hold_s=1.5),
     # Log lines that cannot be written are lost; no service waits for the disk.
-    Fault("disk full, then contact", environment.fill_disk, RESET, within(0.05),
-          environment.empty_disk, harmless=True, needs="small disk"),
+    Fault("disk full, then contact", injectors.fill_disk, RESET, within(0.05), harmless=True,
+          needs="small disk"),
     # Delayed calls have no effect: no frame moves the vehicle, and the latch stays.
     Fault("contact, then 20 resets 1.3 s late", injectors.late_resets, RESET, within(0.02)),
     Fault("contact, then 20 releases 1.3 s late", injectors.late_releases, RESET, within(0.02)),
 ]  # fmt: skip
 
-NETWORK = [
-    Fault("driver's network cut for 3 s", environment.network(Wire(drop=1.0)),
-          (*ITSELF, *NEUTRAL), REQUEST_LEASE, environment.restore_network, hold_s=3.0,
-          needs="remote driver"),
+NETWORK = needing("remote driver",
+    Fault("driver's network cut for 3 s", network(Wire(drop=1.0)), (*ITSELF, *NEUTRAL),
+          REQUEST_LEASE, hold_s=3.0),
     # The stick was released meanwhile: no earlier request may move the vehicle any more.
     *(
         Fault(f"driver's network cut for {seconds:g} s, then the burst",
-              environment.cut_and_let_go(seconds), NEUTRAL, REQUEST_LEASE,
-              environment.restore_network, hold_s=seconds + 1.0, needs="remote driver")
+              injectors.cut_and_let_go(seconds), NEUTRAL, REQUEST_LEASE, hold_s=seconds + 1.0)
         for seconds in (0.8, 3.0)
     ),
-    Fault("all from the driver 1 s late", environment.network(Wire(direction="to_pc", delay=1.0)),
-          (*ITSELF, *NEUTRAL), REQUEST_LEASE, environment.restore_network, hold_s=2.0,
-          needs="remote driver"),
+    Fault("all from the driver 1 s late", network(to_pc(delay=1.0)), (*ITSELF, *NEUTRAL),
+          REQUEST_LEASE, hold_s=2.0),
     *(
-        Fault(f"driver's network: {what}", environment.network(faults),
-              (*ON, *ITSELF, *NEUTRAL), None, environment.restore_network, hold_s=1.5,
-              needs="remote driver")
+        Fault(f"driver's network: {what}", network(faults), (*ON, *ITSELF, *NEUTRAL), hold_s=1.5)
         for what, faults in {
             "1 % lost": Wire(drop=0.01),
             "10 % lost": Wire(drop=0.1),
             "30 % lost": Wire(drop=0.3),
-            "200 ms late, up to 50 ms more": Wire(direction="to_pc", delay=0.2, jitter=0.05),
+            "200 ms late, up to 50 ms more": to_pc(delay=0.2, jitter=0.05),
             "25 % twice, 25 % out of order": Wire(duplicate=0.25, reorder=0.25),
         }.items()
     ),
-]  # fmt: skip
+)  # fmt: skip
 
 BOARD = [
     # A frozen board reads its queue when it continues; the newest command in it is STOP.
@@ -168,27 +164,27 @@ BOARD = [
               (*NEUTRAL, *RESET), within(seconds + 0.1))
         for seconds in (0.3, 0.12)
     ),
-    Fault("board not heard", wire(drop=1.0), NEUTRAL, SILENCE),
-    Fault("board answers 0.5 s late", wire(delay=0.5), NEUTRAL, SILENCE, hold_s=1.0),
-    Fault("board's datagrams from elsewhere", wire(foreign=1.0), NEUTRAL, SILENCE),
+    Fault("board not heard", do(to_pc(drop=1.0)), NEUTRAL, SILENCE),
+    Fault("board answers 0.5 s late", do(to_pc(delay=0.5)), NEUTRAL, SILENCE, hold_s=1.0),
+    Fault("board's datagrams from elsewhere", do(to_pc(foreign=1.0)), NEUTRAL, SILENCE),
     # The header has no CRC: an echo with a damaged id can read as a pressed bumper.
-    Fault("board's datagrams all damaged", wire(corrupt=1.0), (*NEUTRAL, *RESET), SILENCE),
-    Fault("board's datagrams twice, out of order", wire(duplicate=0.5, reorder=0.3),
-          (*ON, *ITSELF, *NEUTRAL), None),
+    Fault("board's datagrams all damaged", do(to_pc(corrupt=1.0)), (*NEUTRAL, *RESET), SILENCE),
+    Fault("board's datagrams twice, out of order", do(to_pc(duplicate=0.5, reorder=0.3)),
+          (*ON, *ITSELF, *NEUTRAL)),
     Fault("left driver fault", do(Driver(side="left", bits=1)), RESET, within(0.1)),
     Fault("right driver fault", do(Driver(side="right", bits=1 << 3)), RESET, within(0.1)),
     # The sonars of the direction of travel stop the vehicle; the others do not.
     Fault("front sonar faulty", do(Sonar(name="front", fault=True)), ITSELF, within(0.15)),
-    Fault("rear sonar faulty", do(Sonar(name="rear", fault=True)), ON, None, hold_s=0.8),
+    Fault("rear sonar faulty", do(Sonar(name="rear", fault=True)), ON, hold_s=0.8),
     # Suspect after 0.5 m without a change: the speed limit drops.
-    Fault("front sonar stuck", do(Sonar(name="front", range=3.0)), ON, None, hold_s=1.3),
-    Fault("rear sonar stuck", do(Sonar(name="rear", range=3.0)), ON, None, hold_s=0.8),
+    Fault("front sonar stuck", do(Sonar(name="front", range=3.0)), ON, hold_s=1.3),
+    Fault("rear sonar stuck", do(Sonar(name="rear", range=3.0)), ON, hold_s=0.8),
     # One frame reports all eight.
     Fault("sonars silent", do(Mute(reports=("ultrasonic",))), ITSELF, ULTRASONIC_AGE),
     Fault("bumper silent", do(Mute(reports=("bumper",))), NEUTRAL, BUMPER_AGE),
     Fault("velocity silent", do(Mute(reports=("velocity",))), NEUTRAL, VELOCITY_AGE),
     # The vehicle drives further than the largest accepted step of the counters.
-    Fault("mileage silent for 4 s", injectors.silent("mileage", 4.0), ON, None, hold_s=4.8),
+    Fault("mileage silent for 4 s", injectors.silent("mileage", 4.0), ON, hold_s=4.8),
     # Other firmware behaviour.
     Fault("contact while every third answer is lost",
           in_sequence(do(Lose(reports=("bumper",))), hit(0.06)), RESET, within(0.02)),
@@ -196,7 +192,7 @@ BOARD = [
           in_sequence(do(Firmware(hits="second")), hit(0.3)), RESET, within(0.02)),
     # The bridge changes to the other port after 0.1 s without an answer.
     Fault("board answers on the other port", do(Firmware(answers="second")),
-          (*ON, *ITSELF, *NEUTRAL), None),
+          (*ON, *ITSELF, *NEUTRAL)),
     # While safety is dead only the bridge detects that STOP has no effect.
     Fault("safety SIGKILL, the board ignores STOP",
           in_sequence(do(Firmware(ignores=(Command.STOP,))), kill("safety")),
@@ -205,13 +201,12 @@ BOARD = [
 ]  # fmt: skip
 
 GREEDY = [
-    Fault("a stranger's 20 000 datagrams/s", injectors.flood, ON, None, injectors.end_others,
-          hold_s=1.0),
+    Fault("a stranger's 20 000 datagrams/s", injectors.flood, ON, hold_s=1.0),
     Fault("board's 20 000 datagrams/s of garbage", do(Flood(seconds=0.9, garbage=True)),
-          (*ON, *NEUTRAL), None, hold_s=1.0, harmless=True),
+          (*ON, *NEUTRAL), hold_s=1.0, harmless=True),
     # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
-          (*ON, *ITSELF, *NEUTRAL), None, hold_s=1.0, harmless=True),
+          (*ON, *ITSELF, *NEUTRAL), hold_s=1.0, harmless=True),
     Fault("browser's estop while a viewer sends 50 000 messages/s",
           injectors.browser_estop(lambda server: flooded(server, FLOODS["look"])), RESET,
           within(0.3)),
@@ -221,17 +216,15 @@ GREEDY = [
 
 BUS = [
     *(
-        Fault(f"{what} on every key", publish, (*ON, *ITSELF, *NEUTRAL, *RESET), None,
-              harmless=True)
+        Fault(f"{what} on every key", publish, (*ON, *ITSELF, *NEUTRAL, *RESET), harmless=True)
         for what, publish in injectors.HOSTILE.items()
     ),
-    Fault("safety hangs, then contact", injectors.hung("safety", injectors.HUNG_S, hit(0.3)),
-          RESET, within(0.02), injectors.go_on("safety")),
-    Fault("safety hangs for 2 s, then estop",
-          injectors.hung("safety", injectors.LOST_S, injectors.estop), RESET, within(0.02),
-          injectors.go_on("safety"), stops=("brake",)),
+    Fault("safety hangs, then contact", hung("safety", injectors.HUNG_S, hit(0.3)), RESET,
+          within(0.02)),
+    Fault("safety hangs for 2 s, then estop", hung("safety", injectors.LOST_S, injectors.estop),
+          RESET, within(0.02), stops=("brake",)),
     *(
-        Fault(what, injectors.forged(forge), ON, None, harmless=True)
+        Fault(what, injectors.forged(forge), ON, harmless=True)
         for what, forge in {
             "safety's authority copied": injectors.authority,
             "safety's number overtaken": injectors.lock_out,
@@ -241,41 +234,37 @@ BUS = [
 ]  # fmt: skip
 
 # The driver is a client of the site's router, to which the robot's router connects.
-SITE = [
-    *signals("site router", (*NEUTRAL, *ITSELF), REQUEST_LEASE, needs="site"),
+SITE = needing("site",
+    *signals("site router", (*NEUTRAL, *ITSELF), REQUEST_LEASE),
     Fault("site: estop of all", estop_by(lambda session, _: session.put("t2/v1/*/estop", b"")),
-          RESET, within(0.05), needs="site"),
-    Fault("site: flood of another robot", injectors.flood_of_another_robot, ON, None, hold_s=1.5,
-          harmless=True, needs="site"),
-]  # fmt: skip
+          RESET, within(0.05)),
+    Fault("site: flood of another robot", injectors.flood_of_another_robot, ON, hold_s=1.5,
+          harmless=True),
+)  # fmt: skip
 
-RELAY_LEASE = within(0.2 + 0.05)
-RELAY = [
-    Fault("relay: everything on the PC killed", environment.kill_pc, (*NEUTRAL, *RESET),
-          RELAY_LEASE, needs="relay"),
-    Fault("relay: everything on the PC stopped", environment.stop_pc, (*NEUTRAL, *RESET),
-          RELAY_LEASE, environment.continue_pc, needs="relay"),
+RELAY_LEASE = within(0.2 + NOTICE_S)
+RELAY = needing("relay",
+    Fault("relay: everything on the PC killed", injectors.kill_pc, (*NEUTRAL, *RESET),
+          RELAY_LEASE),
+    Fault("relay: everything on the PC stopped", injectors.stop_pc, (*NEUTRAL, *RESET),
+          RELAY_LEASE),
     Fault("relay: everything on the PC killed in a flood of the board",
-          in_sequence(do(Flood(seconds=0.9)), environment.kill_pc), (*NEUTRAL, *RESET),
-          RELAY_LEASE, hold_s=1.0, needs="relay"),
-    Fault("relay: the PC's cable cut for 0.5 s", environment.cut_cable("pc", 0.5),
-          (*NEUTRAL, *RESET), RELAY_LEASE, hold_s=1.0, needs="relay"),
+          in_sequence(do(Flood(seconds=0.9)), injectors.kill_pc), (*NEUTRAL, *RESET),
+          RELAY_LEASE, hold_s=1.0),
+    Fault("relay: the PC's cable cut for 0.5 s", injectors.cut_cable("pc", 0.5),
+          (*NEUTRAL, *RESET), RELAY_LEASE, hold_s=1.0),
     # Here the board holds the last RUN until its cable, or the relay, is back: 0.2 s until the
     # address is resolved, 0.5 s until the program has started.
-    Fault("relay: the board's cable cut for 0.5 s", environment.cut_cable("board", 0.5),
-          (*NEUTRAL, *RESET), within(0.5 + 0.2), hold_s=1.0, needs="relay"),
-    Fault("relay SIGKILL, started again after 0.3 s", environment.restart_relay(0.3),
-          (*NEUTRAL, *RESET), within(0.3 + 0.5), hold_s=1.2, needs="relay"),
+    Fault("relay: the board's cable cut for 0.5 s", injectors.cut_cable("board", 0.5),
+          (*NEUTRAL, *RESET), within(0.5 + 0.2), hold_s=1.0),
+    Fault("relay SIGKILL, started again after 0.3 s", injectors.restart_relay(0.3),
+          (*NEUTRAL, *RESET), within(0.3 + 0.5), hold_s=1.2),
     # The relay's own BRAKE, and one of the bridge that crosses it.
-    Fault("relay: contact", hit(0.3), RESET, within(0.02), needs="relay"),
-    Fault("relay: estop", injectors.estop, RESET, within(0.02), needs="relay"),
-    Fault("relay: bridge SIGKILL", kill("bridge"), NEUTRAL, within(0.01), needs="relay"),
-]  # fmt: skip
+    Fault("relay: contact", hit(0.3), RESET, within(0.02)),
+    Fault("relay: estop", injectors.estop, RESET, within(0.02)),
+    Fault("relay: bridge SIGKILL", kill("bridge"), NEUTRAL, within(0.01)),
+)  # fmt: skip
 
 # Groups in sequence, the most sensitive to host load first.
-GROUPS = (
-    [*MILLISECONDS, *CLOCKS],
-    GREEDY,
-    [*PROCESSES, *NETWORK, *BOARD, *BUS, *SITE, *RELAY],
-)
+GROUPS = (MILLISECONDS, GREEDY, [*PROCESSES, *NETWORK, *BOARD, *BUS, *SITE, *RELAY])
 FAULTS = [fault for group in GROUPS for fault in group]

@@ -28,7 +28,6 @@ class Fault:
     inject: Callable[[StackFixture], int | None]
     outcome: tuple[Outcome, ...]  # allowed by docs/safety.md
     budget: Budget | None = None  # None where the vehicle may drive on
-    restore: Callable[[StackFixture], None] = lambda fixture: fixture.restore()
     hold_s: float = 0.6  # how long requests go on after the fault
     harmless: bool = False  # no process may end because of it
     needs: Requirement = "none"

@@ -2,11 +2,13 @@
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Self
 
@@ -26,9 +28,11 @@ from verification.faults.namespaces import (
     clock,
     relay_host,
     small_disk,
+    step_clock,
 )
 from verification.harness.bus import bus_on, running
 from verification.harness.ports import free_port
+from verification.harness.process_stats import tree
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
 from verification.harness.waiting import becomes_true
@@ -43,6 +47,11 @@ ROOM_M = 900.0  # from here the vehicle is put back to the origin
 READY_S = 30.0
 SPEED_MPS = 0.8  # of every fault
 LIMIT_LEASE_S = 0.5
+CLOCKS = ("robot", "driver")
+NORMAL = (
+    Wire(), Mute(), Firmware(), Lose(), Bumper(pressed=False), Driver(side="left", bits=0),
+    Driver(side="right", bits=0), Sonar(name="front"), Sonar(name="rear"),
+)  # fmt: skip
 PROGRAMS = "verification.faults.programs"
 (PC, RELAY_TO_PC), (BOARD, RELAY_TO_BOARD) = RELAY_CABLES.values()
 RELAY_PORT = 4010  # of its reports
@@ -61,8 +70,11 @@ class StackFixture:
         folder: Path,
         driver: Sequence[str],
         env: Mapping[str, str],
+        *,
+        need: Requirement = "none",
     ) -> None:
         self.running = stack
+        self._need = need
         self._driver, self._env = [sys.executable, "-m", *driver], env
         self.bus = bus
         self.folder = folder
@@ -153,30 +165,33 @@ class StackFixture:
     def ready(self) -> None:
         """Bring the vehicle to speed; raise AssertionError after ``READY_S``."""
         self.restart_ended().restore()
-        if self.at_speed() and not self.latched():
-            self.frames.forget()
-            return
         end_s = time.monotonic() + READY_S
-        while time.monotonic() < end_s:
-            self.restart_ended()
-            if self.latched():
+        while not self.at_speed() or self.latched():
+            if time.monotonic() > end_s:
+                log = self.running.log.read_text()[-2000:]
+                raise AssertionError(f"does not drive: {self.state}\n{log}")
+            if self.restart_ended().latched():
                 self.request(0.0)
                 time.sleep(0.1)
                 self.reset()
-            if self.rearm(2.0):
-                self.frames.forget()
-                return
-        log = self.running.log.read_text()[-2000:]
-        raise AssertionError(f"does not drive: {self.state}\n{log}")
+            self.rearm(2.0)
+        self.frames.forget()
 
     def restore(self) -> None:
-        """Remove all faults of the simulated board; put a distant vehicle back to the origin."""
-        normal = (
-            Wire(), Mute(), Firmware(), Lose(), Bumper(pressed=False),
-            Driver(side="left", bits=0), Driver(side="right", bits=0),
-            Sonar(name="front"), Sonar(name="rear"),
-        )  # fmt: skip
-        for request in normal:
+        """Undo all faults but killed processes; put a distant vehicle back to the origin."""
+        living = [it.pid for it in self.running.processes.values() if it.poll() is None]
+        for _, pid in chain.from_iterable(tree("", pid) for pid in living):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)
+        while self.running.others:
+            process = self.running.others.pop()
+            process.terminate()
+            process.communicate(timeout=20)
+        if self._need == "remote driver":
+            self.disturb_network(Wire())
+        for name in CLOCKS if self._need == "separate clocks" else ():
+            step_clock(self.folder / name, 0)
+        for request in NORMAL:
             self.running.control.do(request)
         if abs(self.running.control.truth().x) > ROOM_M:
             self.running.control.do(Place(x=0.0, y=0.0))
@@ -251,12 +266,16 @@ def stack_fixture(
             )
         )
         env = clock(folder / "driver") if clocks else os.environ
-        yield stack.enter_context(driven(made, folder, _driver(need, made.config), env))
+        yield stack.enter_context(driven(made, folder, _driver(need, made.config), env, need))
 
 
 @contextlib.contextmanager
 def driven(
-    stack: RunningStack, folder: Path, driver: Sequence[str], env: Mapping[str, str]
+    stack: RunningStack,
+    folder: Path,
+    driver: Sequence[str],
+    env: Mapping[str, str],
+    need: Requirement = "none",
 ) -> Iterator[StackFixture]:
     """Add a driver and an operator to a running stack."""
     with running(Loop()) as loop:
@@ -267,5 +286,5 @@ def driven(
                 it[0].state = arrival.message
 
         with bus_on(stack.endpoint, loop, lambda bus: bus.subscribe(keys.SAFETY, take)) as bus:
-            it.append(StackFixture(stack, bus, folder, driver, env))
+            it.append(StackFixture(stack, bus, folder, driver, env, need=need))
             yield it[0]

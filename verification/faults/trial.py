@@ -38,7 +38,7 @@ def run_trial(fixture: StackFixture, fault: Fault) -> Sample:
     commands = list(fixture.frames.commands)
     moving = fixture.moving()
     ended = fixture.ended() if fault.harmless else ()
-    fault.restore(fixture)
+    fixture.restore()
     stopped_s = first_stop_s(commands, fault_ns, fault.stops)
     outcome = "drives on" if moving and stopped_s is None else _outcome(fixture)
     return Sample(

@@ -73,8 +73,7 @@ def test_the_page_keeps_the_rows_of_an_earlier_page() -> None:
     good = row(sample(0.001), sample(0.002)).line(DATE)
     wrong = replace(row(sample(outcome=None)), fault=replace(FAULT, name="that")).line(DATE)
     assert good == (
-        "| it | 2 | 20.0 ms | 1.0 ms | 2.0 ms | 2.0 ms | 0.0 ms | after a neutral | 2026-01-02 "
-        "| ok |"
+        "| it | 2 | 20.0 ms | 1.0 ms | 2.0 ms | 0.0 ms | after a neutral | 2026-01-02 | ok |"
     )
     lines = {"it": good, "that": wrong}
     page = render("a machine", lines, ["a third: no disk"])
