@@ -2,8 +2,7 @@
 
 The driver resets latches, waits while odometry is silent, sets the vehicle's true pose after a
 restart of odometry (as a localization does), and puts the vehicle back to its start when a lap is
-stuck. It is a separate process, so that it can be killed. It imports nothing of ``verification``:
-the systemd test copies this file, and the package ``t2``, to another computer.
+stuck. It is a separate process, so that it can be killed.
 """
 
 import argparse

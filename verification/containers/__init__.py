@@ -1,1 +1,0 @@
-"""The containers of compose.yaml on a real Docker engine: ``python -m verification.containers``."""

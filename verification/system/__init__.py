@@ -1,0 +1,1 @@
+"""T2's installations: containers, systemd units, and the relay's image."""

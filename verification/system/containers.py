@@ -1,0 +1,261 @@
+"""The containers of compose.yaml: isolation, crashes, upgrade; ``T2_BASE`` names a base image."""
+
+import json
+import os
+import re
+import secrets
+import shutil
+import signal
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from verification.harness.ports import udp_ports
+from verification.harness.waiting import wait_until
+from verification.system import frame
+from verification.system.frame import ROOT, Container, Vehicle, attempt, run
+
+OVERLAYS = ("compose.yaml", "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml")
+CHAIN = ("router", "bridge", "safety")
+HEALTHY = (*CHAIN, "odom", "recorder", "dashboard")  # have a health check
+SERVICES = (*HEALTHY, "sim")
+USER, ROBOT_MB = 10001, 120.0
+NETWORK = {
+    "bridge": "host", "sim": "host", "safety": "none", "odom": "none", "recorder": "none",
+    "router": "site", "dashboard": "page",
+}  # fmt: skip
+ISOLATED = {
+    "ReadonlyRootfs": True, "CapDrop": ["ALL"], "CapAdd": None, "Privileged": False, "Init": True,
+    "SecurityOpt": ["no-new-privileges:true"],
+    "RestartPolicy": {"Name": "unless-stopped", "MaximumRetryCount": 0},
+}  # fmt: skip
+TOOLS = ("sh", "bash", "busybox", "apt", "dpkg", "pip", "perl")
+HEALTHY_S = 180.0
+STOPS_S, RESTARTS_S = 1.0, 15.0  # docs/faults.md measures what the processes need: 0.25 s
+
+
+class Stack:
+    """The containers of a Compose project, and their vehicle."""
+
+    vehicle: Vehicle
+
+    def __init__(self, folder: Path, base: str) -> None:
+        self.name = f"t2-test{secrets.token_hex(3)}"
+        self.keys = folder / "keys"
+        self.control_port, board, *listen = udp_ports(4)
+        settings, laptop = folder / "robot.toml", folder / "laptop.json"
+        settings.write_text(
+            f"[board]\nport = {board}\nlisten_ports = {listen}\n"
+            f'[sim]\nworld = "empty"\ncontrol_port = {self.control_port}\n',
+            encoding="utf-8",
+        )
+        # There is no other host to connect from.
+        laptop.write_text('{"services": {"laptop": {"networks": ["site"]}}}', encoding="utf-8")
+        self.files = [ROOT / name for name in OVERLAYS] + [laptop]
+        self.variables = {
+            "T2_BASE": base, "T2_TAG": self.name, "T2_CONFIG": str(settings),
+            "T2_KEYS": f"{self.keys}/robot.001", "T2_DASHBOARD_PORT": "0",
+            "T2_ROUTER_ADDRESS": "127.0.0.1", "T2_ROUTER_PORT": "0",
+        }  # fmt: skip
+
+    def compose(self, *words: str, **environ: str) -> str:
+        """Run a command of Compose."""
+        files = [word for file in self.files for word in ("--file", str(file))]
+        options = ("--project-name", self.name, *files, "--profile", "sim", "--profile", "laptop")
+        return run(*compose(), *options, *words, **self.variables | environ)
+
+    def __getitem__(self, service: str) -> Container:
+        """Return the container of a service, as it is now."""
+        labels = {"project": self.name, "service": service}
+        words = [f"--filter=label=com.docker.compose.{k}={v}" for k, v in labels.items()]
+        return Container(run("docker", "ps", "--all", "--quiet", "--no-trunc", *words))
+
+    def began(self) -> dict[str, tuple[str, str]]:
+        """Return the container of each service, and its start time."""
+        found = {name: self[name].about() for name in SERVICES}
+        return {name: (it["Id"], it["State"]["StartedAt"]) for name, it in found.items()}
+
+    def changed(self, before: dict[str, tuple[str, str]]) -> list[str]:
+        """Return the services that were started again."""
+        return [name for name, began in self.began().items() if began != before[name]]
+
+    def wait_for(self, health: str, *services: str) -> None:
+        """Wait until the health checks of these services have a result."""
+
+        def reached() -> bool:
+            states = [self[name].about()["State"] for name in services]
+            return all(each["Health"]["Status"] == health for each in states)
+
+        wait_until(reached, f"{health}: {', '.join(services)}", HEALTHY_S)
+
+    def signal(self, number: int, service: str, module: str = "") -> None:
+        """Send a signal to the processes of a container, except its init."""
+        container = self[service]
+        init = str(container.about()["State"]["Pid"])
+        for line in run("docker", "top", container.name, "-eo", "pid,args").splitlines()[1:]:
+            pid, *words = line.split()
+            if pid != init and (not module or module in words):
+                os.kill(int(pid), number)
+
+
+@contextmanager
+def started() -> Iterator[Stack]:
+    """Build the images and start the containers; remove all of them."""
+    base = os.environ.get("T2_BASE", f"t2-base:{frame.SUITE}")
+    if attempt("docker", "inspect", base).returncode:
+        run("sh", f"{ROOT}/deploy/image/base.sh", base)
+    frame.wheelhouse(base, "laptop")
+    with tempfile.TemporaryDirectory() as folder:
+        stack = Stack(Path(folder), base)
+        issue_keys(stack.keys)
+        try:
+            stack.compose("build")
+            stack.compose("up", "--detach", *SERVICES)
+            stack.wait_for("healthy", *HEALTHY)
+            with Vehicle(stack["sim"], stack.control_port) as stack.vehicle:
+                yield stack
+        except BaseException:
+            print(stack.compose("logs", "--tail=20"))
+            raise
+        finally:
+            stack.compose("down", "--volumes", "--rmi", "all", "--timeout", "10")
+            attempt("docker", "image", "prune", "--force", "--filter", "label=t2.stage=build")
+    for kind in ("container", "volume", "network"):
+        assert not run("docker", kind, "ls", "--quiet", "--filter", f"name={stack.name}"), kind
+
+
+def compose() -> list[str]:
+    """Return the command of Compose: the plugin of Docker, or the older program."""
+    plugin = attempt("docker", "compose", "version").returncode == 0
+    return ["docker", "compose"] if plugin else ["docker-compose"]
+
+
+def issue_keys(folder: Path) -> None:
+    """Issue the certificates of a laptop, and of the robot, whose containers can read them."""
+    frame.issue_keys(folder, "robot 001 --address router", "viewer anna")
+    robot = folder / "robot.001"
+    for file in (robot, *robot.iterdir()):
+        shutil.chown(file, USER, USER)
+    for each in (folder, folder.parent):
+        each.chmod(0o711)
+
+
+# --- the checks -----------------------------------------------------------------------------------
+
+
+def drives_and_records(stack: Stack) -> str:
+    """Drive, stop by emergency stop, drive again; the recorder writes a file."""
+    stack.vehicle.drive()
+    stack.vehicle.robot.estop()
+    wait_until(lambda: stack.vehicle.truth().command.kind == "brake", "BRAKE", STOPS_S)
+    stack.vehicle.drive()
+    listing = ("python", "-c", "import os; print(os.listdir('/recordings'))")
+    pattern = re.compile(r"001-[^']*-latch-[^']*\.mcap")
+    found = wait_until(lambda: pattern.search(stack["recorder"].run(*listing)), "a recording")
+    return found[0] if found else ""
+
+
+def are_isolated(stack: Stack) -> str:
+    """Check rights, limits and network of each container, and its image."""
+    for name in SERVICES:
+        about = stack[name].about()
+        host = about["HostConfig"]
+        assert about["Config"]["User"] == f"{USER}:{USER}", (name, about)
+        assert {key: host[key] for key in ISOLATED} == ISOLATED, (name, host)
+        assert 0 < host["Memory"] == host["MemorySwap"], (name, host)
+        assert min(host["NanoCpus"], host["PidsLimit"]) > 0, (name, host)
+        assert host["LogConfig"]["Config"].keys() >= {"max-size", "max-file"}, (name, host)
+        network = host["NetworkMode"].removeprefix(f"{stack.name}_")
+        assert network == NETWORK[name], (name, network)
+        assert not [t for t in TOOLS if not stack[name].attempt(t, "--help").returncode], name
+    image = json.loads(run("docker", "image", "inspect", stack["safety"].about()["Image"]))[0]
+    assert image["Size"] < ROBOT_MB * 1e6, image["Size"]
+    return f"no rights, no tools, no network but for four; image {image['Size'] / 1e6:.1f} MB"
+
+
+def laptop_connects(stack: Stack) -> str:
+    """Query safety from the laptop's container; zenohd's rules and the dashboard are closed."""
+    own = {"T2_KEYS": f"{stack.keys}/viewer.anna", "T2_ROUTER": "tls/router:7447"}
+    words = ("run", "--rm", "-T", "laptop", "health", "safety", "--json")
+    assert json.loads(stack.compose(*words, T2_USER="0:0", **own))["told"]
+    printed = stack["safety"].run("python", "-c", "print(open('/run/t2/router.json5').read())")
+    assert json.loads(printed)["access_control"]["default_permission"] == "deny"
+    page = "import urllib.request; urllib.request.urlopen('http://127.0.0.1:8080')"
+    assert "401" in stack["dashboard"].attempt("python", "-c", page).stderr
+    return "over TLS; zenohd's rules deny by default, the dashboard requires its token"
+
+
+def restart_when_killed(stack: Stack) -> str:
+    """Kill all processes of a container: the vehicle stops, only that container is restarted."""
+    seen = []
+    for name in HEALTHY:
+        before = stack.began()
+        kill = partial(stack.signal, signal.SIGKILL, name)
+        if name in CHAIN:  # the guard brakes once the bridge's container runs again
+            limit_s = RESTARTS_S if name == "bridge" else STOPS_S
+            seen.append(f"{name} {stack.vehicle.stops_after(kill, limit_s)}")
+        else:
+            kill()
+        wait_until(partial(stack.changed, before), f"a restarted {name}", RESTARTS_S)
+        stack.wait_for("healthy", name)
+        assert stack.changed(before) == [name]
+    stack.vehicle.drive()
+    return f"{'; '.join(seen)}; drives again"
+
+
+def supervisor_restarts_the_guard(stack: Stack) -> str:
+    """Kill the guard: the vehicle stops, and the container keeps running."""
+    before = stack.began()
+    kill = partial(stack.signal, signal.SIGKILL, "bridge", "services.bridge")
+    seen = stack.vehicle.stops_after(kill, STOPS_S)
+    stack.vehicle.drive()
+    assert stack.began() == before
+    return f"{seen}; drives again"
+
+
+def hang_is_detected(stack: Stack) -> str:
+    """Stop a process by SIGSTOP: its health check detects it, and the vehicle drives."""
+    stack.signal(signal.SIGSTOP, "odom", "services.odom")
+    try:
+        stack.vehicle.drive()
+        stack.wait_for("unhealthy", "odom")
+    finally:
+        stack.signal(signal.SIGCONT, "odom", "services.odom")
+    stack.wait_for("healthy", "odom")
+    return "odom is unhealthy while it hangs, healthy after"
+
+
+def one_service_is_upgraded(stack: Stack) -> str:
+    """Change the image of one service and back: only its container is replaced."""
+    upgraded = f"{stack.name}-next"
+    run("docker", "commit", stack["odom"].name, f"t2-robot:{upgraded}")
+    for tag in (upgraded, stack.name):
+        before = stack.began()
+        stack.compose("up", "--detach", "--no-deps", "--no-build", "odom", T2_TAG=tag)
+        assert stack.changed(before) == ["odom"]
+        assert stack["odom"].about()["Config"]["Image"] == f"t2-robot:{tag}"
+        stack.wait_for("healthy", "odom")
+        stack.vehicle.drive()
+    run("docker", "image", "rm", f"t2-robot:{upgraded}")
+    return "odom only, upgrade and rollback; drives"
+
+
+def logs_are_valid(stack: Stack) -> str:
+    """Check that each line of the logs is JSON, without a traceback."""
+    count = 0
+    for name in (*SERVICES, "router-settings"):
+        done = attempt("docker", "logs", stack[name].name)
+        for line in (done.stdout + done.stderr).splitlines():
+            assert isinstance(json.loads(line), dict), (name, line)
+            assert "Traceback" not in line, (name, line)
+            count += 1
+    return f"{count} lines of JSON"
+
+
+CHECKS = (
+    drives_and_records, are_isolated, laptop_connects, restart_when_killed,
+    supervisor_restarts_the_guard, hang_is_detected, one_service_is_upgraded,
+    logs_are_valid,
+)  # fmt: skip

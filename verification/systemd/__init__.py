@@ -1,1 +1,0 @@
-"""The units under a real systemd: ``make systemd-test``."""
