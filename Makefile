@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench compose-test rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse systemd-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -83,9 +83,6 @@ bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/perfor
 	$(subst $(BIN)/python,$(ROBOT)/bin/python,$(UV_INSTALL)) --require-hashes -r requirements-robot.lock || \
 	  $(ROBOT)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-robot.lock
 	$(BIN)/python -m bench --out docs/performance.md
-
-compose-test: $(STAMP) ## test the containers on a Docker engine: build, drive, kill, disconnect, upgrade
-	$(BIN)/python -m verification.containers
 
 rust-example: $(STAMP) ## compile examples/rust and drive with it; needs cargo
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo build
@@ -182,9 +179,8 @@ wheelhouse: $(STAMP) ## package set for a robot without internet; SET=laptop WHE
 	  sha256sum -- * > SHA256SUMS
 	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
 
-systemd-test: $(STAMP) ## t2-install.sh, units, watchdog and the relay's image under a real systemd; needs root, Docker and debootstrap
-	$(BIN)/python -m verification.systemd
-	$(BIN)/python -m verification.relay.image
+system-test: $(STAMP) ## containers, systemd units and the relay's image, ONLY=relay; needs root, Docker and debootstrap
+	$(BIN)/python -m verification.system $(ONLY)
 
 audit: $(STAMP) ## known vulnerabilities of FILE=requirements.lock, from a public database
 	$(BIN)/python -m tools.audit $(FILE)
