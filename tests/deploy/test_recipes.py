@@ -21,6 +21,12 @@ OWN_ROUTER, TLS = "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml"
 REALTIME = "deploy/compose/realtime.yaml"
 OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "dashboard"}
 OPTIONAL = {"sim", "laptop", "ros2"}  # services, each with a profile of its name
+HOST_NETWORK, NO_NETWORK = {"bridge", "sim"}, {"safety", "odom", "recorder"}
+ISOLATED = (  # each container
+    "\n    read_only: true\n", "\n    init: true\n", "\n    cap_drop:\n +- ALL\n",
+    "no-new-privileges:true", " cpus: ", " mem_limit: ", " memswap_limit: ", " pids_limit: ",
+    " max-size: ", "\n    restart: ",
+)  # fmt: skip
 SHIPPED = {"common", "services", "sim", "cli", "config", "deploy"}
 
 
@@ -51,6 +57,11 @@ def test_compose_gives_each_container_its_rights_only(overlays: tuple[str, ...])
     granted = {name for name, text in services.items() if f"rtprio: {realtime.GUARD}\n" in text}
     assert granted == {"router", "bridge", "safety"}
     assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in services["laptop"]
+    for name, text in services.items():
+        assert not [rule for rule in ISOLATED if not re.search(rule, f"\n{text}")], name
+    for network, names in {"host": HOST_NETWORK, "none": NO_NETWORK}.items():
+        using = {name for name, text in services.items() if f"network_mode: {network}\n" in text}
+        assert using - {"router-settings", "ros2"} == names
     # deploy/nftables/t2.nft drops the traffic of containers on the board's network.
     for file in ("compose.yaml", *overlays):
         assert "10.7.5." not in (ROOT / file).read_text(encoding="utf-8"), file

@@ -22,15 +22,6 @@ CHAIN = ("router", "bridge", "safety")
 HEALTHY = (*CHAIN, "odom", "recorder", "dashboard")  # have a health check
 SERVICES = (*HEALTHY, "sim")
 USER, ROBOT_MB = 10001, 120.0
-NETWORK = {
-    "bridge": "host", "sim": "host", "safety": "none", "odom": "none", "recorder": "none",
-    "router": "site", "dashboard": "page",
-}  # fmt: skip
-ISOLATED = {
-    "ReadonlyRootfs": True, "CapDrop": ["ALL"], "CapAdd": None, "Privileged": False, "Init": True,
-    "SecurityOpt": ["no-new-privileges:true"],
-    "RestartPolicy": {"Name": "unless-stopped", "MaximumRetryCount": 0},
-}  # fmt: skip
 TOOLS = ("sh", "bash", "busybox", "apt", "dpkg", "pip", "perl")
 HEALTHY_S = 180.0
 STOPS_S, RESTARTS_S = 1.0, 15.0  # docs/faults.md measures what the processes need: 0.25 s
@@ -157,22 +148,14 @@ def drives_and_records(stack: Stack) -> str:
     return found[0] if found else ""
 
 
-def are_isolated(stack: Stack) -> str:
-    """Check rights, limits and network of each container, and its image."""
-    for name in SERVICES:
-        about = stack[name].about()
-        host = about["HostConfig"]
-        assert about["Config"]["User"] == f"{USER}:{USER}", (name, about)
-        assert {key: host[key] for key in ISOLATED} == ISOLATED, (name, host)
-        assert 0 < host["Memory"] == host["MemorySwap"], (name, host)
-        assert min(host["NanoCpus"], host["PidsLimit"]) > 0, (name, host)
-        assert host["LogConfig"]["Config"].keys() >= {"max-size", "max-file"}, (name, host)
-        network = host["NetworkMode"].removeprefix(f"{stack.name}_")
-        assert network == NETWORK[name], (name, network)
-        assert not [t for t in TOOLS if not stack[name].attempt(t, "--help").returncode], name
-    image = json.loads(run("docker", "image", "inspect", stack["safety"].about()["Image"]))[0]
+def image_is_minimal(stack: Stack) -> str:
+    """Check that the robot's image is small, and has neither root nor tools."""
+    safety = stack["safety"]
+    assert safety.run("python", "-c", "import os; print(os.getuid())") == str(USER)
+    assert not [each for each in TOOLS if not safety.attempt(each, "--help").returncode]
+    image = json.loads(run("docker", "image", "inspect", safety.about()["Image"]))[0]
     assert image["Size"] < ROBOT_MB * 1e6, image["Size"]
-    return f"no rights, no tools, no network but for four; image {image['Size'] / 1e6:.1f} MB"
+    return f"{image['Size'] / 1e6:.1f} MB, no shell, no installer"
 
 
 def laptop_connects(stack: Stack) -> str:
@@ -255,7 +238,7 @@ def logs_are_valid(stack: Stack) -> str:
 
 
 CHECKS = (
-    drives_and_records, are_isolated, laptop_connects, restart_when_killed,
+    drives_and_records, image_is_minimal, laptop_connects, restart_when_killed,
     supervisor_restarts_the_guard, hang_is_detected, one_service_is_upgraded,
     logs_are_valid,
 )  # fmt: skip

@@ -22,7 +22,7 @@ from verification.harness.waiting import becomes_true, wait_until
 ROOT = Path(__file__).parents[2]
 SUITE = os.environ.get("SUITE", "bookworm")  # of Debian, as in deploy/image/base.sh
 PACKAGES = "systemd-sysv,dbus,udev,kmod,iproute2,python3"
-PATIENCE_S = 60.0
+PATIENCE_S, BUILD_S = 60.0, 3600.0
 SPEED, MOVING = 0.3, 0.1  # m/s
 SETNS = ctypes.CDLL(None, use_errno=True).setns  # os.setns is Python 3.12
 # Like --privileged, without SYS_RESOURCE, which not every host grants: systemd then skips
@@ -58,7 +58,12 @@ def lacking() -> str:
 def attempt(*words: str, **environ: str) -> "subprocess.CompletedProcess[str]":
     """Run a command to its end."""
     return subprocess.run(
-        words, env=os.environ | environ, capture_output=True, text=True, check=False
+        words,
+        env=os.environ | environ,
+        capture_output=True,
+        text=True,
+        timeout=BUILD_S,
+        check=False,
     )
 
 

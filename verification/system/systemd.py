@@ -44,13 +44,13 @@ def started() -> Iterator[Container]:
         yield machine
 
 
-def wait_active(m: Container, *units: str) -> None:
-    """Wait until these units are ready."""
+def wait_active(m: Container) -> None:
+    """Wait until the units are ready."""
 
     def active() -> bool:
-        return all(m.unit(name)["ActiveState"] == "active" for name in units)
+        return all(m.unit(name)["ActiveState"] == "active" for name in UNITS)
 
-    wait_until(active, f"active: {', '.join(units)}", PATIENCE_S)
+    wait_until(active, "active units", PATIENCE_S)
 
 
 def append(m: Container, settings: str) -> None:
@@ -88,7 +88,7 @@ def verifies(m: Container) -> str:
 def starts(m: Container) -> str:
     """Start like an operator: the units become ready in their order."""
     m.run("systemctl", "enable", "--now", "t2.target")
-    wait_active(m, *UNITS)
+    wait_active(m)
     order = [int(m.unit(name)["ActiveEnterTimestampMonotonic"]) for name in UNITS[:3]]
     assert order == sorted(order), order
     assert all(m.unit(name)["NRestarts"] == "0" for name in UNITS)
@@ -171,22 +171,17 @@ def rejects_bad_settings(m: Container) -> str:
 
 
 def upgrades(m: Container) -> str:
-    """Install another build, roll back, and uninstall."""
+    """Install another build, and roll back."""
     m.run("sh", "-c", NEXT_BUILD)
     first = m.run("readlink", "/opt/t2/current")
     for command in (("sh", "/srv/next/t2-install.sh"), (*INSTALL, "--rollback")):
         m.run(*command)
-        assert (m.run("readlink", "/opt/t2/current") == first) == ("--rollback" in command)
+        current = m.run("readlink", "/opt/t2/current")
+        assert (current == first) == ("--rollback" in command), current
         m.run("systemctl", "daemon-reload")
         m.run("systemctl", "restart", "t2.target")
-        wait_active(m, *UNITS)
-    refused = m.attempt(T2, "install", "--uninstall")
-    assert "disable --now" in refused.stdout + refused.stderr, refused
-    m.run("systemctl", "disable", "--now", "t2.target")
-    m.run(T2, "install", "--uninstall")
-    assert m.attempt("systemctl", "cat", ODOM).returncode != 0
-    m.run("test", "-f", SETTINGS)
-    return "upgrade and rollback; uninstalled, the settings stay"
+        wait_active(m)
+    return "upgrade and rollback"
 
 
 CHECKS = (
