@@ -106,7 +106,6 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
 	$(BIN)/codespell
-	$(BIN)/python -m tools.prose
 
 search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
