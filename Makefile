@@ -50,8 +50,7 @@ MANY = -n 6 --dist worksteal
 FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/verification/vehicles/test_runs.py tests/safety/test_walk.py \
-  tests/tools/test_docs_current.py
+SEARCH = tests/invariants tests/verification/vehicles/test_runs.py tests/safety/test_walk.py
 WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
 # Failed tests run a second time, alone: docs/adr/0026-second-run.md.
@@ -106,6 +105,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
 	$(BIN)/codespell
+	$(BIN)/python -m tools.docs --check
 
 search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)

@@ -1,11 +1,12 @@
 """``make docs``: write the generated tables of the documents, and the JSON schemas.
 
-A test compares the output with the committed files. The tables stand between ``<!-- name -->`` and
-``<!-- end -->``; the text around them is written by hand.
+With ``--check`` (in ``make lint``) it compares them with the committed files instead. The tables
+stand between ``<!-- name -->`` and ``<!-- end -->``; the text around them is written by hand.
 """
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -15,43 +16,52 @@ from cli.inspect.schema import fields_of
 from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
-from tools import rights_table, safety_states, sdk
+from services.safety.causes import RULES, SEVERITY, Clears
+from tools import rights_table, sdk
 from verification.harness.results import filled, table
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+CLEARED = {
+    Clears.RESET: "reset",
+    Clears.SETTLED: "by itself after 0.5 s, then a neutral request",
+    Clears.NEUTRAL: "by itself, then a neutral request",
+    Clears.AT_ONCE: "by itself",
+}
 
 
-def main() -> int:
-    """Write every generated file."""
-    for path, text in generated().items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    return 0
+def main(arguments: Sequence[str]) -> int:
+    """Write every generated file, or return 1 when one is not current."""
+    checks = "--check" in arguments
+    stale = {path: text for path, text in generated().items() if current(path) != text}
+    for path, text in stale.items():
+        if checks:
+            print(f"{path.relative_to(ROOT)} is not current; run `make docs`")
+        else:
+            path.write_text(text, encoding="utf-8")
+    return int(checks and bool(stale))
+
+
+def current(path: Path) -> str:
+    """Return the committed text of a generated file; empty when there is none."""
+    return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
 def generated() -> dict[Path, str]:
     """Return the text of each generated file."""
+    all_fields = "\n".join(fields(kind) for kind in kinds())
+    bus = {"topics": topics(), "calls": calls(), "classes": classes(), "fields": all_fields}
+    blocks = {
+        "bus": bus,
+        "safety": {"causes": causes()},
+        "security": {"rights": rights_table.table()},
+        "operations": {"metrics": metrics()},
+        "integrate": {f"rust_{name}": rust(name) for name in ("read", "drive", "limit")},
+    }
+    pages = {DOCS / f"{name}.md": tables for name, tables in blocks.items()}
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
-    bus = {
-        "topics": topics(),
-        "calls": calls(),
-        "classes": classes(),
-        "fields": "\n".join(fields(kind) for kind in kinds()),
-    }
-    safety = {"states": safety_states.diagram(), "causes": causes()}
-    security = {"rights": rights_table.table()}
-    pages = {
-        DOCS / "bus.md": bus,
-        DOCS / "safety.md": safety,
-        DOCS / "security.md": security,
-        DOCS / "operations.md": {"metrics": metrics()},
-        DOCS / "integrate.md": {f"rust_{name}": rust(name) for name in ("read", "drive", "limit")},
-    }
-    return (
-        {page: filled(page.read_text(encoding="utf-8"), blocks) for page, blocks in pages.items()}
-        | schemas
-        | sdk.generated()
-    )
+    filled_pages = {page: filled(current(page), tables) for page, tables in pages.items()}
+    return filled_pages | schemas | sdk.generated()
 
 
 def kinds() -> list[type[Struct]]:
@@ -112,8 +122,13 @@ def fields(kind: type[Struct]) -> str:
 
 
 def causes() -> str:
-    """Return the table of safety's causes."""
-    return table(("cause", "action", "latched", "clears", "in words"), safety_states.causes())
+    """Return the table of safety's causes, most severe first."""
+    rows = [
+        (f"`{rule.name}`", rule.action.upper(), "yes" if rule.clears is Clears.RESET else "no",
+         CLEARED[rule.clears], rule.text)
+        for rule in sorted(RULES, key=lambda rule: -SEVERITY[rule.action])
+    ]  # fmt: skip
+    return table(("cause", "action", "latched", "clears", "in words"), rows)
 
 
 def metrics() -> str:
@@ -127,7 +142,7 @@ def metrics() -> str:
 
 def rust(name: str) -> str:
     """Return a program of the Rust example as a fenced block."""
-    file = DOCS.parent / "examples" / "rust" / "src" / "bin" / f"{name}.rs"
+    file = ROOT / "examples" / "rust" / "src" / "bin" / f"{name}.rs"
     return f"```rust\n{file.read_text(encoding='utf-8')}```"
 
 
@@ -136,4 +151,4 @@ def _link(kind: type[Struct]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))
