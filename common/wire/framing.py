@@ -57,6 +57,7 @@ class Framing:
     covers: ``payload``, or ``header_and_payload`` with the CRC field counted as zero.
     """
 
+    # 1 equivalent mutant: crcmod takes the names of its CRCs in any case.
     def __init__(self, crc: str = "crc-16", covers: Covers = "payload") -> None:
         self._checksum = crc_function(crc)
         self._covers_header = covers != "payload"

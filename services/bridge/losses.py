@@ -42,6 +42,7 @@ class Losses:
             self._lost_ns.append(now_ns)
             self.total += 1
             self._drop_expired(now_ns)
+        # 1 equivalent mutant: None is as false as False.
         self._answered = False
 
     def on_answer(self, now_ns: int) -> None:

@@ -101,6 +101,7 @@ class Ports:
             (self.main, self._began_ns) if stream is None else (stream.port, stream.received_ns)
         )
         turn_ns = max(UNANSWERED_NS, timeout_ns)
+        # 1 equivalent mutant: a nanosecond is no turn: both give the first port.
         return (port + max(0, now_ns - since_ns) // turn_ns) % self._count
 
     def is_received(self, kind: type[Frame], now_ns: int) -> bool:

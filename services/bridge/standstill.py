@@ -92,7 +92,9 @@ class Standstill:
         kept = 1 - elapsed_s / LEAK_S
         linear = _steady(before[0].linear, velocity.linear, STANDING_MPS)
         angular = _steady(before[0].angular, velocity.angular, STANDING_RADPS)
+        # 1 equivalent mutant: only the size of the sum is judged.
         travel.moved = travel.moved * kept + linear * elapsed_s
+        # 1 equivalent mutant: only the size of the sum is judged.
         travel.turned = travel.turned * kept + angular * elapsed_s
         self._check(travel.moved, travel.turned)
 
@@ -104,7 +106,9 @@ class Standstill:
         before, travel.mileage = travel.mileage, (mileage, now_ns)
         if before is None or before[0].epoch != mileage.epoch:
             return
+        # 1 equivalent mutant: only the size of the sum is judged.
         travel.counted_m += mileage.distance - before[0].distance
+        # 1 equivalent mutant: only the size of the sum is judged.
         turned = travel.counted_rad + math.remainder(mileage.heading - before[0].heading, math.tau)
         drift = DRIFT_RADPS * (now_ns - before[1]) / NS_PER_S
         travel.counted_rad = math.copysign(max(0.0, abs(turned) - drift), turned)
@@ -121,6 +125,7 @@ class Standstill:
 
 def _steady(before: float, after: float, threshold: float) -> float:
     """Return the smaller of two velocities of one sign; 0 below the threshold."""
+    # 1 equivalent mutant: with a product of zero the smaller of the two is zero, too.
     if before * after <= 0:
         return 0.0
     steady = min(before, after, key=abs)

@@ -91,6 +91,7 @@ class Estimator:
         self._velocity: Latest[m.Velocity] | None = None
         self._slip_detector = SlipDetector(settings)
         self._standstill = Standstill(settings)
+        # 2 equivalent mutants: it decides nothing before the first counters.
         self._news = False  # counters came since the last estimate
 
     def on_velocity(self, velocity: m.Velocity, now_ns: int) -> Outcome:
@@ -144,6 +145,7 @@ class Estimator:
         twist = self._twist(now_ns)
         if twist is None:
             return None
+        # 1 equivalent mutant: None is as false as False.
         self._news = False
         estimate = self._predicted
         for segment in self._extrapolate(now_ns):

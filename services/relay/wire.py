@@ -71,5 +71,7 @@ def bumper_samples(datagram: bytes) -> Iterator[bool]:
     while at >= 0:
         answer = datagram[at : at + SAMPLE_SIZE]
         if answer in SAMPLES:
+            # 1 equivalent mutant: the high byte of the CRC of one byte is zero for zero only.
             yield answer[-1] != 0
+        # 3 equivalent mutants: two never end, and no sample begins at the second byte.
         at = datagram.find(SAMPLE_OPENING, at + 1)

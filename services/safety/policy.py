@@ -184,7 +184,11 @@ class Policy:
             Observation("runaway", bad_s >= self.settings.runaway_time, tick),
             Observation("uncommanded_motion", state.standstill.left, tick),
             Observation(
-                "not_stopping", state.standstill.is_late(now_ns), tick, state.standstill.text
+                "not_stopping",
+                state.standstill.is_late(now_ns),
+                # 1 equivalent mutant: this cause clears by time, without a token.
+                tick,
+                state.standstill.text,
             ),
             Observation(
                 "two_publishers", bool(conflicts), tick, f"Two publishers use {conflicts}."

@@ -194,6 +194,7 @@ def _move(standstill: Standstill, now_ns: int) -> Standstill:
     """Return the state of a motion; the time limit is kept until the vehicle stands."""
     began_ns = standstill.began_ns if standstill.phase is Phase.MOVING else now_ns
     due_ns = None if standstill.velocities.standing else standstill.due_ns
+    # 1 equivalent mutant: None is as false as False.
     return replace(_begin(standstill, Phase.MOVING, due_ns), began_ns=began_ns, rolls=False)
 
 
@@ -237,6 +238,7 @@ def _steady(before: Twist, after: Twist) -> Twist:
 
 
 def _common(one: float, other: float) -> float:
+    # 1 equivalent mutant: the smaller of the two is zero then.
     return 0.0 if one * other <= 0 else min(one, other, key=abs)
 
 
@@ -256,6 +258,7 @@ def _count(standstill: Standstill, newest: Latest[Mileage] | None) -> Standstill
     step = newest.value.distance - before.value.distance
     turn = math.remainder(newest.value.heading - before.value.heading, math.tau)
     drift = DRIFT_RADPS * gap_s
+    # 1 equivalent mutant: only the size of the sum is judged.
     turned = standstill.counted.angular + _credible(turn, max(AWAY_RAD, FASTEST_RADPS * gap_s))
     counted = Twist(
         standstill.counted.linear + _credible(step, max(AWAY_M, FASTEST_MPS * gap_s)),

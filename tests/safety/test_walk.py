@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 from itertools import product, starmap
 
+import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
@@ -34,6 +35,8 @@ from tests.safety.cause_sets import (
     subsets,
 )
 from tests.safety.policy_fixture import NO_ECHO, PolicyFixture
+
+pytestmark = pytest.mark.campaign  # it takes half a minute
 
 HELD_CLEARS = (Clears.RESET, Clears.SETTLED)
 HOUR_NS = 3600 * NS_PER_S

@@ -7,6 +7,8 @@ import pytest
 
 from verification.vehicles.wander import run
 
+pytestmark = pytest.mark.campaign
+
 
 @pytest.mark.parametrize(("saturation", "seed"), [(5.0, 0), (3.0, 0), (3.0, 1)])
 def test_the_vehicle_goes_on_moving_and_hits_nothing(saturation: float, seed: int) -> None:

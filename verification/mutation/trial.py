@@ -1,17 +1,28 @@
-"""Run mutmut on one file in a copy of the source."""
+"""Run mutmut on one file in a copy of the source, and judge the mutants that no test killed.
+
+A mutant counts as killed only when a test fails. Every other outcome, such as an endless loop, is a
+survivor. A survivor is allowed when it is equivalent to the original, and the line above the
+changed one gives the number of such mutants and the reason: ``# 1 equivalent mutant: ...``.
+"""
 
 import contextlib
+import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 
-from verification.mutation.verdict import Mutant, changed_lines, outcome
-
+KILLED = 1  # pytest: a test failed
+OUTCOMES = {None: "not run", 0: "survived", 33: "untested", 36: "endless", -24: "endless"}
+MARK = re.compile(r" *# (\d+) equivalent mutants?: \S")
+COPIED = "cli", "common", "config", "services", "sim", "tests", "verification"
 LONGEST_S = 2 * 3600  # timeout of one file, also on a slow host
 SETTINGS = """\
 [mutmut]
@@ -21,10 +32,15 @@ source_paths =
     sim
     cli
 only_mutate = {file}
+also_copy =
+    config
+    verification
 # Without conftest the tests do not load zenoh; this profile makes hypothesis deterministic.
 pytest_add_cli_args =
     --noconftest
     --hypothesis-profile=ci
+    -m
+    not campaign
 pytest_add_cli_args_test_selection =
     {tests}
 # At least 30 s, and three times the normal duration: only an endless loop takes longer.
@@ -39,17 +55,37 @@ class TrialError(Exception):
     """mutmut failed."""
 
 
-def run(file: str, tests: Sequence[str], where: Path) -> tuple[int, list[Mutant]]:
+class Survivor(NamedTuple):
+    """A change of the source that no test detected."""
+
+    outcome: str
+    diff: str
+
+    @property
+    def line(self) -> str:
+        """The first changed line, without its indent."""
+        body = self.diff.splitlines()[2:]
+        return next(line[1:].strip() for line in body if line.startswith("-"))
+
+
+def run(file: str, tests: Sequence[str], where: Path) -> tuple[int, list[Survivor]]:
     """Return the number of mutants of a file, and the survivors."""
     shutil.rmtree(where, ignore_errors=True)
-    for part in ("common", "services", "sim", "cli", "tests"):
+    for part in COPIED:
         shutil.copytree(part, where / part, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy("pyproject.toml", where)
     settings = SETTINGS.format(file=file, tests="\n    ".join(tests))
     (where / "setup.cfg").write_text(settings, "utf-8")
     with contextlib.chdir(where):
         _mutmut()
-        return _results(file)
+        data = SourceFileMutationData(path=file)
+        data.load()
+        codes = data.exit_code_by_key
+        return len(codes), [
+            Survivor(OUTCOMES.get(code, f"exit code {code}"), get_diff_for_mutant(name, path=file))
+            for name, code in codes.items()
+            if code != KILLED
+        ]
 
 
 def _mutmut() -> None:
@@ -64,18 +100,23 @@ def _mutmut() -> None:
         raise TrialError(f"{log}\nmutmut ended with exit code {ended.returncode}")
 
 
-def _results(file: str) -> tuple[int, list[Mutant]]:
-    data = SourceFileMutationData(path=file)
-    data.load()
-    survivors = []
-    for name, exit_code in data.exit_code_by_key.items():
-        if result := outcome(exit_code):
-            old, new = changed_lines(get_diff_for_mutant(name, path=file))
-            survivors.append(Mutant(file, _function(name), old, new, result))
-    return len(data.exit_code_by_key), survivors
+def complaints(source: str, survivors: Sequence[Survivor]) -> list[str]:
+    """Return the lines whose survivors are not as many as their mark gives, with the diffs."""
+    allowed, found = marked(source), Counter(survivor.line for survivor in survivors)
+    return [
+        "\n".join([
+            f"{found[line]} survivors, {allowed[line]} marked as equivalent: {line}",
+            *(f"{each.outcome}\n{each.diff}" for each in survivors if each.line == line),
+        ])
+        for line in dict.fromkeys([*found, *allowed])
+        if found[line] != allowed[line]
+    ]  # fmt: skip
 
 
-def _function(mutant: str) -> str:
-    """Return the function in mutmut's name of a mutant."""
-    name = mutant.rpartition(".")[2].partition("__mutmut_")[0]
-    return name.removeprefix("x_").removeprefix("xǁ").replace("ǁ", ".")
+def marked(source: str) -> Counter[str]:
+    """Return the number of equivalent mutants by the text of the line below the mark."""
+    counts: Counter[str] = Counter()
+    for mark, line in pairwise(source.splitlines()):
+        if found := MARK.match(mark):
+            counts[line.strip()] += int(found[1])
+    return counts

@@ -1,0 +1,80 @@
+"""Which files are cores, and which tests have to notice every change of them.
+
+``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are those of its
+folder below ``tests/`` that import it, directly or not, and start no process: they reach neither
+Zenoh nor ``subprocess``.
+"""
+
+import subprocess
+import tomllib
+from pathlib import Path
+
+import grimp
+
+PACKAGES = "cli", "common", "services", "sim", "tests", "verification"
+WITH_PROCESSES = {"zenoh", "subprocess"}
+
+Cores = dict[str, list[str]]  # tests of each file
+
+
+def cores() -> Cores:
+    """Return the cores of the current folder with their tests; ValueError for a wrong name."""
+    folders = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["tool"]["mutants"]
+    graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
+    imported = {
+        module: graph.find_upstream_modules(module)
+        for module in graph.modules
+        if module.rpartition(".")[2].startswith("test_")
+    }
+    found: Cores = {}
+    for pattern in (f"{folder}/{name}.py" for folder, names in folders.items() for name in names):
+        paths = [path for path in sorted(Path().glob(pattern)) if not path.stem.startswith("_")]
+        if not paths and "*" not in pattern:
+            raise ValueError(f"pyproject.toml: tool.mutants: {pattern} does not exist")
+        for path in paths:
+            core, folder = module_of(path), mirror(path)
+            found[str(path)] = [
+                f"{test.replace('.', '/')}.py"
+                for test, modules in sorted(imported.items())
+                if test.startswith(folder) and core in modules and not modules & WITH_PROCESSES
+            ]
+            if not found[str(path)]:
+                raise ValueError(f"{path}: no test imports it")
+    return found
+
+
+def module_of(path: Path) -> str:
+    """Return the module of a file."""
+    return ".".join(path.with_suffix("").parts)
+
+
+def mirror(path: Path) -> str:
+    """Return the package of a core's tests, with a dot at its end."""
+    return ".".join(["tests", *(part for part in path.parts[:-1] if part != "services"), ""])
+
+
+def changed(cores: Cores) -> Cores:
+    """Return the cores that differ from the base, committed or not, and print their names."""
+    commit = _base()
+    diff = None if commit is None else _git("diff", "--name-only", "--relative", commit)
+    if commit is None or diff is None:
+        print("mutants: skipped, no commit to compare with; `make mutants` tests all cores")
+        return {}
+    chosen = {file: tests for file, tests in cores.items() if file in diff.splitlines()}
+    print(f"mutants: since {commit[:7]}: {', '.join(chosen) or 'no core changed'}", flush=True)
+    return chosen
+
+
+def _base() -> str | None:
+    """Return the fork point of the branch; on main, the previous commit."""
+    head, fork = _git("rev-parse", "HEAD"), _git("merge-base", "origin/main", "HEAD")
+    return fork if fork and fork != head else _git("rev-parse", "--verify", "HEAD~1")
+
+
+def _git(*words: str) -> str | None:
+    """Return the output of git; None when it fails or is missing."""
+    try:
+        done = subprocess.run(["git", *words], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
