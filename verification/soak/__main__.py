@@ -1,174 +1,243 @@
 """``python -m verification.soak``: laps with random faults and SIGKILL, and resource usage."""
 
 import argparse
-import socket
+import os
+import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Mapping
 from pathlib import Path
+from random import Random
 
-from msgspec.structs import replace
+import msgspec
 
-from cli.__main__ import EXIT_CODES
 from cli.demo import host_stalls
-from cli.demo.command import (
-    WORLD,
-    free_ports,
-    log_file,
-    own_ports,
-    prepare_folder,
-    trace_file,
-    traced,
-)
-from cli.demo.lap import PATIENT, QUICK
-from cli.inspect.session import interruptible
-from cli.run.supervisor import Supervisor
-from cli.run.up import passed_on
+from cli.demo.lap import PATIENT, QUICK, Pace
 from cli.settings import Everything
-from common import child_process, log
-from common.bus.bus import Bus
-from common.cli_args import add_sources, sources
-from common.config import load
-from common.errors import LinkError, RobotError
+from common import child_process, clock, keys
+from common.bus.bus import Arrival, Bus
+from common.errors import LinkError, MessageError
+from common.freshness import NS_PER_S
 from common.loop import Loop
-from sim.sockets import Control
-from verification.harness.process_stats import PROC
+from common.messages import Health
+from sim.requests import Asked
+from verification.harness.bus import bus_on, running, set_options
+from verification.harness.host import StallRecorder
+from verification.harness.process_stats import GONE, PROC, stat, tree
+from verification.harness.results import table
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.trace import Tail, TraceFollower, last_move_s
+from verification.harness.waiting import wait_until
 from verification.soak.driver import STEP_S
-from verification.soak.record import Record, encoded
-from verification.soak.runner import SoakRunner
-from verification.soak.verdict import Limits, good, results
+from verification.soak.faults import Fault, faults
+from verification.soak.verdict import Limits, Record, Sample, results
 
-POLL_S = 0.05
+FIRST_S = 10.0  # without faults, so that a lap begins
+PAUSE_S = (3.0, 7.0)  # between the end of a fault and the next one
+KILLS_PART = 0.4  # of the time; afterwards every process lives long enough to be judged
 WARM_UP_S = 60.0
 LAP_S = {QUICK: 120.0, PATIENT: 240.0}  # a lap takes a third of that without faults
-KILLS_PART = 0.4  # of the time; afterwards every process runs long enough to be judged
 REST_S = 0.3  # beyond the leases, from a fault to the last command that moves
+HANG_S = 0.2  # without a heartbeat the guard kills its child
+PATIENCE_S = 60.0  # until a restarted simulator takes requests
+DRIVER_EVENTS = ("step", "lap finished", "lap restarted")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the soak; return its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m verification.soak", description=__doc__)
-    add_arguments(parser)
-    options = parser.parse_args(argv)
+class Soak:
+    """Injects faults into a running stack, and records all observations."""
+
+    def __init__(
+        self, stack: RunningStack, stalls: StallRecorder, record: Record, seed: int
+    ) -> None:
+        self._stack, self._stalls, self._record = stack, stalls, record
+        self._faults, self._random = faults(Random(seed)), Random(seed)
+        self._log, self._trace = Tail(stack.log), TraceFollower(stack.trace_file)
+        self._began_ns = clock.now_ns()
+        self._sampled_ns = self._began_ns
+        self._seen: dict[str, int] = {}  # pids by name
+        self._doomed: set[int] = set()  # pids that were killed on purpose
+        self._held = ""  # the process that stays dead until the fault is over
+        config = stack.config
+        self._budget_s = max(config.bridge.lease, config.safety.sources["demo"].lease) + REST_S
+
+    def run(self, seconds: float) -> None:
+        """Inject faults until the time is over."""
+        self._wait(FIRST_S)
+        while (past_s := self._at_s(clock.now_ns())) < seconds:
+            kills = past_s < KILLS_PART * seconds
+            self.inject(next(fault for fault in self._faults if kills or not fault.kills))
+            self._wait(self._random.uniform(*PAUSE_S))
+
+    def subscribe(self, bus: Bus) -> None:
+        """Record health messages."""
+
+        def take(arrival: Arrival[Health]) -> None:
+            times = self._record.health.setdefault(arrival.message.service, [])
+            times.append(self._at_s(arrival.received_ns))
+
+        bus.subscribe(keys.HEALTH, take, depth=16, service="*")
+
+    def inject(self, fault: Fault) -> None:
+        """Begin a fault, wait, judge the commands of that time, and remove it."""
+        name, still = fault.name, fault.still
+        if fault.begin is not None:
+            self._request(fault.begin)
+        self._trace.follow().forget()
+        since_ns = clock.now_ns()
+        if fault.kills:
+            name = self._kill(fault.kills)
+            still = fault.still and bool(self._held)
+        self._record.faults.append((self._at_s(since_ns), name))
+        print(f"{self._at_s(since_ns):7.1f} s  {name}, {fault.seconds:.1f} s", flush=True)
+        self._wait(fault.seconds + still * self._budget_s)
+        if still:
+            # A command that the host held back is the host's fault.
+            stall_s = self._stalls.worst_s(since_ns, (clock.now_ns() - since_ns) / NS_PER_S)
+            moved_s = last_move_s(self._trace.follow().commands, since_ns)
+            self._record.late.append((moved_s - self._budget_s - stall_s, name))
+        if fault.end is not None:
+            self._request(fault.end)
+        if self._held:
+            self._stack.start(self._held)
+            self._held = ""
+
+    def _request(self, request: Asked) -> None:
+        """Send a request to the simulated vehicle until it is taken."""
+
+        def taken() -> bool:
+            try:
+                self._stack.control.do(request)
+            except (LinkError, MessageError):
+                self._wait(0.1)
+                return False
+            return True
+
+        wait_until(taken, f"the simulator takes {request}", PATIENCE_S)
+
+    def _kill(self, service: str) -> str:
+        """Kill one of a service's processes; return its name."""
+        main = self._stack.processes[service].pid
+        processes = list(tree(service, main))
+        name, pid = self._random.choice(processes)
+        # Orphans end as well.
+        self._doomed |= {one for child, one in processes if child.startswith(name)}
+        if pid == main:
+            self._held = service
+            self._stack.kill(service)
+        else:
+            os.kill(pid, signal.SIGKILL)  # its parent restarts it
+        return f"kill {name}"
+
+    def _wait(self, seconds: float) -> None:
+        """Sample once a second meanwhile."""
+        end_ns = clock.now_ns() + round(seconds * NS_PER_S)
+        while (now_ns := clock.now_ns()) < end_ns:
+            if now_ns - self._sampled_ns >= NS_PER_S:
+                self._sampled_ns = now_ns
+                self.sample()
+            time.sleep(0.05)
+
+    def sample(self) -> None:
+        """Take one sample of all processes and of the log."""
+        record = self._record
+        record.seconds = self._at_s(clock.now_ns())
+        pids: dict[str, int] = {}
+        for name, process in self._stack.processes.items():
+            if process.poll() is None:
+                pids |= dict(tree(name, process.pid))
+            elif name != self._held:
+                self._stack.start(name)
+        for name, pid in pids.items():
+            self._sample_process(name, pid)
+        self._find_crashes(pids)
+        for line in self._log.read().splitlines():
+            self._take_line(line)
+        record.log.append((record.seconds, self._log.bytes))
+
+    def _sample_process(self, name: str, pid: int) -> None:
+        try:
+            now = stat(pid)
+            descriptors = sum(1 for _ in (PROC / str(pid) / "fd").iterdir())
+        except GONE:
+            return
+        if now.state not in "ZX":
+            samples = self._record.lives.setdefault((name, pid), [])
+            samples.append(Sample(self._record.seconds, now.rss, now.threads, descriptors))
+
+    def _find_crashes(self, pids: dict[str, int]) -> None:
+        """Record processes that disappeared without a kill of the soak.
+
+        A guard kills a child that hangs: during a stall of the host that is no crash.
+        """
+        hung = self._stalls.worst_s(clock.now_ns() - 2 * NS_PER_S, 2.0) > HANG_S
+        for name, pid in self._seen.items():
+            gone = pids.get(name) != pid and pid not in self._doomed
+            if gone and not (hung and "/" in name):
+                self._record.crashes.append(name)
+                print(f"{name} has crashed", flush=True)
+        self._seen = pids
+
+    def _take_line(self, line: bytes) -> None:
+        self._record.tracebacks += b"Traceback" in line
+        if b'"service": "driver"' in line:
+            event = msgspec.json.decode(line, type=dict[str, object])
+            if (what := str(event["event"])) in DRIVER_EVENTS:
+                self._record.events.append((self._record.seconds, what))
+
+    def _at_s(self, now_ns: int) -> float:
+        return (now_ns - self._began_ns) / NS_PER_S
+
+
+def main() -> int:
+    """Run the soak and print the results; return 0 when all are good."""
+    options = _parser().parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    for old in options.out.glob("*.jsonl"):
+        old.unlink()
+    pace = PATIENT if host_stalls.measured() > host_stalls.LIMIT_S else QUICK
+    record, seconds = Record(), options.minutes * 60
+    limits = Limits(min(WARM_UP_S, seconds / 10), LAP_S[pace], 2 * STEP_S[pace] + 15)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        return run(options)
-    except RobotError as error:
-        print(f"soak: {error}", file=sys.stderr)
-        return EXIT_CODES.get(type(error), 1)
+        soak(options.out, pace, record, options.seed, seconds)
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+    (options.out / "samples.json").write_bytes(msgspec.json.encode(list(record.lives.items())))
+    rows = list(results(record, limits))
+    marks = {True: "ok", False: "WRONG", None: ""}
+    print(table(("result", "value", ""), [(what, text, marks[fine]) for what, text, fine in rows]))
+    return 1 if any(fine is False for _, _, fine in rows) else 0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add this command's options."""
-    parser.add_argument("--minutes", type=_minutes, default=30.0, help="duration, 30")
+def soak(out: Path, pace: Pace, record: Record, seed: int, seconds: float) -> None:
+    """Run the stack and the driver of laps, and disturb them."""
+
+    def driver(config: Everything) -> Mapping[str, list[str]]:
+        where = set_options(
+            f"bus.connect={config.bus.endpoints[0]}", f"sim.control_port={config.sim.control_port}"
+        )
+        words = ["--patient"] if pace is PATIENT else []
+        return {"driver": list(child_process.command("verification.soak.driver", *words, *where))}
+
+    with (
+        StallRecorder() as stalls,
+        running_stack(out, "office", beside=driver) as stack,
+        running(Loop()) as loop,
+    ):
+        made = Soak(stack, stalls, record, seed)
+        with bus_on(stack.endpoint, loop, made.subscribe):
+            made.run(seconds)
+        record.stall_s = stalls.stop()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m verification.soak", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=30.0, help="duration, 30")
     parser.add_argument("--seed", type=int, default=1, help="seed of the faults, 1")
     parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("out/soak"),
-        metavar="DIR",
-        help="folder for plot, trace and log",
+        "--out", type=Path, default=Path("out/soak"), help="folder for log, trace and samples"
     )
-    add_sources(parser)
-
-
-def run(options: argparse.Namespace) -> int:
-    """Run the soak and print the results; 0 for success, 128 plus the number after a signal."""
-    try:
-        from verification.soak import plot
-        from verification.soak.show import Show
-    except ImportError as error:
-        raise RobotError(
-            f"the soak needs {error.name}; `make soak` installs it, or pip install -e '.[demo]'"
-        ) from None
-    if not (PROC / "self" / "stat").exists():
-        raise RobotError("the soak needs /proc of Linux")
-    options.no_sim, options.world = False, WORLD
-    prepare_folder(options)
-    stall_s = host_stalls.measured()
-    pace = PATIENT if stall_s > host_stalls.LIMIT_S else QUICK
-    (control,) = free_ports(socket.SOCK_DGRAM)
-    options.sets = host_stalls.with_accepted_joined([
-        *own_ports(), f"sim.control_port={control}", *host_stalls.settings(stall_s), *options.sets
-    ])  # fmt: skip
-    config = load(Everything, sources(options)).config
-    log.configure(replace(config.log, level="error"), "soak")
-    seconds = options.minutes * 60
-    show = Show(seconds)
-    if pace is PATIENT:
-        show.line(host_stalls.warning(stall_s).replace("demo", "soak"))
-    record = Record()
-    interrupted = soak(options, config, pace is PATIENT, record, show.event)
-    limits = Limits(min(WARM_UP_S, seconds / 10), LAP_S[pace], 2 * STEP_S[pace] + 15)
-    rows = results(record, limits)
-    (options.out / "samples.json").write_bytes(encoded(record))
-    files = [options.out / "soak.png", options.out / "soak.svg"]
-    plot.save(files, record)
-    show.results(rows, files)
-    if interrupted:
-        return 128 + interrupted
-    return 0 if good(rows) else 1
-
-
-def soak(
-    options: argparse.Namespace,
-    config: Everything,
-    patient: bool,
-    record: Record,
-    report: Callable[[str], None],
-) -> int:
-    """Supervise the processes until the time is over; return a signal or 0."""
-    began_s, seconds = time.monotonic(), options.minutes * 60
-    commands = [*traced(options), ("driver", driver_command(options, patient))]
-    with (
-        closing(Loop()) as loop,
-        closing(Bus(config.bus, config.robot.id, loop.post)) as bus,
-        log_file(options).open("wb") as output,
-        interruptible(loop) as signals,
-    ):
-        supervisor = Supervisor(commands, output)
-        runner = SoakRunner(
-            supervisor, Control(config.sim.control_port, timeout_s=1.0), record,
-            files=(log_file(options), trace_file(options)), seed=options.seed,
-            budget_s=budget_s(config), report=report, take_lateness_s=loop.take_lateness_s,
-        )  # fmt: skip
-
-        def step(now_ns: int) -> None:
-            if supervisor.look(time.monotonic()):
-                raise LinkError(f"a process does not run; see {output.name}")
-            past_s = time.monotonic() - began_s
-            runner.disturb(now_ns, kills=past_s < KILLS_PART * seconds)
-            if past_s > seconds:
-                loop.stop()
-
-        runner.subscribe(bus)
-        bus.open()
-        loop.every(POLL_S, step)
-        loop.every(1.0, lambda _: runner.sample())
-        try:
-            loop.run()
-            runner.sample()
-        finally:
-            supervisor.end()
-    return signals[0] if signals else 0
-
-
-def budget_s(config: Everything) -> float:
-    """Return how long after a fault a command may move the vehicle, in seconds."""
-    return max(config.bridge.lease, config.safety.sources["demo"].lease) + REST_S
-
-
-def driver_command(options: argparse.Namespace, patient: bool) -> list[str]:
-    """Return the command of the driver."""
-    words = ["--patient"] if patient else []
-    return child_process.command("verification.soak.driver", *words, *passed_on(options))
-
-
-def _minutes(text: str) -> float:
-    minutes = float(text)
-    if not 0.1 <= minutes <= 7 * 24 * 60:
-        raise argparse.ArgumentTypeError(f"{text} is not within 0.1..10080")
-    return minutes
+    return parser
 
 
 if __name__ == "__main__":

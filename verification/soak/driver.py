@@ -31,10 +31,8 @@ STEP_S = {QUICK: 30.0, PATIENT: 75.0}  # a step takes a third of that; a lap has
 class LocatedDriver(Driver):
     """A driver that sets the true pose after each restart of odometry."""
 
-    def __init__(
-        self, robot: t2.Robot, record: LapRecord, ended: threading.Event, control: Control
-    ) -> None:
-        super().__init__(robot, record, ended)
+    def __init__(self, robot: t2.Robot, timeout: "StepTimeout", control: Control) -> None:
+        super().__init__(robot, LapRecord(timeout.restart), timeout)
         self._control = control
         self._boot: int | None = None  # of the odometry whose pose is set
 
@@ -57,32 +55,6 @@ class LocatedDriver(Driver):
         self.robot.set_pose(truth.x, truth.y, truth.heading)
 
 
-class Operator:
-    """Drives laps, each from the start of the world."""
-
-    def __init__(self, robot: t2.Robot, control: Control, pace: Pace) -> None:
-        self._robot, self._control, self._pace = robot, control, pace
-        self._log = log.Logger()
-
-    def drive(self) -> None:
-        """Drive one lap; give it up when a step takes too long."""
-        timeout = StepTimeout(STEP_S[self._pace])
-        record = LapRecord(timeout.restart)
-        driver = LocatedDriver(self._robot, record, timeout, self._control)
-        try:
-            self._put_back()
-            drive_lap(driver, self._pace)
-        except (LapEndedError, LinkError, MessageError) as error:
-            why = [str(error), *(text for *_, text in record.answers[-1:])]
-            self._log.warning("begun anew", stuck="".join(record.steps[-1:]), why=" ".join(why))
-            time.sleep(TRY_S)
-        else:
-            self._log.info("lap finished", latches=record.unplanned)
-
-    def _put_back(self) -> None:
-        self._control.do(Place(x=0.0, y=0.0))
-
-
 class StepTimeout(threading.Event):
     """Set when a step takes too long; without a thread, whose number the soak watches."""
 
@@ -101,6 +73,21 @@ class StepTimeout(threading.Event):
         return time.monotonic() > self._end_s
 
 
+def drive(robot: t2.Robot, control: Control, pace: Pace) -> None:
+    """Drive one lap from the start of the world; give it up when a step takes too long."""
+    driver = LocatedDriver(robot, StepTimeout(STEP_S[pace]), control)
+    try:
+        control.do(Place(x=0.0, y=0.0))
+        drive_lap(driver, pace)
+    except (LapEndedError, LinkError, MessageError) as error:
+        why = [str(error), *(text for *_, text in driver.record.answers[-1:])]
+        stuck = "".join(driver.record.steps[-1:])
+        log.Logger().warning("lap restarted", stuck=stuck, why=" ".join(why))
+        time.sleep(TRY_S)
+    else:
+        log.Logger().info("lap finished", latches=driver.record.unplanned)
+
+
 def main() -> int:
     """Drive until SIGTERM."""
     parser = argparse.ArgumentParser(prog="python -m verification.soak.driver")
@@ -112,12 +99,11 @@ def main() -> int:
     config = load(Everything, sources(options)).config
     log.configure(config.log, "driver")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    pace = PATIENT if options.patient else QUICK
     log.Logger().info("started")
+    control = Control(config.sim.control_port, timeout_s=1.0)
     with connected(config.robot.id, config.bus.endpoints[0], threading.Event()) as robot:
-        operator = Operator(robot, Control(config.sim.control_port, timeout_s=1.0), pace)
         while True:
-            operator.drive()
+            drive(robot, control, PATIENT if options.patient else QUICK)
 
 
 if __name__ == "__main__":
