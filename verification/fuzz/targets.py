@@ -25,13 +25,10 @@ from common.wire.reports import FROM_BOARD
 COVERS: tuple[Covers, ...] = ("payload", "header_and_payload")
 FRAMINGS = [(Framing("crc-16", covers), kinds)
             for covers in COVERS for kinds in (FROM_BOARD, TO_BOARD)]  # fmt: skip
-KINDS: tuple[type[Struct], ...] = tuple(
+KINDS: list[type[Struct]] = list(
     dict.fromkeys(
-        [
-            *(topic.message for topic in keys.TOPICS),
-            *(call.request for call in keys.CALLS),
-            *(call.reply for call in keys.CALLS),
-        ]
+        [topic.message for topic in keys.TOPICS]
+        + [kind for call in keys.CALLS for kind in (call.request, call.reply)]
     )
 )
 SEPARATOR = b"\0"  # cannot occur in arguments and environment variables
@@ -56,7 +53,7 @@ def messages(data: bytes) -> None:
     try:
         message = decode(data[1:], kind)
     except MessageError as error:
-        _check_error(error, kind.__name__)
+        _check(error, kind.__name__)
         return
     assert type(message) is kind
     sent = encode(message)
@@ -84,13 +81,13 @@ def _settings(files: Sequence[Path], given: Mapping[str, str], words: Sequence[s
     try:
         loaded = load(Everything, Sources(files, given, words))
     except ConfigError as error:
-        _check_error(error, ": ")
+        _check(error, ": ")
         return
     non_finite = [(path, value) for path, value in flatten(loaded.config) if not _finite(value)]
     assert not non_finite, f"non-finite settings: {non_finite}"
 
 
-def _check_error(error: RobotError, words: str) -> None:
+def _check(error: RobotError, words: str) -> None:
     """Check that the error names its subject."""
     assert words in str(error), error
 
