@@ -1,8 +1,8 @@
 """Which files are cores, and which tests have to notice every change of them.
 
 ``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are those of its
-folder below ``tests/`` that import it, directly or not, and start no process: they reach neither
-Zenoh nor ``subprocess``.
+folder below ``tests/`` that import it, themselves or by a fixture, and start no process: they reach
+neither Zenoh nor ``subprocess``.
 """
 
 import subprocess
@@ -21,10 +21,11 @@ def cores() -> Cores:
     """Return the cores of the current folder with their tests; ValueError for a wrong name."""
     folders = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["tool"]["mutants"]
     graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
-    imported = {
-        module: graph.find_upstream_modules(module)
-        for module in graph.modules
-        if module.rpartition(".")[2].startswith("test_")
+    imports = {
+        test: _imports(graph, test)
+        for test in sorted(graph.modules)
+        if test.rpartition(".")[2].startswith("test_")
+        and not graph.find_upstream_modules(test) & WITH_PROCESSES
     }
     found: Cores = {}
     for pattern in (f"{folder}/{name}.py" for folder, names in folders.items() for name in names):
@@ -35,12 +36,18 @@ def cores() -> Cores:
             core, folder = module_of(path), mirror(path)
             found[str(path)] = [
                 f"{test.replace('.', '/')}.py"
-                for test, modules in sorted(imported.items())
-                if test.startswith(folder) and core in modules and not modules & WITH_PROCESSES
+                for test, imported in imports.items()
+                if test.startswith(folder) and core in imported
             ]
             if not found[str(path)]:
                 raise ValueError(f"{path}: no test imports it")
     return found
+
+
+def _imports(graph: grimp.ImportGraph, test: str) -> set[str]:
+    """Return what a test imports, itself or through the fixtures of its folder."""
+    near = {each for each in graph.find_upstream_modules(test) if each.startswith("tests.")}
+    return {one for each in near | {test} for one in graph.find_modules_directly_imported_by(each)}
 
 
 def module_of(path: Path) -> str:

@@ -26,9 +26,10 @@ def _in_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_tests_of_a_core_are_those_of_its_folder_without_processes() -> None:
     found = cores()
-    zones = found["services/safety/zones.py"]
-    assert {"tests/safety/test_zones.py", "tests/safety/test_policy.py"} <= set(zones)
-    assert "tests/safety/test_service.py" not in zones
+    assert "tests/safety/test_zones.py" in found["services/safety/zones.py"]
+    by_fixture = found["services/safety/policy.py"]
+    assert "tests/safety/test_driving.py" in by_fixture
+    assert "tests/safety/test_service.py" not in by_fixture
     assert found["common/wire/frame.py"] == sorted(
         map(str, Path().glob("tests/common/wire/test_*"))
     )
