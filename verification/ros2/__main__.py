@@ -1,84 +1,97 @@
 """Run the gateway against independent ROS 2 peers, and print a table."""
 
 import argparse
+import os
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 from verification.harness.results import table
-from verification.ros2 import build, dead, held_back, hostile, independent, older
-from verification.ros2.fixture import Robot, robot_with_gateway
+from verification.ros2 import hiroz, peers
+from verification.ros2.robot import GATEWAY, Robot, robot_with_gateway
 
-HEAD = "group", "check", "observation", ""
+OUT = Path(__file__).resolve().parents[2] / "out" / "ros2-peer"
+CRATE = Path(__file__).parent / "peer"
+UV = Path(sys.executable).with_name("uv")
+VERSIONS = "1.6.2", "1.7.2", "1.9.0"  # of Zenoh
+KILLED = GATEWAY, "safety", "router"
 
-Check = tuple[str, str, Callable[[Robot], str]]  # group, name, check
-Row = tuple[str, str, str, str]
+Check = Callable[[Robot], str]
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Return 1 when a check fails, and 0 when cargo is missing."""
-    options = _parser().parse_args(argv)
-    if not build.has_cargo():
+    parser = argparse.ArgumentParser(prog="python -m verification.ros2", description=__doc__)
+    parser.add_argument("--only", metavar="TEXT", default="", help="checks with this text in name")
+    only = parser.parse_args().only
+    if not shutil.which("cargo"):
         print("skipped: cargo is not installed; install Rust from https://rustup.rs")
         return 0
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the processes of the check
     print("building the peer; the first time takes several minutes", flush=True)
-    try:
-        peer = build.crate()
-    except build.BuildError as error:
-        print(f"the crate of verification/ros2/peer cannot be built: {error}", file=sys.stderr)
-        return 1
-    with tempfile.TemporaryDirectory() as folder:
-        rows = run(Path(folder), peer, chosen(options.only))
-    print(f"\n{table(HEAD, rows)}")
-    failed = sum(row[-1] != "ok" for row in rows)
-    print(f"\n{len(rows)} checks, {failed} failed")
-    return 1 if failed else 0
+    node = build_crate()
+    rows = [run(name, check, node) for name, check in checks().items() if only in name]
+    print(f"\n{table(('check', 'observation', ''), rows)}")
+    return 1 if any(mark != "ok" for *_, mark in rows) else 0
 
 
-def chosen(only: str | None) -> list[Check]:
-    """Return the checks with this text in their group or name, in their order."""
-    found: list[Check] = [("hiroz", check.__name__, check) for check in independent.CHECKS]
-    found += [
-        ("zenoh", version, partial(older.version, zenoh=version)) for version in older.VERSIONS
-    ]
-    for module in (dead, hostile, held_back):
-        group = module.__name__.rsplit(".", 1)[1]
-        found += [(group, check.__name__, check) for check in module.CHECKS]
-    return [each for each in found if not only or only in f"{each[0]} {each[1]}"]
+def checks() -> dict[str, Check]:
+    """Return the checks by name."""
+    found: dict[str, Check] = {f"hiroz {check.__name__}": check for check in hiroz.CHECKS}
+    found |= {check.__name__: check for check in peers.CHECKS}
+    found |= {f"killed {name}": partial(peers.killed, name=name) for name in KILLED}
+    return found | {f"zenoh {version}": partial(older, version=version) for version in VERSIONS}
 
 
-def run(folder: Path, peer: Path, checks: Sequence[Check]) -> list[Row]:
-    """Run each check on a stack of its own: a failed one must not disturb the next."""
-    rows = []
-    for number, (group, name, check) in enumerate(checks):
-        own = folder / str(number)
-        own.mkdir()
-        rows.append(_row(own, peer, group, name, check))
-        print(" ".join(rows[-1]), flush=True)
-    return rows
+def older(robot: Robot, version: str) -> str:
+    """Run the plain peer with this version of Zenoh."""
+    return peers.version(robot, build_environment(version))
 
 
-def _row(folder: Path, peer: Path, group: str, name: str, check: Callable[[Robot], str]) -> Row:
+def run(name: str, check: Check, node: Path) -> tuple[str, str, str]:
+    """Run a check on a stack of its own, so that a failed one does not disturb the next."""
     began_s = time.monotonic()
+    sets = hiroz.NAMESPACE_SETTINGS if check is hiroz.namespace else ()
     try:
-        with robot_with_gateway(folder, peer, independent.SETTINGS.get(name, ())) as robot:
-            observed = check(robot)
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            robot_with_gateway(Path(folder), node, sets) as robot,
+        ):
+            row = name, f"{check(robot)} ({time.monotonic() - began_s:.0f} s)", "ok"
     except Exception as error:
         traceback.print_exc()
-        return group, name, f"{type(error).__name__}: {error}"[:300], "FAILED"
-    return group, name, f"{observed} ({time.monotonic() - began_s:.0f} s)", "ok"
+        row = name, f"{type(error).__name__}: {error}"[:300], "FAILED"
+    print(" ".join(row), flush=True)
+    return row
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m verification.ros2", description=__doc__)
-    parser.add_argument("--only", metavar="TEXT", help="checks with this text in group or name")
-    return parser
+def build_crate() -> Path:
+    """Build the crate; return its program."""
+    command = ["cargo", "build", "--quiet", "--manifest-path", str(CRATE / "Cargo.toml")]
+    target = OUT / "target"
+    subprocess.run(command, env=os.environ | {"CARGO_TARGET_DIR": str(target)}, check=True)
+    return target / "debug" / "t2-ros2-peer"
+
+
+def build_environment(zenoh: str) -> Path:
+    """Make a Python environment with this version of Zenoh; return its Python."""
+    folder = OUT / f"zenoh-{zenoh}"
+    python = folder / "bin" / "python"
+    if not python.exists():
+        subprocess.run([UV, "venv", "--quiet", "--python", sys.executable, folder], check=True)
+    install = [
+        str(UV), "pip", "install", "--quiet", "--system-certs", "--only-binary", ":all:",
+        "--python", str(python), f"eclipse-zenoh=={zenoh}", "xxhash==4.1.0",
+    ]  # fmt: skip
+    subprocess.run(install, check=True)
+    return python
 
 
 if __name__ == "__main__":

@@ -1,31 +1,29 @@
 """A ROS 2 node on plain Zenoh, written from the description of rmw_zenoh's wire.
 
 ``python plain_peer.py tcp/HOST:PORT`` runs ``exercise`` and prints its results as JSON. It imports
-nothing of T2, so that it runs with any version of Zenoh. Poses are in ``odom``; SI units.
+nothing of T2, so that it runs with any version of Zenoh. SI units.
 """
 
+import contextlib
 import json
 import queue
 import struct
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import xxhash
 import zenoh
+import zenoh.ext
 
 PATIENCE_S = 15.0
 PERIOD_S = 0.05
 NEUTRAL_S = 1.0  # a publisher is taken when its delay has been steady
 MOTION_S = 1.5
-SPEED_MPS = 0.3
 
-ODOMETRY = (
-    "nav_msgs::msg::dds_::Odometry_/"
-    "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
-)
 TWIST = (
     "geometry_msgs::msg::dds_::TwistStamped_/"
     "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64"
@@ -42,20 +40,20 @@ QOS = "::,10:,:,:,,"
 CDR = b"\0\1\0\0"
 FRAME = b"base_link\0"
 
-Pose = tuple[float, float]  # x, y
-
 
 class Twist(NamedTuple):
     """A command."""
 
     linear: float = 0.0
     angular: float = 0.0
-    lateral: float = 0.0
 
     def encode(self) -> bytes:
         """Return a geometry_msgs/TwistStamped with a zero stamp."""
-        axes = self.linear, self.lateral, 0.0, 0.0, 0.0, self.angular
+        axes = self.linear, 0.0, 0.0, 0.0, 0.0, self.angular
         return CDR + struct.pack("<iII10s2x6d", 0, 0, len(FRAME), FRAME, *axes)
+
+
+FORWARD, BACKWARD = Twist(0.4), Twist(-0.4)
 
 
 class Endpoint:
@@ -67,13 +65,13 @@ class Endpoint:
         token = f"@ros2_lv/0/{zid}/0/{number}/{kind}/%/%/plain_peer/{mangled}/{about}/{QOS}"
         self.gid = xxhash.xxh3_128_digest(token.encode())[::-1]
         self.key = f"0/{name.strip('/')}/{about}"
-        self.sequence = 0
+        self._sequence = 0
         self._token = session.liveliness().declare_token(token)
 
     def attachment(self) -> bytes:
         """Return the attachment of the next message."""
-        self.sequence += 1
-        return struct.pack("<qqB16s", self.sequence, time.time_ns(), 16, self.gid)
+        self._sequence += 1
+        return struct.pack("<qqB16s", self._sequence, time.time_ns(), 16, self.gid)
 
     def close(self) -> None:
         """Undeclare the token, as when the publisher is destroyed."""
@@ -81,7 +79,7 @@ class Endpoint:
 
 
 class PlainPeer:
-    """A session with one node; its publisher of commands appears with the first command."""
+    """A session with one node."""
 
     def __init__(self, endpoint: str) -> None:
         config = zenoh.Config()
@@ -89,28 +87,18 @@ class PlainPeer:
         config.insert_json5("connect/endpoints", json.dumps([endpoint]))
         config.insert_json5("scouting/multicast/enabled", "false")
         self.session = zenoh.open(config)
-        zid = self.session.info.zid()
-        node = f"@ros2_lv/0/{zid}/0/0/NN/%/%/plain_peer"
+        node = f"@ros2_lv/0/{self.session.info.zid()}/0/0/NN/%/%/plain_peer"
         self._node = self.session.liveliness().declare_token(node)
         self._number = 0
-
-    def close(self) -> None:
-        """Close the session: all its tokens disappear."""
-        self.session.close()
 
     def endpoint(self, kind: str, name: str, about: str) -> Endpoint:
         """Declare a publisher (MP) or client (SC)."""
         self._number += 1
         return Endpoint(self.session, self._number, kind, name, about)
 
-    def tokens(self) -> list[str]:
-        """Return the liveliness tokens of all nodes and endpoints."""
-        replies = self.session.liveliness().get("@ros2_lv/0/**", timeout=PATIENCE_S)
-        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
-
-    def commands(self, about: str = TWIST) -> Endpoint:
-        """Declare a publisher of commands; ``about`` is another type and hash."""
-        return self.endpoint("MP", "/cmd_vel", about)
+    def publisher(self) -> Endpoint:
+        """Declare a publisher of commands."""
+        return self.endpoint("MP", "/cmd_vel", TWIST)
 
     def send(self, publisher: Endpoint, twist: Twist, *, blocks: bool = False) -> None:
         """Publish a command; with ``blocks`` it waits for space, as reliable publishers of ROS."""
@@ -120,41 +108,22 @@ class PlainPeer:
             congestion_control=control,
         )  # fmt: skip
 
-    def repeat(self, publisher: Endpoint, twist: Twist, seconds: float) -> None:
-        """Publish a command at 20 Hz."""
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            self.send(publisher, twist)
-            time.sleep(PERIOD_S)
-
-    def drive(self, publisher: Endpoint, twist: Twist, seconds: float) -> None:
-        """Publish neutral commands, then this one, then neutral ones."""
-        self.repeat(publisher, Twist(), NEUTRAL_S)
-        self.repeat(publisher, twist, seconds)
-        self.repeat(publisher, Twist(), NEUTRAL_S)
-
-    def pose(self) -> Pose:
-        """Return the next pose of /odom."""
-        arrived: queue.Queue[bytes] = queue.Queue()
-        key = f"0/odom/{ODOMETRY}"
-        subscriber = self.session.declare_subscriber(
-            key, lambda sample: arrived.put(sample.payload.to_bytes())
-        )
-        try:
-            return decoded_pose(arrived.get(timeout=PATIENCE_S))
-        finally:
-            subscriber.undeclare()
+    def sees_gateway(self) -> bool:
+        """Return whether liveliness tokens of the gateway exist."""
+        replies = self.session.liveliness().get("@ros2_lv/0/**", timeout=PATIENCE_S)
+        return any("/%/%/t2" in str(reply.ok.key_expr) for reply in replies if reply.ok)
 
     def description(self) -> str:
         """Return the latched /robot_description."""
         arrived: queue.Queue[bytes] = queue.Queue()
-        subscriber = _latched(
+        subscriber = zenoh.ext.declare_advanced_subscriber(
             self.session,
             f"0/robot_description/{TEXT}",
             lambda sample: arrived.put(sample.payload.to_bytes()),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
         )
         try:
-            return text(arrived.get(timeout=PATIENCE_S), 4)[0]
+            return text(arrived.get(timeout=PATIENCE_S), 4)
         finally:
             subscriber.undeclare()
 
@@ -162,71 +131,71 @@ class PlainPeer:
         """Call a service of std_srvs/srv/Trigger; return success and message."""
         client = self.endpoint("SC", service, TRIGGER)
         about = client.attachment()
-        for reply in self._replies(client.key, about):
-            raw = reply.attachment.to_bytes()
-            if raw[:8] != about[:8] or raw[17:] != about[17:]:
-                raise ValueError(f"a reply to another request: {raw.hex()}")
-            payload = reply.payload.to_bytes()
-            return bool(payload[4]), text(payload, 8)[0]
+        replies = self.session.get(
+            client.key, payload=CDR, attachment=about, target=zenoh.QueryTarget.ALL_COMPLETE,
+            timeout=PATIENCE_S,
+        )  # fmt: skip
+        for reply in replies:
+            if reply.ok is not None and reply.ok.attachment is not None:
+                raw = reply.ok.attachment.to_bytes()
+                if raw[:8] != about[:8] or raw[17:] != about[17:]:
+                    raise ValueError(f"a reply to another request: {raw.hex()}")
+                payload = reply.ok.payload.to_bytes()
+                return bool(payload[4]), text(payload, 8)
         raise TimeoutError(f"{service} does not reply")
 
-    def _replies(self, key: str, about: bytes) -> Iterator[Any]:
-        target = zenoh.QueryTarget.ALL_COMPLETE
-        for reply in self.session.get(
-            key, payload=CDR, attachment=about, target=target, timeout=PATIENCE_S
-        ):
-            if reply.ok is not None:
-                yield reply.ok
+
+class Driver:
+    """Publishes the current command at 20 Hz in a thread; None publishes nothing."""
+
+    def __init__(self, peer: PlainPeer) -> None:
+        self.twist: Twist | None = Twist()
+        self._peer, self._publisher = peer, peer.publisher()
+        self._ends = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop publishing."""
+        self._ends.set()
+        self._thread.join()
+        self._publisher.close()
+
+    def _run(self) -> None:
+        while not self._ends.wait(PERIOD_S):
+            if (twist := self.twist) is not None:
+                self._peer.send(self._publisher, twist)
 
 
-def _latched(session: zenoh.Session, key: str, take: Callable[[Any], None]) -> Any:
-    """Declare the subscriber of a transient local topic."""
-    import zenoh.ext
-
-    history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
-    return zenoh.ext.declare_advanced_subscriber(session, key, take, history=history)
-
-
-def decoded_pose(payload: bytes) -> Pose:
-    """Return x and y of a nav_msgs/Odometry."""
-    _, at = text(payload, 12)
-    _, at = text(payload, at)
-    at += -(at - 4) % 8
-    x, y, *_ = struct.unpack_from("<7d", payload, at)
-    return x, y
+@contextlib.contextmanager
+def plain_peer(endpoint: str) -> Iterator[PlainPeer]:
+    """Open a peer; its session ends with the context."""
+    peer = PlainPeer(endpoint)
+    try:
+        yield peer
+    finally:
+        peer.session.close()
 
 
-def text(payload: bytes, at: int) -> tuple[str, int]:
-    """Return the string at an offset, aligned to 4, and the offset behind it."""
-    at += -at % 4
+def text(payload: bytes, at: int) -> str:
+    """Return the string at an offset of a CDR payload."""
     (size,) = struct.unpack_from("<I", payload, at)
-    at += 4
-    return payload[at : at + size - 1].decode(), at + size
+    return payload[at + 4 : at + 3 + size].decode()
 
 
 def exercise(peer: PlainPeer) -> dict[str, Any]:
     """Read, drive, stop, try to drive, reset; return what was observed."""
-    found: dict[str, Any] = {"zenoh": version("eclipse-zenoh")}
-    found["description"] = peer.description()
-    publisher, forward = peer.commands(), Twist(SPEED_MPS)
-    found["poses"] = [peer.pose()]
-    peer.drive(publisher, forward, MOTION_S)
-    found["poses"].append(peer.pose())
-    found["stop"] = peer.call("/hardware/e_stop_trigger")
-    peer.drive(publisher, forward, MOTION_S)
-    found["poses"].append(peer.pose())
-    found["reset"] = peer.call("/hardware/e_stop_reset")
+    found: dict[str, Any] = {"zenoh": version("eclipse-zenoh"), "description": peer.description()}
+    driver = Driver(peer)
+    for result, service in (("stop", "e_stop_trigger"), ("reset", "e_stop_reset")):
+        for twist, seconds in ((Twist(), NEUTRAL_S), (FORWARD, MOTION_S), (Twist(), NEUTRAL_S)):
+            driver.twist = twist
+            time.sleep(seconds)
+        found[result] = peer.call(f"/hardware/{service}")
+    driver.close()
     return found
 
 
-def main() -> None:
-    """Print the results of ``exercise`` as JSON."""
-    peer = PlainPeer(sys.argv[1])
-    try:
-        print(json.dumps(exercise(peer)))
-    finally:
-        peer.close()
-
-
 if __name__ == "__main__":
-    main()
+    with plain_peer(sys.argv[1]) as this:
+        print(json.dumps(exercise(this)))

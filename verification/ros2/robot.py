@@ -4,20 +4,19 @@ import contextlib
 import json
 import os
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cli.settings import Everything
-from common import child_process, clock, keys
+from common import child_process, keys
 from common.bus.bus import Arrival, Bus
 from common.loop import Loop
 from common.messages import Health, SafetyState
-from sim.trace import Truth
 from verification.harness.bus import bus_on, running, set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, last_move_s, moves
-from verification.harness.waiting import becomes_true, wait_until
+from verification.harness.waiting import wait_until
 
 GATEWAY = "ros2"  # its process and its source of drive requests
 STILL_MPS, MOTION_MPS = 0.001, 0.1
@@ -29,13 +28,15 @@ PATIENCE_S = 30.0  # of a peer's command, on a busy host
 class Robot:
     """A running stack with the gateway, observed on its bus and at its board."""
 
-    def __init__(self, stack: RunningStack, peer: Path) -> None:
+    def __init__(self, stack: RunningStack, node: Path) -> None:
         self.stack = stack
         self.frames = TraceFollower(stack.trace_file)
         self.state: SafetyState | None = None
         self.counters: Mapping[str, int] = {}  # of the gateway
         self.ros_domain = 0  # of the crate's nodes
-        self._peer = peer
+        self.lease_s = stack.config.safety.sources[GATEWAY].lease
+        self.port = int(stack.endpoint.rsplit(":", 1)[1])  # of the router
+        self._node = node
 
     def declare(self, bus: Bus) -> None:
         """Subscribe to safety's state and the gateway's counters."""
@@ -49,113 +50,87 @@ class Robot:
         bus.subscribe(keys.SAFETY, on_state)
         bus.subscribe(keys.HEALTH, on_health, service=GATEWAY)
 
-    def peer(self, *words: object) -> "subprocess.Popen[str]":
+    def start_node(self, *words: object) -> "subprocess.Popen[str]":
         """Start the node of the crate; it prints JSON lines."""
-        command = [str(self._peer), self.stack.endpoint, *map(str, words)]
         process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            [str(self._node), self.stack.endpoint, *map(str, words)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env=os.environ | {"ROS_DOMAIN_ID": str(self.ros_domain)},
         )  # fmt: skip
         self.stack.others.append(process)  # type: ignore[arg-type]
         return process
 
-    def peer_lines(self, *words: object) -> list[Any]:
+    def node(self, *words: object) -> list[Any]:
         """Run the node of the crate to its end; return what it printed."""
-        return finished(self.peer(*words))
+        return finished(self.start_node(*words))
 
-    def truth(self) -> Truth:
-        """Return the true state of the vehicle."""
-        return self.stack.control.truth()
+    def node_moves(self, *words: object) -> float:
+        """Return the distance that the vehicle drives by this command of the node, in metres."""
+        before = self.distance()
+        self.node(*words)
+        self.wait_standstill()
+        return self.distance() - before
 
     def distance(self) -> float:
         """Return the distance driven since the start, in metres."""
-        return self.truth().distance
-
-    @property
-    def port(self) -> int:
-        """Return the TCP port of the router."""
-        return int(self.stack.endpoint.rsplit(":", 1)[1])
-
-    @property
-    def lease_s(self) -> float:
-        """Return the lease of the gateway's requests, in seconds."""
-        return self.stack.config.safety.sources[GATEWAY].lease
+        return self.stack.control.truth().distance
 
     def latched(self) -> tuple[str, ...]:
         """Return the causes that need a reset; fails without a state."""
         assert self.state is not None, "safety publishes no state"
         return self.state.latched
 
+    def is_ready(self) -> bool:
+        """Return whether safety lacks at most a request."""
+        return self.state is not None and {it.name for it in self.state.causes} <= {"no_request"}
+
     def is_moving(self) -> bool:
         """Return whether the board's last command moves the vehicle."""
         commands = self.frames.follow().commands
         return bool(commands) and moves(commands[-1])
 
+    def is_driving(self, direction: int = 1) -> bool:
+        """Return whether the vehicle moves by its last command, forward or backward (-1)."""
+        return self.is_moving() and direction * self.stack.speed() > MOTION_MPS
+
     def wait_motion(self, direction: int = 1) -> None:
-        """Wait until the vehicle moves, forward or backward (-1), by its last command."""
-        moves = becomes_true(
-            lambda: self.is_moving() and direction * self.truth().linear > MOTION_MPS, PATIENCE_S
-        )
-        assert moves, f"does not move; safety: {self.state and self.state.text}"
+        """Wait until the vehicle moves, forward or backward (-1)."""
+        wait_until(lambda: self.is_driving(direction), f"motion {direction}", PATIENCE_S)
 
     def wait_standstill(self) -> None:
         """Wait until the vehicle stands, with no command to move."""
-        stands = becomes_true(
-            lambda: not self.is_moving() and abs(self.truth().linear) < STILL_MPS, PATIENCE_S
-        )
-        assert stands, f"does not stand; safety: {self.state and self.state.text}"
+        wait_until(
+            lambda: not self.is_moving() and abs(self.stack.speed()) < STILL_MPS,
+            "a standstill", PATIENCE_S,
+        )  # fmt: skip
 
-    def is_ready(self) -> bool:
-        """Return whether safety lacks at most a request."""
-        return self.state is not None and {it.name for it in self.state.causes} <= {"no_request"}
-
-    def wait_counter(self, name: str, before: int) -> int:
-        """Wait until a counter of the gateway exceeds a value; return its value."""
-        return wait_until(
-            lambda: self.counters.get(name, 0) > before and self.counters[name],
-            f"counter {name} above {before}, not {dict(self.counters)}",
-        )
-
-    def killed(self, process: "subprocess.Popen[str]") -> int:
-        """Kill a peer with SIGKILL; return the time, in monotonic nanoseconds."""
-        at_ns = clock.now_ns()
-        process.kill()
-        process.communicate()
-        return at_ns
+    def wait_refused(self, counter: str, count: int) -> None:
+        """Wait until the gateway has refused this many commands more for this reason."""
+        before = self.counters.get(counter, 0)
+        wait_until(lambda: self.counters.get(counter, 0) >= before + count, f"{count} {counter}")
 
     def stops_within_lease(self, since_ns: int) -> str:
         """Check that the last command to move came within the lease; return the observation."""
         self.wait_standstill()
         took_s = last_move_s(self.frames.follow().commands, since_ns)
-        allowed_s = self.lease_s + MARGIN_S
-        assert took_s <= allowed_s, f"moved for {took_s:.3f} s, {allowed_s:.3f} s are allowed"
+        assert took_s <= self.lease_s + MARGIN_S, f"moved for {took_s:.3f} s"
         return f"last command to move after {took_s:.3f} s, lease {self.lease_s:.1f} s"
 
-    def refused(self) -> int:
-        """Return how many commands the gateway has refused or dropped."""
-        return sum(self.counters.values())
-
-    def moved_during(self, do: Callable[[], object]) -> float:
-        """Return the distance that the vehicle drives meanwhile and until it stands, in metres."""
-        before = self.distance()
-        do()
-        self.wait_standstill()
-        return self.distance() - before
-
-    def ended(self) -> list[str]:
-        """Return the processes of the stack that have ended."""
-        return [name for name, it in self.stack.processes.items() if it.poll() is not None]
+    def check_processes(self) -> None:
+        """Check that no process of the stack has ended."""
+        ended = [name for name, it in self.stack.processes.items() if it.poll() is not None]
+        assert not ended, f"{ended} ended"
 
 
 def finished(process: "subprocess.Popen[str]") -> list[Any]:
-    """Return the JSON lines of a peer that ends well; raise AssertionError."""
+    """Return the JSON lines of a node that ends well; raise AssertionError."""
     output, errors = process.communicate(timeout=2 * PATIENCE_S)
     assert process.returncode == 0, f"exit code {process.returncode}: {errors[-500:]}"
     return [json.loads(line) for line in output.splitlines() if line.startswith(("{", "["))]
 
 
 @contextlib.contextmanager
-def robot_with_gateway(folder: Path, peer: Path, sets: Sequence[str] = ()) -> Iterator[Robot]:
+def robot_with_gateway(folder: Path, node: Path, sets: Sequence[str] = ()) -> Iterator[Robot]:
     """Run the stack in an empty world; only a request is missing when the context begins.
 
     ``sets`` are settings of the gateway.
@@ -169,7 +144,7 @@ def robot_with_gateway(folder: Path, peer: Path, sets: Sequence[str] = ()) -> It
     with (
         running_stack(folder, beside=beside) as stack,
         running(loop),
-        bus_on(stack.endpoint, loop, (robot := Robot(stack, peer)).declare),
+        bus_on(stack.endpoint, loop, (robot := Robot(stack, node)).declare),
     ):
         wait_until(robot.is_ready, "safety ready")
         yield robot
