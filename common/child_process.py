@@ -1,6 +1,6 @@
 """Child processes: safe import path and restart backoff.
 
-``common`` and ``services`` are generic names (docs/adr/0001-import-names.md). A folder of that
+``common`` and ``services`` are generic names (docs/decisions.md#import-names). A folder of that
 name in the working directory, or on PYTHONPATH as in every ROS workspace, must not shadow ours.
 """
 

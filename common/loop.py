@@ -2,7 +2,7 @@
 
 A handler runs only in the thread that holds the loop's lock, so that the cores need no locks of
 their own. The loop's thread holds it except while it sleeps. Then another thread may ``submit`` a
-call and run it at once, without waking the loop's thread: ``docs/adr/0002-one-thread.md``.
+call and run it at once, without waking the loop's thread: ``docs/decisions.md#one-thread-decides``.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 """The drive link: the private session on which bridge and safety move the vehicle.
 
 The bridge listens on a Unix socket and safety connects to it. Neither end has other endpoints, so
-no message of the router can be mistaken for one of theirs (``docs/adr/0022-drive-link.md``).
+no message of the router can be mistaken for one of theirs (``docs/decisions.md#drive-link``).
 """
 
 from collections.abc import Callable
