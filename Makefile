@@ -53,7 +53,7 @@ FEW = -n 2 --dist worksteal
 SEARCH = tests/invariants tests/verification/vehicles/test_runs.py tests/safety/test_walk.py
 WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
-# Failed tests run a second time, alone: docs/adr/0026-second-run.md.
+# Failed tests run a second time, alone: docs/decisions.md#second-run.
 TESTS = $(BIN)/python -m tools.run_tests
 
 test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
