@@ -56,7 +56,6 @@ def generated() -> dict[Path, str]:
         "safety": {"causes": causes()},
         "security": {"rights": rights_table.table()},
         "operations": {"metrics": metrics()},
-        "integrate": {f"rust_{name}": rust(name) for name in ("read", "drive", "limit")},
     }
     pages = {DOCS / f"{name}.md": tables for name, tables in blocks.items()}
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
@@ -138,12 +137,6 @@ def metrics() -> str:
         for one in FAMILIES
     ]
     return table(("metric", "kind", "labels", ""), rows)
-
-
-def rust(name: str) -> str:
-    """Return a program of the Rust example as a fenced block."""
-    file = ROOT / "examples" / "rust" / "src" / "bin" / f"{name}.rs"
-    return f"```rust\n{file.read_text(encoding='utf-8')}```"
 
 
 def _link(kind: type[Struct]) -> str:
