@@ -15,7 +15,6 @@ from sim.requests import Bumper
 from tests.docs.integrator import (
     PAGE,
     ROOT,
-    TRIES,
     Integrator,
     check_driving,
     check_limiting,
@@ -180,22 +179,8 @@ def test_the_version_of_zenoh_is_that_of_the_stack() -> None:
     assert re.findall(r"eclipse-zenoh==(\S+)", TEXT) == [locked]
 
 
-def test_the_program_of_the_page_on_the_bus(it: Integrator) -> None:
-    save_files(PAGE.with_name("bus.md"), it.folder)
-    with it.limited("plain/limit.py"):
-        before = it.stack.control.truth().x
-        for _ in range(TRIES):
-            done = it.run("drive_nav.py")
-            assert done.returncode == 0, done
-            if it.stack.control.truth().x > before + 0.2:
-                return
-            it.await_clear()
-        raise AssertionError(done)
-
-
 def test_the_programs_are_formatted(tmp_path: Path) -> None:
     save_files(PAGE, tmp_path)
-    save_files(PAGE.with_name("bus.md"), tmp_path)
     words = ["format", "--check", "--isolated", "--line-length", "100", str(tmp_path)]
     done = subprocess.run(
         [sys.executable, "-m", "ruff", *words], capture_output=True, text=True, check=False
