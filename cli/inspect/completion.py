@@ -1,7 +1,7 @@
 """``t2 completion``: shell completion by argcomplete, from the parsers of the commands.
 
 The shell's script starts ``t2`` at each Tab with ``_ARGCOMPLETE`` set; ``complete`` then answers
-from the parser of the command that is being typed. See docs/decisions.md#shell-completion.
+from the parser of the command that is being typed. See docs/decisions.md#libraries.
 """
 
 import argparse
