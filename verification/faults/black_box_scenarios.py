@@ -250,9 +250,10 @@ def wall_ahead(box: BlackBox) -> None:
     board = box.board
     with box.driving(0.4):
         board.wall_m = board.distance + 1.5
-        wait_until(lambda: abs(board.linear) < 0.01, "the vehicle stands", 15.0)
+        wait_until(lambda: "blocked" in box.client.causes, "blocked by the wall", 15.0)
         time.sleep(1.0)
         gap_m = board.wall_m - board.distance
+    assert board.linear == 0.0, f"moves at {board.linear:.2f} m/s"
     assert 0.0 < gap_m <= 0.6, f"{gap_m:.2f} m left"
     assert not box.client.latched, f"latched: {box.client.latched}"
 
@@ -286,6 +287,7 @@ def rolling_away_without_safety(box: BlackBox) -> None:
 def rolls(box: BlackBox) -> None:
     """Let the vehicle roll; require BRAKE in time."""
     at_s, from_m = time.monotonic(), box.board.distance
+    assert box.board.commands[-1].kind == "stop", "it is not STOP that holds the vehicle"
     box.board.rolls = 0.1
     box.first("brake", at_s, 4.0)
     rolled_m = box.board.distance - from_m

@@ -56,6 +56,11 @@ class Client:
         """The causes that need a reset."""
         return list(self.state.get("latched", ()))
 
+    @property
+    def causes(self) -> list[str]:
+        """All active causes."""
+        return [cause["name"] for cause in self.state["causes"]]
+
     def put(self, key: str, payload: bytes = b"") -> float:
         """Publish on a key of the robot; return the time."""
         self.bus.put(f"{ROOT}/{key}", payload)
