@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from services.relay.wire import BRAKE, BUMPER, MOTION, frame
 from verification.harness.network_hosts import ip
 from verification.harness.waiting import wait_until
-from verification.system.frame import ROOT, Container, booted, debian, in_network, run
+from verification.system.frame import ROOT, Container, attempt, booted, debian, in_network, run
 
 PC, BOARD = (f"t2image{os.getpid()}{end}" for end in "pb")
 CABLES = (("eth0", BOARD, "10.7.5.224"), ("eth1", PC, "10.7.6.2"))  # the relay's end, host, address
@@ -48,8 +48,8 @@ def started() -> Iterator[Relay]:
         with booted(name, "--read-only") as machine, cables(machine.pid()):
             yield Relay(machine, *(udp(host, address) for _, host, address in CABLES))
     finally:
-        run("docker", "rm", name)
-        run("docker", "image", "rm", name)
+        attempt("docker", "rm", name)
+        attempt("docker", "image", "rm", name)
 
 
 @contextmanager
