@@ -85,8 +85,9 @@ bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/perfor
 
 rust-example: $(STAMP) ## compile examples/rust and drive with it; needs cargo
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo build
-	$(BIN)/pytest tests/examples/test_rust.py
+	$(BIN)/pytest tests/docs/test_integrate.py -k rust
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo clippy --quiet -- -D warnings
+	cd examples/rust && cargo fmt --check
 
 roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roaming.md
 	$(BIN)/python -m verification.roaming --out docs/roaming.md

@@ -1,9 +1,12 @@
-"""An integrator: a folder with the files of docs/integrate.md, and a stack for its programs."""
+"""An integrator: a folder with the files of docs/integrate.md, and a stack for its programs.
+
+A program is called as the page calls it, with the endpoint or the Zenoh configuration last.
+"""
 
 import contextlib
+import math
 import os
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -11,8 +14,9 @@ from pathlib import Path
 
 import t2
 from sim.requests import Sonar
+from sim.trace import Truth
 from verification.harness.stack import SETTINGS_FILE, RunningStack, running_stack
-from verification.harness.waiting import becomes_true, wait_until
+from verification.harness.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "integrate.md"
@@ -44,41 +48,29 @@ class Integrator:
         self.stack = stack
         self.robot = robot
 
-    def words(self, program: Sequence[str], router: str = "") -> list[str]:
+    def command(self, program: str, router: str = "") -> list[str]:
         """Return the command of a program: a Python file of the page, or an executable."""
-        python = [sys.executable] if program[0].endswith(".py") else []
-        return [*python, *program, router or self.stack.endpoint]
+        python = [sys.executable] if program.endswith(".py") else []
+        return [*python, program, router or self.stack.endpoint]
 
-    def run(self, *program: str, router: str = "") -> "subprocess.CompletedProcess[str]":
-        """Run a program to its end."""
-        return subprocess.run(
-            self.words(program, router), cwd=self.folder, env=environment(),
-            capture_output=True, text=True, timeout=60, check=False,
-        )  # fmt: skip
-
-    def check_success(self, *program: str, router: str = "") -> None:
-        """Check that a program ends without an error; on a busy host at the third try."""
+    def check_end(self, code: int, reported: str, program: str, router: str = "") -> None:
+        """Check exit code and error text of a program; on a busy host at the third try."""
         for _ in range(TRIES):
-            done = self.run(*program, router=router)
-            if done.returncode == 0:
-                break
-            self.await_clear()
-        assert done.returncode == 0, done
-
-    def check_failure(self, reported: str, *program: str, router: str = "") -> None:
-        """Check that a program ends with this error text; likewise."""
-        for _ in range(TRIES):
-            done = self.run(*program, router=router)
-            if reported in done.stderr:
-                break
-        assert reported in done.stderr, done
-        assert done.returncode == 1
+            done = subprocess.run(
+                self.command(program, router), cwd=self.folder, env=environment(),
+                capture_output=True, text=True, timeout=60, check=False,
+            )  # fmt: skip
+            if done.returncode == code and reported in done.stderr:
+                return
+            if code == 0:
+                self.await_clear()
+        raise AssertionError(done)
 
     @contextlib.contextmanager
-    def running(self, *program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
+    def running(self, program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
         """Run a program during the context."""
         with subprocess.Popen(
-            self.words(program, router), cwd=self.folder, env=environment(),
+            self.command(program, router), cwd=self.folder, env=environment(),
             stdout=subprocess.PIPE, text=True,
         ) as process:  # fmt: skip
             try:
@@ -86,16 +78,10 @@ class Integrator:
             finally:
                 process.kill()
 
-    @contextlib.contextmanager
-    def moving(self, *program: str) -> Iterator["subprocess.Popen[str]"]:
-        """Run a source, and wait until the vehicle moves; on a busy host at the third try."""
-        for _ in range(TRIES):
-            with self.running(*program) as process:
-                if becomes_true(lambda: self.stack.speed() > 0.1, 6.0):
-                    yield process
-                    return
-            self.await_clear()
-        raise AssertionError(f"{program} does not move the vehicle")
+    def driven(self, start: Truth) -> float:
+        """Return the distance of the vehicle from where it was, in m."""
+        truth = self.stack.control.truth()
+        return math.dist((start.x, start.y), (truth.x, truth.y))
 
     def causes(self) -> set[str]:
         """Return the names of the causes that safety reports."""
@@ -113,13 +99,13 @@ class Integrator:
         wait_until(is_clear, "a vehicle that may drive")
 
     @contextlib.contextmanager
-    def limited(self, *program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
+    def limited(self, program: str, router: str = "") -> Iterator["subprocess.Popen[str]"]:
         """Run a limit program, and wait until its limit is valid and the vehicle may drive.
 
         It starts after the lease of an earlier one: two publishers on one source are a conflict.
         """
         wait_until(lambda: self.limit().silent, "the end of an earlier limit")
-        with self.running(*program, router=router) as process:
+        with self.running(program, router) as process:
             wait_until(lambda: not self.limit().silent, "the limit")
             self.await_clear()
             yield process
@@ -172,47 +158,3 @@ def lines_until(process: "subprocess.Popen[str]", true: Callable[[str], bool]) -
         if true(line):
             return lines
     raise AssertionError(f"ended with {process.wait()}: {lines}")
-
-
-# --- what each program of the page must do, in whichever language --------------------------------
-
-
-def check_reading(it: Integrator, *program: str) -> None:
-    """Check that a consumer prints pose and nearest obstacle."""
-    place = it.robot.odometry.latest()
-    with it.obstacle(0.62), it.running(*program) as process:
-        line = lines_until(process, lambda line: "nearest 0.6" in line)[-1]
-    pose = f"x {place.x:.1f}"
-    assert re.match(pose + r"\d m  y -?\d+\.\d\d m  heading -?\d\.\d\d rad  nearest 0\.6\d m", line)
-
-
-def check_driving(it: Integrator, *program: str, router: str = "") -> None:
-    """Check that a source drives forward and ends without an error."""
-    with it.limited("plain/limit.py"):
-        before = it.stack.control.truth().x
-        it.check_success(*program, router=router)
-        wait_until(lambda: abs(it.stack.speed()) < 0.02, "standstill")
-        assert 0.2 < it.stack.control.truth().x - before < 1.5
-
-
-def check_limiting(it: Integrator, *program: str) -> None:
-    """Check that a limit caps the speed before an obstacle, and that its end stops the vehicle."""
-    with it.limited(*program) as process:
-        assert it.limit().linear is None
-        with it.obstacle(1.0):
-            wait_until(lambda: it.limit().linear == 0.1, "the cap")
-            wait_until(lambda: it.limit().reason.startswith("obstacle at "), "its reason")
-        wait_until(lambda: it.limit().linear is None, "no cap")
-        assert it.limit().reason == ""
-        process.send_signal(signal.SIGKILL)
-        wait_until(lambda: "limit_silent" in it.causes(), "the stop")
-
-
-def check_silent_safety(it: Integrator, *program: str) -> None:
-    """Check that a source ends when safety dies."""
-    with it.limited("plain/limit.py"), it.moving(*program) as process:
-        it.stack.kill("safety")
-        try:
-            assert process.wait(timeout=20.0) == 1
-        finally:
-            it.stack.start("safety")

@@ -1,6 +1,7 @@
 """docs/integrate.md with certificates, and its own test file, as they stand there."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -11,63 +12,92 @@ import pytest
 
 import t2
 from cli.demo import host_stalls
+from common.config import Sources, load
+from common.settings import Shared
 from tests.cli.stack import ports
-from tests.docs.integrator import LEASES, PAGE, TRIES, environment, lines_until, save_files
-from tests.docs.secured import Secured, secured_integrator
+from tests.docs.integrator import (
+    LEASES,
+    PAGE,
+    TRIES,
+    Integrator,
+    environment,
+    lines_until,
+    running_integrator,
+    save_files,
+)
+from verification.harness.certificates import ADDRESS, Site
 from verification.harness.ports import free_port
-
-UNNAMED = "safety.sources or your certificate does not name it"  # the page's program reports it
 
 pytestmark = [pytest.mark.timed, pytest.mark.campaign, pytest.mark.timeout(300)]
 
+ROBOT, DRIVER = "tls/192.168.201.1:7447", "driver.planner"  # in planner.json5 of the page
+FILES = {
+    "ca": "ca.pem",
+    "certificate": "certificate.pem",
+    "private_key": "private.key",
+    "members": "members.json",
+}
+
 
 @pytest.fixture(scope="module")
-def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
-    with secured_integrator(tmp_path_factory.mktemp("secured")) as it:
+def it(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
+    """Run a stack whose router admits the members that the page issues; write their settings."""
+    folder = tmp_path_factory.mktemp("secured")
+    site = Site(folder / "keys")
+    site.keys("issue", "robot", "001", "--address", ADDRESS)
+    for words in re.findall(r"^t2 keys (issue .*)$", PAGE.read_text("utf-8"), re.MULTILINE):
+        site.keys(*words.split())
+    remote = f"tls/{ADDRESS}:{free_port()}"
+    sets = [f"bus.{name}={site.folder / 'robot.001' / file}" for name, file in FILES.items()]
+    listen = f"unixsock-stream/{folder}/bus.sock,{remote}"
+    with running_integrator(folder, sets=sets, listen=listen) as it:
+        for member in ("driver.planner", "device.detector", "viewer.screen"):
+            write_settings(folder, member, remote)
         yield it
 
 
-def test_each_role_may_do_what_the_page_states(secured: Secured) -> None:
-    it = secured.integrator
-    driver, device, viewer = (
-        secured.configuration(member)
-        for member in ("driver.planner", "device.detector", "viewer.screen")
-    )
-    with it.running("plain/read.py", router=viewer) as process:
+def write_settings(folder: Path, member: str, endpoint: str) -> None:
+    """Write a member's Zenoh configuration as on the page, and its bus.toml, for this router."""
+    text = (folder / "planner.json5").read_text(encoding="utf-8")
+    text = text.replace(ROBOT, endpoint).replace(DRIVER, f"keys/{member}")
+    (folder / f"{member}.json5").write_text(text, encoding="utf-8")
+    file = folder / "keys" / member / "bus.toml"
+    bus = load(Shared, Sources(files=(file,), environ={})).config.bus
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace(bus.connect[0], endpoint), encoding="utf-8")
+
+
+def test_each_role_may_do_what_the_page_states(it: Integrator) -> None:
+    with it.running("plain/read.py", "viewer.screen.json5") as process:
         lines_until(process, lambda line: "nearest" in line)
-    with it.limited("plain/limit.py", router=device):
-        it.check_success("plain/drive.py", router=driver)
-        for other in (device, viewer):
-            it.check_failure(f"patrol: {UNNAMED}\n", "plain/drive.py", router=other)
+    with it.limited("plain/limit.py", "device.detector.json5"):
+        it.check_end(0, "", "plain/drive.py", "driver.planner.json5")
+        unnamed = "patrol: safety.sources or your certificate does not name it\n"
+        for other in ("device.detector.json5", "viewer.screen.json5"):
+            it.check_end(1, unnamed, "plain/drive.py", other)
 
 
-def test_the_package_takes_the_folder_of_a_certificate(secured: Secured) -> None:
-    toml = secured.bus_toml("driver.planner")
-    with t2.connect("001", config=toml) as robot:
+def test_the_package_reports_what_a_certificate_may_not_do(it: Integrator) -> None:
+    def connected(member: str) -> t2.Robot:
+        return t2.connect("001", config=it.folder / "keys" / member / "bus.toml")
+
+    with connected("viewer.screen") as robot:
         assert robot.odometry.latest(timeout=5.0).frame_id == "odom"
-
-
-def test_the_package_reports_a_certificate_that_may_not_drive(secured: Secured) -> None:
-    toml = secured.bus_toml("viewer.screen")
-    with (
-        secured.integrator.limited("plain/limit.py"),
-        t2.connect("001", config=toml) as robot,
-        pytest.raises(t2.NotAllowed, match="this certificate may not drive"),
-        robot.drive("patrol"),
-    ):
-        pass
-
-
-def test_the_package_reports_a_certificate_that_may_not_limit(secured: Secured) -> None:
+        with (
+            it.limited("plain/limit.py"),
+            pytest.raises(t2.NotAllowed, match="this certificate may not drive"),
+            robot.drive("patrol"),
+        ):
+            pass
     for member in ("viewer.screen", "driver.planner"):
         with (
-            t2.connect("001", config=secured.bus_toml(member)) as robot,
+            connected(member) as robot,
             pytest.raises(t2.NotAllowed, match="safety does not show the limit of 'detector'"),
         ):
             robot.limit("detector", linear=0.1, seconds=60)
-    with t2.connect("001", config=secured.bus_toml("device.detector")) as robot:
+    with connected("device.detector") as robot:
         robot.limit("detector", linear=0.1, seconds=60)
-        assert secured.integrator.limit().linear == 0.1
+        assert it.limit().linear == 0.1
 
 
 def test_the_test_file_of_the_page(tmp_path: Path) -> None:

@@ -1,105 +1,186 @@
-"""The examples as documented, with a real router and a fake robot."""
+"""Every example once, as a process on the real stack."""
 
+import asyncio
+import csv
+import json
 import math
+import os
+import re
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from threading import Thread
 from typing import Any
 
+import nbformat
 import pytest
+from mcp import Client, StdioServerParameters
+from nbclient import NotebookClient
 
-from common import keys
-from common.bus.bus import Arrival, Bus
-from common.loop import Loop
-from common.messages import Limit, Odometry, Ultrasonic
-from examples import limit_speed, nearest_obstacle
-from verification.harness.bus import bus_on, router_process, running
-from verification.harness.ports import free_port
+import t2
+from sim.requests import Bumper, Sonar
+from tests.sdk.library_robot import blocked, ready
+from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-LIMITS: list[Limit] = []
-RANGES = (2.0, 1.5, 0.62, None, 3.0, None, None, 4.0)
+pytestmark = pytest.mark.timed
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "sdk")}
+SETS = (
+    "safety.sources.agent={priority=1, lease=0.3, operator=false}",
+    'safety.limits.lidar={lease=1.0, silence="ignore"}',
+)
 
 
 @pytest.fixture(scope="module")
-def robot() -> Iterator[str]:
-    """Run a router with a fake robot; yield the endpoint."""
-    where = f"tcp/127.0.0.1:{free_port()}"
-
-    def declare(bus: Bus) -> None:
-        ultrasonic, odometry = bus.publisher(keys.ULTRASONIC), bus.publisher(keys.ODOMETRY)
-
-        def publish(_: int) -> None:
-            status = tuple("no_echo" if one is None else "ok" for one in RANGES)
-            ultrasonic.put(Ultrasonic(ranges=RANGES, status=status))  # type: ignore[arg-type]
-            odometry.put(
-                Odometry(
-                    x=1.25, y=-0.5, heading=0.1, linear=0.3, angular=0.0,
-                    pose_covariance=(0.0,) * 9, twist_covariance=(0.0,) * 4,
-                    epoch=0, residual=None, slip=False,
-                )
-            )  # fmt: skip
-
-        loop.every(0.05, publish)
-        bus.subscribe(keys.LIMIT, lambda it: LIMITS.append(it.message), source="lidar")
-
-    with router_process(where), running(Loop()) as loop, bus_on(where, loop, declare):
-        yield where
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    with running_stack(tmp_path_factory.mktemp("examples"), "office", sets=SETS) as it:
+        yield it
 
 
-def first_line(*words: str) -> tuple[str, int]:
-    """Run a program until its first line of output, then stop it like Ctrl-C."""
-    with subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True) as process:
+@pytest.fixture
+def robot(stack: RunningStack) -> Iterator[t2.Robot]:
+    with ready(stack) as it:
+        yield it
+
+
+@contextmanager
+def example(*words: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run an example; stop it like Ctrl-C."""
+    with subprocess.Popen(
+        [sys.executable, *words], cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
+    ) as process:
         try:
-            assert process.stdout is not None
-            line = process.stdout.readline()
+            yield process
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE_S)
+            assert process.wait(PATIENCE_S) in (0, -signal.SIGINT)
         finally:
             process.kill()
-    return line, process.returncode
-
-
-def test_the_consumer_with_t2_prints_the_nearest_obstacle(robot: str) -> None:
-    line, code = first_line("-m", "examples.nearest_obstacle", "--set", f"bus.connect={robot}")
-    assert line == "0.62 m front\n"
-    assert code == 0
-
-
-def test_the_plain_consumer_prints_the_pose(robot: str) -> None:
-    line, _ = first_line("examples/watch_plain.py", robot)
-    assert line == "x   1.25 m  y  -0.50 m   0.30 m/s\n"
-
-
-def test_a_limit_slows_before_the_nearest_obstacle(robot: str) -> None:
-    words = [sys.executable, "-m", "examples.limit_speed", "--set", f"bus.connect={robot}"]
-    with subprocess.Popen(words) as process:
-        try:
-            wait_until(lambda: LIMITS, "a limit")
-        finally:
-            process.kill()
-    limit = LIMITS[-1]
-    assert (limit.linear, limit.angular, limit.reason) == (0.2, None, "something at 0.62 m")
 
 
 @pytest.mark.parametrize(
-    ("range_m", "status", "distance"),
-    [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
+    ("words", "line"),
+    [
+        (
+            ("-m", "examples.nearest_obstacle", "--set", "bus.connect={}"),
+            r"(\d\.\d\d m \w+|nothing near)\n",
+        ),
+        (("examples/watch_plain.py", "{}"), r"x +-?\d+\.\d\d m  y +-?\d+\.\d\d m  +\d\.\d\d m/s\n"),
+    ],
 )
-def test_a_front_sonar_that_cannot_measure_counts_as_0(
-    range_m: float | None, status: Any, distance: float
+def test_a_consumer_prints_what_it_receives(
+    robot: t2.Robot, words: tuple[str, ...], line: str
 ) -> None:
-    clear: list[Any] = ["no_echo"] * 8
-    clear[2] = status
-    ranges: list[float | None] = [None] * 8
-    ranges[2] = range_m
-    sample = Ultrasonic(ranges=tuple(ranges), status=tuple(clear))
-    assert limit_speed.front(sample) == distance
+    with example(*(word.format(robot.endpoint) for word in words)) as process:
+        assert process.stdout is not None
+        assert re.fullmatch(line, process.stdout.readline())
 
 
-def test_the_consumer_with_t2_counts_a_fault_as_0(capsys: pytest.CaptureFixture[str]) -> None:
-    status: Any = ("ok", "ok", "ok", "fault", "ok", "no_echo", "too_near", "ok")
-    sample = Ultrasonic(ranges=RANGES, status=status)
-    nearest_obstacle.print_nearest(Arrival(sample, "", 0, b""))
-    assert capsys.readouterr().out == "0.00 m front_right\n"
+def test_the_limit_slows_before_an_obstacle(robot: t2.Robot, stack: RunningStack) -> None:
+    with example("-m", "examples.limit_speed", "--set", f"bus.connect={robot.endpoint}"):
+        stack.control.do(Sonar(name="front", range=0.62))
+        try:
+            wait_until(
+                lambda: (
+                    [one.reason for one in robot.safety.latest().limit_sources]
+                    == ["something at 0.62 m"]
+                ),
+                "the limit",
+            )
+        finally:
+            stack.control.do(Sonar(name="front"))
+
+
+def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:
+    file = tmp_path / "poses.csv"
+    with example("examples/odometry_logger.py", str(file), robot.endpoint):
+        wait_until(lambda: file.exists() and file.read_text().count("\n") > 5, "poses")
+    rows = list(csv.DictReader(file.read_text().splitlines()))
+    assert float(rows[0]["x"]) == pytest.approx(robot.odometry.latest().x, abs=0.05)
+
+
+def test_the_square_ends_at_its_start(robot: t2.Robot) -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "square.py"), robot.endpoint],
+        env=ENVIRONMENT, stdout=subprocess.PIPE, text=True, timeout=110, check=True,
+    )  # fmt: skip
+    distance, rest = done.stdout.split(" ", 1)
+    assert float(distance) < 0.3
+    assert rest == "m from the start\n"
+
+
+def test_the_notebook_plots_while_it_drives(
+    robot: t2.Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("T2_ENDPOINT", robot.endpoint)
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
+    notebook = nbformat.read(  # type: ignore[no-untyped-call]
+        EXAMPLES / "live_plot.ipynb", as_version=4
+    )
+    NotebookClient(notebook, timeout=100, resources={"metadata": {"path": tmp_path}}).execute()
+    plots = notebook.cells[-2].outputs
+    assert any("image/png" in output.get("data", {}) for output in plots)
+
+
+def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: RunningStack) -> None:
+    server = StdioServerParameters(
+        command=sys.executable,
+        args=[str(EXAMPLES / "mcp_server.py"), robot.endpoint],
+        env={"PYTHONPATH": ENVIRONMENT["PYTHONPATH"]},
+    )
+
+    async def session() -> None:
+        async with Client(server) as client:
+            tools = {tool.name for tool in (await client.list_tools()).tools}
+            assert tools == {"state", "sonars", "incidents", "drive", "stop"}
+            before: Any = (await client.call_tool("state", {})).structured_content
+            driven: Any = (await client.call_tool("drive", {"distance": 0.3})).structured_content
+            way = math.dist((before["x"], before["y"]), (driven["x"], driven["y"]))
+            assert way == pytest.approx(0.3, abs=0.1)
+            await client.call_tool("stop", {})
+            refused: Any = await client.call_tool("drive", {"turn": 90.0})
+            assert refused.is_error
+            assert "Emergency stop" in refused.content[0].text
+
+    asyncio.run(asyncio.wait_for(session(), 100.0))
+    wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
+
+
+def test_the_web_hook_gets_each_latch_once(robot: t2.Robot, stack: RunningStack) -> None:
+    bodies: list[dict[str, object]] = []
+
+    class Hook(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            bodies.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+    with HTTPServer(("127.0.0.1", 0), Hook) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        hook = f"http://127.0.0.1:{server.server_port}/hook"
+        with example("examples/webhook.py", hook, robot.endpoint):
+            for number in (1, 2):
+                stack.control.do(Bumper(pressed=True))
+                wait_until(lambda: len(bodies) >= number, "a POST")  # noqa: B023 - called here
+                stack.control.do(Bumper(pressed=False))
+                wait_until(lambda: not blocked(robot), "a reset")
+        server.shutdown()
+    assert [body["causes"] for body in bodies] == [["contact"], ["contact"]]
+
+
+def test_the_wall_follower_approaches_the_wall(robot: t2.Robot) -> None:
+    with example("examples/wall_follower.py", robot.endpoint):
+        start = robot.odometry.latest()
+
+        def follows() -> bool:
+            pose, wall = robot.odometry.latest(5.0), robot.ultrasonic.latest(5.0).ranges[4]
+            way = math.dist((start.x, start.y), (pose.x, pose.y))
+            return way > 1.0 and wall is not None and 0.6 < wall < 1.0
+
+        wait_until(follows, "the wall beside the vehicle", 100.0)
