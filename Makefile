@@ -14,13 +14,13 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench rust-example check cover search mutants lint format types docs pictures lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench rust-example check cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
 
-help: ## list the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+help:
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 $(STAMP): requirements.lock pyproject.toml sdk/pyproject.toml
 	$(PYTHON) -c '$(CHECK_PYTHON)'
@@ -55,9 +55,13 @@ WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
 # Failed tests run a second time, alone: docs/decisions.md#second-run.
 TESTS = $(BIN)/python -m tools.run_tests
+SECOND_RUN = out/second-run.txt
+# Each worker imports each file that it is given: the timed tests get theirs only.
+TIMED = $(FEW) $$(grep -rl --include=*.py mark.timed tests)
 
 test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
-	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m "timed and not campaign"
+	@rm -f $(SECOND_RUN)
+	$(TESTS) $(TIMED) -m "timed and not campaign"
 	$(TESTS) $(WITHOUT_SEARCH) $(MANY) -m "not timed and not campaign"
 
 fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
@@ -83,7 +87,8 @@ bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/perfor
 	  $(ROBOT)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-robot.lock
 	$(BIN)/python -m bench --out docs/performance.md
 
-rust-example: $(STAMP) ## compile examples/rust and drive with it; needs cargo
+# Compile examples/rust and drive with it; needs cargo.
+rust-example: $(STAMP)
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo build
 	$(BIN)/pytest tests/docs/test_integrate.py -k rust
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo clippy --quiet -- -D warnings
@@ -98,8 +103,12 @@ vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews doc
 ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz, older versions of Zenoh and hostile peers; needs cargo
 	$(BIN)/python -m verification.ros2
 
-check: lint types cover search ## what CI runs: format, lint, spelling, types, import rules, tests, coverage, mutants
-	@$(MAKE) --no-print-directory mutants CHANGED=1
+# The tests that needed a second run are named last, also when a check fails.
+check: $(STAMP) ## what CI runs: lint, types, tests, coverage of the cores, search, mutants of changed cores
+	@rm -f $(SECOND_RUN)
+	@$(MAKE) --no-print-directory -j2 --output-sync lint types
+	@$(MAKE) --no-print-directory cover search mutants CHANGED=1; code=$$?; \
+	  cat $(SECOND_RUN) 2> /dev/null; exit $$code
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -111,34 +120,20 @@ lint: $(STAMP)
 search: $(STAMP) ## search for violations of the invariants
 	$(BIN)/pytest -n 2 $(SEARCH)
 
-# They run little of what ships in their own process, or thousands of times the same.
-UNTRACED = tests/verification tests/tools tests/deploy tests/bench tests/cli/commission/test_stop_coverage.py \
-  tests/test_lap.py
-
-cover: $(STAMP) ## all tests except the search, with coverage
+# All tests except the search. Not a branch of a core is untested.
+cover: $(STAMP)
 	$(BIN)/coverage erase
-	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(addprefix --ignore=,$(UNTRACED)) $(MANY) -m "not timed"
-	$(TESTS) $(WITHOUT_SEARCH) $(UNTRACED) $(MANY) -m "not timed"
-	$(TESTS) $(WITHOUT_SEARCH) $(FEW) -m timed
-	$(BIN)/coverage report --fail-under=85
-	$(BIN)/coverage report --fail-under=100 --include="$$($(PURE))"
-
-pictures: $(STAMP) ## renew the README's screenshots; needs chromium
-	$(BIN)/python -m tools.pictures
+	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(MANY) -m "not timed"
+	$(TESTS) $(TIMED) -m timed
+	$(BIN)/coverage report --fail-under=100 --include="$$($(BIN)/python -m tools.cores)"
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
 	$(BIN)/python -m verification.mutation $(if $(CHANGED),--changed)
 
-# The cores that decide, as the import rules name them: not a branch of theirs is untested.
-PURE = $(BIN)/python -c 'import tomllib; \
-  rules = tomllib.load(open("pyproject.toml", "rb"))["tool"]["importlinter"]["contracts"]; \
-  cores = rules[-1]["source_modules"]; \
-  print(",".join(c.replace(".", "/") + e for c in cores for e in (".py", "/*")))'
-
 types: $(STAMP)
 	$(BIN)/mypy
 
-format: $(STAMP) ## format the code with ruff
+format: $(STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -198,5 +193,6 @@ sbom: $(STAMP) ## bill of materials, installed and robot, as CycloneDX: out/sbom
 	$(SBOM) environment $(SBOM_OPTIONS) --output-file out/sbom.json $(BIN)/python
 	$(SBOM) requirements $(SBOM_OPTIONS) --output-file out/sbom-robot.json requirements-robot.lock
 
-clean: ## remove all generated files
+# Remove all generated files.
+clean:
 	rm -rf .venv out mutants .coverage .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist

@@ -15,6 +15,8 @@ from tests.cli.demo.lap_fixture import as_client
 from tests.simulated_robot import simulated_robot
 from tests.simulated_stack import SimulatedStack
 
+pytestmark = pytest.mark.no_cover  # whole laps; the cores have tests of their own
+
 
 @cache
 def driven() -> tuple[SimulatedStack, LapRecord]:

@@ -2,7 +2,8 @@
 
 Most tests start real processes with real time limits, and several run at once. A host that stalls
 processes fails a few of them. So the tests that failed run a second time, one by one, with the
-machine to themselves. A test that fails again fails the run; the others are listed at the end.
+machine to themselves. A test that fails again fails the run; the others are listed at the end and
+in ``out/second-run.txt``, after those of earlier runs: ``make check`` prints that file last.
 
 Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run. A run that
 takes longer than ``LONGEST_S`` hangs; pytest and its workers are ended, with their stacks.
@@ -24,6 +25,7 @@ FAILED_BY_TIME = 124  # as of timeout(1)
 DUMP_S = 5.0  # for the stacks
 END_S = 60.0  # for the fixtures, after Ctrl-C
 CACHE = Path(".pytest_cache/v/cache/lastfailed")
+NAMES = Path("out/second-run.txt")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -42,7 +44,10 @@ def main(arguments: Sequence[str]) -> int:
     again = ["--last-failed", "--last-failed-no-failures=none", "-n", "0", *appended]
     code = pytest([*arguments, *again])
     if code == 0:
-        print("run_tests: passed the second time only:", *failed, sep="\n  ", flush=True)
+        NAMES.parent.mkdir(exist_ok=True)
+        with NAMES.open("a", encoding="utf-8") as names:
+            names.writelines(f"passed the second time only: {name}\n" for name in failed)
+        print(NAMES.read_text(encoding="utf-8"), end="", flush=True)
     return code
 
 

@@ -52,6 +52,11 @@ def test_a_deceleration_near_zero_must_be_owned_up_to() -> None:
     assert read(*given, "safety.unsafe_overrides=deceleration").deceleration == 0.09
 
 
+def test_an_emergency_stop_is_kept_alive_by_a_source_once() -> None:
+    with pytest.raises(ConfigError, match="estop_keepalive names a source twice"):
+        read('safety.estop_keepalive=["pendant", "pendant"]')
+
+
 @pytest.mark.parametrize("name", ["bumper_age", "settle", "max_linear", "sources.teleop.lease"])
 def test_zero_never_means_off(name: str) -> None:
     with pytest.raises(ConfigError, match=name.split(".")[0]):
