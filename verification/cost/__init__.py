@@ -1,1 +1,0 @@
-"""Cost of the hot paths in counts that do not depend on the load of the host."""
