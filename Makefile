@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults roaming fleet vehicles ros2-peer bench rust-example check cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -73,18 +73,9 @@ soak: $(STAMP) ## drive laps with random faults and kill -9 for MINUTES=30, chec
 faults: $(STAMP) ## run the fault campaign; renews docs/faults.md
 	$(BIN)/python -m verification.faults --out docs/faults.md
 
-fleet: $(STAMP) ## measure N=50 robots behind one site's router; renews docs/fleet.md
-	$(BIN)/python -m verification.fleet --robots $(or $(N),50) --out docs/fleet.md
-
-# What costs on board is measured with what a robot installs.
-ROBOT = out/robot
-
-bench: $(STAMP) ## compare T2 with other buses and libraries; renews docs/performance.md
+bench: $(STAMP) ## compare T2 with other buses, many robots, a bad link; renews docs/performance.md
 	$(UV_INSTALL) --require-hashes -r requirements-bench.lock || \
 	  $(PIP_INSTALL) --require-hashes -r requirements-bench.lock
-	$(BIN)/python -m venv --clear $(ROBOT)
-	$(subst $(BIN)/python,$(ROBOT)/bin/python,$(UV_INSTALL)) --require-hashes -r requirements-robot.lock || \
-	  $(ROBOT)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-robot.lock
 	$(BIN)/python -m bench --out docs/performance.md
 
 # Compile examples/rust and drive with it; needs cargo.
@@ -93,9 +84,6 @@ rust-example: $(STAMP)
 	$(BIN)/pytest tests/docs/test_integrate.py -k rust
 	cd examples/rust && CARGO_TARGET_DIR=$(CURDIR)/out/rust cargo clippy --quiet -- -D warnings
 	cd examples/rust && cargo fmt --check
-
-roaming: $(STAMP) ## drive over a bad link between two hosts; renews docs/roaming.md
-	$(BIN)/python -m verification.roaming --out docs/roaming.md
 
 vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
 	$(BIN)/python -m verification.vehicles --runs $(or $(N),1000) --out docs/vehicles.md

@@ -6,120 +6,80 @@ Raw samples are stored in ``out/bench``. A benchmark that is not measured again 
 import argparse
 import platform
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
-from bench.command import measure as command_measure
-from bench.growth import measure as growth_measure
-from bench.growth import page as growth_page
-from bench.load import measure as load_measure
-from bench.load import page as load_page
-from bench.path import page as path_page
-from bench.reaction import measure as reaction_measure
-from bench.reaction import page as reaction_page
-from bench.reaction import plot as reaction_plot
-from bench.series import RAW, Measured, Series, load, store
-from bench.start import measure as start_measure
-from bench.start import page as start_page
-from bench.target import Target, summary
-from bench.telemetry import measure as telemetry_measure
-from bench.telemetry import page as telemetry_page
-from common import clock
-from common.freshness import NS_PER_S
+from bench import fleet, link, load, reaction, series
+from bench.processes import MissingError
+from bench.reaction import PACKAGE
+from bench.series import RAW, Column, Limits, Measured, Series, columns, compared, store
 from verification.harness.host import StallRecorder, description
+from verification.harness.results import table
 
 PAGE = Path(__file__).with_name("page.md")
-UNMEASURED = 3  # exit code when packages or samples are missing
-
-
-Questions = Mapping[str, Callable[[Sequence[Series]], list[Target]]]
+HEAD = ["question", "figure", "compared with", "ratio", "target", "verdict"]
+UNMEASURED = 3  # exit code when samples are missing
 
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """One or more sections of the document: measurement, blocks, targets by question, plot."""
+    """A section of the document: question, measurement, table, limits and remarks."""
 
+    question: str
     measure: Callable[[], list[Series]]
-    versions: Callable[[], str]
-    blocks: Callable[[Sequence[Series]], dict[str, str]]
-    questions: Questions
-    draw: Callable[[Path, Sequence[Series]], None] | None = None
+    heads: Sequence[str]
+    columns: Sequence[Column]
+    limits: Limits
+    notes: Callable[[], str] = str
 
 
-BENCHMARKS = {
-    "reaction": Benchmark(
-        reaction_measure.measure,
-        reaction_measure.versions,
-        reaction_page.blocks,
-        {"How soon after a contact does the vehicle brake?": reaction_page.targets},
-        reaction_plot.draw,
+BENCHMARKS: Mapping[str, Benchmark] = {
+    "reflex": Benchmark(
+        "How soon after a contact does the bridge brake?",
+        partial(reaction.measured, reaction.REFLEX_ROWS),
+        ["row"], reaction.columns(reaction.LOOP), reaction.LIMITS, reaction.notes,
     ),
-    "command": Benchmark(
-        command_measure.measure,
-        command_measure.versions,
-        path_page.blocks,
-        {"How soon does a request reach the wheels?": path_page.targets},
+    "stop": Benchmark(
+        "How soon does safety's decision brake?",
+        partial(reaction.measured, reaction.STOP_ROWS),
+        ["row"], reaction.columns(reaction.ZENOH), reaction.LIMITS, reaction.notes,
     ),
-    "telemetry": Benchmark(
-        telemetry_measure.measure,
-        telemetry_measure.versions,
-        telemetry_page.blocks,
-        {
-            "How soon does a consumer have a sample?": telemetry_page.targets,
-            "How old are the samples that safety decides on?": telemetry_page.age_targets,
-        },
+    "cpu": Benchmark(
+        "What does the chain cost on board?",
+        load.cpu, ["", "process"], load.CPU_COLUMNS, load.CPU_LIMITS,
     ),
-    "load": Benchmark(
-        load_measure.measure,
-        load_measure.versions,
-        load_page.blocks,
-        {
-            "How many frames and consumers does the bridge serve?": load_page.throughput_targets,
-            "What does the stack cost on board?": load_page.cost_targets,
-        },
+    "consumers": Benchmark(
+        "What do consumers on board cost?",
+        load.consumers, ["consumers"], load.CONSUMER_COLUMNS, load.CONSUMER_LIMITS,
     ),
-    "start": Benchmark(
-        start_measure.measure,
-        start_measure.versions,
-        start_page.blocks,
-        {"How soon after the start is the first STOP sent?": start_page.targets},
+    "fleet": Benchmark(
+        "What do robots cost a site's router?",
+        fleet.measure, ["robots", "subscribed"], fleet.COLUMNS, fleet.LIMITS,
     ),
-    "growth": Benchmark(
-        growth_measure.measure,
-        growth_measure.versions,
-        growth_page.blocks,
-        {
-            "Does the cost grow faster than the number of consumers or bytes?": (
-                growth_page.targets
-            ),
-        },
+    "link": Benchmark(
+        "What does a bad link do?", link.measure, ["link"], link.COLUMNS, link.LIMITS
     ),
-}
+}  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, store, print; return ``UNMEASURED`` when something is missing."""
+    """Measure, store and print; return ``UNMEASURED`` without samples."""
     options = _arguments().parse_args(argv)
     for name in [] if options.again else options.only or BENCHMARKS:
-        try:
-            print(f"{name}: {store(name, measured(BENCHMARKS[name]))}", file=sys.stderr)
-        except ModuleNotFoundError as error:
-            print(f"{error.name} is not installed; run make bench", file=sys.stderr)
-            return UNMEASURED
-    stored = {name: load(name) for name in BENCHMARKS}
-    missing = [name for name, one in stored.items() if one is None]
-    if missing:
-        print(f"no samples in {RAW} of {', '.join(missing)}: measure them first", file=sys.stderr)
-        return UNMEASURED
+        print(f"{name}: {store(name, measured(BENCHMARKS[name]))}", file=sys.stderr, flush=True)
+    stored = {name: series.load(name) for name in BENCHMARKS}
     found = {name: one for name, one in stored.items() if one is not None}
+    if missing := ", ".join(stored.keys() - found.keys()):
+        print(f"no samples in {RAW} of {missing}: measure them first", file=sys.stderr)
+        return UNMEASURED
     text = page(found)
     print(text)
-    for name, one in found.items():
-        draw = BENCHMARKS[name].draw
-        if draw:
-            draw(plot_file(options.out, name) if options.out else RAW / f"{name}.png", one.series)
     if options.out:
         options.out.write_text(text, encoding="utf-8")
     return 0
@@ -127,41 +87,34 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def measured(benchmark: Benchmark) -> Measured:
     """Measure, and record the stalls of the host meanwhile."""
-    versions = benchmark.versions()
+    names = ["eclipse-zenoh", *([PACKAGE] if find_spec(PACKAGE) else [])]
+    versions = ", ".join(f"{name} {version(name)}" for name in names)
+    begin_s, left_out, made = time.monotonic(), "", list[Series]()
     with StallRecorder() as stalls:
-        begin_ns = clock.now_ns()
-        series = benchmark.measure()
-        seconds = (clock.now_ns() - begin_ns) / NS_PER_S
-        stall_ms = 1000 * stalls.worst_s(begin_ns, seconds)
-    return Measured(
-        where=f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}; "
-        f"{versions}; {seconds / 60:.0f} minutes",
-        noise=f"A sleeping process was stalled for at most {stall_ms:.0f} ms",
-        series=series,
-    )
+        try:
+            made = benchmark.measure()
+        except MissingError as error:
+            left_out = f"not measured: {error}"
+        stall_ms = 1000 * stalls.stop()
+    where = [
+        f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}",
+        versions, f"{time.monotonic() - begin_s:.0f} s",
+        f"the host stalled a sleeping process for {stall_ms:.0f} ms at most",
+        benchmark.notes(), left_out,
+    ]  # fmt: skip
+    return Measured(where="; ".join(filter(None, where)), series=made)
 
 
-def page(results: dict[str, Measured]) -> str:
-    """Return the document; the name of a benchmark prefixes its blocks."""
-    blocks: dict[str, str] = {"summary": summary(answers(results))}
+def page(results: Mapping[str, Measured]) -> str:
+    """Return the document."""
+    blocks, rows = dict[str, str](), list[list[str]]()
     for name, one in results.items():
-        own = BENCHMARKS[name].blocks(one.series) | {"where": one.where, "noise": one.noise}
-        blocks |= {f"{name}_{block}": text for block, text in own.items()}
+        it = BENCHMARKS[name]
+        blocks[f"{name}_where"] = one.where
+        blocks[f"{name}_table"] = columns(it.heads, it.columns, one.by_name)
+        rows += compared(it.question, it.limits, one.by_name)
+    blocks["summary"] = table(HEAD, rows)
     return PAGE.read_text(encoding="utf-8").format(**blocks)
-
-
-def answers(results: Mapping[str, Measured]) -> list[tuple[str, list[Target]]]:
-    """Return the targets by question, in the order of the document."""
-    return [
-        (question, targets(results[name].series))
-        for name, benchmark in BENCHMARKS.items()
-        for question, targets in benchmark.questions.items()
-    ]
-
-
-def plot_file(out: Path, name: str) -> Path:
-    """Return the file of a plot, beside the document."""
-    return out.parent / "images" / f"performance-{name}.png"
 
 
 def _arguments() -> argparse.ArgumentParser:

@@ -1,71 +1,122 @@
-"""Samples of a row with their percentiles, and the raw files in ``out/bench``."""
+"""Samples of a row with their percentiles, targets, and the raw files in ``out/bench``."""
 
 import gzip
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 from msgspec import Struct
 
-from verification.harness.results import percentile
+from verification.harness.results import percentile, table
 
 RAW = Path("out/bench")
 
 
 class Series(Struct, frozen=True, kw_only=True):
-    """The samples of one row."""
+    """The samples of one figure of one row."""
 
     name: tuple[str, ...]
-    samples_ns: Sequence[int]
-    note: str = ""  # remark on the row
-
-    def percentile_ns(self, share: float) -> float:
-        """Return the percentile of a share (nearest rank), in ns."""
-        return percentile(self.samples_ns, share)
+    samples: Sequence[float]  # times in ns, other units by the benchmark's table
 
     @property
-    def p50_ns(self) -> float:
-        """Median, in ns."""
-        return self.percentile_ns(0.5)
+    def p50(self) -> float:
+        """Median."""
+        return percentile(self.samples, 0.5)
 
-    @property
-    def p99_ns(self) -> float:
-        """99th percentile, in ns."""
-        return self.percentile_ns(0.99)
-
-    @property
-    def p999_ns(self) -> float:
-        """99.9th percentile, in ns."""
-        return self.percentile_ns(0.999)
-
-    def ratio(self, other: "Series") -> float:
-        """Return this median divided by the other median."""
-        return self.p50_ns / other.p50_ns
+    def value(self, share: Literal["p50", "p99", "max"]) -> float:
+        """Return the median, the 99th percentile or the highest sample."""
+        return percentile(self.samples, {"p50": 0.5, "p99": 0.99, "max": 1.0}[share])
 
 
 class Measured(Struct, frozen=True, kw_only=True):
     """The result of one benchmark."""
 
-    where: str  # date, machine, Python, versions
-    noise: str  # other load on the machine
+    where: str  # date, machine, versions, and what was left out
     series: Sequence[Series]
+
+    @property
+    def by_name(self) -> dict[tuple[str, ...], Series]:
+        """The series with samples, by name."""
+        return {one.name: one for one in self.series if one.samples}
+
+
+ByName = Mapping[tuple[str, ...], Series]
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """How a sample is printed."""
+
+    name: str
+    divisor: float
+    digits: int = 0
+
+    def text(self, value: float) -> str:
+        """Return a number without its unit."""
+        return f"{value / self.divisor:,.{self.digits}f}"
+
+
+US, MS, CPU, ONE = Unit("us", 1e3), Unit("ms", 1e6, 1), Unit("CPU %", 1e7, 1), Unit("", 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table: a figure of each row, or its median as a multiple of a row's."""
+
+    head: str
+    figure: str  # the last part of a series' name
+    unit: Unit
+    share: Literal["p50", "p99", "max"] = "p50"
+    of: tuple[str, ...] = ()
+
+    def cell(self, by_name: ByName, row: tuple[str, ...]) -> str:
+        """Return the text for a row; empty where it was not measured."""
+        one, other = by_name.get((*row, self.figure)), by_name.get((*self.of, self.figure))
+        if one is None or (self.of and other is None):
+            return ""
+        return f"× {one.p50 / other.p50:.2f}" if other else self.unit.text(one.value(self.share))
+
+
+def columns(heads: Sequence[str], some: Sequence[Column], by_name: ByName) -> str:
+    """Return the table of all rows; ``heads`` are of the parts of a row's name."""
+    names = list(dict.fromkeys(name[:-1] for name in by_name))
+    cells = [[*row, *(column.cell(by_name, row) for column in some)] for row in names]
+    return table([*heads, *(f"{c.head} {c.unit.name}".strip() for c in some)], cells)
+
+
+# Our row, the compared row, the figure, and the highest multiple.
+Limits = Sequence[tuple[tuple[str, ...], tuple[str, ...], Column, float]]
+
+
+def compared(question: str, limits: Limits, by_name: ByName) -> list[list[str]]:
+    """Return a row for each limit whose figures were measured; the first has the question."""
+    rows: list[list[str]] = []
+    for ours, theirs, column, limit in limits:
+        both = [by_name.get((*row, column.figure)) for row in (ours, theirs)]
+        mine, other = (one.value(column.share) if one else 0.0 for one in both)
+        if all(both) and other:
+            texts = [f"{column.unit.text(value)} {column.unit.name}" for value in (mine, other)]
+            rows.append([
+                "" if rows else question, f"{', '.join(ours)}: {column.head} {texts[0]}",
+                f"{', '.join(theirs)}: {texts[1]}", f"× {mine / other:.2f}",
+                f"at most × {limit:g}", "reached" if mine <= limit * other else "not reached",
+            ])  # fmt: skip
+    return rows
 
 
 def store(benchmark: str, measured: Measured, folder: Path = RAW) -> Path:
     """Write all samples of a benchmark, compressed; return the file."""
     folder.mkdir(parents=True, exist_ok=True)
-    file = _file(benchmark, folder)
+    file = folder / f"{benchmark}.json.gz"
     file.write_bytes(gzip.compress(msgspec.json.encode(measured)))
     return file
 
 
 def load(benchmark: str, folder: Path = RAW) -> Measured | None:
     """Return the last stored result of a benchmark, or None."""
-    file = _file(benchmark, folder)
+    file = folder / f"{benchmark}.json.gz"
     if not file.exists():
         return None
     return msgspec.json.decode(gzip.decompress(file.read_bytes()), type=Measured)
-
-
-def _file(benchmark: str, folder: Path) -> Path:
-    return folder / f"{benchmark}.json.gz"

@@ -1,1 +1,0 @@
-"""One adapter per bus: a source and a subscriber, and the pair of the benchmark ``reaction``."""

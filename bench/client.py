@@ -1,0 +1,143 @@
+"""``python -m bench.client ENDPOINT reset | drive ROBOT [SETTING]...``: a robot's clients.
+
+``reset`` is an operator that resets every latch. ``drive`` requests motion like teleop, with a
+speed that identifies the frame at the board that answers. It is a ``harness.child_process`` that
+also executes ``estop``, repeated until safety confirms it, and ``go``: request again.
+"""
+
+import json
+import sys
+import threading
+from collections.abc import Sequence
+from functools import partial
+
+from common import keys
+from common import messages as m
+from common.bus.bus import Arrival, Bus
+from common.config import Sources, load
+from common.loop import Loop
+from common.operator import reset_request
+from common.settings import BusSettings, Shared
+from common.source import DriveSource
+
+PERIOD_S = 0.05
+SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20
+RESET_TICKS = 10
+
+
+class Resetter:
+    """Calls reset, one call at a time, while anything is latched."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._pending = False
+        self._state: m.SafetyState | None = None
+        bus.subscribe(keys.SAFETY, self._on_state)
+        bus.subscribe(keys.MOTION, self._on_motion)  # more frequent than the state
+
+    def _on_state(self, arrival: Arrival[m.SafetyState]) -> None:
+        self._state = arrival.message
+
+    def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
+        state = self._state
+        if arrival.message.latched and state is not None and state.latched and not self._pending:
+            self._pending = True
+            self._bus.call(keys.RESET, reset_request(state), self._answered, self._answered, 1.0)
+
+    def _answered(self, _: object) -> None:
+        self._pending = False
+
+
+class Driver:
+    """Requests motion 20 times a second; zero and a reset while safety refuses motion.
+
+    Requests of zero before motion are what safety wants to see of a source that it refused.
+    """
+
+    def __init__(self, loop: Loop, bus: Bus) -> None:
+        self._bus = bus
+        self._source = DriveSource(bus, "teleop")
+        self._state: m.SafetyState | None = None
+        self._number = self._refusals = 0
+        self._stops = False
+        self.begin()
+        bus.subscribe(keys.SAFETY, self._on_safety)
+        loop.every(PERIOD_S, self._request)
+
+    def begin(self) -> None:
+        """Forget the requests."""
+        self.requests: list[tuple[int, float]] = []
+
+    def execute(self, word: str) -> None:
+        """Execute ``estop`` or ``go``."""
+        self._stops = word == "estop"
+        if self._stops:
+            self._bus.estop()
+
+    def _request(self, _: int) -> None:
+        state = self._state
+        if self._stops or state is None or state.verdict not in ("run", "slow"):
+            self._source.request(0.0, 0.0)
+            self._wait(state)
+            return
+        self._number += 1
+        linear = round(SLOW_MPS + STEP_MPS * (self._number % STEPS), 3)
+        drive = self._source.request(linear, 0.0)
+        if self._number % STEPS:  # the large step down is ramped
+            self.requests.append((drive.mono_ns, linear))
+
+    def _wait(self, state: m.SafetyState | None) -> None:
+        self._refusals += 1
+        if self._stops:
+            if state is None or not state.latched:
+                self._bus.estop()
+        elif state and state.latched and self._refusals % RESET_TICKS == 0:
+            request = reset_request(state)
+            self._bus.call(keys.RESET, request, lambda _: None, lambda _: None)
+
+    def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
+        self._state = arrival.message
+
+
+def drive(endpoint: str, robot: str, sets: Sequence[str]) -> None:
+    """Drive until standard input ends."""
+    config = load(Shared, Sources(sets=[f"bus.connect={endpoint}", *sets])).config
+    loop = Loop()
+    bus = Bus(config.bus, robot, loop.post)
+    driver = Driver(loop, bus)
+    bus.open()
+
+    def read() -> None:
+        calls = {"begin": driver.begin, "end": lambda: write(driver.requests)}
+        for line in sys.stdin:
+            word = line.strip()
+            loop.post(calls.get(word, partial(driver.execute, word)))
+        loop.stop()
+
+    threading.Thread(target=read, daemon=True).start()
+    write("ready")
+    loop.run()
+    bus.close()
+
+
+def write(what: object) -> None:
+    """Write a line to the parent."""
+    sys.stdout.write(f"{json.dumps(what)}\n")
+    sys.stdout.flush()
+
+
+def reset(endpoint: str) -> None:
+    """Reset until killed."""
+    loop = Loop()
+    bus = Bus(BusSettings(connect=(endpoint,)), "001", loop.post)
+    Resetter(bus)
+    bus.open()
+    loop.run()
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case [endpoint, "reset"]:
+            reset(endpoint)
+        case [endpoint, "drive", robot, *sets]:
+            drive(endpoint, robot, sets)

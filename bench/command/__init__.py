@@ -1,1 +1,0 @@
-"""Command path: time from a motion request to its frame at the board."""

@@ -1,1 +1,0 @@
-"""CPU and delay over the number of consumers and bytes."""

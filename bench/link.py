@@ -1,0 +1,212 @@
+"""``python -m bench.link``: drive over a bad link, and lose it; prints the figures as JSON.
+
+The robot's host has the stack, the simulated vehicle and a router with certificates. The laptop's
+host, with its own network and clock, has a client that requests motion like teleop. A link in user
+space (``verification.faults.remote_host``) drops, delays and queues packets, on any kernel.
+"""
+
+import contextlib
+import io
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+
+from bench.processes import MissingError, module
+from bench.series import MS, ONE, Column, Limits, Series, Unit
+from common import clock, keys
+from common.freshness import NS_PER_S
+from common.loop import Loop
+from services.safety.config import SafetyConfig
+from sim.requests import Wire
+from sim.trace import Command
+from verification.faults.namespaces import enter, missing
+from verification.faults.remote_host import Address, net
+from verification.faults.stack_fixture import QUICK
+from verification.harness.bus import bus_on, running
+from verification.harness.certificates import Site
+from verification.harness.child_process import ChildProcess
+from verification.harness.ports import free_port
+from verification.harness.stack import running_stack
+from verification.harness.trace import TraceFollower, moves
+from verification.harness.waiting import becomes_true, wait_until
+
+CONDITIONS = {
+    "good": Wire(),
+    "1 % lost": Wire(drop=0.01),
+    "10 % lost": Wire(drop=0.1),
+    "30 % lost": Wire(drop=0.3),
+    "100 to 120 ms each way": Wire(delay=0.1, jitter=0.02),
+    "200 to 250 ms each way": Wire(delay=0.2, jitter=0.05),
+    "1 Mbit/s": Wire(rate=1e6, delay=0.01),
+    "256 kbit/s": Wire(rate=256e3, delay=0.01),
+}
+OUTAGES_S = {
+    "down for 0.2 s": 0.2, "down for 1 s": 1.0, "down for 5 s": 5.0, "another address": 0.0,
+}  # fmt: skip
+ANOTHER = 3  # the last number of the laptop's address
+UNAVAILABLE = 3  # exit code when this host cannot simulate two
+SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 30.0
+SURE_NS = NS_PER_S  # of driving without a stop
+NOTICE_NS = NS_PER_S // 20  # to detect the end of a lease
+SHIPPED = SafetyConfig().safety
+FILES = ("ca", "certificate", "private_key", "members")
+
+
+@dataclass(frozen=True, slots=True)
+class Hosts:
+    """Both hosts, what the board received, and when bumper samples arrived on board."""
+
+    laptop: ChildProcess
+    frames: TraceFollower
+    bumper_ns: list[int]
+
+    def send(self, line: str) -> None:
+        """Send a line to the link or the client."""
+        pipe = self.laptop.process.stdin
+        assert pipe is not None
+        pipe.write(f"{line}\n")
+        pipe.flush()
+
+    def disturb(self, what: Wire | Address) -> None:
+        """Set the faults of the link from now on, or the laptop's address."""
+        self.send(msgspec.json.encode(what).decode())
+
+    def commands(self, since_ns: int) -> list[Command]:
+        """Return the motion commands at the board since a time."""
+        return [c for c in self.frames.follow().commands if c.mono_ns >= since_ns]
+
+    def drives(self, since_ns: int) -> list[int]:
+        """Return the time at which the vehicle began to drive without a stop, when it is sure."""
+        commands = self.commands(since_ns)
+        stood = max((c.mono_ns for c in commands if not moves(c)), default=since_ns)
+        began = [c.mono_ns for c in commands if c.mono_ns > stood][:1]
+        return began if began and clock.now_ns() - began[0] > SURE_NS else []
+
+    def ready(self) -> None:
+        """Remove the faults, and wait until the vehicle drives."""
+        self.disturb(Wire())
+        self.send("go")
+        wait_until(lambda: self.drives(clock.now_ns() - 2 * SURE_NS), "a drive", PATIENCE_S)
+
+    def gap_ns(self, since_ns: int) -> int:
+        """Return the longest time without a bumper sample on board since a time."""
+        times = [since_ns, *(at for at in list(self.bumper_ns) if at > since_ns), clock.now_ns()]
+        return max(b - a for a, b in pairwise(times))
+
+
+@contextlib.contextmanager
+def two_hosts(folder: Path) -> Iterator[Hosts]:
+    """Run both hosts, with mutual TLS between them."""
+    port, bumper_ns = free_port(), list[int]()
+    with contextlib.redirect_stdout(io.StringIO()):  # instructions of `t2 keys`
+        site = Site(folder / "keys")
+        robot = site.member("robot", "001", "--address", f"{net(port)}.1")
+        driver = site.member("driver", "anna", "--robot", "001")
+    robots, drivers = (
+        [f"bus.{name}={getattr(member, name)}" for name in FILES] for member in (robot, driver)
+    )
+    listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
+    with (
+        running_stack(folder, sets=[*QUICK, *robots], shipped=True, listen=listen) as stack,
+        running(Loop()) as loop,
+        bus_on(
+            stack.endpoint, loop,
+            lambda bus: bus.subscribe(keys.BUMPER, lambda it: bumper_ns.append(it.received_ns)),
+        ),
+        ChildProcess(
+            "verification.faults.remote_host", stack.config.bus.listen[-1],
+            "bench.client", "drive", "001", *drivers,
+        ) as laptop,
+    ):  # fmt: skip
+        yield Hosts(laptop, TraceFollower(stack.trace_file), bumper_ns)
+
+
+def measure_here(folder: Path) -> list[Series]:
+    """Return the figures of each condition and outage, times in ns."""
+    with two_hosts(folder) as hosts:
+        made = {name: under(hosts, faults) for name, faults in CONDITIONS.items()}
+        made |= {name: outage(hosts, seconds) for name, seconds in OUTAGES_S.items()}
+    made["allowed"] = {
+        "stop": [round(SHIPPED.sources["teleop"].lease * NS_PER_S) + NOTICE_NS],
+        "gap": [round(SHIPPED.bumper_age * NS_PER_S)],
+    }
+    return [Series(name=(n, what), samples=v) for n, one in made.items() for what, v in one.items()]
+
+
+def under(hosts: Hosts, faults: Wire) -> dict[str, Sequence[float]]:
+    """Drive under a condition, then stop."""
+    hosts.ready()
+    hosts.disturb(faults)
+    time.sleep(SETTLE_S)
+    since_ns = clock.now_ns()
+    time.sleep(SECONDS)
+    commands, pressed_ns = hosts.commands(since_ns), clock.now_ns()
+    hosts.send("estop")
+
+    def braked() -> list[int]:
+        return [c.mono_ns - pressed_ns for c in hosts.commands(pressed_ns) if c.kind == "brake"]
+
+    becomes_true(braked, ESTOP_S)
+    driven_ns = sum(b.mono_ns - a.mono_ns for a, b in pairwise(commands) if moves(a))
+    return {
+        "driven": [driven_ns / (pressed_ns - since_ns)],
+        "stops": [sum(moves(a) and not moves(b) for a, b in pairwise(commands))],
+        "brake": braked()[:1],
+        "gap": [hosts.gap_ns(since_ns)],
+    }
+
+
+def outage(hosts: Hosts, seconds: float) -> dict[str, Sequence[float]]:
+    """Cut the link for some time, or change the laptop's address; wait until it drives again."""
+    hosts.ready()
+    cut_ns = clock.now_ns()
+    hosts.disturb(Wire(drop=1.0) if seconds else Address(ANOTHER))
+    time.sleep(seconds)
+    hosts.disturb(Wire())
+    back_ns = clock.now_ns()
+    time.sleep(SETTLE_S)
+    again = wait_until(lambda: hosts.drives(cut_ns), "a drive after an outage", PATIENCE_S)
+    stopped = [c.mono_ns - cut_ns for c in hosts.commands(cut_ns) if not moves(c)][:1]
+    return {
+        "gap": [hosts.gap_ns(cut_ns)],
+        "stop": stopped,
+        "again": [max(0, again[0] - back_ns)] if stopped else [],
+    }
+
+
+def measure() -> list[Series]:
+    """Measure in a process of its own, which enters the namespaces of the robot's host."""
+    done = subprocess.run(module("bench.link"), capture_output=True, text=True, check=False)
+    if done.returncode == UNAVAILABLE:
+        raise MissingError(f"cannot simulate two hosts: {done.stderr.strip()}")
+    if done.returncode:
+        raise RuntimeError(done.stderr[-4000:])
+    return msgspec.json.decode(done.stdout, type=list[Series])
+
+
+COLUMNS = (
+    Column("time in motion", "driven", Unit("%", 0.01)), Column("stops", "stops", ONE),
+    Column("E-STOP to BRAKE", "brake", MS), Column("STOP after", "stop", MS),
+    Column("drives again after", "again", MS),
+    Column("bumper's longest gap on board", "gap", MS, "max"),
+)  # fmt: skip
+LIMITS: Limits = [
+    ((name,), ("allowed",), column, 1.0)
+    for column in (COLUMNS[3], COLUMNS[5])
+    for name in OUTAGES_S
+]
+
+
+if __name__ == "__main__":
+    if reason := missing(enter()).get("remote driver"):
+        sys.stderr.write(reason)
+        sys.exit(UNAVAILABLE)
+    with tempfile.TemporaryDirectory() as temporary:
+        sys.stdout.write(msgspec.json.encode(measure_here(Path(temporary))).decode())

@@ -1,0 +1,135 @@
+"""CPU of the chain beside two bare processes, and of router and bridge for N consumers."""
+
+import contextlib
+import random
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from bench.processes import module, one_pool, running
+from bench.reaction import SEED
+from bench.series import CPU, ONE, US, Column, Limits, Series, Unit
+from common import keys
+from verification.harness.bus import router_process, set_options
+from verification.harness.child_process import ChildProcess
+from verification.harness.ports import free_port, udp_ports
+from verification.harness.process_stats import CpuShares, children
+from verification.harness.stack import RunningStack, running_stack
+from verification.harness.trace import TraceFollower, moves
+from verification.harness.waiting import wait_until
+
+Pids = Mapping[str, int]
+TURNS, TURN_S = 3, 5.0
+CONSUMERS, SETTLE_S, WATCHED_S = (1, 5, 20, 50), 1.0, 3.0
+AT_ONCE = 8  # consumers that start in parallel
+EVERYTHING = f"{keys.ROOT}/001/tel/**"
+STEADY_S, PATIENCE_S = 1.0, 60.0
+T2, PAIR, TOGETHER = "T2", "two processes, Zenoh, a router", "together"
+# Growth of the cost beyond the number that still counts as proportional: CPU time has a resolution
+# of 10 ms, and other processes use the host.
+MARGIN = 1.25
+
+
+def pids_of(it: RunningStack) -> Pids:
+    """Return the processes of the chain; on a busy host the guard may restart the bridge."""
+    found = {name: it.processes[name].pid for name in ("router", "safety", "odom")}
+    guard = it.processes["bridge"].pid
+    return found | {"guard": guard, "bridge": wait_until(lambda: children(guard), "a bridge")[0]}
+
+
+def watched(pids: Pids, seconds: float) -> dict[str, int]:
+    """Return the CPU share of these processes, in ns/s."""
+    with CpuShares(pids) as shares:
+        time.sleep(seconds)
+    return {name: ns for name, ns in shares.ns.items() if name in pids}
+
+
+@contextlib.contextmanager
+def chain_of_t2(folder: Path) -> Iterator[Pids]:
+    """Run the chain as shipped, with a source that requests motion like teleop."""
+    with (
+        running_stack(folder, shipped=True) as it,
+        ChildProcess("bench.client", it.endpoint, "drive", "001"),
+    ):
+        wait_until_it_drives(it.trace_file)
+        yield pids_of(it)
+
+
+@contextlib.contextmanager
+def bare_pair(folder: Path) -> Iterator[Pids]:
+    """Run the two processes with a router and the same simulated vehicle."""
+    endpoint, (board, port, standby) = f"tcp/127.0.0.1:{free_port()}", udp_ports(3)
+    sets = set_options(f"board.port={board}", f"board.listen_ports=[{port}, {standby}]")
+    sim = module("sim", "--world", "empty", "--trace", folder / "trace.jsonl", *sets)
+    pair = [
+        one_pool(module("bench.zenoh_pair", "drive-board", port, endpoint, board)),
+        one_pool(module("bench.zenoh_pair", "drive-decide", endpoint)),
+    ]
+    with router_process(endpoint) as router, running(sim, *pair) as (_, at_board, decides):
+        wait_until_it_drives(folder / "trace.jsonl")
+        yield {"router": router.pid, "at the board": at_board.pid, "decides": decides.pid}
+
+
+def wait_until_it_drives(trace: Path) -> None:
+    """Wait until the board receives a motion, and until that is steady."""
+    frames = TraceFollower(trace)
+    wait_until(lambda: any(map(moves, frames.follow().commands)), "a motion", PATIENCE_S)
+    time.sleep(STEADY_S)
+
+
+def cpu(turns: int = TURNS, seconds: float = TURN_S) -> list[Series]:
+    """Return the CPU of each process, in ns/s; the candidates take turns in random order."""
+    samples, shuffler = defaultdict[tuple[str, ...], list[int]](list), random.Random(SEED)
+    for _ in range(turns):
+        for name, run in shuffler.sample([(T2, chain_of_t2), (PAIR, bare_pair)], 2):
+            with tempfile.TemporaryDirectory() as folder, run(Path(folder)) as pids:
+                shares = watched(pids, seconds)
+            for process, ns in {**shares, TOGETHER: sum(shares.values())}.items():
+                samples[name, process, "cpu"].append(ns)
+    return [Series(name=name, samples=some) for name, some in samples.items()]
+
+
+def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> list[Series]:
+    """Return CPU, delay and loss with more and more consumers of everything on board."""
+    made: list[Series] = []
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running_stack(Path(folder), shipped=True) as it,
+        ThreadPoolExecutor(AT_ONCE) as pool,
+        contextlib.ExitStack() as held,
+    ):
+        some: list[ChildProcess] = []
+        for count in counts:
+            words = "bench.consumer", it.endpoint, EVERYTHING
+            new = pool.map(lambda _, words=words: ChildProcess(*words), range(count - len(some)))
+            some += [held.enter_context(each) for each in new]
+            time.sleep(SETTLE_S)
+            for each in some:
+                each.begin()
+            shares = watched(pids_of(it), seconds)
+            results: list[Any] = [each.end() for each in some]
+            figures: dict[str, Sequence[float]] = {
+                "router": [shares["router"]], "bridge": [shares["bridge"]],
+                "delay": list(chain.from_iterable(each["ages_ns"] for each in results)),
+                "lost": [max(each["lost"] for each in results)],
+            }  # fmt: skip
+            made += [Series(name=(str(count), what), samples=v) for what, v in figures.items()]
+    return made
+
+
+SHARE = Column("", "cpu", CPU)
+CPU_COLUMNS = (SHARE, Column("of the pair's", "cpu", ONE, of=(PAIR, TOGETHER)))
+CPU_LIMITS: Limits = [((T2, TOGETHER), (PAIR, TOGETHER), SHARE, 2.0)]
+CONSUMER_COLUMNS = (
+    Column("router", "router", CPU), Column("bridge", "bridge", CPU),
+    Column("delay p50", "delay", US), Column("p99", "delay", US, "p99"),
+    Column("lost", "lost", Unit("%", 0.01, 1)),
+)  # fmt: skip
+CONSUMER_LIMITS: Limits = [
+    (("50",), ("1",), column, 50 * MARGIN) for column in CONSUMER_COLUMNS[:3]
+]

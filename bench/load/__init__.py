@@ -1,1 +1,0 @@
-"""Throughput of the bridge, and CPU and memory of the stack on board."""

@@ -1,1 +1,0 @@
-"""Shared by ``command`` and ``telemetry``: the simulated vehicle, T2's stack, processes."""

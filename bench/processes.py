@@ -1,0 +1,56 @@
+"""Processes that last as long as their context, and the programs and packages that they need."""
+
+import contextlib
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from common.bus.session import ONE_POOL, RUNTIME_ENV
+
+Command = Sequence[str]
+HERE = Path(__file__).parent
+
+
+class MissingError(Exception):
+    """Something that a benchmark needs is not there; the text is for the page."""
+
+
+@contextlib.contextmanager
+def running(*commands: Command) -> Iterator[list["subprocess.Popen[bytes]"]]:
+    """Run these processes while the context lasts."""
+    with contextlib.ExitStack() as stack:
+        processes = []
+        for command in commands:
+            process = stack.enter_context(
+                subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            )
+            stack.callback(process.kill)
+            processes.append(process)
+        yield processes
+
+
+def busy(processes: int) -> list[Command]:
+    """Return the commands of processes with a busy loop."""
+    return [[sys.executable, "-S", "-c", "while True: pass"]] * processes
+
+
+def module(name: str, *words: object) -> Command:
+    """Return the command that runs a module."""
+    return [sys.executable, "-m", name, *map(str, words)]
+
+
+def one_pool(command: Command) -> Command:
+    """Return the command with Zenoh's runtimes on one pool of threads, as T2's services set it."""
+    return ["env", f"{RUNTIME_ENV}={ONE_POOL.format(links=1)}", *command]
+
+
+def compiled(name: str, folder: Path) -> str:
+    """Compile a C program of this package into a folder; return its path."""
+    if shutil.which("cc") is None:
+        raise MissingError("no C compiler (Debian: apt-get install gcc libc6-dev)")
+    made = str(folder / name)
+    source = str(HERE / f"{name}.c")
+    subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", made, source], check=True)
+    return made

@@ -1,0 +1,133 @@
+"""Time from a bumper hit at the board to BRAKE: rows that react, block by block in random order."""
+
+import random
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from functools import partial
+from importlib.util import find_spec
+from itertools import product
+from pathlib import Path
+
+from bench.processes import Command, busy, compiled, module, one_pool, running
+from bench.series import ONE, US, Column, Limits, Series
+from common import realtime
+from common.wire import commands, reports
+from common.wire.framing import Framing
+from verification.harness.bus import set_options
+from verification.harness.ports import free_port, udp_ports
+
+SEED = 20_240_607
+BLOCKS, HITS, WARM = 2, 250, 20
+_, BUSY = LOADS = ("quiet", "busy")
+BUSY_PROCESSES = 4
+PATIENCE_S = 600.0
+FRAMING = Framing("crc-16", "payload")
+HIT, CLEAR = (FRAMING.pack(reports.BumperReport(on)).hex() for on in (True, False))
+BREAK, STOP = (
+    FRAMING.pack(commands.MotionCommand(kind)).hex()
+    for kind in (commands.MotionKind.BREAK, commands.MotionKind.STOP)
+)
+# Safety accepts a reset only while the vehicle stands.
+STANDS = FRAMING.pack(reports.VelocityReport(0, 0)).hex()
+
+BRIDGE, NO_REFLEX = "services.bridge", "bench.no_reflex"
+Start = Callable[[int, int], AbstractContextManager[object]]  # its port, the board's port
+LOOP, REFLEX = "Python, one process", "T2, reflex"
+JUDGED, DDS, ZENOH = "T2, judged stop", "CycloneDDS", "Zenoh, a router"
+PACKAGE = "cyclonedds"
+
+
+def loop(port: int, _: int) -> AbstractContextManager[object]:
+    """Run one process without T2."""
+    return running(module("bench.loop", port))
+
+
+def stack(port: int, board: int, bridge: str = BRIDGE) -> AbstractContextManager[object]:
+    """Run router, bridge and safety as shipped, and an operator that resets latches."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    ports = f"board.port={board}", f"board.listen_ports={[port, *udp_ports(1)]}"
+    given = set_options(*ports, f"bus.listen={endpoint}")
+    services = [module(name, *given) for name in (bridge, "services.safety")]
+    operator = module("bench.client", endpoint, "reset")
+    return running(module("cli", "router", *given), *services, operator)
+
+
+def dds(port: int, _: int) -> AbstractContextManager[object]:
+    """Run two processes on CycloneDDS, in an unused domain."""
+    return running(*pair("bench.dds_pair", port, 1 + free_port() % 200))
+
+
+def zenoh(port: int, _: int) -> AbstractContextManager[object]:
+    """Run two processes on Zenoh, with the router as shipped."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    router = module("cli", "router", *set_options(f"bus.listen={endpoint}"))
+    return running(router, *map(one_pool, pair("bench.zenoh_pair", port, endpoint)))
+
+
+def pair(name: str, port: int, where: object) -> list[Command]:
+    """Return the commands of the process that decides and of the one at the board."""
+    return [module(name, "decide", where), module(name, "board", port, where)]
+
+
+REFLEX_ROWS: Mapping[str, Start] = {LOOP: loop, REFLEX: stack}
+STOP_ROWS: Mapping[str, Start] = {
+    JUDGED: partial(stack, bridge=NO_REFLEX),
+    ZENOH: zenoh,
+    **({DDS: dds} if find_spec(PACKAGE) else {}),
+}
+P50S, P99S = ([Column(f"{load}, {f}", load, US, f) for load in LOADS] for f in ("p50", "p99"))
+# At most these multiples of the other row.
+LIMITS: Limits = [
+    *(((REFLEX,), (LOOP,), column, 1.3) for column in P50S),
+    *(((REFLEX,), (LOOP,), column, 1.5) for column in P99S),
+    *(((JUDGED,), other, column, 1.0) for other in ((DDS,), (ZENOH,)) for column in P50S),
+    *(((JUDGED,), (DDS,), column, 1.5) for column in P99S),
+]
+
+
+def columns(of: str) -> list[Column]:
+    """Return the columns, with each median as a multiple of a row's."""
+    return [
+        one
+        for p50, p99 in zip(P50S, P99S, strict=True)
+        for one in (p50, p99, Column(f"{p50.figure}, of {of}", p50.figure, ONE, of=(of,)))
+    ]
+
+
+def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) -> list[Series]:
+    """Return the samples of all rows, in ns."""
+    samples: dict[tuple[str, str], list[int]] = {turn: [] for turn in product(rows, LOADS)}
+    shuffler = random.Random(SEED)
+    with tempfile.TemporaryDirectory() as folder:
+        program = compiled("board", Path(folder))
+        for _ in range(blocks):
+            for name, load in shuffler.sample(list(samples), len(samples)):
+                with running(*busy(BUSY_PROCESSES if load == BUSY else 0)):
+                    samples[name, load] += block(program, rows[name], hits)
+    return [Series(name=name, samples=some) for name, some in samples.items()]
+
+
+def block(program: str, start: Start, hits: int) -> list[int]:
+    """Return the reaction times of a block, in ns; raise ``RuntimeError`` for a missed hit."""
+    board, port = udp_ports(2)
+    numbers = map(str, (board, port, hits, WARM))
+    with start(port, board):
+        done = subprocess.run(
+            [program, *numbers, HIT, CLEAR, BREAK, STOP, STANDS],
+            capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+        )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip())
+    return [int(line) for line in done.stdout.split()]
+
+
+def notes() -> str:
+    """Return what is left out, and whether this host grants SCHED_FIFO."""
+    script = "from common import realtime as r; r.request(r.GUARD); print(r.priority())"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    granted = done.stdout.strip() == str(realtime.GUARD).encode()
+    left_out = [] if find_spec(PACKAGE) else [f"{DDS} left out, {PACKAGE} is not installed"]
+    return "; ".join([f"SCHED_FIFO {'granted' if granted else 'not granted'}", *left_out])

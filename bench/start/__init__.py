@@ -1,1 +1,0 @@
-"""Start: time until the first STOP, and memory of each process."""

@@ -1,0 +1,122 @@
+"""Small runs of two benchmarks, and the document from stored samples."""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from bench import __main__ as bench
+from bench import load, loop, reaction
+from bench.fleet import answers_ns
+from bench.processes import MissingError
+from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
+from bench.series import RAW, Measured, Series, compared, store
+from common import motion
+from common.freshness import NS_PER_S
+from sim.trace import Command
+
+CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+MS = 1_000_000
+
+
+def made_up(rows: Mapping[str, int]) -> list[Series]:
+    return [Series(name=(row, "quiet"), samples=[us * 1000] * 10) for row, us in rows.items()]
+
+
+SERIES = {
+    "reflex": made_up({LOOP: 100, REFLEX: 140}),
+    "stop": made_up({JUDGED: 700, ZENOH: 1000}),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder with samples of all benchmarks."""
+    monkeypatch.chdir(tmp_path)
+    for name in bench.BENCHMARKS:
+        store(name, Measured(where=f"a machine for {name}", series=SERIES.get(name, [])))
+    return tmp_path
+
+
+def test_the_document_is_printed_from_stored_samples(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bench.main(["--again", "--out", "performance.md"]) == 0
+    text = (folder / "performance.md").read_text(encoding="utf-8")
+    assert text in capsys.readouterr().out
+    assert f"| {REFLEX} | 140 | 140 | × 1.40 |  |  |  |" in text
+    question = bench.BENCHMARKS["stop"].question
+    row = f"| {JUDGED}: quiet, p50 700 us | {ZENOH}: 1,000 us | × 0.70 | at most × 1 | reached |"
+    assert f"| {question} {row}" in text
+    assert (
+        f"| {REFLEX}: quiet, p50 140 us | {LOOP}: 100 us | × 1.40 | at most × 1.3 | not r" in text
+    )
+    assert all(f"Measured on a machine for {name}." in text for name in bench.BENCHMARKS)
+
+
+def test_a_benchmark_without_samples_is_named(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / RAW / "fleet.json.gz").unlink()
+    assert bench.main(["--again"]) == bench.UNMEASURED
+    assert capsys.readouterr().err == f"no samples in {RAW} of fleet: measure them first\n"
+
+
+def test_what_a_host_lacks_is_on_the_page(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lacking() -> list[Series]:
+        raise MissingError("no C compiler")
+
+    it = bench.BENCHMARKS["link"]
+    made = bench.Benchmark(it.question, lacking, it.heads, it.columns, it.limits)
+    monkeypatch.setitem(bench.BENCHMARKS, "link", made)
+    assert bench.main(["--only", "link"]) == 0
+    assert "; not measured: no C compiler." in capsys.readouterr().out
+
+
+def test_a_limit_of_a_row_that_was_not_measured_is_left_out() -> None:
+    by_name = {one.name: one for one in SERIES["reflex"]}
+    rows = compared("How soon?", reaction.LIMITS, by_name)
+    assert [row[0] for row in rows] == ["How soon?", ""]
+    assert [row[-1] for row in rows] == ["not reached", "reached"]
+
+
+def test_the_one_process_has_the_frames_of_the_bridge() -> None:
+    assert (loop.command(loop.BREAK).hex(), loop.command(loop.STOP).hex()) == (BREAK, STOP)
+    received = [bytes.fromhex(each) for each in (HIT, CLEAR, STANDS, HIT[:-2] + "00", HIT[:6])]
+    assert [loop.is_hit(each) for each in received] == [True, False, False, False, False]
+
+
+def test_a_request_is_answered_by_the_next_frame_with_its_speed() -> None:
+    def frame(at_ns: int, linear: float) -> Command:
+        return Command(mono_ns=at_ns, kind=motion.Command.RUN, linear=linear, angular=0.0)
+
+    requests = [(10 * MS, 0.301), (60 * MS, 0.302), (110 * MS, 0.303)]
+    late = 110 * MS + NS_PER_S
+    commands = [frame(5 * MS, 0.301), frame(12 * MS, 0.301), frame(65 * MS, 0.302)]
+    commands += [frame(late, 0.303)]
+    assert answers_ns(requests, commands) == [2 * MS, 5 * MS, None]
+
+
+@CC
+@pytest.mark.campaign
+@pytest.mark.timed
+@pytest.mark.parametrize("rows", [reaction.REFLEX_ROWS, reaction.STOP_ROWS], ids=["reflex", "stop"])
+def test_each_row_answers_every_hit(
+    rows: Mapping[str, reaction.Start], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reaction, "LOADS", ("quiet",))
+    for one in reaction.measured(rows, blocks=1, hits=3):
+        assert len(one.samples) == 3, one.name
+        assert all(0 < ns < NS_PER_S for ns in one.samples), one.name
+
+
+@pytest.mark.campaign
+@pytest.mark.timed
+def test_consumers_receive_everything() -> None:
+    by_name = {one.name: one for one in load.consumers((1, 2), seconds=1.0)}
+    for count in ("1", "2"):
+        assert by_name[count, "delay"].samples
+        assert by_name[count, "lost"].samples == [0.0]

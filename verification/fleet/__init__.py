@@ -1,1 +1,0 @@
-"""Cost of a fleet on a site router: real stacks and simulated robots on one host."""

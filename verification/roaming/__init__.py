@@ -1,1 +1,0 @@
-"""Driving over a disturbed link between two hosts."""
