@@ -51,50 +51,42 @@ def robot(stack: RunningStack) -> Iterator[t2.Robot]:
 
 
 @contextmanager
-def example(*words: str) -> Iterator["subprocess.Popen[str]"]:
-    """Run an example; stop it like Ctrl-C."""
+def example(*words: str, code: int = 0) -> Iterator["subprocess.Popen[str]"]:
+    """Run an example; stop it like Ctrl-C, and expect an exit code."""
     with subprocess.Popen(
         [sys.executable, *words], cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
     ) as process:
         try:
             yield process
             process.send_signal(signal.SIGINT)
-            assert process.wait(PATIENCE_S) in (0, -signal.SIGINT)
+            assert process.wait(PATIENCE_S) == code
         finally:
             process.kill()
 
 
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (
-            ("-m", "examples.nearest_obstacle", "--set", "bus.connect={}"),
-            r"(\d\.\d\d m \w+|nothing near)\n",
-        ),
-        (("examples/watch_plain.py", "{}"), r"x +-?\d+\.\d\d m  y +-?\d+\.\d\d m  +\d\.\d\d m/s\n"),
-    ],
-)
-def test_a_consumer_prints_what_it_receives(
-    robot: t2.Robot, words: tuple[str, ...], line: str
-) -> None:
-    with example(*(word.format(robot.endpoint) for word in words)) as process:
-        assert process.stdout is not None
-        assert re.fullmatch(line, process.stdout.readline())
+def test_the_consumers_print_what_they_receive(robot: t2.Robot) -> None:
+    connect = f"bus.connect={robot.endpoint}"
+    with example("-m", "examples.nearest_obstacle", "--set", connect) as process:
+        assert re.fullmatch(r"\d\.\d\d m \w+\n", line_of(process))
+    with example("examples/watch_plain.py", robot.endpoint, code=-signal.SIGINT) as process:
+        assert re.fullmatch(r"x +-?\d+\.\d\d m  y +-?\d+\.\d\d m +.*\n", line_of(process))
+
+
+def line_of(process: "subprocess.Popen[str]") -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
 
 
 def test_the_limit_slows_before_an_obstacle(robot: t2.Robot, stack: RunningStack) -> None:
     with example("-m", "examples.limit_speed", "--set", f"bus.connect={robot.endpoint}"):
         stack.control.do(Sonar(name="front", range=0.62))
-        try:
-            wait_until(
-                lambda: (
-                    [one.reason for one in robot.safety.latest().limit_sources]
-                    == ["something at 0.62 m"]
-                ),
-                "the limit",
-            )
-        finally:
-            stack.control.do(Sonar(name="front"))
+        wait_until(lambda: limited(robot) == (0.2, "something at 0.62 m"), "the limit")
+        stack.control.do(Sonar(name="front"))
+
+
+def limited(robot: t2.Robot) -> tuple[float | None, str]:
+    (limit,) = robot.safety.latest().limit_sources
+    return limit.linear, limit.reason
 
 
 def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:
@@ -106,11 +98,9 @@ def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:
 
 
 def test_the_square_ends_at_its_start(robot: t2.Robot) -> None:
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / "square.py"), robot.endpoint],
-        env=ENVIRONMENT, stdout=subprocess.PIPE, text=True, timeout=110, check=True,
-    )  # fmt: skip
-    distance, rest = done.stdout.split(" ", 1)
+    with example("examples/square.py", robot.endpoint) as process:
+        distance, _, rest = line_of(process).partition(" ")
+        assert process.wait(PATIENCE_S) == 0
     assert float(distance) < 0.3
     assert rest == "m from the start\n"
 
