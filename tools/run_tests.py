@@ -5,8 +5,7 @@ processes fails a few of them. So the tests that failed run a second time, one b
 machine to themselves. A test that fails again fails the run; the others are listed at the end and
 in ``out/second-run.txt``, after those of earlier runs: ``make check`` prints that file last.
 
-Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run. A run that
-takes longer than ``LONGEST_S`` hangs; pytest and its workers are ended, with their stacks.
+Many failures have another cause: with more than ``RETRIED_MAX`` there is no second run.
 """
 
 import json
@@ -14,16 +13,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 FAILED = 1  # pytest's exit code for failed tests, as opposed to usage errors and interrupts
 RETRIED_MAX = 30
-LONGEST_S = float(os.environ.get("T2_TESTS_LONGEST", "1500"))
-FAILED_BY_TIME = 124  # as of timeout(1)
-DUMP_S = 5.0  # for the stacks
-END_S = 60.0  # for the fixtures, after Ctrl-C
 CACHE = Path(".pytest_cache/v/cache/lastfailed")
 NAMES = Path("out/second-run.txt")
 
@@ -53,21 +47,12 @@ def main(arguments: Sequence[str]) -> int:
 
 def pytest(arguments: Sequence[str]) -> int:
     """Run pytest in its own process group; return its exit code."""
-    command = [sys.executable, "-m", "pytest", *arguments]
-    with subprocess.Popen(command, process_group=0) as process:
+    with subprocess.Popen([sys.executable, "-m", "pytest", *arguments], process_group=0) as process:
         try:
-            return process.wait(LONGEST_S)
+            return process.wait()
         except KeyboardInterrupt:  # the terminal's Ctrl-C reaches this process's group only
             os.killpg(process.pid, signal.SIGINT)
-            return process.wait(END_S)
-        except subprocess.TimeoutExpired:
-            print(f"\nrun_tests: not finished after {LONGEST_S:.0f} s", flush=True)
-            os.killpg(process.pid, signal.SIGABRT)  # pytest's faulthandler prints all stacks
-            time.sleep(DUMP_S)
-            return FAILED_BY_TIME
-        finally:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
+            return process.wait()
 
 
 if __name__ == "__main__":

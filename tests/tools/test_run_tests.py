@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.run_tests import FAILED_BY_TIME, NAMES, RETRIED_MAX
+from tools.run_tests import NAMES, RETRIED_MAX
 
 SCRIPT = Path(__file__).parents[2] / "tools/run_tests.py"
 FAILS_ONCE = """
@@ -63,16 +63,6 @@ def test_a_test_that_hangs_is_named_with_its_stack(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     assert "in test_fails_once" in done.stderr
     assert done.stdout.endswith(NAMED)
-
-
-def test_a_run_without_an_end_is_ended_with_all_stacks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("T2_TESTS_LONGEST", "15")
-    done = run(tmp_path, HANGS_ONCE, "-n", "1", "-o", "faulthandler_timeout=0")
-    assert done.returncode == FAILED_BY_TIME
-    assert "not finished after 15 s" in done.stdout
-    assert "in test_fails_once" in done.stderr
 
 
 def test_the_failures_of_other_runs_do_not_count(tmp_path: Path) -> None:
