@@ -22,6 +22,7 @@ def test_standing(linear: float, angular: float, stands: bool) -> None:
 def test_clamp(value: float, limit: float) -> None:
     assert abs(clamp(value, limit)) <= limit
     assert clamp(clamp(value, limit), limit) == clamp(value, limit)
+    assert clamp(-limit - 1.0, limit) == -limit
 
 
 @pytest.mark.parametrize(
@@ -41,3 +42,4 @@ def test_a_twist_within_limits_keeps_its_curve(linear: float, angular: float) ->
     assert inside.linear * angular == pytest.approx(inside.angular * linear)
     if abs(linear) <= 1.0 and abs(angular) <= 0.5:
         assert inside == twist
+    assert Twist(0.8, 0.2).within(0.4, 0.5) == Twist(0.4, 0.1)

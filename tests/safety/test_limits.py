@@ -258,6 +258,7 @@ def test_a_conflict_lasts_for_the_lease_of_the_source() -> None:
     limits, refused = put(limits, boot=2)
     assert refused == "second_publisher"
     assert limits.conflicts(999_999_999) == ["limit lidar"]
+    assert next(limits.observations(999_999_999)).text == "Stopped by lidar: two publishers."
     assert limits.conflicts(1_000_000_000) == []
 
 

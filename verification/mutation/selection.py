@@ -1,8 +1,8 @@
 """Which files are cores, and which tests have to notice every change of them.
 
-``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are those of its
-folder below ``tests/`` that import it, themselves or by a fixture, and start no process: they reach
-neither Zenoh nor ``subprocess``.
+``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are the stateful ones
+of its folder below ``tests/``, and those that import it, themselves or by a fixture. They start no
+process: they reach neither Zenoh nor ``subprocess``.
 """
 
 import subprocess
@@ -19,7 +19,9 @@ Cores = dict[str, list[str]]  # tests of each file
 
 def cores() -> Cores:
     """Return the cores of the current folder with their tests; ValueError for a wrong name."""
-    folders = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["tool"]["mutants"]
+    settings = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["tool"]["mutants"]
+    folders = settings["cores"]
+    stateful = {module_of(test) for glob in settings["stateful"] for test in Path().glob(glob)}
     graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
     imports = {
         test: _imports(graph, test)
@@ -37,7 +39,7 @@ def cores() -> Cores:
             found[str(path)] = [
                 f"{test.replace('.', '/')}.py"
                 for test, imported in imports.items()
-                if test.startswith(folder) and core in imported
+                if test.startswith(folder) and (core in imported or test in stateful)
             ]
             if not found[str(path)]:
                 raise ValueError(f"{path}: no test imports it")
