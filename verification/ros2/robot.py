@@ -146,5 +146,5 @@ def robot_with_gateway(folder: Path, node: Path, sets: Sequence[str] = ()) -> It
         running(loop),
         bus_on(stack.endpoint, loop, (robot := Robot(stack, node)).declare),
     ):
-        wait_until(robot.is_ready, "safety ready")
+        wait_until(robot.is_ready, "safety ready", PATIENCE_S)
         yield robot
