@@ -17,7 +17,7 @@ from pathlib import Path
 
 from bench import fleet, link, load, reaction, series
 from bench.processes import MissingError
-from bench.reaction import PACKAGE
+from bench.reaction import PACKAGE, is_granted
 from bench.series import RAW, Column, Limits, Measured, Series, columns, compared, store
 from verification.harness.host import StallRecorder, description
 from verification.harness.results import table
@@ -29,26 +29,25 @@ UNMEASURED = 3  # exit code when samples are missing
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """A section of the document: question, measurement, table, limits and remarks."""
+    """A section of the document: question, measurement, table and limits."""
 
     question: str
     measure: Callable[[], list[Series]]
     heads: Sequence[str]
     columns: Sequence[Column]
     limits: Limits
-    notes: Callable[[], str] = str
 
 
 BENCHMARKS: Mapping[str, Benchmark] = {
     "reflex": Benchmark(
         "How soon after a contact does the bridge brake?",
         partial(reaction.measured, reaction.REFLEX_ROWS),
-        ["row"], reaction.columns(reaction.LOOP), reaction.LIMITS, reaction.notes,
+        ["row"], reaction.columns(reaction.LOOP), reaction.LIMITS,
     ),
     "stop": Benchmark(
         "How soon does safety's decision brake?",
         partial(reaction.measured, reaction.STOP_ROWS),
-        ["row"], reaction.columns(reaction.ZENOH), reaction.LIMITS, reaction.notes,
+        ["row"], reaction.columns(reaction.ZENOH), reaction.LIMITS,
     ),
     "cpu": Benchmark(
         "What does the chain cost on board?",
@@ -70,13 +69,19 @@ BENCHMARKS: Mapping[str, Benchmark] = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, store and print; return ``UNMEASURED`` without samples."""
-    options = _arguments().parse_args(argv)
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument(
+        "--only", action="append", choices=BENCHMARKS, metavar="NAME",
+        help=f"measure only this: {', '.join(BENCHMARKS)}; repeatable",
+    )  # fmt: skip
+    parser.add_argument("--again", action="store_true", help="use the stored samples")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
+    options = parser.parse_args(argv)
     for name in [] if options.again else options.only or BENCHMARKS:
         print(f"{name}: {store(name, measured(BENCHMARKS[name]))}", file=sys.stderr, flush=True)
-    stored = {name: series.load(name) for name in BENCHMARKS}
-    found = {name: one for name, one in stored.items() if one is not None}
-    if missing := ", ".join(stored.keys() - found.keys()):
-        print(f"no samples in {RAW} of {missing}: measure them first", file=sys.stderr)
+    found = {name: one for name in BENCHMARKS if (one := series.load(name))}
+    if missing := [name for name in BENCHMARKS if name not in found]:
+        print(f"no samples in {RAW} of {', '.join(missing)}: measure them first", file=sys.stderr)
         return UNMEASURED
     text = page(found)
     print(text)
@@ -87,8 +92,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def measured(benchmark: Benchmark) -> Measured:
     """Measure, and record the stalls of the host meanwhile."""
-    names = ["eclipse-zenoh", *([PACKAGE] if find_spec(PACKAGE) else [])]
-    versions = ", ".join(f"{name} {version(name)}" for name in names)
+    dds = version(PACKAGE) if find_spec(PACKAGE) else "not installed, its row is left out"
+    granted = "granted" if is_granted() else "not granted"
     begin_s, left_out, made = time.monotonic(), "", list[Series]()
     with StallRecorder() as stalls:
         try:
@@ -98,9 +103,10 @@ def measured(benchmark: Benchmark) -> Measured:
         stall_ms = 1000 * stalls.stop()
     where = [
         f"{datetime.now(UTC):%Y-%m-%d}: {description()}, Python {platform.python_version()}",
-        versions, f"{time.monotonic() - begin_s:.0f} s",
+        f"eclipse-zenoh {version('eclipse-zenoh')}; {PACKAGE} {dds}; SCHED_FIFO {granted}",
+        f"{time.monotonic() - begin_s:.0f} s",
         f"the host stalled a sleeping process for {stall_ms:.0f} ms at most",
-        benchmark.notes(), left_out,
+        left_out,
     ]  # fmt: skip
     return Measured(where="; ".join(filter(None, where)), series=made)
 
@@ -115,17 +121,6 @@ def page(results: Mapping[str, Measured]) -> str:
         rows += compared(it.question, it.limits, one.by_name)
     blocks["summary"] = table(HEAD, rows)
     return PAGE.read_text(encoding="utf-8").format(**blocks)
-
-
-def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
-    parser.add_argument(
-        "--only", action="append", choices=BENCHMARKS, metavar="NAME",
-        help=f"measure only this: {', '.join(BENCHMARKS)}; repeatable",
-    )  # fmt: skip
-    parser.add_argument("--again", action="store_true", help="use the stored samples")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
-    return parser
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 ``reset`` is an operator that resets every latch. ``drive`` requests motion like teleop, with a
 speed that identifies the frame at the board that answers. It is a ``harness.child_process`` that
-also executes ``estop``, repeated until safety confirms it, and ``go``: request again.
+also executes ``estop``, repeated until ``go``, which requests again.
 """
 
 import json
@@ -20,9 +20,8 @@ from common.operator import reset_request
 from common.settings import BusSettings, Shared
 from common.source import DriveSource
 
-PERIOD_S = 0.05
 SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20
-RESET_TICKS = 10
+PERIOD_S, RESET_TICKS = 0.05, 10
 
 
 class Resetter:
@@ -49,10 +48,7 @@ class Resetter:
 
 
 class Driver:
-    """Requests motion 20 times a second; zero and a reset while safety refuses motion.
-
-    Requests of zero before motion are what safety wants to see of a source that it refused.
-    """
+    """Requests motion 20 times a second; neutral and a reset while safety refuses motion."""
 
     def __init__(self, loop: Loop, bus: Bus) -> None:
         self._bus = bus
@@ -69,7 +65,7 @@ class Driver:
         self.requests: list[tuple[int, float]] = []
 
     def execute(self, word: str) -> None:
-        """Execute ``estop`` or ``go``."""
+        """Execute ``estop``, which is repeated, or ``go``."""
         self._stops = word == "estop"
         if self._stops:
             self._bus.estop()
@@ -78,22 +74,18 @@ class Driver:
         state = self._state
         if self._stops or state is None or state.verdict not in ("run", "slow"):
             self._source.request(0.0, 0.0)
-            self._wait(state)
+            self._refusals += 1
+            if self._stops:
+                self._bus.estop()
+            elif state and state.latched and self._refusals % RESET_TICKS == 0:
+                request = reset_request(state)
+                self._bus.call(keys.RESET, request, lambda _: None, lambda _: None)
             return
         self._number += 1
         linear = round(SLOW_MPS + STEP_MPS * (self._number % STEPS), 3)
         drive = self._source.request(linear, 0.0)
         if self._number % STEPS:  # the large step down is ramped
             self.requests.append((drive.mono_ns, linear))
-
-    def _wait(self, state: m.SafetyState | None) -> None:
-        self._refusals += 1
-        if self._stops:
-            if state is None or not state.latched:
-                self._bus.estop()
-        elif state and state.latched and self._refusals % RESET_TICKS == 0:
-            request = reset_request(state)
-            self._bus.call(keys.RESET, request, lambda _: None, lambda _: None)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._state = arrival.message

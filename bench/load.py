@@ -25,8 +25,8 @@ from verification.harness.waiting import wait_until
 
 Pids = Mapping[str, int]
 TURNS, TURN_S = 3, 5.0
-CONSUMERS, SETTLE_S, WATCHED_S = (1, 5, 20, 50), 1.0, 3.0
-AT_ONCE = 8  # consumers that start in parallel
+CONSUMERS, SETTLE_S, WATCHED_S, AT_ONCE = (1, 5, 20, 50), 1.0, 3.0, 8
+CONSUME = "bench.zenoh_programs", "consume"
 EVERYTHING = f"{keys.ROOT}/001/tel/**"
 STEADY_S, PATIENCE_S = 1.0, 60.0
 T2, PAIR, TOGETHER = "T2", "two processes, Zenoh, a router", "together"
@@ -67,8 +67,8 @@ def bare_pair(folder: Path) -> Iterator[Pids]:
     sets = set_options(f"board.port={board}", f"board.listen_ports=[{port}, {standby}]")
     sim = module("sim", "--world", "empty", "--trace", folder / "trace.jsonl", *sets)
     pair = [
-        one_pool(module("bench.zenoh_pair", "drive-board", port, endpoint, board)),
-        one_pool(module("bench.zenoh_pair", "drive-decide", endpoint)),
+        one_pool(module("bench.zenoh_programs", "drive-board", port, endpoint, board)),
+        one_pool(module("bench.zenoh_programs", "drive-decide", endpoint)),
     ]
     with router_process(endpoint) as router, running(sim, *pair) as (_, at_board, decides):
         wait_until_it_drives(folder / "trace.jsonl")
@@ -105,7 +105,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
     ):
         some: list[ChildProcess] = []
         for count in counts:
-            words = "bench.consumer", it.endpoint, EVERYTHING
+            words = *CONSUME, it.endpoint, EVERYTHING
             new = pool.map(lambda _, words=words: ChildProcess(*words), range(count - len(some)))
             some += [held.enter_context(each) for each in new]
             time.sleep(SETTLE_S)

@@ -10,7 +10,6 @@ from pathlib import Path
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 
 Command = Sequence[str]
-HERE = Path(__file__).parent
 
 
 class MissingError(Exception):
@@ -31,11 +30,6 @@ def running(*commands: Command) -> Iterator[list["subprocess.Popen[bytes]"]]:
         yield processes
 
 
-def busy(processes: int) -> list[Command]:
-    """Return the commands of processes with a busy loop."""
-    return [[sys.executable, "-S", "-c", "while True: pass"]] * processes
-
-
 def module(name: str, *words: object) -> Command:
     """Return the command that runs a module."""
     return [sys.executable, "-m", name, *map(str, words)]
@@ -51,6 +45,6 @@ def compiled(name: str, folder: Path) -> str:
     if shutil.which("cc") is None:
         raise MissingError("no C compiler (Debian: apt-get install gcc libc6-dev)")
     made = str(folder / name)
-    source = str(HERE / f"{name}.c")
+    source = Path(__file__).with_name(f"{name}.c")
     subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", made, source], check=True)
     return made

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
-from bench.processes import Command, busy, compiled, module, one_pool, running
+from bench.processes import Command, compiled, module, one_pool, running
 from bench.series import ONE, US, Column, Limits, Series
 from common import realtime
 from common.wire import commands, reports
@@ -22,7 +22,7 @@ from verification.harness.ports import free_port, udp_ports
 SEED = 20_240_607
 BLOCKS, HITS, WARM = 2, 250, 20
 _, BUSY = LOADS = ("quiet", "busy")
-BUSY_PROCESSES = 4
+BUSY_PROCESSES, SPIN = 4, [sys.executable, "-S", "-c", "while True: pass"]
 PATIENCE_S = 600.0
 FRAMING = Framing("crc-16", "payload")
 HIT, CLEAR = (FRAMING.pack(reports.BumperReport(on)).hex() for on in (True, False))
@@ -33,19 +33,13 @@ BREAK, STOP = (
 # Safety accepts a reset only while the vehicle stands.
 STANDS = FRAMING.pack(reports.VelocityReport(0, 0)).hex()
 
-BRIDGE, NO_REFLEX = "services.bridge", "bench.no_reflex"
 Start = Callable[[int, int], AbstractContextManager[object]]  # its port, the board's port
 LOOP, REFLEX = "Python, one process", "T2, reflex"
 JUDGED, DDS, ZENOH = "T2, judged stop", "CycloneDDS", "Zenoh, a router"
 PACKAGE = "cyclonedds"
 
 
-def loop(port: int, _: int) -> AbstractContextManager[object]:
-    """Run one process without T2."""
-    return running(module("bench.loop", port))
-
-
-def stack(port: int, board: int, bridge: str = BRIDGE) -> AbstractContextManager[object]:
+def stack(port: int, board: int, bridge: str = "services.bridge") -> AbstractContextManager[object]:
     """Run router, bridge and safety as shipped, and an operator that resets latches."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     ports = f"board.port={board}", f"board.listen_ports={[port, *udp_ports(1)]}"
@@ -55,16 +49,11 @@ def stack(port: int, board: int, bridge: str = BRIDGE) -> AbstractContextManager
     return running(module("cli", "router", *given), *services, operator)
 
 
-def dds(port: int, _: int) -> AbstractContextManager[object]:
-    """Run two processes on CycloneDDS, in an unused domain."""
-    return running(*pair("bench.dds_pair", port, 1 + free_port() % 200))
-
-
 def zenoh(port: int, _: int) -> AbstractContextManager[object]:
     """Run two processes on Zenoh, with the router as shipped."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     router = module("cli", "router", *set_options(f"bus.listen={endpoint}"))
-    return running(router, *map(one_pool, pair("bench.zenoh_pair", port, endpoint)))
+    return running(router, *map(one_pool, pair("bench.zenoh_programs", port, endpoint)))
 
 
 def pair(name: str, port: int, where: object) -> list[Command]:
@@ -72,12 +61,16 @@ def pair(name: str, port: int, where: object) -> list[Command]:
     return [module(name, "decide", where), module(name, "board", port, where)]
 
 
-REFLEX_ROWS: Mapping[str, Start] = {LOOP: loop, REFLEX: stack}
-STOP_ROWS: Mapping[str, Start] = {
-    JUDGED: partial(stack, bridge=NO_REFLEX),
-    ZENOH: zenoh,
-    **({DDS: dds} if find_spec(PACKAGE) else {}),
+REFLEX_ROWS: Mapping[str, Start] = {
+    LOOP: lambda port, _: running(module("bench.loop", port)),
+    REFLEX: stack,
 }
+STOP_ROWS: dict[str, Start] = {
+    JUDGED: partial(stack, bridge="bench.no_reflex"),
+    ZENOH: zenoh,
+}
+if find_spec(PACKAGE):  # in an unused domain
+    STOP_ROWS[DDS] = lambda port, _: running(*pair("bench.dds_pair", port, 1 + free_port() % 200))
 P50S, P99S = ([Column(f"{load}, {f}", load, US, f) for load in LOADS] for f in ("p50", "p99"))
 # At most these multiples of the other row.
 LIMITS: Limits = [
@@ -105,7 +98,7 @@ def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) 
         program = compiled("board", Path(folder))
         for _ in range(blocks):
             for name, load in shuffler.sample(list(samples), len(samples)):
-                with running(*busy(BUSY_PROCESSES if load == BUSY else 0)):
+                with running(*[SPIN] * (BUSY_PROCESSES if load == BUSY else 0)):
                     samples[name, load] += block(program, rows[name], hits)
     return [Series(name=name, samples=some) for name, some in samples.items()]
 
@@ -124,10 +117,8 @@ def block(program: str, start: Start, hits: int) -> list[int]:
     return [int(line) for line in done.stdout.split()]
 
 
-def notes() -> str:
-    """Return what is left out, and whether this host grants SCHED_FIFO."""
+def is_granted() -> bool:
+    """Return whether this host grants SCHED_FIFO."""
     script = "from common import realtime as r; r.request(r.GUARD); print(r.priority())"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
-    granted = done.stdout.strip() == str(realtime.GUARD).encode()
-    left_out = [] if find_spec(PACKAGE) else [f"{DDS} left out, {PACKAGE} is not installed"]
-    return "; ".join([f"SCHED_FIFO {'granted' if granted else 'not granted'}", *left_out])
+    return done.stdout.strip() == str(realtime.GUARD).encode()

@@ -1,6 +1,5 @@
 """Samples of a row with their percentiles, targets, and the raw files in ``out/bench``."""
 
-import gzip
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from msgspec import Struct
 from verification.harness.results import percentile, table
 
 RAW = Path("out/bench")
+Share = Literal["p50", "p99", "max"]
 
 
 class Series(Struct, frozen=True, kw_only=True):
@@ -20,12 +20,7 @@ class Series(Struct, frozen=True, kw_only=True):
     name: tuple[str, ...]
     samples: Sequence[float]  # times in ns, other units by the benchmark's table
 
-    @property
-    def p50(self) -> float:
-        """Median."""
-        return percentile(self.samples, 0.5)
-
-    def value(self, share: Literal["p50", "p99", "max"]) -> float:
+    def value(self, share: Share = "p50") -> float:
         """Return the median, the 99th percentile or the highest sample."""
         return percentile(self.samples, {"p50": 0.5, "p99": 0.99, "max": 1.0}[share])
 
@@ -68,7 +63,7 @@ class Column:
     head: str
     figure: str  # the last part of a series' name
     unit: Unit
-    share: Literal["p50", "p99", "max"] = "p50"
+    share: Share = "p50"
     of: tuple[str, ...] = ()
 
     def cell(self, by_name: ByName, row: tuple[str, ...]) -> str:
@@ -76,7 +71,11 @@ class Column:
         one, other = by_name.get((*row, self.figure)), by_name.get((*self.of, self.figure))
         if one is None or (self.of and other is None):
             return ""
-        return f"× {one.p50 / other.p50:.2f}" if other else self.unit.text(one.value(self.share))
+        return (
+            f"× {one.value() / other.value():.2f}"
+            if other
+            else self.unit.text(one.value(self.share))
+        )
 
 
 def columns(heads: Sequence[str], some: Sequence[Column], by_name: ByName) -> str:
@@ -106,17 +105,15 @@ def compared(question: str, limits: Limits, by_name: ByName) -> list[list[str]]:
     return rows
 
 
-def store(benchmark: str, measured: Measured, folder: Path = RAW) -> Path:
-    """Write all samples of a benchmark, compressed; return the file."""
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"{benchmark}.json.gz"
-    file.write_bytes(gzip.compress(msgspec.json.encode(measured)))
+def store(benchmark: str, measured: Measured) -> Path:
+    """Write all samples of a benchmark; return the file."""
+    RAW.mkdir(parents=True, exist_ok=True)
+    file = RAW / f"{benchmark}.json"
+    file.write_bytes(msgspec.json.encode(measured))
     return file
 
 
-def load(benchmark: str, folder: Path = RAW) -> Measured | None:
+def load(benchmark: str) -> Measured | None:
     """Return the last stored result of a benchmark, or None."""
-    file = folder / f"{benchmark}.json.gz"
-    if not file.exists():
-        return None
-    return msgspec.json.decode(gzip.decompress(file.read_bytes()), type=Measured)
+    file = RAW / f"{benchmark}.json"
+    return msgspec.json.decode(file.read_bytes(), type=Measured) if file.exists() else None

@@ -58,7 +58,7 @@ def test_the_document_is_printed_from_stored_samples(
 def test_a_benchmark_without_samples_is_named(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (folder / RAW / "fleet.json.gz").unlink()
+    (folder / RAW / "fleet.json").unlink()
     assert bench.main(["--again"]) == bench.UNMEASURED
     assert capsys.readouterr().err == f"no samples in {RAW} of fleet: measure them first\n"
 
