@@ -7,10 +7,10 @@ from playwright.sync_api import Browser, sync_playwright
 
 from common.loop import Loop
 from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.page import CHROMIUM
 from tests.dashboard.servers import CallServers, serving
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.dashboard import Server, dashboard
-from verification.harness.dashboard_page import CHROMIUM
 from verification.harness.ports import free_port
 
 

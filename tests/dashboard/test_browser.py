@@ -6,8 +6,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from sim.requests import Driver
-from verification.harness.dashboard import Server, dashboard
-from verification.harness.dashboard_page import (
+from tests.dashboard.page import (
     BROWSER_MARKS,
     center_of,
     drive_until_moving,
@@ -19,6 +18,7 @@ from verification.harness.dashboard_page import (
     wait_for_standstill,
     wait_for_text,
 )
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.stack import RunningStack, running_stack
 
 pytestmark = BROWSER_MARKS

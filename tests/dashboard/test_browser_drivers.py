@@ -8,11 +8,7 @@ from playwright.sync_api import Browser
 
 from common.loop import Loop
 from tests.dashboard.bus_fixture import Peer
-from tests.drive_source import ConstantSource
-from verification.harness.bus import at, bus_on, joined, running
-from verification.harness.certificates import Site
-from verification.harness.dashboard import Server, dashboard
-from verification.harness.dashboard_page import (
+from tests.dashboard.page import (
     BROWSER_MARKS,
     drive_until_moving,
     open_page,
@@ -21,6 +17,10 @@ from verification.harness.dashboard_page import (
     wait_for_standstill,
     wait_for_text,
 )
+from tests.drive_source import ConstantSource
+from verification.harness.bus import at, bus_on, joined, running
+from verification.harness.certificates import Site
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 

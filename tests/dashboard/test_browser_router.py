@@ -5,9 +5,9 @@ from pathlib import Path
 
 from playwright.sync_api import Browser
 
+from tests.dashboard.page import BROWSER_MARKS, take_control, wait_for_text
 from verification.harness.bus import router_process
 from verification.harness.dashboard import dashboard
-from verification.harness.dashboard_page import BROWSER_MARKS, take_control, wait_for_text
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 

@@ -8,14 +8,14 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from sim.requests import Bumper
-from verification.harness.dashboard import Server, dashboard
-from verification.harness.dashboard_page import (
+from tests.dashboard.page import (
     BROWSER_MARKS,
     open_page,
     reset_all,
     take_control,
     wait_for_text,
 )
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.page import BROWSER_MARKS, take_control, wait_for_text
 from verification.harness.dashboard import dashboard
-from verification.harness.dashboard_page import BROWSER_MARKS, take_control, wait_for_text
 from verification.harness.waiting import wait_until
 
 pytestmark = BROWSER_MARKS

@@ -9,14 +9,14 @@ from playwright.sync_api import Browser, Page
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import LimitPublisher
-from verification.harness.bus import bus_on, running
-from verification.harness.dashboard import dashboard
-from verification.harness.dashboard_page import (
+from tests.dashboard.page import (
     BROWSER_MARKS,
     reset_all,
     take_control,
     wait_for_text,
 )
+from verification.harness.bus import bus_on, running
+from verification.harness.dashboard import dashboard
 from verification.harness.stack import RunningStack, running_stack
 
 pytestmark = BROWSER_MARKS

@@ -8,9 +8,9 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.page import CHROMIUM, center_of, take_control, wait_for_text
 from tests.dashboard.servers import FREE, NEWER, CallServers
 from verification.harness.dashboard import Server, dashboard
-from verification.harness.dashboard_page import CHROMIUM, center_of, take_control, wait_for_text
 from verification.harness.waiting import wait_until
 
 pytestmark = [

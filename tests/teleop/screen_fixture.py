@@ -14,8 +14,8 @@ from services.teleop.app import Panel
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from tests.factories import contact_state
+from tests.teleop.local_app import LocalTerminalApp
 from tests.teleop.support import FakeNode, answer
-from verification.harness.teleop_app import LocalTerminalApp
 from verification.harness.waiting import PATIENCE_S
 
 

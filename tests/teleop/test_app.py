@@ -12,8 +12,8 @@ from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Cause, ReleaseRequest, ResetRequest
 from tests.factories import contact_state
+from tests.teleop.local_app import LocalTerminalApp
 from tests.teleop.screen_fixture import Screen, play, tell_contact, until
-from verification.harness.teleop_app import LocalTerminalApp
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive
-from verification.harness.dashboard_page import CHROMIUM
+from tests.dashboard.page import CHROMIUM
 
 PHONE: ViewportSize = {"width": 390, "height": 844}
 
