@@ -57,7 +57,7 @@ WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 TESTS = $(BIN)/python -m tools.run_tests
 SECOND_RUN = out/second-run.txt
 # Each worker imports each file that it is given: the timed tests get theirs only.
-TIMED = $(FEW) $$(grep -rl --include=*.py mark.timed tests)
+TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
 test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
 	@rm -f $(SECOND_RUN)
