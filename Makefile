@@ -50,7 +50,7 @@ MANY = -n 6 --dist worksteal
 FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/invariants tests/verification/vehicles/test_runs.py tests/safety/test_walk.py
+SEARCH = tests/search tests/safety/test_walk.py
 WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
 
 # Failed tests run a second time, alone: docs/decisions.md#second-run.
@@ -86,7 +86,7 @@ rust-example: $(STAMP)
 	cd examples/rust && cargo fmt --check
 
 vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
-	$(BIN)/python -m verification.vehicles --runs $(or $(N),1000) --out docs/vehicles.md
+	$(BIN)/python -m verification.search --runs $(or $(N),1000) --out docs/vehicles.md
 
 ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz, older versions of Zenoh and hostile peers; needs cargo
 	$(BIN)/python -m verification.ros2
@@ -105,7 +105,7 @@ lint: $(STAMP)
 	$(BIN)/codespell
 	$(BIN)/python -m tools.docs --check
 
-search: $(STAMP) ## search for violations of the invariants
+search: $(STAMP) ## search for violations: random events, 200 random vehicles, mutations of the protections
 	$(BIN)/pytest -n 2 $(SEARCH)
 
 # All tests except the search. Not a branch of a core is untested.

@@ -5,7 +5,6 @@ lap takes some seconds and is the same each time.
 """
 
 import threading
-from collections import Counter
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -19,19 +18,43 @@ import t2.drive
 import t2.publisher
 import t2.robot
 import t2.stream
+from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
-from services.safety.inputs import DriveRequest, Hold, Reset
-from t2.keys import TOPICS
-from tests.simulated_stack import SimulatedStack
+from sim.config import Config, load_plan
+from verification.search.bus import MS, Envelope, Subscription
+from verification.search.stack import ASK_NS, Stack
 
 ENCODE = msgspec.msgpack.encode
-ROOT = "t2/v1/001"
+TICK_MS = 10
 
 
 def raw(payload: bytes) -> SimpleNamespace:
     """Return a sample as Zenoh passes it."""
     return SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: payload))
+
+
+class SimulatedStack(Stack):
+    """The stack in a world, with the shipped settings of the vehicle.
+
+    The calls of ``each_beat`` are made 20 times a second.
+    """
+
+    def __init__(self, world: str = "office") -> None:
+        config = Config()
+        plan = load_plan(world, config.vehicle)
+        super().__init__(config, plan, odometry=True, step_ns=TICK_MS * MS)
+        self.each_beat: list[Callable[[], object]] = []
+        self.poses: list[m.Odometry] = []
+        self.answers: list[tuple[str, bool]] = []
+        self.hand.subscribe(keys.ODOMETRY, lambda arrival: self.poses.append(arrival.message))
+
+    def advance(self) -> None:
+        """Turn for one tick."""
+        self.run(TICK_MS)
+        if self.net.now_ns % ASK_NS == 0:
+            for call in self.each_beat.copy():
+                call()
 
 
 class SimulatedTime:
@@ -41,10 +64,10 @@ class SimulatedTime:
         self._stack = stack
 
     def monotonic(self) -> float:
-        return self._stack.now_ns / NS_PER_S
+        return self._stack.net.now_ns / NS_PER_S
 
     def monotonic_ns(self) -> int:
-        return self._stack.now_ns
+        return self._stack.net.now_ns
 
     time_ns = monotonic_ns
 
@@ -96,50 +119,37 @@ class SimulatedSession:
 
     def __init__(self, stack: SimulatedStack) -> None:
         self._stack = stack
-        self._subscribers: dict[str, Callable[[Any], None]] = {}
-        self._seqs: Counter[str] = Counter()
-        stack.on_message = self._publish
+        self._process = stack.process("sdk")
 
     def declare_subscriber(self, key: str, handler: Callable[[Any], None]) -> object:
-        self._subscribers[key] = handler
+        def take(envelope: Envelope) -> None:
+            handler(raw(ENCODE(envelope.message)))
+
+        self._stack.net.subscriptions.append(Subscription(self._process, key, take, depth=1))
         return object()
 
     def declare_publisher(self, key: str, **_: object) -> object:
-        source = key.rpartition("/")[2]
-        return SimpleNamespace(
-            put=lambda payload: self._drive(source, payload),
-            matching_status=SimpleNamespace(matching=True),
-            undeclare=lambda: None,
-        )
+        def put(payload: bytes) -> None:
+            self._process.post(key, msgspec.msgpack.decode(payload, type=m.Drive))
+
+        matching = SimpleNamespace(matching=True)
+        return SimpleNamespace(put=put, matching_status=matching, undeclare=lambda: None)
 
     def get(self, key: str, payload: bytes, **_: object) -> list[SimpleNamespace]:
-        """Call safety, as its service does."""
-        event: Reset | Hold
+        """Call safety."""
         if key.endswith("reset"):
-            reset = msgspec.msgpack.decode(payload, type=m.ResetRequest)
-            event = Reset(reset.echo, reset.causes)
+            name = "reset"
+            caller = self._stack.call_reset(msgspec.msgpack.decode(payload, type=m.ResetRequest))
         else:
-            hold = msgspec.msgpack.decode(payload, type=m.ReleaseRequest)
-            event = Hold(hold.held, hold.direction, hold.echo)
-        reply = self._stack.decide(event)
-        assert reply is not None
-        if not reply.done:
-            return [SimpleNamespace(ok=None, err=raw(reply.text.encode()))]
-        beat = self._stack.heartbeat + 1
-        done = m.ResetDone(text=reply.text, heartbeat=beat, cleared=reply.cleared)
-        return [SimpleNamespace(ok=raw(ENCODE(done)), err=None)]
+            name = "release"
+            request = msgspec.msgpack.decode(payload, type=m.ReleaseRequest)
+            caller = self._stack.call_release(request)
+        self._stack.answers.append((name, bool(caller.done)))
+        if not caller.done:
+            return [SimpleNamespace(ok=None, err=raw(caller.text.encode()))]
+        return [SimpleNamespace(ok=raw(ENCODE(caller.answer)), err=None)]
 
     def close(self) -> None: ...
-
-    def _publish(self, name: str, message: m.Message) -> None:
-        handler = self._subscribers.get(f"{ROOT}/{TOPICS[name][0]}") if name in TOPICS else None
-        if handler is not None:
-            self._seqs[name] += 1
-            handler(raw(ENCODE(msgspec.structs.replace(message, seq=self._seqs[name]))))
-
-    def _drive(self, source: str, payload: bytes) -> None:
-        request = msgspec.msgpack.decode(payload, type=m.Drive)
-        self._stack.decide(DriveRequest(source, request, self._stack.now_ns))
 
 
 def simulated_robot(stack: SimulatedStack, patch: pytest.MonkeyPatch) -> t2.Robot:

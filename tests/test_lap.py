@@ -12,8 +12,7 @@ from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
 from t2.messages import Odometry
 from tests.cli.demo.lap_fixture import as_client
-from tests.simulated_robot import simulated_robot
-from tests.simulated_stack import SimulatedStack
+from tests.simulated_robot import SimulatedStack, simulated_robot
 
 pytestmark = pytest.mark.no_cover  # whole laps; the cores have tests of their own
 
@@ -25,15 +24,15 @@ def driven() -> tuple[SimulatedStack, LapRecord]:
     with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
         drive_lap(Driver(robot, record, threading.Event()), QUICK)
     record.finished = True
-    record.odometry = [as_client(pose, Odometry) for pose in stack.odometry]
+    record.odometry = [as_client(pose, Odometry) for pose in stack.poses]
     return stack, record
 
 
 def trace_of(stack: SimulatedStack) -> Trace:
     return Trace(
-        [r for r in stack.records if isinstance(r, t.Truth)],
-        [r for r in stack.records if isinstance(r, t.Command)],
-        [r for r in stack.records if isinstance(r, t.BumperSent)],
+        [r for r in stack.vehicle.records if isinstance(r, t.Truth)],
+        [r for r in stack.vehicle.records if isinstance(r, t.Command)],
+        [r for r in stack.vehicle.records if isinstance(r, t.BumperSent)],
     )
 
 
@@ -43,6 +42,7 @@ def test_the_lap_is_driven_as_it_should_be() -> None:
     rows = results(trace, record, fast=False)
     assert good(rows), rows
     assert record.unplanned == []
+    assert stack.oracle.violations == []
     assert min(x.clearance for x in trace.truth if x.clearance is not None) > 0.15
     (stop,) = stops(trace)
     assert stop.reaction_s is not None
@@ -51,16 +51,16 @@ def test_the_lap_is_driven_as_it_should_be() -> None:
 
 def test_safety_answers_as_the_steps_expect() -> None:
     stack, record = driven()
-    answers = [(kind, done) for kind, done, _ in stack.answers]
-    first_reset = answers.index(("Reset", False))
-    first_hold = answers.index(("Hold", True))
-    last_reset = len(answers) - 1 - answers[::-1].index(("Reset", True))
+    answers = stack.answers
+    first_reset = answers.index(("reset", False))
+    first_hold = answers.index(("release", True))
+    last_reset = len(answers) - 1 - answers[::-1].index(("reset", True))
     assert first_reset < first_hold < last_reset
     assert record.answers[0][:2] == ("reset, refused", False)
     assert record.answers[-1][:2] == ("reset", True)
 
 
 def test_the_same_lap_twice_is_the_same() -> None:
-    first = driven()[0].records
+    first = driven()[0].vehicle.records
     driven.cache_clear()
-    assert driven()[0].records == first
+    assert driven()[0].vehicle.records == first

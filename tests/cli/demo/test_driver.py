@@ -9,10 +9,8 @@ import pytest
 import t2
 from cli.demo.driver import Driver, LapEndedError
 from cli.demo.record import LapRecord
-from services.safety.inputs import Estop
 from sim.requests import Sonar
-from tests.simulated_robot import simulated_robot
-from tests.simulated_stack import SimulatedStack
+from tests.simulated_robot import SimulatedStack, simulated_robot
 
 
 class Vehicle:
@@ -26,7 +24,7 @@ class Vehicle:
 
     def block(self, distance: float | None) -> None:
         """Make the front sonar report an obstacle, or none."""
-        self.stack.sim.sonars.inject(Sonar(name="front", range=distance))
+        self.stack.vehicle.inject(Sonar(name="front", range=distance))
 
     @property
     def x(self) -> float:
@@ -43,11 +41,11 @@ class Vehicle:
         self.stack.each_beat.append(beat)
 
     def has_moved(self, distance: float) -> Callable[[], bool]:
-        return lambda: self.stack.odometry[-1].x >= distance
+        return lambda: self.stack.poses[-1].x >= distance
 
     def after(self, seconds: float) -> Callable[[], bool]:
-        end_ns = self.stack.now_ns + seconds * 1e9
-        return lambda: self.stack.now_ns >= end_ns
+        end_ns = self.stack.net.now_ns + seconds * 1e9
+        return lambda: self.stack.net.now_ns >= end_ns
 
 
 @pytest.fixture
@@ -65,11 +63,11 @@ def test_a_distance_and_an_angle(vehicle: Vehicle) -> None:
 
 
 def test_an_unplanned_latch_is_reset_and_counted_and_the_motion_goes_on(vehicle: Vehicle) -> None:
-    vehicle.when(vehicle.has_moved(0.5), lambda: vehicle.stack.decide(Estop()))
+    vehicle.when(vehicle.has_moved(0.5), vehicle.stack.estop)
     vehicle.driver.forward(1.0, 0.5)
     assert vehicle.record.unplanned == ["estop"]
     assert vehicle.x == pytest.approx(1.0, abs=0.03)
-    vehicle.when(vehicle.has_moved(1.5), lambda: vehicle.stack.decide(Estop()))
+    vehicle.when(vehicle.has_moved(1.5), vehicle.stack.estop)
     vehicle.driver.forward(1.0, 0.5)
     assert vehicle.record.unplanned == ["estop", "estop"]
 
@@ -85,7 +83,7 @@ def test_a_motion_waits_for_an_obstacle_to_leave(vehicle: Vehicle) -> None:
 
 
 def test_an_expected_cause_ends_the_motion(vehicle: Vehicle) -> None:
-    vehicle.when(vehicle.has_moved(0.5), lambda: vehicle.stack.decide(Estop()))
+    vehicle.when(vehicle.has_moved(0.5), vehicle.stack.estop)
     with pytest.raises(t2.Latched):
         vehicle.driver.forward(5.0, 0.5, expected="estop")
     assert vehicle.record.unplanned == []
@@ -97,9 +95,8 @@ def test_an_expected_cause_ends_the_motion(vehicle: Vehicle) -> None:
 
 
 def test_a_refused_call_is_repeated_and_its_answer_kept_once(vehicle: Vehicle) -> None:
-    vehicle.stack.sim.pressed_by_hand = True
-    vehicle.stack.sim.update_bumper(vehicle.stack.now_ns)
-    vehicle.stack.decide(Estop())
+    vehicle.stack.vehicle.pressed = True
+    vehicle.stack.estop()
     vehicle.when(vehicle.after(8.0), vehicle.ended.set)
     with pytest.raises(LapEndedError):
         vehicle.driver.release("backward")

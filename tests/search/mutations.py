@@ -1,0 +1,450 @@
+"""Mutations: each removes one protection; the oracle must object to its scenario."""
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from msgspec.structs import replace
+
+from common import keys
+from common import messages as m
+from common.freshness import NS_PER_S
+from common.heartbeat import Heartbeat
+from common.motion import Command, Twist
+from common.wire.frame import Side
+from common.wire.framing import Framing
+from common.wire.reports import BumperReport
+from services.bridge import lease as leases
+from services.bridge import readiness
+from services.bridge.core import Core
+from services.bridge.lease import Lease
+from services.bridge.output import Output, Send
+from services.bridge.readiness import Readiness
+from services.bridge.reflex import Hit
+from services.safety import arbiter, causes, conditions, latches, policy
+from services.safety.arbiter import Arbiter
+from services.safety.channel import Admission
+from services.safety.inputs import Inputs
+from services.safety.keepalive import Keepalives
+from services.safety.latches import Held, Observation
+from services.safety.limits import SpeedLimits
+from services.safety.release import Release
+from services.safety.service import SafetyService
+from services.safety.sonar_array import SonarOverrides
+from services.safety.standstill import Standstill, Supervisor
+from services.safety.state import State
+from services.safety.zones import Zones
+from tests.search.scripted_stack import ScriptedStack as Stack
+from verification.search.bus import ROBOT, DriveEnd, Envelope
+from verification.search.condition_books import IGNORED, NEEDED
+from verification.search.vehicle import FAULT_MM
+
+Script = tuple[Callable[[Stack], object], ...]
+# Owner, attribute and replacement of a protection; its scenario; the oracle's objection.
+Mutation = tuple[object, str, object, Script, str]
+
+# --- scenarios: what happens to a vehicle that drives at 0.5 m/s ----------------------------------
+
+LET_GO: Script = (lambda s: s.request(None, 1500),)
+STAND: Script = (lambda s: s.request(0.0, 1500),)
+GO: Script = (lambda s: s.request(0.5),)
+GO_ON = (*STAND, *GO)
+HIT: Script = (lambda s: s.press(True, 1500),)
+STUCK: Script = (lambda s: s.request(None), *HIT)
+LATE_MOTIONS: Script = (lambda s: s.disturb("motion", 300, late_ms=60),)
+LATE_STREAMS: Script = (lambda s: s.disturb("streams", 300, late_ms=120),)
+PROTECTIVE_STOP: Script = (
+    lambda s: s.limit(0.0, 1500, source=IGNORED),
+    lambda s: s.limit(None, source=IGNORED),  # while the stick is pushed
+)
+FRONT = range(2, 3)
+
+
+def brakes_go_off_and_on(stack: Stack) -> None:
+    """Report to safety too late that the board's brake was off."""
+    for on in (False, True):
+        assert stack.switches(on=on)
+        stack.run(60)
+
+
+def successor(
+    stack: Stack, deliver: Callable[[Callable[[Envelope], None], Envelope], None]
+) -> None:
+    """Kill safety with a latched emergency stop; ``deliver`` passes the link to its successor."""
+    stack.stop(100)
+    stack.kill("safety", 20)
+    stack.run(25)
+    of_safety = [one for one in stack.net.subscriptions if one.owner is stack.safety]
+    (link,) = [one for one in of_safety if one.key == keys.LINK.on(ROBOT)]
+    link.take = partial(deliver, link.take)
+
+
+def successor_hits_something(stack: Stack) -> None:
+    """Latch a contact in the successor before it receives the link, then release."""
+    deaf_until_ns = stack.net.now_ns + NS_PER_S
+
+    def late(take: Callable[[Envelope], None], envelope: Envelope) -> None:
+        if stack.net.now_ns > deaf_until_ns:
+            take(envelope)
+
+    successor(stack, late)
+    stack.measure(0.2, 40)  # still, so that a way off is known
+    stack.measure(None)
+    stack.request(None)
+    stack.press(True, 2500)
+    stack.creep()
+
+
+def successor_hears_of_no_latch(stack: Stack) -> None:
+    """Deliver to the successor a link sample from before the latch."""
+
+    def old(take: Callable[[Envelope], None], envelope: Envelope) -> None:
+        assert isinstance(envelope.message, m.Link)
+        message = replace(envelope.message, latched_by=None, armed=True)
+        take(dataclasses.replace(envelope, message=message))
+
+    successor(stack, old)
+
+
+def resets_all_but_the_stop(stack: Stack) -> None:
+    seen = stack.seen
+    assert seen is not None
+    kept = tuple(one for one in seen.causes if one.name != "estop")
+    stack.reset(replace(seen, causes=kept))
+    stack.run(300)
+
+
+SAFETY_HANGS: Script = (
+    lambda s: s.stall("safety", 1500),
+    lambda s: s.run(700),
+    lambda s: s.stop(1500),
+    lambda s: s.request(0.0, 700),
+    resets_all_but_the_stop,
+    *GO,
+)
+
+
+def authority_is_copied(stack: Stack) -> None:
+    copy = m.Motion(command=Command.RUN, linear=0.9, seq=2**19, boot=stack.safety.boot)
+    stack.forge(keys.MOTION, copy)
+
+
+def late_holds(stack: Stack) -> None:
+    seen = stack.seen
+    stack.run(2000)
+    for _ in range(20):
+        stack.hold(True, "backward", seen)
+
+
+def pressed_again_and_again(stack: Stack) -> None:
+    """Free the bumper repeatedly at standstill, and use the whole distance of each release."""
+    for _ in range(4):
+        stack.creep()
+        stack.run(1500)
+        stack.press(False, 300)
+        stack.press(True, 300)
+
+
+def reset_of_what_was_seen(stack: Stack) -> None:
+    """Reset an emergency stop as it was seen before a contact that came meanwhile."""
+    stack.stop(100)
+    seen = stack.seen
+    stack.press(True, 60)
+    stack.press(False, 400)
+    stack.reset(seen)
+    stack.run(300)
+
+
+def late_reset(stack: Stack) -> None:
+    """Reset three seconds after what the operator saw; the bumper was touched meanwhile."""
+    for _ in range(2):
+        stack.press(True, 60)
+        seen = stack.seen
+        stack.press(False, 40)
+    stack.run(3000)
+    stack.reset(seen)
+    stack.run(300)
+
+
+def reset_too_early(stack: Stack) -> None:
+    """Reset a driver's fault after its first good sample; they come twice a second."""
+    stack.driver(1, 20)
+    stack.driver(0, 600)
+    stack.reset()
+    stack.run(300)
+
+
+def driver_blinks(stack: Stack) -> None:
+    """Report a driver fault and its end at the same time."""
+    stack.driver(1)
+    stack.driver(0)
+    stack.vehicle.send(Framing().pack(stack.vehicle.board.driver(Side.LEFT)))
+
+
+def reset_without_a_velocity(stack: Stack) -> None:
+    stack.estop()
+    stack.velocities(False, 1000)
+    stack.reset()
+    stack.velocities(True, 1000)
+
+
+def nav_goes_on(stack: Stack) -> None:
+    """Overrule nav by teleop, then end teleop's requests."""
+    stack.request(None)
+    stack.request(0.0, 1000, source="nav")
+    stack.request(0.3, 300, source="nav")
+    stack.request(0.0, 300)
+    stack.request(None)
+
+
+def rival_limit(stack: Stack) -> None:
+    limiter = stack.limiters[NEEDED]
+    limiter.put(m.Limit(linear=9.0, echo=limiter.echo, boot=5))
+
+
+def limit_falls_silent(stack: Stack) -> None:
+    stack.limiters[NEEDED].caps = None
+
+
+def pendant_falls_silent(stack: Stack) -> None:
+    stack.pendant.alive = False
+
+
+def pendant_is_held(stack: Stack) -> None:
+    """Deliver a sign of life almost too late, then none."""
+    echo = stack.pendant.echo
+    stack.pendant.alive = False
+    stack.run(850)
+    stack.pendant.put(m.EstopKeepalive(echo=echo))
+
+
+def reset_is_granted(stack: Stack) -> None:
+    assert stack.reset().done
+
+
+# --- replacements ---------------------------------------------------------------------------------
+
+ORDER, EXPIRE, ON_MOTION = leases._order, leases.expire, leases.on_motion
+AFTER, STORE = Release.after, SafetyService._store
+HIT_FRAME = Framing().pack(BumperReport(True))
+
+
+def never(*_: Any) -> bool:
+    return False
+
+
+def unchanged(first: Any, *_: Any) -> Any:
+    return first
+
+
+def claims_to_brake(core: Core, datagram: bytes) -> Hit | None:
+    sent = Send(b"", core.motions.port)
+    return Hit(HIT_FRAME, sent) if HIT_FRAME in datagram else None
+
+
+def still_armed(lease: Lease, ready: bool) -> Lease:
+    return replace(lease, ready=ready)
+
+
+def unacknowledged(lease: Lease, received_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=received_ns), Command.BRAKE
+
+
+def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=now_ns), Command.BRAKE
+
+
+def overwritten(lease: Lease, motion: m.Motion) -> int | None:
+    if motion.latched:
+        return motion.boot
+    return None if lease.latched_by == motion.boot else lease.latched_by
+
+
+def whoever(lease: Lease, motion: m.Motion) -> Any:
+    return ORDER(replace(lease, latched_by=None), motion)
+
+
+def untold(lease: Lease, motion: m.Motion, *rest: Any, **more: Any) -> Any:
+    return ON_MOTION(lease, replace(motion, latched=False), *rest, **more)
+
+
+def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
+    return replace(EXPIRE(lease, now_ns, lease_ns), neutral=lease.neutral)
+
+
+def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
+    """Subscribe on the router as well."""
+    link._process.subscribe(topic, handler, **names)
+
+
+def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) -> Release:
+    """Update a release, but forget earlier presses at each new press."""
+    anew = contact.good == 0 and old is not None and old.good > 0
+    return AFTER(Release() if anew else release, None if anew else old, contact, *rest)
+
+
+def knows_at_once(overrides: SonarOverrides, unseen: Any, _: Any, now_ns: int) -> SonarOverrides:
+    return SonarOverrides(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
+
+
+def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False) -> Any:
+    return STORE(ports, field)
+
+
+def however_old(inputs: Inputs, *_: object) -> Twist | None:
+    return inputs.measured
+
+
+def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
+    lost = state.estop_connection > 0 and not inputs.estop_connection
+    return Observation("estop_reader", lost, (0, now_ns))
+
+
+# --- the table ------------------------------------------------------------------------------------
+
+MUTATIONS: dict[str, Mutation] = {
+    "the bridge's lease never ends": (
+        leases, "expire", unchanged, (lambda s: s.kill("safety", 5000),), "a RUN is held",
+    ),
+    "no neutral after a lease": (
+        leases, "expire", still_neutral,
+        (lambda s: s.disturb("streams", late_ms=120), lambda s: s.disturb("motion", 250, lose=1),
+         lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
+    ),
+    "silence is not noticed": (
+        readiness, "link_on_tick", unchanged, (*LATE_STREAMS, lambda s: s.vehicle.freeze(240)),
+        "the board is silent",
+    ),
+    "brakes that are off": (
+        Readiness, "ready", property(lambda self: self.link.state == "up"),
+        (*LATE_STREAMS, brakes_go_off_and_on), "its brakes are not both on",
+    ),
+    "no neutral after brakes that were off": (
+        leases, "on_ready", still_armed, (*LATE_STREAMS, brakes_go_off_and_on),
+        "no neutral motion came",
+    ),
+    "the bridge remembers no latch": (
+        leases, "on_motion", untold,
+        (lambda s: s.stop(100), lambda s: s.kill("safety", 20), lambda s: s.run(1500),
+         lambda s: s.request(0.0, 700), *GO), "bridge knows of estop",
+    ),
+    "a successor's own latch hides the one that is due": (
+        leases, "_latched_by", overwritten, (successor_hits_something,), "safety knows of estop",
+    ),
+    "a successor need not know of the latch": (
+        leases, "_order", whoever, (successor_hears_of_no_latch, *GO_ON), "bridge knows of estop",
+    ),
+    "a hit needs no judgement": (
+        leases, "on_hit", unjudged, (*LATE_MOTIONS, *HIT), "bridge knows of contact",
+    ),
+    "an emergency stop needs no acknowledgement": (
+        leases, "on_estop", unacknowledged, SAFETY_HANGS, "bridge knows of estop",
+    ),
+    "the bridge does not brake for an emergency stop": (
+        Core, "estop", lambda *_: Output(), SAFETY_HANGS, "without a BRAKE",
+    ),
+    "the drive link takes messages of the router": (
+        DriveEnd, "subscribe", from_anybody, (authority_is_copied,), "a RUN that no safety sent",
+    ),
+    "the reflex does not brake": (
+        Core, "reflex", claims_to_brake, (*LATE_MOTIONS, *HIT), "without a BRAKE",
+    ),
+    "late calls are obeyed": (
+        Heartbeat, "refusal", lambda *_: "", (*STUCK, late_holds), "no operator holds the release",
+    ),
+    "a late reset is obeyed": (
+        Heartbeat, "refusal", lambda *_: "", (*STAND, late_reset, *GO), "safety knows of contact",
+    ),
+    "a reset clears what it does not name": (
+        latches, "named", lambda held, _: latches.latched(held),
+        (*STAND, reset_of_what_was_seen, *GO), "safety knows of contact",
+    ),
+    "each press has its full distance again": (
+        Release, "after", unforgetting, (*STUCK, pressed_again_and_again), "farther than its way",
+    ),
+    "no direction is forbidden": (
+        Release, "after", unforgetting,
+        (*STUCK, lambda s: s.creep(), lambda s: s.press(False, 150), lambda s: s.press(True, 700),
+         lambda s: s.creep()), "in which the bumper was pressed",
+    ),
+    "latches clear by time": (
+        latches, "_is_over", lambda *_: True,
+        (lambda s: s.stop(700), lambda s: s.request(0.0, 700), *GO), "safety knows of estop",
+    ),
+    "no neutral after a return": (
+        Arbiter, "disarmed", unchanged, (lambda s: s.vehicle.freeze(400),), "was not neutral",
+    ),
+    "a reset clears what is not gone": (
+        latches, "GOOD_SAMPLES", 0, (*STAND, reset_too_early, *GO), "safety knows of driver",
+    ),
+    "no input is too old": (
+        conditions, "_is_old", never, (lambda s: s.velocities(False),), "old velocity",
+    ),
+    "an old velocity is as good as a new one": (
+        Inputs, "known_velocity", however_old, (*STAND, reset_without_a_velocity, *GO),
+        "safety knows of estop",
+    ),
+    "samples are not decided upon one by one": (
+        SafetyService, "_store", at_the_next_tick, (driver_blinks,), "safety knows of driver",
+    ),
+    "the margin is ignored": (
+        Zones, "allowed", lambda *_: 1.0, (lambda s: s.sonars(250, numbers=FRONT),),
+        "toward sonar 2",
+    ),
+    "a stop is not supervised": (
+        Standstill, "is_late", never, (lambda s: s.measure(0.28), lambda s: s.request(None)),
+        "no BRAKE while",
+    ),
+    "a standstill is not supervised": (
+        Supervisor, "_stay", lambda self, standstill, *_: standstill,
+        (lambda s: s.request(None, 2500), lambda s: s.measure(0.28)), "no BRAKE while",
+    ),
+    "a limit does not slow": (
+        SpeedLimits, "limited", lambda _, twist, __: (twist, None),
+        (lambda s: s.limit(0.2, source=IGNORED),), "faster than a limit",
+    ),
+    "a protective stop does not stop": (
+        SpeedLimits, "observations", lambda *_: iter(()), PROTECTIVE_STOP,
+        "protective stop of fleet",
+    ),
+    "a protective stop wants no neutral": (
+        policy, "wants_neutral", lambda name: name != "limit_stop" and causes.wants_neutral(name),
+        PROTECTIVE_STOP, "was not neutral",
+    ),
+    "a silent limit source drives on": (
+        SpeedLimits, "_silent", lambda *_: [], (limit_falls_silent,), "no limit of lidar",
+    ),
+    "two publishers of a limit": (
+        SpeedLimits, "_in_conflict", lambda *_: [], (rival_limit,), "two publishers of one limit",
+    ),
+    "a pendant that fell silent does not latch": (
+        Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),
+        (pendant_falls_silent,), "safety knows of estop_keepalive",
+    ),
+    "a held sign of life counts from its reception": (
+        Admission, "sent_ns", lambda self, _: self.now_ns, (pendant_is_held,),
+        "safety knows of estop_keepalive",
+    ),
+    "a connection that was lost in between does not latch": (
+        conditions, "_estop_reader", only_if_down,
+        (lambda s: s.router(False), lambda s: s.router(True), *GO_ON),
+        "safety knows of estop_reader",
+    ),
+    "a stall of safety does not latch": (
+        conditions, "_estop_reader", only_if_down,
+        (lambda s: s.stall("safety", 1500), lambda s: s.request(0.0, 2500), reset_is_granted,
+         *GO_ON),
+        "safety knows of estop_reader",
+    ),
+    "a suspended program drives on": (
+        arbiter, "LAPSE_S", 1e9, (*LET_GO, *GO), "was not neutral",
+    ),
+    "an override does not hold": (
+        Arbiter, "overruled", unchanged, (nav_goes_on,), "nav was not neutral",
+    ),
+    "a hold that was meant for a good sonar drives on blind": (
+        SonarOverrides, "updated", knows_at_once,
+        (lambda s: s.sonars(FAULT_MM, numbers=FRONT),), "toward sonar 2",
+    ),
+}  # fmt: skip

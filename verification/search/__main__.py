@@ -1,0 +1,75 @@
+"""``python -m verification.search``: random vehicles, rooms, operators and faults."""
+
+import argparse
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from verification.search.draw import Draw, draw, shrink
+from verification.search.page import page
+from verification.search.run import Result, fails_as, run
+
+RESULTS = Path("out/vehicles/runs.jsonl")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the campaign or one seed; return 1 when an invariant is broken."""
+    parser = argparse.ArgumentParser(prog="python -m verification.search", description=__doc__)
+    parser.add_argument("--runs", type=int, default=1000, help="the seeds 0 to N - 1; 1000")
+    parser.add_argument("--out", type=Path, help="the page to write, docs/vehicles.md")
+    parser.add_argument("--seed", type=int, help="run one seed and print it")
+    parser.add_argument(
+        "--shrink", action="store_true", help="with --seed: find the parameters that matter"
+    )
+    options = parser.parse_args(argv)
+    if options.seed is not None:
+        return show(options.seed, shrinks=options.shrink)
+    results = sorted(campaign(options.runs), key=lambda result: result.seed)
+    if options.out:
+        options.out.write_text(page(results), encoding="utf-8")
+    return int(any(result.violations for result in results))
+
+
+def campaign(runs: int) -> list[Result]:
+    """Run the seeds in parallel; keep the results as JSON lines too, and print violations."""
+    began_s, found = time.monotonic(), []
+    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    context = multiprocessing.get_context("spawn")
+    with RESULTS.open("wb") as file, context.Pool(initializer=os.nice, initargs=(10,)) as pool:
+        for result in pool.imap_unordered(run_seed, range(runs), chunksize=4):
+            found.append(result)
+            file.write(msgspec.json.encode(result) + b"\n")
+            if result.violations:
+                print(f"seed {result.seed}: {result.violations[0]}", flush=True)
+    print(f"{runs} runs in {(time.monotonic() - began_s) / 60:.0f} min")
+    return found
+
+
+def run_seed(seed: int) -> Result:
+    """Return the result of one seed."""
+    return run(draw(seed))
+
+
+def show(seed: int, *, shrinks: bool) -> int:
+    """Print one run, and the parameters that its failure needs."""
+    result = run_seed(seed)
+    print(_json(result))
+    if shrinks and (result.violations or not result.completed):
+        same = fails_as(result)
+        smallest = shrink(draw(seed), lambda smaller: same(run(smaller)))
+        print("the failure needs:", _json(smallest.values))
+        print(_json(run(Draw(seed, smallest.values))))
+    return int(bool(result.violations))
+
+
+def _json(found: object) -> str:
+    return msgspec.json.format(msgspec.json.encode(found)).decode()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

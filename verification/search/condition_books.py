@@ -1,0 +1,183 @@
+"""Oracle's books on speed limits, signs of life and standstill, as one safety service knows them.
+
+As in ``safety_book.py``, nothing is taken from the code under test.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from common.freshness import NS_PER_S
+from common.messages import Limit, Motion, SourceMessage, Velocity
+
+LEASE_S, ECHO_AGE_S, RIVAL_S = 0.5, 0.4, 0.5
+NEEDED, IGNORED = "lidar", "fleet"  # whose silence stops; whose silence has no effect
+SLOWING = (0.6, 1.0)  # m/s^2, rad/s^2
+STEP_S = 0.1  # a decision after a longer pause slows as if it came after this one
+ROUNDING = 2e-3
+NO_CAP = (math.inf, math.inf)
+
+TIMEOUT_S = 1.0  # of a pendant
+
+BRAKING_MPS2, BRAKING_RADPS2, GRACE_S = 0.6, 1.0, 0.5
+FASTEST_MPS = 1.0
+STANDING_MPS, STANDING_RADPS = 0.02, 0.05
+AWAY = 0.05  # m or rad that a standing vehicle may be moved
+# Two samples and a decision later at 1.5 m/s, and what the oracle counts more generously.
+SLACK, SLACK_S = 0.10, 0.06
+GAP_S, FRESH_S = 0.1, 0.2
+
+
+@dataclass(slots=True)
+class GoodLimit:
+    """The newest good limit of one source."""
+
+    boot: int
+    seq: int
+    at_ns: int
+    caps: tuple[float, float]  # m/s, rad/s
+
+
+@dataclass(slots=True)
+class LimitBook:
+    """Limits delivered to one safety service, and the speed that they permit."""
+
+    newest: dict[str, GoodLimit] = field(default_factory=dict)
+    rivals: dict[str, int] = field(default_factory=dict)
+    permitted: tuple[float, float] = NO_CAP  # m/s, rad/s; falls at the normal deceleration
+    looked_ns: int = 0
+
+    def on_limit(self, source: str, limit: Limit, sent_ns: int | None, now_ns: int) -> None:
+        """Take a limit in, if it is a good one."""
+        given = [one for one in (limit.linear, limit.angular) if one is not None]
+        late = sent_ns is None or now_ns - sent_ns > ECHO_AGE_S * NS_PER_S
+        if source not in (NEEDED, IGNORED) or late or not all(map(math.isfinite, given)):
+            return
+        old = self.newest.get(source)
+        if old is not None and old.boot != limit.boot and _is_valid(old, now_ns):
+            self.rivals[source] = now_ns
+        elif old is None or old.boot != limit.boot or limit.seq > old.seq:
+            linear = math.inf if limit.linear is None else limit.linear
+            angular = math.inf if limit.angular is None else limit.angular
+            self.newest[source] = GoodLimit(limit.boot, limit.seq, now_ns, (linear, angular))
+
+    def look(self, now_ns: int) -> None:
+        """Update the permitted speed, at the time of a decision."""
+        step_s = min((now_ns - self.looked_ns) / NS_PER_S, STEP_S)
+        self.looked_ns = now_ns
+        valid = [one.caps for one in self.newest.values() if _is_valid(one, now_ns)]
+        linear, angular = (
+            max(
+                min((caps[axis] for caps in valid), default=math.inf),
+                min(self.permitted[axis], 1.0) - SLOWING[axis] * step_s,
+            )
+            for axis in (0, 1)
+        )
+        self.permitted = linear, angular
+
+    def stops(self, now_ns: int) -> Iterator[str]:
+        """Yield why the vehicle must stand, whatever is requested."""
+        valid = {name for name, one in self.newest.items() if _is_valid(one, now_ns)}
+        if NEEDED not in valid:
+            yield f"no limit of {NEEDED}"
+        yield from (f"protective stop of {one}" for one in valid if 0 in self.newest[one].caps)
+
+    def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
+        """Yield the reasons why a motion must not run."""
+        yield from self.stops(now_ns)
+        linear, angular = self.permitted
+        if abs(motion.linear) > linear + ROUNDING or abs(motion.angular) > angular + ROUNDING:
+            yield f"faster than a limit: {motion.linear} m/s, {motion.angular} rad/s"
+        if any(now_ns - at_ns < RIVAL_S * NS_PER_S for at_ns in self.rivals.values()):
+            yield "two publishers of one limit"
+
+
+def _is_valid(limit: GoodLimit, now_ns: int) -> bool:
+    return now_ns - limit.at_ns <= LEASE_S * NS_PER_S
+
+
+@dataclass(slots=True)
+class KeepaliveBook:
+    """The newest proof of life of a pendant that one safety service received."""
+
+    boot: int | None = None
+    seq: int = 0
+    proven_ns: int = 0  # when safety sent the heartbeat that was echoed last
+
+    def on_message(self, message: SourceMessage, sent_ns: int | None, now_ns: int) -> bool:
+        """Take a message in; return whether it shows a loss: a gap, or another program."""
+        if sent_ns is None or now_ns - sent_ns > TIMEOUT_S * NS_PER_S:
+            return False
+        lost = self.boot is not None and now_ns - self.proven_ns > TIMEOUT_S * NS_PER_S
+        broken = self.boot is not None and (lost or message.boot != self.boot)
+        if message.boot != self.boot and (self.boot is None or lost):
+            self.boot, self.seq = message.boot, message.seq - 1
+        if message.boot == self.boot and message.seq > self.seq:
+            self.seq, self.proven_ns = message.seq, sent_ns
+        return broken
+
+    def is_lost(self, now_ns: int) -> bool:
+        """Return whether it was received once and is not alive now."""
+        return self.boot is not None and now_ns - self.proven_ns > TIMEOUT_S * NS_PER_S
+
+    def missing(self) -> Iterator[str]:
+        """Yield a complaint while it was never received."""
+        if self.boot is None:
+            yield "no sign of life of the pendant"
+
+
+@dataclass(slots=True)
+class StandstillBook:
+    """The velocities that one safety service received, and when it last commanded motion."""
+
+    stop_ns: int = 0  # when standstill was commanded
+    due_ns: int | None = None  # when the vehicle must stand; None while motion is commanded
+    newest: Velocity | None = None
+    newest_ns: int = 0
+    rolled: float = 0.0  # m or rad, the larger, since standstill was last commanded
+
+    def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
+        """Take a velocity in."""
+        if rolls(velocity):
+            gap_s = min((now_ns - self.newest_ns) / NS_PER_S, GAP_S)
+            before = self.newest is not None and rolls(self.newest)
+            self.rolled += max(abs(velocity.linear), abs(velocity.angular)) * gap_s * before
+        else:
+            self.rolled = 0.0
+        if self.due_ns is not None and not self._known(now_ns):  # the first one after a gap
+            self.due_ns = min(self.due_ns, now_ns + stopping_ns(velocity))
+        self.newest, self.newest_ns = velocity, now_ns
+
+    def _known(self, now_ns: int) -> bool:
+        """Return whether the velocity is known; an unknown one counts as the highest."""
+        return now_ns - self.newest_ns <= FRESH_S * NS_PER_S
+
+    def complaint(self, motion: Motion, moves: bool, now_ns: int) -> str:
+        """Return what is wrong with a motion that does not brake; empty if nothing is."""
+        if moves:
+            self.due_ns = None
+            return ""
+        if self.due_ns is None:
+            self.stop_ns = self.due_ns = now_ns
+        if now_ns - self.stop_ns <= GAP_S * NS_PER_S:  # the speed at STOP may be measured later
+            speed = self.newest if self._known(now_ns) else None
+            self.due_ns = max(self.due_ns, self.stop_ns + stopping_ns(speed))
+        late_s = (now_ns - self.due_ns) / NS_PER_S
+        if motion.command == "brake" or late_s < SLACK_S or not self._known(now_ns):
+            return ""
+        rolled = self.rolled > AWAY + SLACK
+        return f"safety: no BRAKE while the vehicle rolls {self.rolled:.2f}" if rolled else ""
+
+
+def rolls(velocity: Velocity) -> bool:
+    """Return whether a velocity is a motion."""
+    return abs(velocity.linear) >= STANDING_MPS or abs(velocity.angular) >= STANDING_RADPS
+
+
+def stopping_ns(velocity: Velocity | None) -> int:
+    """Return how long stopping may take from this velocity."""
+    linear, angular = (
+        (FASTEST_MPS, 0.0) if velocity is None else (velocity.linear, velocity.angular)
+    )
+    stopping_s = max(abs(linear) / BRAKING_MPS2, abs(angular) / BRAKING_RADPS2)
+    return round((stopping_s + GRACE_S) * NS_PER_S)

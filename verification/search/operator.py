@@ -1,0 +1,163 @@
+"""A random operator: holds keys or a stick through teleop's controls, and resets what stops.
+
+An attentive beginner: drives some manoeuvres, turns to the next one when there is no room, lets go
+when safety wants a neutral request, backs off a pressed bumper, and resets what is latched.
+"""
+
+import random
+from typing import Any
+
+from msgspec import Struct
+
+from common import keys
+from common import messages as m
+from common.freshness import NS_PER_S
+from services.teleop.config import Teleop
+from services.teleop.controls import Controls, Deflection, Stick
+from verification.search import sources
+from verification.search.bus import Process
+from verification.search.draw import Draw
+
+KEYS = ("w", "w", "w", "w", "s", "s", "a", "d", "z", "c", "end", "pagedown")
+PATIENCE_S = 0.7  # without room, until the next manoeuvre
+LET_GO_S = 0.4  # for a neutral request
+LOOK_S = 1.2  # from a stop that is latched to the first call
+BACK_OFF_S = 5.0  # of holding the release
+CLEAR_S = 0.4  # after the bumper is free
+GIVE_UP_S = 25.0  # of trying to reset
+
+
+class Manoeuvre(Struct, frozen=True):
+    """One hold of a key or a stick, and the pause after it."""
+
+    key: str
+    push: Deflection
+    hold_s: float
+    pause_s: float
+
+
+def script(draw: Draw) -> list[Manoeuvre]:
+    """Return the manoeuvres of a draw."""
+    chance = random.Random(f"{draw.seed} script")
+    number = int(draw.get("operator.manoeuvres", 3))
+    return [
+        Manoeuvre(
+            chance.choice(KEYS),
+            Deflection(chance.choice((1, 1, 0.6, 0.3, 0, -0.6, -1)), chance.uniform(-1, 1)),
+            chance.uniform(1.0, 6.0),
+            chance.choice((0.3, 0.5, 1.0, 2.0)),
+        )
+        for _ in range(number)
+    ]
+
+
+class Operator(sources.Stick):
+    """A source that sends what teleop's controls make of the script; ``act`` runs at 20 Hz."""
+
+    def __init__(self, process: Process, draw: Draw) -> None:
+        super().__init__("teleop", process)
+        self.seen: m.SafetyState | None = None
+        self.pressed = False  # the bumper, as shown
+        self.gave_up = False
+        self.muted_until_ns: float = 0
+        self.held: m.Direction | None = None  # the release, for the caller to send
+        self.wants_reset = False  # the same
+        self.asks_since_ns: int | None = None  # of motion
+        self.presses = 0  # again, for a neutral request
+        self._script = script(draw)[::-1]
+        self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
+        self._controls = Controls(Teleop())
+        self._controls.press(str(draw.get("operator.gear", 3)), 0)
+        self._events = 0
+        self._began_ns: int | None = None  # the current manoeuvre
+        self._idle_until_ns = 0
+        self._blocked_ns: int | None = None
+        self._latched_ns: int | None = None
+        self._free_ns: int | None = None  # the bumper, after a contact
+        process.subscribe(keys.BUMPER, self._on_bumper)
+
+    @property
+    def done(self) -> bool:
+        """Whether the script is finished, or cannot be."""
+        return self.gave_up or not self._script
+
+    def _listen(self, arrival: Any) -> None:
+        super()._listen(arrival)
+        self.seen = arrival.message
+
+    def _on_bumper(self, arrival: Any) -> None:
+        self.pressed = arrival.message.pressed
+
+    def act(self, now_ns: int) -> None:
+        """Decide what to hold until the next act."""
+        self.held, self.wants_reset = None, False
+        if self.seen is None or self.done:
+            return
+        if self.seen.latched:
+            self._recover(self.seen, now_ns)
+            return
+        self._latched_ns = self._free_ns = None
+        if self._began_ns is None and now_ns >= self._idle_until_ns:
+            self._began_ns = now_ns
+        if self._began_ns is not None:
+            self._drive(self.seen, now_ns)
+
+    def publish(self) -> None:
+        """Publish the request of this tick, if there is one."""
+        now_ns = self.process.net.now_ns
+        driving = self._began_ns is not None
+        push = self._script[-1].push if driving and self._script else Deflection()
+        stick = Stick(push, deadman=driving, turbo=False, events=self._events)
+        twist = self._controls.tick(stick if self._gamepad else None, now_ns)
+        self.requested = None if twist is None else (twist.linear, twist.angular)
+        moves = self.requested not in (None, (0.0, 0.0))
+        self.asks_since_ns = (self.asks_since_ns or now_ns) if moves else None
+        if now_ns >= self.muted_until_ns:
+            super().publish()
+
+    def _drive(self, state: m.SafetyState, now_ns: int) -> None:
+        assert self._began_ns is not None
+        causes = {cause.name for cause in state.causes}
+        held_s = (now_ns - self._began_ns) / NS_PER_S
+        if self._gamepad:
+            self._events += 1
+        else:
+            self._controls.press(self._script[-1].key, now_ns)
+        self._blocked_ns = (self._blocked_ns or now_ns) if "blocked" in causes else None
+        blocked_s = (now_ns - (self._blocked_ns or now_ns)) / NS_PER_S
+        if held_s > self._script[-1].hold_s or blocked_s > PATIENCE_S:
+            self._let_go(now_ns, self._script.pop().pause_s)
+        elif "neutral" in causes and held_s > LET_GO_S:
+            self.presses += 1
+            self._let_go(now_ns, LET_GO_S)
+
+    def _let_go(self, now_ns: int, pause_s: float) -> None:
+        self._controls.release_all()
+        self._began_ns = self._blocked_ns = None
+        self._idle_until_ns = now_ns + round(pause_s * NS_PER_S)
+
+    def _recover(self, state: m.SafetyState, now_ns: int) -> None:
+        """Wait, back off, reset."""
+        if self._latched_ns is None:
+            self._latched_ns = now_ns
+            self._let_go(now_ns, LET_GO_S)
+        self._began_ns = None
+        self._idle_until_ns = now_ns + round(LET_GO_S * NS_PER_S)
+        since_s = (now_ns - self._latched_ns) / NS_PER_S
+        if since_s > GIVE_UP_S:
+            self.gave_up = True
+        elif since_s > LOOK_S:
+            self._free_ns = None if self.pressed else self._free_ns or now_ns
+            if self._free_ns is None and since_s < LOOK_S + BACK_OFF_S:
+                self.held = self._direction(state)
+            elif now_ns - (self._free_ns or now_ns) > CLEAR_S * NS_PER_S:
+                self.wants_reset = True
+
+    @staticmethod
+    def _direction(state: m.SafetyState) -> m.Direction | None:
+        if state.release is None:
+            return None
+        ways: list[m.Direction] = ["backward", "forward"]
+        if state.release.believed_free is not None:
+            ways.insert(0, state.release.believed_free)
+        return next((way for way in ways if way not in state.release.forbidden), None)

@@ -1,0 +1,130 @@
+"""The page of the campaign. Pure, but for the date and the name of the machine."""
+
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from statistics import mean, median
+
+from verification.harness.host import description
+from verification.harness.results import percentile, table
+from verification.search.draw import ranges
+from verification.search.judge import CHI2_95
+from verification.search.run import Result
+
+TEMPLATE = Path(__file__).with_name("page.md")
+WORST = 10
+FAULTS = [one.name for one in ranges() if one.fault]
+
+
+def page(results: Sequence[Result]) -> str:
+    """Return the page of these results."""
+    sound = [result for result in results if not result.faulty]
+    faulty = [result for result in results if result.faulty]
+    return TEMPLATE.read_text(encoding="utf-8").format(
+        date=datetime.now(UTC).date().isoformat(),
+        runs=f"{len(results):,}",
+        hours=f"{_hours(results):.1f}",
+        machine=description(),
+        python=platform.python_version(),
+        cpu=f"{median(result.cpu_s / result.seconds for result in results):.2f}",
+        results=summary({"no fault": sound, "with faults": faulty}),
+        stops=stops(sound),
+        worst=worst(results),
+        faults=by_fault(results),
+        odometry=odometry(sound),
+    )
+
+
+def _hours(results: Sequence[Result]) -> float:
+    return sum(result.seconds for result in results) / 3600
+
+
+def summary(kinds: dict[str, Sequence[Result]]) -> str:
+    """Return the table of both kinds of runs."""
+    head = (
+        "", "runs", "driven", "contacts", "broke an invariant", "completed",
+        "hours between needless stops",
+    )  # fmt: skip
+    rows = []
+    for name, results in kinds.items():
+        hours, needless = _hours(results), sum(len(result.stops) for result in results)
+        between = f"{hours / needless:.2g}" if needless else f"none in {hours:.1f}"
+        row = (
+            name,
+            f"{len(results):,}",
+            f"{sum(result.metres for result in results) / 1000:.2f} km",
+            f"{sum(result.contacts for result in results)}",
+            f"{sum(bool(result.violations) for result in results)}",
+            f"{mean(result.completed for result in results):.2%}" if results else "",
+            between if name == "no fault" else "",
+        )
+        rows.append(row)
+    return table(head, rows)
+
+
+def stops(sound: Sequence[Result]) -> str:
+    """Return the table of the causes of needless stops."""
+    counts = Counter(stop.cause for result in sound for stop in result.stops)
+    rows = []
+    for cause, count in counts.most_common():
+        seeds = [result.seed for result in sound if cause in {one.cause for one in result.stops}]
+        rows.append((f"`{cause}`", str(count), str(len(seeds)), _first(seeds)))
+    return table(("cause", "stops", "runs", "the first seeds"), rows) if rows else "None."
+
+
+def _first(seeds: Sequence[int]) -> str:
+    return ", ".join(map(str, seeds[:WORST]))
+
+
+def worst(results: Sequence[Result]) -> str:
+    """Return the table of the worst runs: violations first, then unfinished scripts."""
+    rows = [
+        (str(result.seed), _faults(result), _why(result))
+        for result in sorted(results, key=_badness, reverse=True)[:WORST]
+        if any(_badness(result))
+    ]
+    return table(("seed", "faults", "what happened"), rows) if rows else "None."
+
+
+def _badness(result: Result) -> tuple[int, int, int]:
+    return len(result.violations), int(not result.finished), len(result.stops)
+
+
+def _why(result: Result) -> str:
+    if result.violations:
+        return result.violations[0]
+    if result.stops:
+        return "; ".join(f"{stop.at_s:.1f} s: {stop.text}" for stop in result.stops[:2])
+    longest = [f"`{name}` for {seconds:.0f} s" for name, seconds in result.held.items()][:3]
+    return ", ".join(["the script was not finished", *longest])
+
+
+def _faults(result: Result) -> str:
+    drawn = [f"`{name}` {result.values[name]}" for name in FAULTS if name in result.values]
+    return ", ".join(drawn) or "none"
+
+
+def by_fault(results: Sequence[Result]) -> str:
+    """Return the table of runs by the fault that they have, alone or beside others."""
+    rows = []
+    for name in FAULTS:
+        with_it = [result for result in results if name in result.values]
+        seeds = [result.seed for result in with_it if not result.finished]
+        if with_it:
+            rows.append((f"`{name}`", str(len(with_it)), str(len(seeds)), _first(seeds)))
+    return table(("fault", "runs", "not finished", "the first seeds"), rows)
+
+
+def odometry(sound: Sequence[Result]) -> str:
+    """Return the table of odometry's errors at the end of the runs."""
+    last = [result.errors[-1] for result in sound if result.errors]
+    rows = []
+    for name, unit in (("position", " m"), ("heading", " rad"), ("nees", "")):
+        values = [float(getattr(error, name)) for error in last]
+        shares = (percentile(values, share) for share in (0.5, 0.95, 1.0))
+        rows.append((name, *(f"{value:.3g}{unit}" for value in (mean(values), *shares))))
+    inside = mean(error.nees <= CHI2_95 for error in last)
+    rows.append((f"share with nees at most {CHI2_95:g}", f"{inside:.1%}", "", "", ""))
+    return table(("error", "mean", "p50", "p95", "worst"), rows)

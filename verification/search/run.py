@@ -1,0 +1,224 @@
+"""One run: a draw, driven in simulated time, with its faults and verdicts."""
+
+import math
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from common import keys
+from common.freshness import NS_PER_S
+from sim import requests as q
+from sim.config import Config
+from verification.search.bus import MS, Disturbance
+from verification.search.draw import Draw, Value, room
+from verification.search.judge import Judge, PoseError, Stop, pose_error
+from verification.search.operator import Operator
+from verification.search.stack import START_NS, Stack
+
+STEP_NS = 10 * MS
+ACT_MS, RESET_MS = 50, 500
+LONGEST_S = 90.0
+TAIL_MS = 1200  # after the script: everything must stand
+
+
+class Result(Struct, frozen=True, kw_only=True):
+    """Verdicts and figures of one run."""
+
+    seed: int
+    values: dict[str, Value]
+    faulty: bool
+    violations: list[str]  # of the invariants
+    stops: list[Stop]  # that nothing justified; of runs without faults only
+    finished: bool  # the script
+    seconds: float  # simulated
+    cpu_s: float
+    metres: float  # driven
+    contacts: int
+    errors: list[PoseError]  # once a second
+    held: dict[str, float] = {}  # of an unfinished run: causes that held the vehicle, in seconds
+
+    @property
+    def completed(self) -> bool:
+        """Whether the script was finished without a needless stop."""
+        return self.finished and not self.stops
+
+
+def run(draw: Draw) -> Result:
+    """Drive a draw; an error of a service is a violation."""
+    began_s = time.process_time()
+    trial = Trial(draw)
+    stack, operator = trial.stack, trial.operator
+    violations: list[str] = []
+    try:
+        trial.drive()
+    except Exception as error:  # whatever a service raises would end it
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        violations.append(f"{type(error).__name__} in {where.name}: {error}")
+    violations += dict.fromkeys(stack.oracle.violations)
+    finished = not operator.gave_up and operator.done
+    return Result(
+        seed=draw.seed,
+        values=draw.values,
+        faulty=draw.faulty,
+        violations=violations,
+        stops=[] if draw.faulty else trial.judge.stops,
+        finished=finished,
+        seconds=round((stack.net.now_ns - START_NS) / NS_PER_S, 2),
+        cpu_s=round(time.process_time() - began_s, 3),
+        metres=round(stack.vehicle.truth.distance, 3),
+        contacts=trial.contacts,
+        errors=trial.errors,
+        held={} if finished else trial.held(),
+    )
+
+
+def fails_as(result: Result) -> Callable[[Result], bool]:
+    """Return whether another result fails for the same reason."""
+
+    def same(other: Result) -> bool:
+        if result.violations:
+            return bool(_kinds(result) & _kinds(other))
+        if result.stops:
+            return bool({stop.cause for stop in result.stops} & {s.cause for s in other.stops})
+        return not other.finished
+
+    return same
+
+
+def _kinds(result: Result) -> set[str]:
+    # Numbers differ from run to run.
+    return {"".join(c for c in text if not c.isdigit()) for text in result.violations}
+
+
+class Trial:
+    """The run under way."""
+
+    def __init__(self, draw: Draw) -> None:
+        config = msgspec.convert(draw.settings(), Config)
+        plan = room(draw, config.vehicle)
+        self.stack = Stack(config, plan, odometry=True, step_ns=STEP_NS)
+        self.operator = Operator(self.stack.process("stick"), draw)
+        self.stack.sticks = {"teleop": self.operator}
+        self.judge = Judge(START_NS)
+        self.contacts = 0
+        self.errors: list[PoseError] = []
+        self._origin = self.stack.vehicle.simulation.pose
+        self._faults = [
+            (START_NS + round((float(value) + after_s) * NS_PER_S), number, step)
+            for name, value in draw.values.items()
+            if name.startswith("fault.")
+            for number, (after_s, step) in enumerate(FAULTS[name.removeprefix("fault.")])
+        ]
+        self._faults.sort(key=lambda fault: fault[:2])
+        self._held: Counter[str] = Counter()  # looks at each cause
+        self.stack.hand.subscribe(keys.ODOMETRY, self._on_odometry)
+
+    def drive(self) -> None:
+        """Run until the script is finished, then let the vehicle stand."""
+        end_ns = START_NS + round(LONGEST_S * NS_PER_S)
+        while not self.operator.done and self.stack.net.now_ns < end_ns:
+            while self._faults and self._faults[0][0] <= self.stack.net.now_ns:
+                self._faults.pop(0)[2](self)
+            self._act()
+            self._advance()
+        self.operator.muted_until_ns = math.inf
+        for _ in range(TAIL_MS // ACT_MS):
+            self._advance()
+
+    def held(self) -> dict[str, float]:
+        """Return the causes that operators saw, and for how many seconds; the longest first."""
+        return {name: count * ACT_MS / 1000 for name, count in self._held.most_common()}
+
+    def _act(self) -> None:
+        """Ask the operator what to hold, and make the calls."""
+        operator, before = self.operator, self.operator.held
+        operator.act(self.stack.net.now_ns)
+        if operator.held is not None:
+            self.stack.hold(True, operator.held)
+        elif before is not None:
+            self.stack.hold(False, before)
+        if operator.wants_reset and self.stack.net.now_ns % (RESET_MS * MS) == 0:
+            self.stack.reset()
+
+    def _advance(self) -> None:
+        """Advance to the next act."""
+        stack, before = self.stack, self.stack.vehicle.truth
+        stack.run(ACT_MS - stack.net.now_ns // MS % ACT_MS)
+        truth = stack.vehicle.truth
+        self.contacts += truth.contact and not before.contact
+        self.judge.look(self.operator, truth, stack.net.now_ns)
+        seen = self.operator.seen
+        self._held.update(cause.name for cause in (seen.causes if seen else ()))
+
+    def _on_odometry(self, arrival: Any) -> None:
+        if (self.stack.net.now_ns - START_NS) // NS_PER_S > len(self.errors):
+            pose = self.stack.vehicle.simulation.pose
+            self.errors.append(pose_error(arrival.message, pose, self._origin))
+
+
+# --- faults -----------------------------------------------------------------------------------
+
+Step = Callable[[Trial], None]
+
+
+def _inject(request: q.Asked) -> Step:
+    return lambda trial: trial.stack.vehicle.inject(request)
+
+
+def _silence(trial: Trial) -> None:
+    trial.operator.muted_until_ns = trial.stack.net.now_ns + NS_PER_S
+
+
+def _late(trial: Trial) -> None:
+    trial.stack.net.disturbances["drive"] = Disturbance(late_ms=400, lose=3)
+
+
+def _restart(trial: Trial) -> None:
+    trial.stack.vehicle.power_cycle(800)
+    trial.stack.oracle.on_power_cycle()
+
+
+def _returned(trial: Trial) -> None:
+    trial.stack.oracle.comeback_ns = trial.stack.net.now_ns
+
+
+# Steps of each fault of ``ranges.toml``: seconds after its begin, and what happens.
+FAULTS: dict[str, tuple[tuple[float, Step], ...]] = {
+    "bridge_killed": ((0.0, lambda trial: trial.stack.kill("bridge", 200)),),
+    "safety_killed": ((0.0, lambda trial: trial.stack.kill("safety", 200)),),
+    "bridge_stalled": ((0.0, lambda trial: trial.stack.stall("bridge", 150)),),
+    "safety_stalled": ((0.0, lambda trial: trial.stack.stall("safety", 400)),),
+    "router_down": (
+        (0.0, lambda trial: trial.stack.router(False)),
+        (1.0, lambda trial: trial.stack.router(True)),
+    ),
+    "operator_silent": ((0.0, _silence),),
+    "requests_late": (
+        (0.0, _late),
+        (0.5, lambda trial: trial.stack.net.disturbances.clear()),
+    ),
+    "estop": ((0.0, lambda trial: trial.stack.estop()),),
+    "board_frozen": ((0.0, lambda trial: trial.stack.vehicle.freeze(600)),),
+    "board_restarted": ((0.0, _restart), (0.8, _returned)),
+    "bumper_pressed": (
+        (0.0, _inject(q.Bumper(pressed=True))),
+        (0.1, _inject(q.Bumper(pressed=False))),
+    ),
+    "bumper_muted": ((0.0, _inject(q.Mute(reports=("bumper",)))), (0.5, _inject(q.Mute()))),
+    "velocity_muted": ((0.0, _inject(q.Mute(reports=("velocity",)))), (0.5, _inject(q.Mute()))),
+    "ultrasonic_muted": (
+        (0.0, _inject(q.Mute(reports=("ultrasonic",)))),
+        (0.8, _inject(q.Mute())),
+    ),
+    "driver": (
+        (0.0, _inject(q.Driver(side="left", bits=1))),
+        (0.5, _inject(q.Driver(side="left", bits=0))),
+    ),
+    "sonar_faulty": ((0.0, _inject(q.Sonar(name="front", fault=True))),),
+    "sonar_stuck": ((0.0, _inject(q.Sonar(name="front", stuck=True))),),
+}

@@ -1,0 +1,311 @@
+"""Oracle's book on one safety service: messages delivered to it, and the motion they permit.
+
+Nothing here comes from the code under test: times, limits and geometry are those of the safety case
+(``docs/safety.md``), repeated here on purpose.
+"""
+
+import math
+from collections import Counter, deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from common import messages as m
+from common.freshness import NS_PER_S
+from verification.search.condition_books import KeepaliveBook, LimitBook, StandstillBook
+from verification.search.operator_book import OperatorBook
+
+LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
+PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
+AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
+GOOD_SAMPLES, ECHO_AGE_S, SETTLE_S, RIVAL_S = 3, 0.4, 0.5, 0.5
+LAPSE_S = 1.0  # after its lease a source is as new
+MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
+# After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
+OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
+LOST_POLLS = 3  # of the bumper
+MOST_MPS, MOST_RADPS = 1.0, 1.0
+RAMP_S = 2.5  # from the highest speed to standstill, and some
+FAST_MPS, FAST_S = 1.35, 0.4  # measured: no command allows it, so it is a runaway
+STEP_S = 0.03  # decisions are that far apart at most, while nothing stalled
+ROUNDING = 2e-3
+
+FRONT, LEFT = 0.55, 0.35  # m from the middle to the bumpers
+# Place and direction of each sonar, clockwise from the left (manual 2.3).
+SONARS = (
+    (0.0, LEFT, 90), (FRONT, LEFT, 45), (FRONT, 0.0, 0), (FRONT, -LEFT, -45),
+    (0.0, -LEFT, -90), (-FRONT, -LEFT, -135), (-FRONT, 0.0, 180), (-FRONT, LEFT, 135),
+)  # fmt: skip
+FLANKS = (0, 4)
+
+
+@dataclass(slots=True)
+class SourceRequest:
+    """The newest good request of one source."""
+
+    boot: int
+    seq: int
+    at_ns: int
+    linear: float
+    angular: float
+    still_ns: int  # since when its source asks for no motion
+
+    @property
+    def still(self) -> bool:
+        """Whether it asks for no motion."""
+        return self.linear == 0 == self.angular
+
+
+@dataclass(slots=True)
+class SafetyBook:
+    """Messages delivered to one safety service, by the time of delivery."""
+
+    boot: int
+    samples: dict[str, tuple[int, m.Message]] = field(default_factory=dict)
+    ranges: deque[tuple[int, m.Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
+    bumpers: deque[m.Bumper] = field(default_factory=lambda: deque(maxlen=3))
+    requests: dict[str, SourceRequest] = field(default_factory=dict)
+    zeros: dict[str, int] = field(default_factory=dict)  # source: its last request of zero
+    unseen: dict[int, int] = field(default_factory=dict)  # sonar: since when it shows nothing
+    rivals: dict[str, int] = field(default_factory=dict)
+    operators: OperatorBook = field(default_factory=OperatorBook)
+    bad_ns: int = 0  # when inputs were last seen to be bad
+    neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
+    fast_ns: int | None = None  # since when the vehicle is measured to be too fast
+    estop_session_was_up: bool = False
+    decided_ns: int | None = None
+    standstill: StandstillBook = field(default_factory=StandstillBook)
+    keepalive: KeepaliveBook = field(default_factory=KeepaliveBook)
+    limits: LimitBook = field(default_factory=LimitBook)
+    well: Counter[str] = field(default_factory=Counter)  # samples without a fault, by driver
+
+    def on_source(self, name: str, message: m.SourceMessage, now_ns: int) -> bool:
+        """Take a message of a source in; return whether an emergency stop was lost."""
+        sent_ns = self.operators.beats.get(message.echo)
+        if isinstance(message, m.Drive):
+            self.on_drive(name, message, now_ns)
+        elif isinstance(message, m.Limit):
+            self.limits.on_limit(name, message, sent_ns, now_ns)
+        pendant = isinstance(message, m.EstopKeepalive)
+        return pendant and self.keepalive.on_message(message, sent_ns, now_ns)
+
+    def on_drive(self, source: str, drive: m.Drive, now_ns: int) -> None:
+        """Take a request in, if it is a good one."""
+        sent_ns = self.operators.beats.get(drive.echo)
+        finite = math.isfinite(drive.linear) and math.isfinite(drive.angular)
+        if source not in LEASES_S or not finite or sent_ns is None:
+            return
+        if now_ns - sent_ns > ECHO_AGE_S * NS_PER_S:
+            return
+        old = self.requests.get(source)
+        if old is not None and old.boot != drive.boot and self.is_fresh(source, now_ns):
+            self.rivals[source] = now_ns
+            return
+        if old is not None and old.boot == drive.boot and drive.seq <= old.seq:
+            return
+        if drive.linear == 0 == drive.angular:
+            self.zeros[source] = now_ns
+        if old is not None and now_ns - old.at_ns > (LEASES_S[source] + LAPSE_S) * NS_PER_S:
+            self.neutral.pop(source, None)  # a program that was suspended
+        since_ns = old.still_ns if old is not None and old.still else now_ns
+        self.requests[source] = SourceRequest(
+            drive.boot, drive.seq, now_ns, drive.linear, drive.angular, since_ns
+        )
+
+    def on_sample(self, name: str, message: m.Message, now_ns: int) -> None:
+        """Take a sample in."""
+        if isinstance(message, m.Bumper):
+            self._on_bumper(message, now_ns)
+        if isinstance(message, m.Velocity):
+            too_fast = abs(message.linear) > FAST_MPS
+            self.fast_ns = (self.fast_ns or now_ns) if too_fast else None
+            self.standstill.on_velocity(message, now_ns)
+        if isinstance(message, m.Driver):
+            self._on_driver(name, message)
+        if isinstance(message, m.Ultrasonic):
+            silent_ns = self._silent_since(now_ns)
+            self.ranges.append((now_ns, message))
+            self._note_unseen(message, silent_ns, now_ns)
+        self.samples[name] = now_ns, message
+
+    def _silent_since(self, now_ns: int) -> int | None:
+        """Return since when all sonars are silent, None while they are not."""
+        last_ns = self.ranges[-1][0] if self.ranges else 0
+        over_ns = last_ns + round(RANGES_AGE_S * NS_PER_S)
+        return over_ns if now_ns > over_ns else None
+
+    def _note_unseen(self, message: m.Ultrasonic, silent_ns: int | None, now_ns: int) -> None:
+        for sonar in range(len(SONARS)):
+            if silent_ns is not None or message.status[sonar] == "fault":
+                self.unseen.setdefault(sonar, silent_ns or now_ns)
+            elif not any(one.status[sonar] == "fault" for _, one in self.ranges):
+                self.unseen.pop(sonar, None)
+
+    def _may_creep(self, sonar: int, source: str | None, now_ns: int) -> bool:
+        """Return whether an operator has acknowledged the fault of this sonar."""
+        since_ns = self.unseen.get(sonar)
+        if source not in OPERATORS or since_ns is None or self._silent_since(now_ns) is not None:
+            return False
+        return self.zeros.get(source, 0) - since_ns >= (SHOWN_S - STEP_S) * NS_PER_S
+
+    def _on_driver(self, side: str, message: m.Driver) -> None:
+        _, before = self.samples.get(side, (0, None))
+        if message.bits:
+            self.well[side] = 0
+        elif before is None:
+            self.well[side] = GOOD_SAMPLES  # there never was a fault
+        elif (before.boot, before.seq) != (message.boot, message.seq):
+            self.well[side] += 1
+
+    def _on_bumper(self, message: m.Bumper, now_ns: int) -> None:
+        before = self.bumpers[-1] if self.bumpers else message
+        if before.boot != message.boot:
+            self.bad_ns = now_ns
+            self.neutral.clear()
+        is_new = before.seq != message.seq or not self.bumpers or before.boot != message.boot
+        self.operators.on_bumper(message, is_new, now_ns)
+        if is_new:
+            self.bumpers.append(message)
+
+    def look(self, now_ns: int, reader: bool, tripped: bool) -> None:
+        """Note, at the time of a decision, whether anything wants a neutral request."""
+        self.limits.look(now_ns)
+        tripped = tripped or any(self.limits.stops(now_ns)) or any(self.keepalive.missing())
+        if "old velocity" in self._what_is_bad(now_ns):
+            self.fast_ns = None  # what is not measured is no runaway
+        if self._what_is_bad(now_ns) or not reader:
+            self.bad_ns = now_ns
+        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S or tripped:
+            self.neutral.clear()
+            return
+        for source, request in self.requests.items():
+            if request.still and self.is_fresh(source, now_ns):
+                self.neutral[source] = request.at_ns
+        for source in [source for source in self.neutral if self._better(source, now_ns)]:
+            del self.neutral[source]  # overruled
+
+    def _better(self, source: str, now_ns: int) -> list[str]:
+        """Return the sources above this one that hold the wheel."""
+        higher = (one for one in self.requests if PRIORITIES[one] > PRIORITIES[source])
+        return [one for one in higher if self.is_fresh(one, now_ns)]
+
+    def is_fresh(self, source: str, now_ns: int) -> bool:
+        """Return whether the newest request of a source is still valid."""
+        return now_ns - self.requests[source].at_ns <= LEASES_S[source] * NS_PER_S
+
+    def complaints(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
+        """Yield the reasons why a motion must not run, except trips."""
+        yield from (f"bad input: {bad}" for bad in self._what_is_bad(now_ns))
+        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S:
+            yield "inputs have not settled"
+        if abs(motion.linear) > MOST_MPS + ROUNDING or abs(motion.angular) > MOST_RADPS + ROUNDING:
+            yield f"beyond the limits: {motion.linear} m/s, {motion.angular} rad/s"
+        if motion.source == "release":
+            yield from self._of_release(motion, now_ns)
+        else:
+            yield from self._of_source(motion.source or "", now_ns)
+        yield from self._of_zones(motion, now_ns)
+        yield from self.limits.complaints(motion, now_ns)
+        yield from self.keepalive.missing()
+
+    def may_reset(self, now_ns: int) -> bool:
+        """Return whether a reset may be granted: at standstill, without a drive request."""
+        at_ns, velocity = self.samples.get("velocity", (0, None))
+        fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
+        stands = fresh and isinstance(velocity, m.Velocity) and abs(velocity.linear) < 0.02
+        asked = any(
+            self.is_fresh(source, now_ns) and not request.still
+            for source, request in self.requests.items()
+        )
+        return stands and not asked
+
+    def is_gone(self, trip: str) -> bool:
+        """Return whether the cause of a trip is gone, so that a reset may clear it."""
+        if trip == "contact":
+            return len(self.bumpers) == 3 and not any(one.pressed for one in self.bumpers)
+        if trip == "driver":
+            return all(self.well[side] >= GOOD_SAMPLES for side in ("left", "right"))
+        return True
+
+    def _faulty(self) -> Iterator[str]:
+        for side in ("left", "right"):
+            at = self.samples.get(side)
+            if at is not None and isinstance(at[1], m.Driver) and at[1].bits:
+                yield side
+
+    def _what_is_bad(self, now_ns: int) -> list[str]:
+        bad = list(self._faulty())
+        for name, age_s in AGES_S.items():
+            if name not in self.samples:
+                bad.append(f"no {name}")
+            elif now_ns - self.samples[name][0] > age_s * NS_PER_S:
+                bad.append(f"old {name}")
+        for _, message in self.samples.values():
+            if isinstance(message, m.Link) and (message.state != "up" or not message.armed):
+                bad.append(f"link {message.state}, armed {message.armed}")
+            if isinstance(message, m.Bumper) and message.lost > LOST_POLLS:
+                bad.append(f"{message.lost} bumper polls lost")
+            if isinstance(message, m.Switches) and not (
+                message.ultrasonic_brake is True and message.bumper_brake is True
+            ):
+                bad.append("the board's brakes are not both on")
+        return bad
+
+    def _of_source(self, source: str, now_ns: int) -> Iterator[str]:
+        if source not in self.requests or not self.is_fresh(source, now_ns):
+            yield f"no fresh request of {source!r}"
+            return
+        request = self.requests[source]
+        if request.still and now_ns - request.still_ns > RAMP_S * NS_PER_S:
+            yield "no source requests motion"
+        if better := self._better(source, now_ns):
+            yield f"{better} go before {source}"
+        if source not in self.neutral:
+            yield f"{source} was not neutral since the last cause"
+        if now_ns - self.rivals.get(source, -now_ns) < RIVAL_S * NS_PER_S:
+            yield "two publishers on one source"
+
+    def _of_release(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
+        yield from self.operators.complaints(motion, now_ns)
+        if not self.bumpers or not self.bumpers[-1].pressed:
+            yield "a release without a pressed bumper"
+
+    def _of_zones(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
+        measured = self.samples.get("velocity")
+        for sonar in range(len(SONARS)):
+            room = max(0.0, self._distance(sonar, now_ns) - MARGIN_M)
+            if self._may_creep(sonar, motion.source, now_ns):
+                room = max(room, stopping_way(BLIND_MPS))
+            speed = approach(sonar, motion.linear, motion.angular)
+            if speed > ROUNDING and stopping_way(speed - ROUNDING) > room:
+                yield f"{speed:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
+            if measured is not None and isinstance(measured[1], m.Velocity):
+                real = approach(sonar, measured[1].linear, measured[1].angular) - ROUNDING
+                if stopping_way(max(0.0, real - 0.2)) > room or (room == 0 and real > 0.05):
+                    yield f"really {real:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
+
+    def _distance(self, sonar: int, now_ns: int) -> float:
+        """Return what may be believed: the nearest of the last three samples, in metres."""
+        if len(self.ranges) < 3 or now_ns - self.ranges[-1][0] > RANGES_AGE_S * NS_PER_S:
+            return 0.0
+        return min(shown(message, sonar) for _, message in self.ranges)
+
+
+def stopping_way(speed: float) -> float:
+    """Return what reacting and stopping takes, in metres."""
+    return speed * REACT_S + speed * speed / (2 * BRAKING_MPS2)
+
+
+def shown(message: m.Ultrasonic, sonar: int) -> float:
+    """Return what one sample shows, 0 where nothing can be trusted."""
+    reading = message.ranges[sonar]
+    if message.status[sonar] == "no_echo":
+        return math.inf
+    return reading if message.status[sonar] == "ok" and reading is not None else 0.0
+
+
+def approach(sonar: int, linear: float, angular: float) -> float:
+    """Return how fast (m/s) a twist closes in on what a sonar sees."""
+    x, y, degrees = SONARS[sonar]
+    yaw = math.radians(degrees)
+    along = (linear - angular * y) * math.cos(yaw) + angular * x * math.sin(yaw)
+    return max(along, abs(angular) * FRONT) if sonar in FLANKS else along

@@ -1,1 +1,0 @@
-"""Simulated vehicles in simulated time."""
