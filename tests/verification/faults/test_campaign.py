@@ -35,6 +35,7 @@ WITH_NAMESPACES = (
     "disk full, then contact", "relay: contact", "site: estop of all",
 )  # fmt: skip
 BEYOND_S = 0.5  # how long a fault outlasts its budget
+STALL_S = 0.05  # of the host
 SLEPT_S = 60
 
 
@@ -62,12 +63,12 @@ def test_the_board_receives_a_stop_in_time(
     stack: StackFixture, stalls: StallRecorder, fault: Fault
 ) -> None:
     budget_s = fault.budget(stack.running.config) if fault.budget else None
-    if budget_s is None:  # a stall of a busy host stops the vehicle, too; it needs no reset
-        fault = replace(fault, outcome=(*fault.outcome, "by itself", "after a neutral"))
-    else:  # it is longer on a slow host
+    if budget_s is not None:  # it is longer on a slow host
         fault = replace(fault, hold_s=max(fault.hold_s, budget_s + BEYOND_S))
     sample = run_trial(stack, fault)
     stall_s = stalls.worst_s(sample.fault_ns, fault.hold_s)
+    if stall_s > STALL_S:  # it stops the vehicle, too; that needs no reset
+        fault = replace(fault, outcome=(*fault.outcome, "by itself", "after a neutral"))
     assert Row(fault, budget_s, [sample], [stall_s]).violations == []
 
 
