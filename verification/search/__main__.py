@@ -12,7 +12,7 @@ import msgspec
 
 from verification.search.draw import Draw, draw, shrink
 from verification.search.page import page
-from verification.search.run import Result, fails_as, run
+from verification.search.run import Result, fails_as, run, run_seed
 
 RESULTS = Path("out/vehicles/runs.jsonl")
 
@@ -48,11 +48,6 @@ def campaign(runs: int) -> list[Result]:
                 print(f"seed {result.seed}: {result.violations[0]}", flush=True)
     print(f"{runs} runs in {(time.monotonic() - began_s) / 60:.0f} min")
     return found
-
-
-def run_seed(seed: int) -> Result:
-    """Return the result of one seed."""
-    return run(draw(seed))
 
 
 def show(seed: int, *, shrinks: bool) -> int:

@@ -16,6 +16,7 @@ from sim import requests as q
 from sim.config import Config
 from verification.search.bus import MS, Disturbance
 from verification.search.draw import Draw, Value, room
+from verification.search.draw import draw as drawn
 from verification.search.judge import Judge, PoseError, Stop, pose_error
 from verification.search.operator import Operator
 from verification.search.stack import START_NS, Stack
@@ -46,6 +47,11 @@ class Result(Struct, frozen=True, kw_only=True):
     def completed(self) -> bool:
         """Whether the script was finished without a needless stop."""
         return self.finished and not self.stops
+
+
+def run_seed(seed: int) -> Result:
+    """Return the result of one seed; worker processes import it."""
+    return run(drawn(seed))
 
 
 def run(draw: Draw) -> Result:
