@@ -197,6 +197,17 @@ def test_a_brake_does_not_depend_on_numbers_that_are_not_finite(bench: Bench) ->
     assert (motions(out), out.obeyed) == ([MotionKind.BREAK], True)
 
 
+def test_an_emergency_stop_brakes_at_once_until_safety_has_latched_it(bench: Bench) -> None:
+    bench.arm()
+    bench.move(Command.RUN)
+    assert motions(bench.core.estop(bench.now_ns)) == [MotionKind.BREAK]
+    assert motions(bench.core.estop(bench.now_ns)) == []  # repeated until it is confirmed
+    assert MotionKind.RUN not in motions(bench.move(Command.RUN, linear=0.5))
+    bench.move(Command.BRAKE, estop=bench.now_ns)
+    bench.move(Command.STOP)
+    assert motions(bench.move(Command.RUN, linear=0.5)) == [MotionKind.RUN]
+
+
 @pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])
 def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: Command) -> None:
     bench.arm()
