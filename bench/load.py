@@ -122,7 +122,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
     return made
 
 
-SHARE = Column("", "cpu", CPU)
+SHARE = Column("share", "cpu", CPU)
 CPU_COLUMNS = (SHARE, Column("of the pair's", "cpu", ONE, of=(PAIR, TOGETHER)))
 CPU_LIMITS: Limits = [((T2, TOGETHER), (PAIR, TOGETHER), SHARE, 2.0)]
 CONSUMER_COLUMNS = (

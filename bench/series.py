@@ -98,7 +98,7 @@ def compared(question: str, limits: Limits, by_name: ByName) -> list[list[str]]:
         if all(both) and other:
             texts = [f"{column.unit.text(value)} {column.unit.name}" for value in (mine, other)]
             rows.append([
-                "" if rows else question, f"{', '.join(ours)}: {column.head} {texts[0]}",
+                "" if rows else question, f"{', '.join([*ours, column.head])}: {texts[0]}",
                 f"{', '.join(theirs)}: {texts[1]}", f"× {mine / other:.2f}",
                 f"at most × {limit:g}", "reached" if mine <= limit * other else "not reached",
             ])  # fmt: skip

@@ -47,10 +47,10 @@ def test_the_document_is_printed_from_stored_samples(
     assert text in capsys.readouterr().out
     assert f"| {REFLEX} | 140 | 140 | × 1.40 |  |  |  |" in text
     question = bench.BENCHMARKS["stop"].question
-    row = f"| {JUDGED}: quiet, p50 700 us | {ZENOH}: 1,000 us | × 0.70 | at most × 1 | reached |"
+    row = f"| {JUDGED}, quiet, p50: 700 us | {ZENOH}: 1,000 us | × 0.70 | at most × 1 | reached |"
     assert f"| {question} {row}" in text
     assert (
-        f"| {REFLEX}: quiet, p50 140 us | {LOOP}: 100 us | × 1.40 | at most × 1.3 | not r" in text
+        f"| {REFLEX}, quiet, p50: 140 us | {LOOP}: 100 us | × 1.40 | at most × 1.3 | not r" in text
     )
     assert all(f"Measured on a machine for {name}." in text for name in bench.BENCHMARKS)
 
