@@ -30,7 +30,7 @@ def main(words: list[str]) -> None:
     with ProcessPoolExecutor(AT_ONCE) as pool:
         wrong = list(pool.map(judge, files, [chosen[file] for file in files]))
     if count := sum(wrong):
-        sys.exit(f"mutants: {count} lines; write a test, or see docs/adr/0009-mutation.md")
+        sys.exit(f"mutants: {count} lines; write a test, or see docs/decisions.md, Mutation gate")
 
 
 def judge(file: str, tests: list[str]) -> int:
