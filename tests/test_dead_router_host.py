@@ -17,7 +17,7 @@ import pytest
 from common.bus.session import RUNTIME_ENV
 from verification.harness.network_hosts import ip, missing
 
-pytestmark = pytest.mark.timed
+pytestmark = [pytest.mark.timed, pytest.mark.campaign]
 
 HERE, THERE = (f"t2dead{os.getpid()}{end}" for end in ("a", "b"))
 ROUTER = "tcp/10.98.0.2:7447"

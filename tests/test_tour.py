@@ -33,7 +33,7 @@ TRIES = 3  # the doctor reports scheduling stalls of a busy machine
 KEY_S = 0.05  # between two repeats of a held key
 PAUSE_S = 1.0  # a "-" among the keys
 
-pytestmark = [pytest.mark.timed, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.timed, pytest.mark.campaign, pytest.mark.timeout(300)]
 
 
 class Newcomer:

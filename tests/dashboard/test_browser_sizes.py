@@ -123,6 +123,7 @@ def on_all_screens(
     return found
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_a_driver_sees_everything(
     page: Page, stack: RunningStack, tmp_path: Path, language: str

@@ -97,6 +97,7 @@ def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:
     assert float(rows[0]["x"]) == pytest.approx(robot.odometry.latest().x, abs=0.05)
 
 
+@pytest.mark.campaign
 def test_the_square_ends_at_its_start(robot: t2.Robot) -> None:
     with example("examples/square.py", robot.endpoint) as process:
         distance, _, rest = line_of(process).partition(" ")
@@ -105,6 +106,7 @@ def test_the_square_ends_at_its_start(robot: t2.Robot) -> None:
     assert rest == "m from the start\n"
 
 
+@pytest.mark.campaign
 def test_the_notebook_plots_while_it_drives(
     robot: t2.Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -35,6 +35,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.timed
+@pytest.mark.campaign
 @pytest.mark.timeout(LAP_S + 40)
 def test_a_lap(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"
