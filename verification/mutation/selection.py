@@ -1,8 +1,8 @@
 """Which files are cores, and which tests have to notice every change of them.
 
-``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are the stateful ones
-of its folder below ``tests/``, and those that import it, themselves or by a fixture. They start no
-process: they reach neither Zenoh nor ``subprocess``.
+``[tool.mutants]`` of ``pyproject.toml`` names the cores. The tests of a core are those of its
+folder below ``tests/`` that are shared by its cores, or import it, themselves or by a fixture. They
+start no process: they reach neither Zenoh nor ``subprocess``.
 """
 
 import subprocess
@@ -21,7 +21,7 @@ def cores() -> Cores:
     """Return the cores of the current folder with their tests; ValueError for a wrong name."""
     settings = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["tool"]["mutants"]
     folders = settings["cores"]
-    stateful = {module_of(test) for glob in settings["stateful"] for test in Path().glob(glob)}
+    shared = {module_of(test) for glob in settings["shared"] for test in Path().glob(glob)}
     graph = grimp.build_graph(*PACKAGES, include_external_packages=True, cache_dir=None)
     imports = {
         test: _imports(graph, test)
@@ -39,7 +39,7 @@ def cores() -> Cores:
             found[str(path)] = [
                 f"{test.replace('.', '/')}.py"
                 for test, imported in imports.items()
-                if test.startswith(folder) and (core in imported or test in stateful)
+                if test.startswith(folder) and (core in imported or test in shared)
             ]
             if not found[str(path)]:
                 raise ValueError(f"{path}: no test imports it")
