@@ -36,7 +36,7 @@ from services.safety.standstill import Standstill, Supervisor
 from services.safety.state import State
 from services.safety.zones import Zones
 from tests.search.scripted_stack import ScriptedStack as Stack
-from verification.search.bus import ROBOT, DriveEnd, Envelope
+from verification.search.bus import ROBOT, Disturbance, DriveEnd, Envelope
 from verification.search.condition_books import IGNORED, NEEDED
 from verification.search.vehicle import FAULT_MM
 
@@ -52,8 +52,9 @@ GO: Script = (lambda s: s.request(0.5),)
 GO_ON = (*STAND, *GO)
 HIT: Script = (lambda s: s.press(True, 1500),)
 STUCK: Script = (lambda s: s.request(None), *HIT)
-LATE_MOTIONS: Script = (lambda s: s.disturb("motion", 300, late_ms=60),)
-LATE_STREAMS: Script = (lambda s: s.disturb("streams", 300, late_ms=120),)
+LATE_MOTIONS: Script = (lambda s: s.disturb("motion", Disturbance(late_ms=60), 300),)
+LATE_STREAMS: Script = (lambda s: s.disturb("streams", Disturbance(late_ms=120), 300),)
+RESET: Script = (lambda s: s.reset(), lambda s: s.run(300))
 PROTECTIVE_STOP: Script = (
     lambda s: s.limit(0.0, 1500, source=IGNORED),
     lambda s: s.limit(None, source=IGNORED),  # while the stick is pushed
@@ -107,12 +108,10 @@ def successor_hears_of_no_latch(stack: Stack) -> None:
     successor(stack, old)
 
 
-def resets_all_but_the_stop(stack: Stack) -> None:
-    seen = stack.seen
+def without(seen: m.SafetyState | None, cause: str) -> m.SafetyState:
+    """Return a state without a cause."""
     assert seen is not None
-    kept = tuple(one for one in seen.causes if one.name != "estop")
-    stack.reset(replace(seen, causes=kept))
-    stack.run(300)
+    return replace(seen, causes=tuple(one for one in seen.causes if one.name != cause))
 
 
 SAFETY_HANGS: Script = (
@@ -120,7 +119,8 @@ SAFETY_HANGS: Script = (
     lambda s: s.run(700),
     lambda s: s.stop(1500),
     lambda s: s.request(0.0, 700),
-    resets_all_but_the_stop,
+    lambda s: s.reset(without(s.seen, "estop")),
+    lambda s: s.run(300),
     *GO,
 )
 
@@ -167,14 +167,6 @@ def late_reset(stack: Stack) -> None:
     stack.run(300)
 
 
-def reset_too_early(stack: Stack) -> None:
-    """Reset a driver's fault after its first good sample; they come twice a second."""
-    stack.driver(1, 20)
-    stack.driver(0, 600)
-    stack.reset()
-    stack.run(300)
-
-
 def driver_blinks(stack: Stack) -> None:
     """Report a driver fault and its end at the same time."""
     stack.driver(1)
@@ -182,39 +174,15 @@ def driver_blinks(stack: Stack) -> None:
     stack.vehicle.send(Framing().pack(stack.vehicle.board.driver(Side.LEFT)))
 
 
-def reset_without_a_velocity(stack: Stack) -> None:
-    stack.estop()
-    stack.velocities(False, 1000)
-    stack.reset()
-    stack.velocities(True, 1000)
-
-
-def nav_goes_on(stack: Stack) -> None:
-    """Overrule nav by teleop, then end teleop's requests."""
-    stack.request(None)
-    stack.request(0.0, 1000, source="nav")
-    stack.request(0.3, 300, source="nav")
-    stack.request(0.0, 300)
-    stack.request(None)
-
-
 def rival_limit(stack: Stack) -> None:
     limiter = stack.limiters[NEEDED]
     limiter.put(m.Limit(linear=9.0, echo=limiter.echo, boot=5))
 
 
-def limit_falls_silent(stack: Stack) -> None:
-    stack.limiters[NEEDED].caps = None
-
-
-def pendant_falls_silent(stack: Stack) -> None:
-    stack.pendant.alive = False
-
-
 def pendant_is_held(stack: Stack) -> None:
     """Deliver a sign of life almost too late, then none."""
     echo = stack.pendant.echo
-    stack.pendant.alive = False
+    stack.silence(stack.pendant)
     stack.run(850)
     stack.pendant.put(m.EstopKeepalive(echo=echo))
 
@@ -309,11 +277,11 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "no neutral after a lease": (
         leases, "expire", still_neutral,
-        (lambda s: s.disturb("streams", late_ms=120), lambda s: s.disturb("motion", 250, lose=1),
+        (*LATE_STREAMS, lambda s: s.disturb("motion", Disturbance(lose=1), 250),
          lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
     ),
     "silence is not noticed": (
-        readiness, "link_on_tick", unchanged, (*LATE_STREAMS, lambda s: s.vehicle.freeze(240)),
+        readiness, "link_on_tick", unchanged, (*LATE_STREAMS, lambda s: s.freeze(240)),
         "the board is silent",
     ),
     "brakes that are off": (
@@ -373,16 +341,20 @@ MUTATIONS: dict[str, Mutation] = {
         (lambda s: s.stop(700), lambda s: s.request(0.0, 700), *GO), "safety knows of estop",
     ),
     "no neutral after a return": (
-        Arbiter, "disarmed", unchanged, (lambda s: s.vehicle.freeze(400),), "was not neutral",
+        Arbiter, "disarmed", unchanged, (lambda s: s.freeze(400),), "was not neutral",
     ),
     "a reset clears what is not gone": (
-        latches, "GOOD_SAMPLES", 0, (*STAND, reset_too_early, *GO), "safety knows of driver",
+        latches, "GOOD_SAMPLES", 0,
+        (*STAND, lambda s: s.driver(1, 20), lambda s: s.driver(0, 600), *RESET, *GO),
+        "safety knows of driver",
     ),
     "no input is too old": (
         conditions, "_is_old", never, (lambda s: s.velocities(False),), "old velocity",
     ),
     "an old velocity is as good as a new one": (
-        Inputs, "known_velocity", however_old, (*STAND, reset_without_a_velocity, *GO),
+        Inputs, "known_velocity", however_old,
+        (*STAND, lambda s: s.estop(), lambda s: s.velocities(False, 1000), *RESET,
+         lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",
     ),
     "samples are not decided upon one by one": (
@@ -413,14 +385,15 @@ MUTATIONS: dict[str, Mutation] = {
         PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (
-        SpeedLimits, "_silent", lambda *_: [], (limit_falls_silent,), "no limit of lidar",
+        SpeedLimits, "_silent", lambda *_: [], (lambda s: s.silence(s.limiters[NEEDED]),),
+        "no limit of lidar",
     ),
     "two publishers of a limit": (
         SpeedLimits, "_in_conflict", lambda *_: [], (rival_limit,), "two publishers of one limit",
     ),
     "a pendant that fell silent does not latch": (
         Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),
-        (pendant_falls_silent,), "safety knows of estop_keepalive",
+        (lambda s: s.silence(s.pendant),), "safety knows of estop_keepalive",
     ),
     "a held sign of life counts from its reception": (
         Admission, "sent_ns", lambda self, _: self.now_ns, (pendant_is_held,),
@@ -441,7 +414,10 @@ MUTATIONS: dict[str, Mutation] = {
         arbiter, "LAPSE_S", 1e9, (*LET_GO, *GO), "was not neutral",
     ),
     "an override does not hold": (
-        Arbiter, "overruled", unchanged, (nav_goes_on,), "nav was not neutral",
+        Arbiter, "overruled", unchanged,
+        (lambda s: s.request(None), lambda s: s.request(0.0, 1000, source="nav"),
+         lambda s: s.request(0.3, 300, source="nav"), lambda s: s.request(0.0, 300),
+         lambda s: s.request(None)), "nav was not neutral",
     ),
     "a hold that was meant for a good sonar drives on blind": (
         SonarOverrides, "updated", knows_at_once,

@@ -10,6 +10,7 @@ from common.motion import Twist
 from common.wire.frame import Side
 from sim import requests as q
 from verification.search.bus import ROBOT, Disturbance
+from verification.search.sources import Limiter, Pendant
 from verification.search.stack import Stack
 
 ALL_SONARS = range(8)
@@ -58,6 +59,14 @@ class ScriptedStack(Stack):
         self.vehicle.inject(q.Mute(reports=() if on else ("velocity",)))
         self.run(ms)
 
+    def freeze(self, ms: int) -> None:
+        """Freeze the board for so long."""
+        self.vehicle.freeze(ms)
+
+    def garbage(self, garbage: bytes) -> None:
+        """Send the bridge bytes that begin as a frame does."""
+        self.vehicle.send(b"GS" + garbage)
+
     def stop(self, ms: int = 5) -> None:
         """Press the emergency stop."""
         self.estop()
@@ -70,6 +79,13 @@ class ScriptedStack(Stack):
         self.router(True)
         self.run(5)
 
+    def silence(self, source: Limiter | Pendant) -> None:
+        """Let a source publish no more."""
+        if isinstance(source, Limiter):
+            source.caps = None
+        else:
+            source.alive = False
+
     def limit(
         self, linear: float | None, ms: int = 0, *, angular: float | None = None, source: str
     ) -> None:
@@ -77,9 +93,9 @@ class ScriptedStack(Stack):
         self.limiters[source].caps = linear, angular
         self.run(ms)
 
-    def disturb(self, route: str, ms: int = 0, **disturbance: int) -> None:
+    def disturb(self, route: str, disturbance: Disturbance, ms: int = 0) -> None:
         """Delay, lose, duplicate or reorder the messages of a route."""
-        self.net.disturbances[route] = Disturbance(**disturbance)
+        self.net.disturbances[route] = disturbance
         self.run(ms)
 
     def creep(self, direction: m.Direction = "backward", times: int = 10) -> None:

@@ -7,6 +7,7 @@ In CI the search is the same each time. A longer one, another each time, half a 
 
 import math
 import os
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -25,7 +26,7 @@ from common import keys
 from common import messages as m
 from common.motion import Command
 from common.wire.frame import Side
-from tests.search.scripted_stack import ScriptedStack
+from tests.search.scripted_stack import ALL_SONARS, ScriptedStack
 from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance
 from verification.search.condition_books import IGNORED, NEEDED
 from verification.search.oracle import STEP_NS
@@ -60,6 +61,12 @@ HASTY = st.sampled_from([5, 90, 320, 700, 1000])
 SHORT = st.sampled_from([5, 20, 60, 150, 210, 320])
 LONG = st.sampled_from([400, 700, 1200])
 RANGES_MM = st.sampled_from([NO_ECHO_MM, FAULT_MM, 0, 120, 190, 210, 260, 400, 800, 1500])
+SONARS = st.sampled_from([ALL_SONARS, *(range(number, number + 1) for number in ALL_SONARS)])
+BITS = st.sampled_from([0, 1, 1 << 31])
+RUNAWAY = st.sampled_from([1.5, -1.5, 0.0, None])
+PROCESSES = st.sampled_from(["safety", "bridge"])
+BOOT_MS = st.sampled_from([300, 600, 1000])
+GUARDED_MS = st.sampled_from([50, 120, 180])  # less than the guard's limit
 NEAR_MM = st.sampled_from([FAULT_MM, 190, 210, 260, 400, 800])
 HOSTILE: st.SearchStrategy[tuple[m.SourceMessage, int]] = st.sampled_from(
     [  # a message with what its echo differs by, and what its number differs by
@@ -82,61 +89,51 @@ RUN_7, RUN_NAN = (m.Motion(command=Command.RUN, linear=linear) for linear in (0.
 FORGED = st.sampled_from([[m.Motion(command=Command.STOP), RUN_7], [RUN_NAN]])
 
 
-class Faults(RuleBasedStateMachine):
-    """Faults of sensors, board, processes, bus and cable, and forged messages."""
+def verb(method: Callable[..., object], after_ms: int = 0) -> Callable[..., None]:
+    """Return the function of a rule that calls a verb of the stack, and lets time pass."""
+
+    def call(self: "StackMachine", **arguments: object) -> None:
+        method(self.stack, **arguments)
+        self.stack.run(after_ms)
+
+    call.__name__ = method.__name__  # Hypothesis knows a rule by it
+    return call
+
+
+class StackMachine(RuleBasedStateMachine):
+    """All faults and operators; the oracle checks every frame at the board."""
 
     def __init__(self) -> None:
         super().__init__()
         self.stack = ScriptedStack()
         self.oracle = self.stack.oracle
+        self.cured = self.idle = 0
 
-    @rule(pressed=st.booleans(), ms=SHORT)
-    def bumper(self, pressed: bool, ms: int) -> None:
-        self.stack.press(pressed, ms)
+    @initialize(under_way=st.sampled_from([True, True, True, False]))
+    def begin(self, under_way: bool) -> None:
+        """Come up, and most often drive at once."""
+        self.stack.run(700)
+        if under_way:
+            self.stack.drive(1.0, 600)
 
-    @rule(sonar=st.integers(0, 7), mm=RANGES_MM)
-    def sonar(self, sonar: int, mm: int) -> None:
-        self.stack.sonars(mm, 60, numbers=range(sonar, sonar + 1))
+    # --- sensors, board, processes, bus and cable -------------------------------------------
 
-    @rule(mm=RANGES_MM)
-    def sonars(self, mm: int) -> None:
-        self.stack.sonars(mm, 60)
-
-    @rule(side=st.sampled_from(Side), bits=st.sampled_from([0, 1, 1 << 31]), ms=SHORT)
-    def driver(self, side: Side, bits: int, ms: int) -> None:
-        self.stack.driver(bits, ms, side=side)
-
-    @rule(linear=st.sampled_from([1.5, -1.5, 0.0, None]), ms=SHORT)
-    def runaway(self, linear: float | None, ms: int) -> None:
-        self.stack.measure(linear, ms)
-
-    @rule(reports=st.booleans(), ms=SHORT | LONG)
-    def velocities(self, reports: bool, ms: int) -> None:
-        self.stack.velocities(reports, ms)
-
-    @rule(on=st.booleans())
-    def brakes(self, on: bool) -> None:
-        """Switch one of the board's own brakes by the bridge's call."""
-        self.stack.switches(on=on)
-        self.stack.run(60)
-
-    @rule(ms=SHORT | LONG)
-    def freeze(self, ms: int) -> None:
-        self.stack.vehicle.freeze(ms)
-        self.stack.run(60)
-
-    @rule(ms=st.sampled_from([300, 600, 1000]))
-    def power_cycle(self, ms: int) -> None:
-        self.stack.power_cycle(ms)
-
-    @rule(garbage=st.binary(max_size=40))
-    def garbage(self, garbage: bytes) -> None:
-        self.stack.vehicle.send(b"GS" + garbage)
-        self.stack.run(5)
-
-    @rule(source=LIMITERS, linear=CAPS, angular=CAPS, ms=SHORT | LONG)
-    def limit(self, source: str, linear: float | None, angular: float | None, ms: int) -> None:
-        self.stack.limit(linear, ms, angular=angular, source=source)
+    press = rule(pressed=st.booleans(), ms=SHORT)(verb(ScriptedStack.press))
+    sonars = rule(mm=RANGES_MM, numbers=SONARS)(verb(ScriptedStack.sonars, 60))
+    driver = rule(side=st.sampled_from(Side), bits=BITS, ms=SHORT)(verb(ScriptedStack.driver))
+    measure = rule(linear=RUNAWAY, ms=SHORT)(verb(ScriptedStack.measure))
+    velocities = rule(on=st.booleans(), ms=SHORT | LONG)(verb(ScriptedStack.velocities))
+    switches = rule(on=st.booleans())(verb(ScriptedStack.switches, 60))
+    freeze = rule(ms=SHORT | LONG)(verb(ScriptedStack.freeze, 60))
+    power_cycle = rule(duration_ms=BOOT_MS)(verb(ScriptedStack.power_cycle))
+    garbage = rule(garbage=st.binary(max_size=40))(verb(ScriptedStack.garbage, 5))
+    limit = rule(linear=CAPS, angular=CAPS, source=LIMITERS, ms=SHORT | LONG)(
+        verb(ScriptedStack.limit)
+    )
+    kill = rule(name=PROCESSES, pause_ms=SHORT | LONG)(verb(ScriptedStack.kill, 60))
+    stall = rule(name=st.just("bridge"), duration_ms=GUARDED_MS)(verb(ScriptedStack.stall, 60))
+    outage = rule(ms=st.just(0) | SHORT | LONG)(verb(ScriptedStack.outage))
+    disturb = rule(route=ROUTES, disturbance=DISTURBANCES, ms=SHORT)(verb(ScriptedStack.disturb))
 
     @rule(source=LIMITERS, ms=SHORT | LONG)
     def silence_limit(self, source: str, ms: int) -> None:
@@ -151,11 +148,6 @@ class Faults(RuleBasedStateMachine):
         self.stack.run(ms)
         self.stack.pendant.alive = True
 
-    @rule(name=st.sampled_from(["safety", "bridge"]), ms=SHORT | LONG)
-    def kill(self, name: str, ms: int) -> None:
-        self.stack.kill(name, ms)
-        self.stack.run(60)
-
     @rule(ms=SHORT | LONG, estop_ms=st.none() | SHORT)
     def stall_safety(self, ms: int, estop_ms: int | None) -> None:
         """Stall safety; perhaps press the emergency stop meanwhile."""
@@ -165,35 +157,19 @@ class Faults(RuleBasedStateMachine):
             self.stack.run(estop_ms)
             self.stack.stop()
 
-    @rule(ms=st.sampled_from([50, 120, 180]))
-    def stall_bridge(self, ms: int) -> None:
-        """Stall the bridge for less than its guard's limit."""
-        self.stack.stall("bridge", ms)
-        self.stack.run(60)
-
-    @rule(ms=st.just(0) | SHORT | LONG)
-    def router(self, ms: int) -> None:
-        """Take the router away for a while, or between two decisions."""
-        self.stack.outage(ms)
-
-    @rule(route=ROUTES, disturbance=DISTURBANCES, ms=SHORT)
-    def disturb(self, route: str, disturbance: Disturbance, ms: int) -> None:
-        self.stack.net.disturbances[route] = disturbance
-        self.stack.run(ms)
-
     @rule(route=CABLES, disturbance=ON_CABLE, ms=SHORT)
     def disturb_cable(self, route: str, disturbance: Disturbance, ms: int) -> None:
         """Delay, lose or duplicate datagrams; a cable keeps their order."""
         # Every second one lost: a STOP of 20 Hz may be the third one that goes out.
         slack_ms = disturbance.late_ms + (100 if disturbance.lose else 0)
         self.oracle.slack_ns = max(self.oracle.slack_ns, slack_ms * MS)
-        self.disturb(route, disturbance, ms)
+        self.stack.disturb(route, disturbance, ms)
 
     @rule(route=ROUTES, ms=SHORT)
     def cut(self, route: str, ms: int) -> None:
         """Lose everything on one route for a while."""
         before = self.stack.net.disturbances.get(route, CLEAR)
-        self.stack.disturb(route, ms, lose=1)
+        self.stack.disturb(route, Disturbance(lose=1), ms)
         self.stack.net.disturbances[route] = before
 
     @rule(settled=st.booleans())
@@ -238,38 +214,22 @@ class Faults(RuleBasedStateMachine):
         self.stack.forge(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0, **stamp))
         self.stack.run(60)
 
+    # --- operators --------------------------------------------------------------------------
 
-class StackMachine(Faults):
-    """Operators besides all faults; the oracle checks every frame at the board."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.cured = self.idle = 0
-
-    @initialize(under_way=st.sampled_from([True, True, True, False]))
-    def begin(self, under_way: bool) -> None:
-        """Come up, and most often drive at once."""
-        self.stack.run(700)
-        if under_way:
-            self.stack.drive(1.0, 600)
-
-    @rule(source=SOURCES, linear=SPEEDS, angular=TURNS, ms=SHORT | LONG)
-    def off_we_go(self, source: str, linear: float, angular: float, ms: int) -> None:
-        self.stack.drive(linear, ms, angular=angular, source=source)
+    drive = rule(linear=SPEEDS, angular=TURNS, source=SOURCES, ms=SHORT | LONG)(
+        verb(ScriptedStack.drive)
+    )
+    request = rule(linear=st.none() | SPEEDS, angular=TURNS, source=SOURCES, ms=SHORT | LONG)(
+        verb(ScriptedStack.request)
+    )
+    stop = rule(ms=SHORT)(verb(ScriptedStack.stop))
+    creep = rule(direction=DIRECTIONS, times=st.integers(1, 8))(verb(ScriptedStack.creep))
 
     # Hypothesis draws the first rule most often: that of the fewest arguments and the first name.
     @rule(linear=FAST)
     def ahead(self, linear: float) -> None:
         """Ask for motion without a neutral request, as someone who noticed nothing does."""
         self.stack.request(linear, 210)
-
-    @rule(source=SOURCES, linear=st.none() | SPEEDS, angular=TURNS, ms=SHORT | LONG)
-    def request(self, source: str, linear: float | None, angular: float, ms: int) -> None:
-        self.stack.request(linear, ms, angular=angular, source=source)
-
-    @rule(ms=SHORT)
-    def estop(self, ms: int) -> None:
-        self.stack.stop(ms)
 
     @rule(lets_go=st.booleans())
     def reset(self, lets_go: bool) -> None:
@@ -279,10 +239,6 @@ class StackMachine(Faults):
                 self.stack.request(None, source=source)
             self.stack.run(500)
         self.stack.reset()
-
-    @rule(times=st.integers(1, 8), direction=DIRECTIONS)
-    def release(self, times: int, direction: m.Direction) -> None:
-        self.stack.creep(direction, times)
 
     @rule(kind=KINDS, ms=LONG, dies=st.sampled_from(["nobody", "safety", "bridge"]))
     def insist(self, kind: str, ms: int, dies: str) -> None:
@@ -355,7 +311,7 @@ class StackMachine(Faults):
     def storm(self, linear: float, route: str, disturbance: Disturbance, hits: bool) -> None:
         """Drive under a disturbance, perhaps hit something, and end it."""
         self.stack.drive(linear, 400)
-        self.disturb(route, disturbance, 210)
+        self.stack.disturb(route, disturbance, 210)
         self.stack.press(hits, 60)
         self.end_disturbances(settled=False)
         self.stack.run(210)
@@ -412,7 +368,8 @@ class StackMachine(Faults):
         stack.net.disturbances.clear()
         stack.limiters[NEEDED].caps, stack.limiters[IGNORED].caps = (None, None), None
         stack.run(1000)
-        self.brakes(on=True)
+        stack.switches(on=True)
+        stack.run(60)
         self.reset(lets_go=True)
         stack.drive(-1.0 if self.cured % 2 else 1.0, 700)
         self.cured += 1

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 import pytest
 
 from common.freshness import NS_PER_S
-from common.messages import Direction
 from common.wire.reports import BumperReport
 from tests.search.mutations import MUTATIONS, driver_blinks
 from tests.search.scripted_stack import ScriptedStack, driving
@@ -45,17 +44,11 @@ def test_a_hit_stops_and_only_reset_and_neutral_let_it_drive_again() -> None:
     check_it_drives(stack)
 
 
-def stuck() -> ScriptedStack:
-    """Return a stack that drove into something and stands there, with an emergency stop."""
+def test_a_pressed_bumper_is_released_after_a_reset_and_not_before() -> None:
     stack = driving()
     stack.press(True)
     stack.stop()
     stack.request(None, 2000)
-    return stack
-
-
-def test_a_pressed_bumper_is_released_after_a_reset_and_not_before() -> None:
-    stack = stuck()
     runs = stack.oracle.runs
     stack.creep()
     assert stack.oracle.runs == runs
@@ -65,32 +58,6 @@ def test_a_pressed_bumper_is_released_after_a_reset_and_not_before() -> None:
     assert -0.11 < linear(stack) < -0.05
     assert trips(stack) == {"contact"}
     assert stack.oracle.violations == []
-
-
-@pytest.mark.parametrize("direction", ["forward", "backward"])
-def test_the_operator_chooses_the_direction(direction: Direction) -> None:
-    stack = stuck()
-    stack.reset()
-    runs = stack.oracle.runs
-    stack.creep(direction)
-    assert stack.oracle.runs > runs
-    # The board's own brake lets no RUN pass toward what was hit.
-    assert (linear(stack) < 0) == (direction == "backward")
-    assert stack.oracle.violations == []
-
-
-@pytest.mark.parametrize("late_ms", [450, 2000, 4000])
-def test_twenty_late_holds_give_no_run(late_ms: int) -> None:
-    stack = stuck()
-    stack.reset()
-    runs, seen = stack.oracle.runs, []
-    for _ in range(20):
-        seen.append(stack.seen)
-        stack.run(late_ms // 20)
-    stack.run(late_ms)
-    assert not any(stack.hold(True, "backward", one).done for one in seen)
-    assert stack.oracle.runs == runs
-    assert stack.hold(True).done
 
 
 def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
