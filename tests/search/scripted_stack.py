@@ -80,7 +80,7 @@ class ScriptedStack(Stack):
         self.run(5)
 
     def silence(self, source: Limiter | Pendant) -> None:
-        """Let a source publish no more."""
+        """Silence a source from now on."""
         if isinstance(source, Limiter):
             source.caps = None
         else:

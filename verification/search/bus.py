@@ -183,23 +183,17 @@ class Publisher:
 
     def __init__(self, process: "Process", key: str, private: bool) -> None:
         self.key = key
-        self.last: Any = None
         self._process = process
         self._private = private
         self._seq = 0
-
-    @property
-    def next_seq(self) -> int:
-        """The ``seq`` that the next message will carry."""
-        return self._seq + 1
 
     def put(self, message: M, raw: bytes | None = None) -> M:
         """Send a message to all subscriptions."""
         self._seq += 1
         now_ns, boot = self._process.net.now_ns, self._process.boot
-        self.last = msgspec.structs.replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
-        self._process.send(Envelope(self.key, self.last, boot, now_ns, self._private))
-        return self.last  # type: ignore[no-any-return]
+        sent = msgspec.structs.replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
+        self._process.send(Envelope(self.key, sent, boot, now_ns, self._private))
+        return sent
 
 
 class DriveEnd:

@@ -63,7 +63,6 @@ class Operator(sources.Stick):
         self.held: m.Direction | None = None  # the release, for the caller to send
         self.wants_reset = False  # the same
         self.asks_since_ns: int | None = None  # of motion
-        self.presses = 0  # again, for a neutral request
         self._script = script(draw)[::-1]
         self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
         self._controls = Controls(Teleop())
@@ -128,7 +127,6 @@ class Operator(sources.Stick):
         if held_s > self._script[-1].hold_s or blocked_s > PATIENCE_S:
             self._let_go(now_ns, self._script.pop().pause_s)
         elif "neutral" in causes and held_s > LET_GO_S:
-            self.presses += 1
             self._let_go(now_ns, LET_GO_S)
 
     def _let_go(self, now_ns: int, pause_s: float) -> None:

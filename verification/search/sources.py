@@ -51,7 +51,7 @@ class Stick(Source):
 
 
 class Limiter(Source):
-    """Limits the speed while ``caps`` is set; a cap of None is none."""
+    """Limits the speed while ``caps`` is set; None in it leaves an axis unlimited."""
 
     topic = keys.LIMIT
     caps: tuple[float | None, float | None] | None = None  # m/s, rad/s
