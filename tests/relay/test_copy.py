@@ -26,7 +26,3 @@ def test_a_module_is_python_3_9_and_imports_the_standard_library_only(file: Path
     tree = ast.parse(file.read_text(encoding="utf-8"), feature_version=(3, 9))
     names = {name.partition(".")[0] for name in imported(tree)}
     assert names <= sys.stdlib_module_names
-
-
-def test_it_is_small_enough_to_be_read_at_once() -> None:
-    assert sum(len(file.read_text(encoding="utf-8").splitlines()) for file in FILES) < 400
