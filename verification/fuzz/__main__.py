@@ -40,8 +40,7 @@ def main() -> int:
 
 def run(target: str, seconds: int) -> int:
     """Fuzz a target in its own process and print a summary; return 1 for a finding."""
-    for folder in ("seeds", "kept"):
-        (OUT / target / folder).mkdir(parents=True, exist_ok=True)
+    (OUT / target / "inputs").mkdir(parents=True, exist_ok=True)
     log = OUT / target / "log.txt"
     command = [sys.executable, "-m", "verification.fuzz", target, f"--seconds={seconds}", "--here"]
     with log.open("wb") as output:
@@ -59,13 +58,12 @@ def fuzz(target: str, seconds: int) -> None:
     with atheris.instrument_imports(include=INSTRUMENTED):
         from verification.fuzz import seeds, targets
     raws = list(seeds.seeds(target))
+    inputs = OUT / target / "inputs"  # libFuzzer adds those with new coverage
     for number, raw in enumerate(raws):
-        (OUT / target / "seeds" / f"{number:03}").write_bytes(raw)
+        (inputs / f"{number:03}").write_bytes(raw)
     words = [f"-max_total_time={seconds}", f"-max_len={LONGEST}", "-print_final_stats=1",
              "-timeout=20", f"-artifact_prefix={OUT / target}/"]  # fmt: skip
-    inputs = [str(OUT / target / "kept"), str(OUT / target / "seeds")]
-    if (seeds.CORPUS / target).exists():
-        inputs.append(str(seeds.CORPUS / target))
+    folders = [str(it) for it in (inputs, seeds.CORPUS / target) if it.exists()]
 
     def mutate(raw: bytes, max_size: int, seed: int) -> bytes:
         random = Random(seed)
@@ -76,7 +74,7 @@ def fuzz(target: str, seconds: int) -> None:
 
     # msgspec decodes in C, where libFuzzer has no coverage: alone it keeps two inputs only.
     more = {"custom_mutator": mutate} if target == "messages" else {}
-    atheris.Setup([sys.argv[0], *words, *inputs], targets.TARGETS[target], **more)
+    atheris.Setup([sys.argv[0], *words, *folders], targets.TARGETS[target], **more)
     atheris.Fuzz()
 
 

@@ -8,6 +8,7 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +20,13 @@ from common.codec import decode, encode
 from common.config import Sources, flatten, load
 from common.errors import ConfigError, MessageError, RobotError
 from common.wire.commands import TO_BOARD
-from common.wire.framing import Covers, Framing, Received
+from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 
-COVERS: tuple[Covers, ...] = ("payload", "header_and_payload")
-FRAMINGS = [(Framing("crc-16", covers), kinds)
-            for covers in COVERS for kinds in (FROM_BOARD, TO_BOARD)]  # fmt: skip
-KINDS: list[type[Struct]] = list(
-    dict.fromkeys(
-        [topic.message for topic in keys.TOPICS]
-        + [kind for call in keys.CALLS for kind in (call.request, call.reply)]
-    )
-)
+PAYLOAD, ALL = Framing("crc-16", "payload"), Framing("crc-16", "header_and_payload")
+FRAMINGS = list(product((PAYLOAD, ALL), (FROM_BOARD, TO_BOARD)))
+CALLED = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
+KINDS: list[type[Struct]] = [*dict.fromkeys([topic.message for topic in keys.TOPICS] + CALLED)]
 SEPARATOR = b"\0"  # cannot occur in arguments and environment variables
 
 

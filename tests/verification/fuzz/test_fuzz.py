@@ -37,7 +37,7 @@ def damaged(draw: st.DrawFn, raws: Sequence[bytes]) -> bytes:
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_seeds_and_damaged_inputs_end_as_declared(name: str) -> None:
-    raws = [*seeds(name), *(file.read_bytes() for file in FOUND if file.parent.name == name)]
+    raws = [b"", *seeds(name), *(file.read_bytes() for file in FOUND if file.parent.name == name)]
     _replay(name)
 
     @settings(max_examples=300, derandomize=True, database=None)
