@@ -4,14 +4,14 @@
 nothing of T2, so that it runs with any version of Zenoh. SI units.
 """
 
-import contextlib
+import itertools
 import json
 import queue
 import struct
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from contextlib import closing
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -53,25 +53,33 @@ class Twist(NamedTuple):
         return CDR + struct.pack("<iII10s2x6d", 0, 0, len(FRAME), FRAME, *axes)
 
 
-FORWARD, BACKWARD = Twist(0.4), Twist(-0.4)
+FORWARD = Twist(0.4)
+COMMANDS = "MP", "/cmd_vel", TWIST
+NUMBERS = itertools.count(1)
 
 
 class Endpoint:
-    """A publisher or client: its liveliness token, and its attachments."""
+    """A publisher (MP) or client (SC): its liveliness token, and its attachments."""
 
-    def __init__(self, session: zenoh.Session, number: int, kind: str, name: str, about: str):
-        zid = session.info.zid()
-        mangled = name.replace("/", "%")
-        token = f"@ros2_lv/0/{zid}/0/{number}/{kind}/%/%/plain_peer/{mangled}/{about}/{QOS}"
-        self.gid = xxhash.xxh3_128_digest(token.encode())[::-1]
+    def __init__(self, session: zenoh.Session, kind: str, name: str, about: str) -> None:
+        zid, mangled = session.info.zid(), name.replace("/", "%")
+        token = f"@ros2_lv/0/{zid}/0/{next(NUMBERS)}/{kind}/%/%/plain_peer/{mangled}/{about}/{QOS}"
+        self._gid = xxhash.xxh3_128_digest(token.encode())[::-1]
         self.key = f"0/{name.strip('/')}/{about}"
-        self._sequence = 0
+        self._session, self._sequence = session, 0
         self._token = session.liveliness().declare_token(token)
 
     def attachment(self) -> bytes:
         """Return the attachment of the next message."""
         self._sequence += 1
-        return struct.pack("<qqB16s", self._sequence, time.time_ns(), 16, self.gid)
+        return struct.pack("<qqB16s", self._sequence, time.time_ns(), 16, self._gid)
+
+    def send(self, twist: Twist, *, blocks: bool = False) -> None:
+        """Publish a command; with ``blocks`` it waits for space, as reliable publishers of ROS."""
+        control = zenoh.CongestionControl.BLOCK if blocks else zenoh.CongestionControl.DROP
+        self._session.put(
+            self.key, twist.encode(), attachment=self.attachment(), congestion_control=control
+        )
 
     def close(self) -> None:
         """Undeclare the token, as when the publisher is destroyed."""
@@ -89,24 +97,10 @@ class PlainPeer:
         self.session = zenoh.open(config)
         node = f"@ros2_lv/0/{self.session.info.zid()}/0/0/NN/%/%/plain_peer"
         self._node = self.session.liveliness().declare_token(node)
-        self._number = 0
 
-    def endpoint(self, kind: str, name: str, about: str) -> Endpoint:
-        """Declare a publisher (MP) or client (SC)."""
-        self._number += 1
-        return Endpoint(self.session, self._number, kind, name, about)
-
-    def publisher(self) -> Endpoint:
-        """Declare a publisher of commands."""
-        return self.endpoint("MP", "/cmd_vel", TWIST)
-
-    def send(self, publisher: Endpoint, twist: Twist, *, blocks: bool = False) -> None:
-        """Publish a command; with ``blocks`` it waits for space, as reliable publishers of ROS."""
-        control = zenoh.CongestionControl.BLOCK if blocks else zenoh.CongestionControl.DROP
-        self.session.put(
-            publisher.key, twist.encode(), attachment=publisher.attachment(),
-            congestion_control=control,
-        )  # fmt: skip
+    def close(self) -> None:
+        """Close the session."""
+        self.session.close()
 
     def sees_gateway(self) -> bool:
         """Return whether liveliness tokens of the gateway exist."""
@@ -129,7 +123,7 @@ class PlainPeer:
 
     def call(self, service: str) -> tuple[bool, str]:
         """Call a service of std_srvs/srv/Trigger; return success and message."""
-        client = self.endpoint("SC", service, TRIGGER)
+        client = Endpoint(self.session, "SC", service, TRIGGER)
         about = client.attachment()
         replies = self.session.get(
             client.key, payload=CDR, attachment=about, target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -150,7 +144,7 @@ class Driver:
 
     def __init__(self, peer: PlainPeer) -> None:
         self.twist: Twist | None = Twist()
-        self._peer, self._publisher = peer, peer.publisher()
+        self._publisher = Endpoint(peer.session, *COMMANDS)
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -164,17 +158,7 @@ class Driver:
     def _run(self) -> None:
         while not self._ends.wait(PERIOD_S):
             if (twist := self.twist) is not None:
-                self._peer.send(self._publisher, twist)
-
-
-@contextlib.contextmanager
-def plain_peer(endpoint: str) -> Iterator[PlainPeer]:
-    """Open a peer; its session ends with the context."""
-    peer = PlainPeer(endpoint)
-    try:
-        yield peer
-    finally:
-        peer.session.close()
+                self._publisher.send(twist)
 
 
 def text(payload: bytes, at: int) -> str:
@@ -197,5 +181,5 @@ def exercise(peer: PlainPeer) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    with plain_peer(sys.argv[1]) as this:
+    with closing(PlainPeer(sys.argv[1])) as this:
         print(json.dumps(exercise(this)))

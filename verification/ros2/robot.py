@@ -50,26 +50,16 @@ class Robot:
         bus.subscribe(keys.SAFETY, on_state)
         bus.subscribe(keys.HEALTH, on_health, service=GATEWAY)
 
-    def start_node(self, *words: object) -> "subprocess.Popen[str]":
-        """Start the node of the crate; it prints JSON lines."""
-        process = subprocess.Popen(
+    def node(self, *words: object) -> list[Any]:
+        """Run the node of the crate to its end; return the JSON lines that it printed."""
+        done = subprocess.run(
             [str(self._node), self.stack.endpoint, *map(str, words)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            capture_output=True, text=True, timeout=2 * PATIENCE_S, check=False,
             env=os.environ | {"ROS_DOMAIN_ID": str(self.ros_domain)},
         )  # fmt: skip
-        self.stack.others.append(process)  # type: ignore[arg-type]
-        return process
-
-    def node(self, *words: object) -> list[Any]:
-        """Run the node of the crate to its end; return what it printed."""
-        return finished(self.start_node(*words))
-
-    def node_moves(self, *words: object) -> float:
-        """Return the distance that the vehicle drives by this command of the node, in metres."""
-        before = self.distance()
-        self.node(*words)
-        self.wait_standstill()
-        return self.distance() - before
+        assert done.returncode == 0, f"exit code {done.returncode}: {done.stderr[-500:]}"
+        lines = done.stdout.splitlines()
+        return [json.loads(line) for line in lines if line.startswith(("{", "["))]
 
     def distance(self) -> float:
         """Return the distance driven since the start, in metres."""
@@ -89,13 +79,13 @@ class Robot:
         commands = self.frames.follow().commands
         return bool(commands) and moves(commands[-1])
 
-    def is_driving(self, direction: int = 1) -> bool:
-        """Return whether the vehicle moves by its last command, forward or backward (-1)."""
-        return self.is_moving() and direction * self.stack.speed() > MOTION_MPS
+    def is_driving(self) -> bool:
+        """Return whether the vehicle moves forward by its last command."""
+        return self.is_moving() and self.stack.speed() > MOTION_MPS
 
-    def wait_motion(self, direction: int = 1) -> None:
-        """Wait until the vehicle moves, forward or backward (-1)."""
-        wait_until(lambda: self.is_driving(direction), f"motion {direction}", PATIENCE_S)
+    def wait_motion(self) -> None:
+        """Wait until the vehicle moves forward."""
+        wait_until(self.is_driving, "motion", PATIENCE_S)
 
     def wait_standstill(self) -> None:
         """Wait until the vehicle stands, with no command to move."""
@@ -103,11 +93,6 @@ class Robot:
             lambda: not self.is_moving() and abs(self.stack.speed()) < STILL_MPS,
             "a standstill", PATIENCE_S,
         )  # fmt: skip
-
-    def wait_refused(self, counter: str, count: int) -> None:
-        """Wait until the gateway has refused this many commands more for this reason."""
-        before = self.counters.get(counter, 0)
-        wait_until(lambda: self.counters.get(counter, 0) >= before + count, f"{count} {counter}")
 
     def stops_within_lease(self, since_ns: int) -> str:
         """Check that the last command to move came within the lease; return the observation."""
@@ -120,13 +105,6 @@ class Robot:
         """Check that no process of the stack has ended."""
         ended = [name for name, it in self.stack.processes.items() if it.poll() is not None]
         assert not ended, f"{ended} ended"
-
-
-def finished(process: "subprocess.Popen[str]") -> list[Any]:
-    """Return the JSON lines of a node that ends well; raise AssertionError."""
-    output, errors = process.communicate(timeout=2 * PATIENCE_S)
-    assert process.returncode == 0, f"exit code {process.returncode}: {errors[-500:]}"
-    return [json.loads(line) for line in output.splitlines() if line.startswith(("{", "["))]
 
 
 @contextlib.contextmanager
