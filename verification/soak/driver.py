@@ -13,7 +13,7 @@ import time
 
 import t2
 from cli.demo.driver import Driver, LapEndedError, connected
-from cli.demo.lap import PATIENT, QUICK, Pace, drive_lap
+from cli.demo.lap import PATIENT, drive_lap
 from cli.demo.record import LapRecord
 from cli.settings import Everything
 from common import log
@@ -25,7 +25,7 @@ from sim.sockets import Control
 from t2.messages import Odometry
 
 TRY_S = 0.5  # between two attempts to recover
-STEP_S = {QUICK: 30.0, PATIENT: 75.0}  # a step takes a third of that; a lap has none longer
+STEP_S = 75.0  # timeout; the longest step of a lap takes a third of that
 
 
 class LocatedDriver(Driver):
@@ -58,27 +58,26 @@ class LocatedDriver(Driver):
 class StepTimeout(threading.Event):
     """Set when a step takes too long; without a thread, whose number the soak watches."""
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._seconds = seconds
-        self._end_s = time.monotonic() + seconds
+        self._end_s = time.monotonic() + STEP_S
 
     def restart(self, name: str) -> None:
         """Begin a step."""
         log.Logger().info("step", name=name)
-        self._end_s = time.monotonic() + self._seconds
+        self._end_s = time.monotonic() + STEP_S
 
     def is_set(self) -> bool:
         """Return whether the step has taken too long."""
         return time.monotonic() > self._end_s
 
 
-def drive(robot: t2.Robot, control: Control, pace: Pace) -> None:
+def drive(robot: t2.Robot, control: Control) -> None:
     """Drive one lap from the start of the world; give it up when a step takes too long."""
-    driver = LocatedDriver(robot, StepTimeout(STEP_S[pace]), control)
+    driver = LocatedDriver(robot, StepTimeout(), control)
     try:
         control.do(Place(x=0.0, y=0.0))
-        drive_lap(driver, pace)
+        drive_lap(driver, PATIENT)
     except (LapEndedError, LinkError, MessageError) as error:
         why = [str(error), *(text for *_, text in driver.record.answers[-1:])]
         stuck = "".join(driver.record.steps[-1:])
@@ -91,19 +90,15 @@ def drive(robot: t2.Robot, control: Control, pace: Pace) -> None:
 def main() -> int:
     """Drive until SIGTERM."""
     parser = argparse.ArgumentParser(prog="python -m verification.soak.driver")
-    parser.add_argument(
-        "--patient", action="store_true", help="relaxed pace for a host with stalls"
-    )
     add_sources(parser)
-    options = parser.parse_args()
-    config = load(Everything, sources(options)).config
+    config = load(Everything, sources(parser.parse_args())).config
     log.configure(config.log, "driver")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     log.Logger().info("started")
     control = Control(config.sim.control_port, timeout_s=1.0)
     with connected(config.robot.id, config.bus.endpoints[0], threading.Event()) as robot:
         while True:
-            drive(robot, control, PATIENT if options.patient else QUICK)
+            drive(robot, control)
 
 
 if __name__ == "__main__":

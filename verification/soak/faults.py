@@ -23,11 +23,7 @@ WIRE = {
     "corrupt": q.Wire(corrupt=0.2),
     "delay": q.Wire(delay=0.08, jitter=0.05),
 }
-# Whether the vehicle must stand meanwhile: a dead board holds no command, and safety needs no
-# odometry; the driver stops without it.
-KILLED = {
-    "router": True, "safety": True, "bridge": True, "driver": True, "sim": False, "odom": False,
-}  # fmt: skip
+KILLED = "router", "safety", "bridge", "driver", "sim", "odom"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +35,6 @@ class Fault:
     begin: q.Asked | None = None
     end: q.Asked | None = None  # removes the fault; None when it ends by itself
     kills: str = ""  # the process
-    still: bool = False  # whether the vehicle must stand during the fault
 
 
 def faults(random: Random) -> Iterator[Fault]:
@@ -69,9 +64,6 @@ def one_of_each(random: Random) -> list[Fault]:
         Fault("freeze", frozen_s, q.Freeze(seconds=frozen_s)),
         Fault("power cycle", off_s, q.PowerCycle(seconds=off_s)),
         Fault("sonar fault", seconds(), faulty, good),
-        Fault("driver fault", seconds(), broken, whole, still=True),
-        *(
-            Fault(f"kill {name}", seconds(), kills=name, still=still)
-            for name, still in KILLED.items()
-        ),
+        Fault("driver fault", seconds(), broken, whole),
+        *(Fault(f"kill {name}", seconds(), kills=name) for name in KILLED),
     ]

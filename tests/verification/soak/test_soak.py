@@ -9,11 +9,10 @@ from random import Random
 import pytest
 
 from verification.soak.faults import KILLED, WIRE, Fault, faults
-from verification.soak.verdict import GROWTH_MAX, Limits, Record, Sample, results
+from verification.soak.verdict import GROWTH_MAX, Record, Sample, results
 
 KINDS = len(KILLED) + len(WIRE) + 4
-LIMITS = Limits(warm_up_s=60.0, lap_s=120.0, stuck_s=75.0)
-S = range(300)
+S = range(600)
 SAFETY, RESTARTED = ("safety", 10), ("safety", 11)
 
 
@@ -24,17 +23,16 @@ def samples(seconds: range = S, rss_per_s: float = 0.0, threads_from_s: int = 99
 def good() -> Record:
     return Record(
         lives={SAFETY: samples()},
-        events=[(s, what) for s in range(0, 300, 10) for what in ("step", "lap finished")],
+        events=[(s, what) for s in range(0, 600, 10) for what in ("step", "lap finished")],
         log=[(s, 500 * s) for s in S],
-        late=[(-0.5, "kill safety")],
         health={"safety": list(map(float, S))},
-        faults=[(20.0, "kill safety")],
-        seconds=300.0,
+        faults=1,
+        seconds=600.0,
     )
 
 
 def wrong(record: Record) -> list[str]:
-    return [what for what, _, fine in results(record, LIMITS) if fine is False]
+    return [what for what, _, fine in results(record) if not fine]
 
 
 def test_a_good_soak() -> None:
@@ -48,15 +46,14 @@ def test_a_soak_that_observed_nothing() -> None:
 
 
 RESOURCES = "safety: threads, descriptors"
-LATE = [(-0.5, "kill router"), (0.1, "driver fault")]
-SPREAD = range(0, 300, 10)
+SPREAD = range(0, 600, 10)
 
 
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"lives": {SAFETY: samples(rss_per_s=0.9 * GROWTH_MAX / 192)}}, []),
-        ({"lives": {SAFETY: samples(rss_per_s=1.1 * GROWTH_MAX / 192)}}, ["safety: memory"]),
+        ({"lives": {SAFETY: samples(rss_per_s=0.9 * GROWTH_MAX / 432)}}, []),
+        ({"lives": {SAFETY: samples(rss_per_s=1.1 * GROWTH_MAX / 432)}}, ["safety: memory"]),
         ({"lives": {SAFETY: samples(threads_from_s=30)}}, []),
         ({"lives": {SAFETY: samples(threads_from_s=150)}}, [RESOURCES]),
         ({"lives": {SAFETY: samples(range(69))}}, ["safety: memory"]),  # too short
@@ -64,7 +61,7 @@ SPREAD = range(0, 300, 10)
         ({"log": [(s, 2100 * s) for s in S]}, ["log"]),
         ({"log": [(s, 120_000 * (s > 100)) for s in S]}, ["log"]),  # all at once
         ({"health": {"safety": [float(s) for s in S if not 100 < s < 125]}}, ["safety: health"]),
-        ({"health": {"safety": [float(s) for s in range(270)]}}, ["safety: health"]),
+        ({"health": {"safety": [float(s) for s in range(570)]}}, ["safety: health"]),
         ({"events": [(s, "step") for s in SPREAD]}, ["laps finished"]),
         (
             {"events": [(s, what) for s in range(0, 210, 10) for what in ("step", "lap finished")]},
@@ -72,7 +69,6 @@ SPREAD = range(0, 300, 10)
         ),
         ({"crashes": ["odom"]}, ["crashes"]),
         ({"tracebacks": 1}, ["tracebacks in the log"]),
-        ({"late": LATE}, ["RUN while it must stand"]),
     ],
 )
 def test_each_limit(change: dict[str, object], expected: list[str]) -> None:
