@@ -7,7 +7,6 @@ Exit code 1 when a mutant survives that is not marked as equivalent, or a marked
 import os
 import subprocess
 import sys
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from verification.mutation.trial import TrialError, complaints, run
 
 ROOT = Path(__file__).parents[2]
 SCRATCH = Path("mutants")
-AT_ONCE = os.cpu_count() or 1
 
 
 def main(words: list[str]) -> None:
@@ -27,7 +25,7 @@ def main(words: list[str]) -> None:
         sys.exit(f"mutants: no core: {', '.join(sorted(unknown))}")
     chosen = changed(found) if words == ["--changed"] else {f: found[f] for f in words or found}
     files = sorted(chosen, key=lambda file: -Path(file).stat().st_size)  # largest first
-    with ProcessPoolExecutor(AT_ONCE) as pool:
+    with ProcessPoolExecutor() as pool:
         wrong = list(pool.map(judge, files, [chosen[file] for file in files]))
     if count := sum(wrong):
         sys.exit(f"mutants: {count} lines; write a test, or see docs/decisions.md, Mutation gate")
@@ -35,15 +33,13 @@ def main(words: list[str]) -> None:
 
 def judge(file: str, tests: list[str]) -> int:
     """Test one file and print the result; return the number of lines that are wrong."""
-    began = time.monotonic()
     try:
         count, surviving = run(file, tests, SCRATCH / file.removesuffix(".py").replace("/", "."))
     except (TrialError, subprocess.TimeoutExpired) as error:
         sys.exit(f"mutants: {file}: {error}")
-    took_s = time.monotonic() - began
     wrong = complaints(Path(file).read_text("utf-8"), surviving)
     print(
-        f"{file}: {count} mutants, {len(surviving)} not killed, {took_s:.0f} s",
+        f"{file}: {count} mutants, {len(surviving)} not killed",
         *(f"\n{file}: {complaint}\n" for complaint in wrong), sep="\n" if wrong else "", flush=True,
     )  # fmt: skip
     return len(wrong)

@@ -35,7 +35,8 @@ def cores() -> Cores:
         if not paths and "*" not in pattern:
             raise ValueError(f"pyproject.toml: tool.mutants: {pattern} does not exist")
         for path in paths:
-            core, folder = module_of(path), mirror(path)
+            core = module_of(path)
+            folder = ".".join(["tests", *(it for it in path.parts[:-1] if it != "services"), ""])
             found[str(path)] = [
                 f"{test.replace('.', '/')}.py"
                 for test, imported in imports.items()
@@ -57,14 +58,13 @@ def module_of(path: Path) -> str:
     return ".".join(path.with_suffix("").parts)
 
 
-def mirror(path: Path) -> str:
-    """Return the package of a core's tests, with a dot at its end."""
-    return ".".join(["tests", *(part for part in path.parts[:-1] if part != "services"), ""])
-
-
 def changed(cores: Cores) -> Cores:
-    """Return the cores that differ from the base, committed or not, and print their names."""
-    commit = _base()
+    """Return the cores that differ from the fork point of the branch, committed or not.
+
+    On main they are compared with the previous commit.
+    """
+    head, fork = _git("rev-parse", "HEAD"), _git("merge-base", "origin/main", "HEAD")
+    commit = fork if fork and fork != head else _git("rev-parse", "--verify", "HEAD~1")
     diff = None if commit is None else _git("diff", "--name-only", "--relative", commit)
     if commit is None or diff is None:
         print("mutants: skipped, no commit to compare with; `make mutants` tests all cores")
@@ -72,12 +72,6 @@ def changed(cores: Cores) -> Cores:
     chosen = {file: tests for file, tests in cores.items() if file in diff.splitlines()}
     print(f"mutants: since {commit[:7]}: {', '.join(chosen) or 'no core changed'}", flush=True)
     return chosen
-
-
-def _base() -> str | None:
-    """Return the fork point of the branch; on main, the previous commit."""
-    head, fork = _git("rev-parse", "HEAD"), _git("merge-base", "origin/main", "HEAD")
-    return fork if fork and fork != head else _git("rev-parse", "--verify", "HEAD~1")
 
 
 def _git(*words: str) -> str | None:
