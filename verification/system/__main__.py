@@ -6,41 +6,31 @@ They need root and Debian's ``debootstrap``. ``SUITE`` names another Debian than
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
-from functools import partial
-from typing import TypeVar
+from types import ModuleType
 
 from verification.system import containers, relay, systemd
 from verification.system.frame import lacking
 
-S = TypeVar("S")
+INSTALLATIONS = {"containers": containers, "systemd": systemd, "relay": relay}
 
 
 def main() -> int:
     """Run the checks of one installation, or of all; a failed check ends the run."""
-    installations = {
-        "containers": partial(run_checks, containers.started, containers.CHECKS),
-        "systemd": partial(run_checks, systemd.started, systemd.CHECKS),
-        "relay": partial(run_checks, relay.started, relay.CHECKS),
-    }
     parser = argparse.ArgumentParser(prog="python -m verification.system", description=__doc__)
-    parser.add_argument("names", nargs="*", help=f"{', '.join(installations)}; all by default")
+    parser.add_argument("names", nargs="*", help=f"{', '.join(INSTALLATIONS)}; all by default")
     names = parser.parse_args().names
     if reason := lacking():
         print(f"system-test: NOT RUN: {reason}")
         return 0
-    for name in names or installations:
-        installations[name]()
+    for name in names or INSTALLATIONS:
+        run_checks(INSTALLATIONS[name])
     return 0
 
 
-def run_checks(
-    started: Callable[[], AbstractContextManager[S]], checks: Sequence[Callable[[S], str]]
-) -> None:
+def run_checks(tested: ModuleType) -> None:
     """Start an installation, and print the result of each check."""
-    with started() as installation:
-        for check in checks:
+    with tested.started() as installation:
+        for check in tested.CHECKS:
             began_s = time.monotonic()
             print(f"{check.__name__:24} ", end="", flush=True)
             print(f"{check(installation)} ({time.monotonic() - began_s:.0f} s)", flush=True)
