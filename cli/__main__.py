@@ -43,7 +43,6 @@ GROUPS = {
         "bw": ("inspect.measure", "bandwidth of a key"),
         "pub": ("inspect.pub", "publish on a key of your own"),
         "call": ("inspect.call", "call a service, such as safety/reset"),
-        "latency": ("latency", "reaction times of the bridge, hop by hop"),
         "schema": ("inspect.schema", "the fields of a message type"),
     },
     "Record": {

@@ -10,8 +10,6 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from common.motion import Command
-from common.timing import Durations as Durations
-from common.timing import Timing as Timing
 from common.verdict import Action as Action
 from common.verdict import Cause as Cause
 from common.verdict import Counts, Few, Name, Text
@@ -201,10 +199,6 @@ class Motion(Message, frozen=True, kw_only=True):
     latched: bool = False  # whether an operator's reset is needed
     predecessor: int | None = None  # the newest ``Link.latched_by`` in the verdict
     estop: int | None = None  # the newest ``Link.estop`` in the verdict, which has latched it
-    # For latency measurement only, on the clock of ``mono_ns``.
-    asked_ns: int = 0  # when the request that this answers was sent; 0 if by another host's clock
-    heard_ns: int = 0  # when safety received that request; 0 when this answers none
-    judged_ns: int = 0  # when safety received the sample that ``judged`` names
 
 
 # --- evt, health ----------------------------------------------------------------------------
@@ -219,6 +213,14 @@ class Event(Message, frozen=True, kw_only=True):
     about: Annotated[dict[Name, Text | int | float | bool | None], Few] = {}
 
 
+class Durations(Struct, frozen=True, kw_only=True):
+    """Histogram of durations since the service's start."""
+
+    bounds: Annotated[tuple[float, ...], Few]  # s, rising; upper bounds of the counts
+    counts: Annotated[tuple[int, ...], Few]  # one for each bound, and one above
+    worst: float  # s, 0 without any
+
+
 class Health(Message, frozen=True, kw_only=True):
     """Health of a service, once a second."""
 
@@ -230,7 +232,7 @@ class Health(Message, frozen=True, kw_only=True):
     lateness: float  # s, maximum lateness of the loop's timers in the last second
     rss: int  # bytes
     priority: int = 0  # of SCHED_FIFO; 0 for normal priority
-    timing: Timing | None = None  # None if not measured
+    reactions: Annotated[dict[Name, Durations], Few] = {}  # reaction times, by name
 
 
 # --- srv ------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from common.config import Loaded, load
 from common.errors import ConfigError, LinkError
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Event, Health, Level, Timing
+from common.messages import Durations, Event, Health, Level
 from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
 from common.verdict import MAX_TEXT
@@ -56,7 +56,7 @@ class Node(Generic[C]):
         self.counters: Counter[str] = Counter()
         self.is_stopped: Callable[[], bool] = lambda: True  # polled while stopping
         self.on_exit: Callable[[], None] = lambda: None  # on every exit path, crashes included
-        self.timing: Callable[[], Timing | None] = lambda: None  # part of the health message
+        self.reactions: Callable[[], dict[str, Durations]] = dict  # part of the health message
         self._loaded = loaded
         self._events = self.bus.publisher(keys.EVENTS, service=name)
         self._health = self.bus.publisher(keys.HEALTH, service=name)
@@ -109,7 +109,7 @@ class Node(Generic[C]):
                 lateness=self.loop.take_lateness_s(),
                 rss=resident_bytes(),
                 priority=realtime.priority(),
-                timing=self.timing(),
+                reactions=self.reactions(),
             )
         )
 

@@ -4,10 +4,10 @@ import ast
 from pathlib import Path
 from types import ModuleType
 
-from common import keys, messages, timing, verdict
+from common import keys, messages, verdict
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
-PARTS = (verdict, timing)
+PARTS = (verdict,)
 ALIASES = ("Counts", "Few", "Name", "Text")  # of types, for use inside the messages
 USED = ("Annotated", "Literal", "Meta", "Struct", *ALIASES)  # that messages import themselves
 PARTS_HEAD = '''"""Parts of messages; generated from the stack by ``make docs``, do not edit."""

@@ -65,7 +65,7 @@ class BoardMaster:
     def listen(self, seconds: float) -> Iterator[Frame]:
         """Wait for frames of the board, at most for a time, and yield them."""
         select.select(self._sockets.sockets, [], [], seconds)
-        for port, datagram, _, _ in self._sockets.read(self._port):
+        for port, datagram, _ in self._sockets.read(self._port):
             for part in self._framing.read(datagram, reports.FROM_BOARD):
                 if isinstance(part, Received):
                     self._port = port

@@ -8,6 +8,8 @@ import argparse
 import itertools
 import sys
 import time
+from bisect import bisect_left
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import msgspec
@@ -19,7 +21,7 @@ from cli.inspect.session import BusSession, add_options, open_session, until_int
 from common import keys
 from common.bus.probe import Answer, Probe
 from common.errors import LinkError, MessageError
-from common.messages import Health
+from common.messages import Durations, Health
 
 NEEDED = ("bridge", "safety", "odom")
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
@@ -94,7 +96,7 @@ def show(found: list[Row], *, in_json: bool) -> int:
     else:
         head, *lines = output.table(HEAD, list(map(as_cells, found))).splitlines()
         painted = (output.painted(line, tone(row)) for line, row in zip(lines, found, strict=True))
-        print("\n".join([head, *painted]), flush=True)
+        print("\n".join([head, *painted, *reaction_lines(found)]), flush=True)
     unhealthy = [row for row in found if row.state != "ok"]
     for row in unhealthy:
         output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
@@ -159,7 +161,8 @@ def listen(probe: Probe, robot: str) -> dict[tuple[str, str], Health]:
 def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.structs.asdict(row.health) if row.health else {}
-    fields.pop("timing", None)  # `t2 latency` shows it
+    if row.health:
+        fields["reactions"] = {name: figures(each) for name, each in row.health.reactions.items()}
     alive, has_health = row.state in ("ok", "hangs"), row.health is not None
     return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
@@ -182,6 +185,36 @@ def as_cells(row: Row) -> list[str]:
         f"{sum(health.rates.values()):.0f}",
         counters or "-",
     ]
+
+
+def reaction_lines(found: list[Row]) -> list[str]:
+    """Return a line for each reaction that was measured since its service's start."""
+    return [
+        f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, in ms: "
+        f"p50 {1e3 * quantile(each, 0.5):.2f}, p99 {1e3 * quantile(each, 0.99):.2f}, "
+        f"worst {1e3 * each.worst:.2f}"
+        for row in found
+        if row.health
+        for name, each in row.health.reactions.items()
+        if any(each.counts)
+    ]
+
+
+def figures(durations: Durations) -> dict[str, Any]:
+    """Return count, quantiles and worst in s; None without any."""
+    known = any(durations.counts)
+    return {
+        "count": sum(durations.counts),
+        "p50": quantile(durations, 0.5) if known else None,
+        "p99": quantile(durations, 0.99) if known else None,
+        "worst": durations.worst if known else None,
+    }
+
+
+def quantile(durations: Durations, part: float) -> float:
+    """Return an upper bound of a quantile: the bound of its bucket, or the worst if less."""
+    number = bisect_left(list(accumulate(durations.counts)), part * sum(durations.counts))
+    return min([*durations.bounds[number : number + 1], durations.worst])
 
 
 def duration(seconds: float) -> str:

@@ -49,7 +49,7 @@ def read(payload: bytes, encoding: str) -> Reading:
 def kinds() -> dict[str, type[Struct]]:
     """Return every struct of the bus contract by its name."""
     of_calls: list[type[Struct]] = [k for call in keys.CALLS for k in (call.request, call.reply)]
-    inner: tuple[type[Struct], ...] = (m.Cause, m.Limits, m.Timing, m.Durations, m.Message)
+    inner: tuple[type[Struct], ...] = (m.Cause, m.Limits, m.Durations, m.Message)
     of_topics: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
     return {kind.__name__: kind for kind in (*of_topics, *of_calls, *inner)}
 

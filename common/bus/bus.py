@@ -223,10 +223,6 @@ class Bus:
         if self._session is not None:
             self._session.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
 
-    def shares_clock(self, message: Message) -> bool:
-        """Return whether the sender's ``mono_ns`` is of this host's clock."""
-        return self.host != 0 and message.host == self.host
-
     # --- session -----------------------------------------------------------------------------
 
     def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:

@@ -1,10 +1,10 @@
 """The bridge's shell: sockets, bus and clock around the core.
 
 The shell carries out what the core returns. The reflex has priority: BRAKE is sent, and the hit is
-published, before the rest of its datagram is read. Receive timestamps and reaction times are
-measured here, after all of that.
+published, before the rest of its datagram is read.
 """
 
+from bisect import bisect_left
 from functools import partial
 from typing import Any
 
@@ -20,12 +20,33 @@ from services.bridge.config import BridgeConfig, tick_s
 from services.bridge.core import Core
 from services.bridge.guard_ipc import Heartbeat, Inherited
 from services.bridge.output import Output, Send
-from services.bridge.timing import Timings
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 LINK_S = 0.2
 MOTIONS = 8  # queue length
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
+
+# Bounds of the histograms: 10 us to 1 s, four a decade.
+BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 4)) for step in range(21))
+
+
+class Histogram:
+    """Histogram of durations, for the health message."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * (len(BOUNDS_NS) + 1)
+        self._worst_ns = 0
+
+    def add(self, duration_ns: int) -> None:
+        """Add a duration."""
+        self._counts[bisect_left(BOUNDS_NS, duration_ns)] += 1
+        self._worst_ns = max(self._worst_ns, duration_ns)
+
+    def message(self) -> m.Durations:
+        """Return the published form."""
+        bounds = tuple(bound / NS_PER_S for bound in BOUNDS_NS)
+        worst = self._worst_ns / NS_PER_S
+        return m.Durations(bounds=bounds, counts=tuple(self._counts), worst=worst)
 
 
 class Bridge:
@@ -36,7 +57,9 @@ class Bridge:
         drive = node.open_drive(listens=True)  # safety accepts samples only from this link
         self._sockets = Sockets(node.config.board, inherited.sockets if inherited else ())
         self._heartbeat = Heartbeat(inherited.heartbeat, self._on_no_guard) if inherited else None
-        self._timings = Timings()
+        # From the read of a hit: until BRAKE is sent, and until safety's motion acknowledges it.
+        self._reactions = {"reflex": Histogram(), "judged_stop": Histogram()}
+        self._hit_ns = 0
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
         self._unsent: Send | None = None  # the BRAKE that the system did not send
@@ -69,7 +92,7 @@ class Bridge:
         loop.every(period_s, self._on_tick)
         loop.every(LINK_S, self._on_link)
         loop.every(1.0, self._on_second)
-        self._node.timing = self._timings.message
+        self._node.reactions = lambda: {n: one.message() for n, one in self._reactions.items()}
         self._node.is_stopped = self._is_stopped
         self._node.on_exit = self._on_exit
 
@@ -83,29 +106,20 @@ class Bridge:
         # The port of the commands first: after a stall both ports have datagrams, and the other one
         # must not take over only because it is read first.
         first = self._core.motions.port
-        for port, datagram, ancillary, read_ns in self._sockets.read(first, *ports):
-            hit, braked_ns, seq = self._core.reflex(datagram), 0, None
+        for port, datagram, read_ns in self._sockets.read(first, *ports):
+            hit = self._core.reflex(datagram)
             if hit is not None:
-                braked_ns = self._brake(hit.brake)
-                reported = self._core.hit(hit, now_ns)
-                seq = reported.hit
-                self._do(reported)
-            out = self._core.datagram(datagram, port, now_ns, reported=hit is not None)
-            self._do(out)
-            receipt = self._sockets.receipt(ancillary, read_ns)
-            if seq is not None:
-                self._timings.on_reflex(seq, receipt, braked_ns)
-            self._timings.on_read(receipt)
+                self._brake(hit.brake)
+                self._reactions["reflex"].add(clock.now_ns() - read_ns)
+                self._hit_ns = read_ns
+                self._do(self._core.hit(hit, now_ns))
+            self._do(self._core.datagram(datagram, port, now_ns, reported=hit is not None))
 
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
-        motion = arrival.message
-        out = self._core.motion(motion, arrival.received_ns, clock.now_ns())
+        out = self._core.motion(arrival.message, arrival.received_ns, clock.now_ns())
         self._do(out)
-        if out.obeyed:
-            sent_ns, shared = clock.now_ns(), self._node.bus.shares_clock(motion)
-            self._timings.on_motion(motion, shared, arrival.received_ns, sent_ns)
-            if out.acked:
-                self._timings.on_acked(motion, shared, arrival.received_ns, sent_ns)
+        if out.acked:
+            self._reactions["judged_stop"].add(clock.now_ns() - self._hit_ns)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._core.operator.on_safety(arrival.message, arrival.received_ns)
@@ -163,14 +177,13 @@ class Bridge:
         if send.order is not None:
             self._unsent = None
 
-    def _brake(self, brake: Send) -> int:
-        """Send BRAKE, retrying when the system refuses; return the time.
+    def _brake(self, brake: Send) -> None:
+        """Send BRAKE, retrying when the system refuses.
 
         A BRAKE that could not be sent is sent again at each tick.
         """
         sent = self._sockets.send(brake.datagram, brake.port, BRAKE_ATTEMPTS)
         self._unsent = None if sent else brake
-        return clock.now_ns()
 
     # --- counters ---------------------------------------------------------------------------
 
@@ -186,7 +199,6 @@ class Bridge:
                 board=f"{board.address}:{board.port}",
             )
         rejected["wrong_address"] = sockets.refused
-        counters["wall_clock_set"] = sockets.wall.steps
         if sockets.send_errors > counters["send_errors"]:
             text = "the system refuses to send to the board"
             self._node.log.warning(text, count=sockets.send_errors, error=sockets.last_error)

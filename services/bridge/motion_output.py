@@ -67,7 +67,6 @@ class MotionOutput:
         )
         if order is not None:
             self.order(order, out, motion)
-            out.obeyed = True
             out.acked = hit is not None and self.lease.hit is None and order is BRAKE
         if refusal is not None:
             self._report(refusal, motion, out)

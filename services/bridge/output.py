@@ -50,7 +50,6 @@ class Output(Struct):
     warnings: list[str] = field(default_factory=list)  # for the log alone
     reported: bool = False  # whether ``Core.hit`` has handled a hit of this datagram
     hit: int | None = None  # ``seq`` of the bumper message that reports a new hit
-    obeyed: bool = False  # whether a motion message became a frame
     acked: bool = False  # whether that motion acknowledged the hit, and brakes
 
     def publish(self, stream: str, message: Message, raw: bytes | None = None) -> None:

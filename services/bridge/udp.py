@@ -2,29 +2,18 @@
 
 import errno
 import socket
-import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 
 from common import clock
 from common.errors import LinkError
 from common.settings import Board
-from services.bridge.rx_timestamp import (
-    ANCILLARY_MAX,
-    SO_TIMESTAMPNS,
-    Receipt,
-    WallClock,
-    kernel_timestamp,
-)
 
 DATAGRAM_MAX = 2048
 # Limit of datagrams per round, so that a flood does not delay the loop's timers.
 BURST = 64
 BURST_PAUSE_S = 20e-6
 BRAKE_ATTEMPTS = 4  # attempts when the system refuses to send a BRAKE
-
-Ancillary = list[tuple[int, int, bytes]]
 
 
 class Sockets:
@@ -46,12 +35,9 @@ class Sockets:
         self.sockets = [socket.socket(fileno=descriptor) for descriptor in inherited] or [
             _bind(board.listen_address, port) for port in board.listen_ports
         ]
-        self.wall = WallClock()
-        for sock in self.sockets:
-            enable_timestamps(sock)
 
-    def read(self, *ports: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
-        """Yield the board's datagrams: port, bytes, ancillary data, read time.
+    def read(self, *ports: int) -> Iterator[tuple[int, bytes, int]]:
+        """Yield the board's datagrams: port, bytes, read time.
 
         ``ports`` are indices, in the order of reading. A full burst ends with a short sleep:
         without it, Linux kills a SCHED_FIFO process in a flood (``realtime.limit``).
@@ -60,7 +46,7 @@ class Sockets:
             sock = self.sockets[port]
             for _ in range(BURST):
                 try:
-                    datagram, ancillary, _, source = sock.recvmsg(DATAGRAM_MAX, ANCILLARY_MAX)
+                    datagram, source = sock.recvfrom(DATAGRAM_MAX)
                 except BlockingIOError:
                     break
                 except OSError:
@@ -68,20 +54,12 @@ class Sockets:
                 if source == self._relay:
                     self._relay_report = datagram
                 elif source == self._board or (self._any_port and source[0] == self._board[0]):
-                    yield port, datagram, ancillary, clock.now_ns()
+                    yield port, datagram, clock.now_ns()
                 else:
                     self.refused += 1
                     self.last_foreign_source = source
             else:
                 time.sleep(BURST_PAUSE_S)
-
-    def receipt(self, ancillary: Ancillary, read_ns: int) -> Receipt:
-        """Return the receive times of a datagram read with this ancillary data."""
-        before_ns, wall_ns, now_ns = clock.now_ns(), time.time_ns(), clock.now_ns()
-        self.wall.update(before_ns, wall_ns, now_ns)
-        stamp_ns = kernel_timestamp(ancillary)
-        kernel_ns = None if stamp_ns is None else self.wall.monotonic_ns(stamp_ns, read_ns)
-        return Receipt(kernel_ns, read_ns)
 
     def take_relay_report(self) -> bytes:
         """Return the newest report of a relay once; or empty."""
@@ -108,13 +86,6 @@ class Sockets:
         """Close the sockets."""
         for sock in self.sockets:
             sock.close()
-
-
-def enable_timestamps(sock: socket.socket) -> None:
-    """Enable kernel receive timestamps where the system supports them."""
-    if sys.platform == "linux":  # elsewhere the number means something else
-        with suppress(OSError):
-            sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
 def _bind(address: str, port: int) -> socket.socket:

@@ -20,13 +20,12 @@ from prometheus_client.core import (
 from common.freshness import fresh
 from common.keys import ROOT
 from common.members import Members
-from common.messages import Health, Link, Message, Odometry, SafetyState, Timing, Verdict
+from common.messages import Health, Link, Message, Odometry, SafetyState, Verdict
 from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
 
 FILE = Path(__file__).with_name("families.toml")
 Kind = Literal["gauge", "counter", "histogram"]
 KINDS = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
-BUCKET_STEP = 4  # every fourth bound of a reaction: two per decade
 
 
 class Family(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -128,21 +127,11 @@ def _health(scrape: Scrape, labels: tuple[str, str], health: Health) -> None:
         scrape.add("t2_service_message_rate_hertz", rate, *labels, short)
     for counter, count in sorted(health.counters.items()):
         scrape.add("t2_service_counts_total", count, *labels, counter)
-    if health.timing is not None:
-        _timing(scrape, labels, health.timing)
-
-
-def _timing(scrape: Scrape, labels: tuple[str, str], timing: Timing) -> None:
-    """Add the reactions; their hops are shown by ``t2 latency``."""
-    for name, durations in sorted(timing.durations.items()):
-        fits = len(durations.counts) == len(timing.bounds) + 1
-        if "." in name or not fits:
-            continue
-        cumulative = list(accumulate(durations.counts))
-        kept = [*cumulative[:-1:BUCKET_STEP], cumulative[-1]]
-        scrape.add_histogram(
-            "t2_reaction_seconds", timing.bounds[::BUCKET_STEP], kept, None, *labels, name
-        )
+    for name, each in sorted(health.reactions.items()):
+        if len(each.counts) == len(each.bounds) + 1:
+            scrape.add_histogram(
+                "t2_reaction_seconds", each.bounds, accumulate(each.counts), None, *labels, name
+            )
 
 
 def _safety(scrape: Scrape, robot: str, state: SafetyState) -> None:

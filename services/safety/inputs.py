@@ -28,7 +28,6 @@ class DriveRequest(Struct, frozen=True):
     source: str
     drive: Drive | None
     received_ns: int = 0
-    shares_clock: bool = False  # whether its timestamp is of this host's clock
 
 
 class LimitRequest(Struct, frozen=True):

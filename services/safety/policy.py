@@ -258,7 +258,6 @@ def brake_for_contact(state: State, inputs: Inputs) -> Motion | None:
         command=BRAKE,
         judged=bumper.value.seq,
         judged_boot=bumper.value.boot,
-        judged_ns=bumper.received_ns,
         latched=True,
         predecessor=inputs.link.value.latched_by if inputs.link else None,
     )

@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
 from common.motion import RUN, Twist
 from services.safety.causes import BARRING, BY_NAME
-from services.safety.inputs import DriveRequest, Hold, Inputs, Reset
 from services.safety.inputs import Event as Trigger
+from services.safety.inputs import Hold, Inputs, Reset
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
 from services.safety.operator_requests import BY_HAND, room, spent
 from services.safety.policy import Policy
@@ -53,25 +52,6 @@ def motion_message(state: State, inputs: Inputs) -> Motion:
         predecessor=inputs.link.value.latched_by if inputs.link else None,
         estop=state.estop,
     )
-
-
-def with_times(motion: Motion, state: State, inputs: Inputs) -> Motion:
-    """Return the motion message with the times of what it answers, for measurements.
-
-    It answers a request that was accepted and whose source is in control.
-    """
-    asked_ns = heard_ns = 0
-    request, verdict = inputs.event, state.verdict
-    if (
-        isinstance(request, DriveRequest)
-        and request.drive
-        and not verdict.refused
-        and verdict.source == request.source
-    ):
-        heard_ns = request.received_ns
-        asked_ns = request.drive.mono_ns if request.shares_clock else 0
-    judged_ns = inputs.bumper.received_ns if inputs.bumper else 0
-    return replace(motion, asked_ns=asked_ns, heard_ns=heard_ns, judged_ns=judged_ns)
 
 
 def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:

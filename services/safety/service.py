@@ -47,7 +47,6 @@ from services.safety.report import (
     signature,
     state_message,
     transitions,
-    with_times,
 )
 from services.safety.state import Reply
 
@@ -168,8 +167,7 @@ class SafetyService:
 
     def _on_drive(self, arrival: Arrival[Drive]) -> None:
         source, drive = source_of(arrival.key), arrival.message
-        shared = self._node.bus.shares_clock(drive)
-        self._decide(DriveRequest(source, drive, arrival.received_ns, shared))
+        self._decide(DriveRequest(source, drive, arrival.received_ns))
 
     def _on_bad_drive(self, key: str, _: MessageError) -> None:
         self._decide(DriveRequest(source_of(key), None))
@@ -220,7 +218,7 @@ class SafetyService:
         before = self._state
         self._state, verdict = self._policy.decide(before, inputs, now_ns)
         motion = motion_message(self._state, inputs)
-        self._motion_publisher.put(with_times(motion, self._state, inputs))
+        self._motion_publisher.put(motion)
         if verdict.refused:
             self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:

@@ -50,7 +50,6 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("drive", "--source"),
         ("router", "--set"),
         ("sim", "--world"),
-        ("latency", "--once"),
         ("config", "--json"),
         ("keys", "revoke"),
         ("wire", "identify-crc"),

@@ -1,14 +1,13 @@
 """Exported samples: names, labels and freshness."""
 
 from datetime import UTC, datetime
-from itertools import pairwise
 
 import pytest
 
 from common import messages as m
 from common.freshness import NS_PER_S, Latest
 from common.members import Member, Members, Role
-from common.messages import Durations, Timing
+from common.messages import Durations
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import FAMILIES, certificate_expiry, metric_families
 from tests.metrics.robots import NOW_NS, event, health, link, odometry, safety, whole
@@ -131,36 +130,19 @@ def test_lateness_histogram_covers_every_second() -> None:
     assert value(found, f"{name}_sum", service="odom") == pytest.approx(0.331)
 
 
-def test_reactions_are_downsampled_without_losing_counts() -> None:
-    bounds = tuple(10e-6 * 10 ** (step / 8) for step in range(41))
-    counts = tuple(range(42))
-    timing = Timing(
-        bounds=bounds,
-        durations={
-            "contact_to_break": Durations(counts=counts, worst=1.0),
-            "contact_to_break.board_to_bridge": Durations(counts=counts, worst=1.0),
-            "of another make": Durations(counts=(1, 2), worst=1.0),
-        },
-        not_counted={},
-    )
+def test_reactions_are_cumulative_histograms() -> None:
     robot = whole()
-    robot.on_health("bridge", health(timing=timing), NOW_NS)
-    found = {
-        dict(labels)["le"]: count
-        for (name, labels), count in values(robot).items()
-        if name == "t2_reaction_seconds_bucket" and dict(labels)["reaction"] == "contact_to_break"
-    }
-    assert len(found) == 12
-    assert found["1e-05"] == 0
-    assert found["0.0001"] == sum(counts[:9])
-    assert found["1"] == sum(counts[:41])
-    assert found["+Inf"] == sum(counts)
-    ordered = [found[end] for end in sorted(found, key=float)]
-    assert all(one <= other for one, other in pairwise(ordered))
     reactions = {
-        dict(labels)["reaction"] for name, labels in values(robot) if name.startswith("t2_reaction")
+        "reflex": Durations(bounds=(0.001, 0.01), counts=(5, 0, 2), worst=1.0),
+        "of another version": Durations(bounds=(0.001, 0.01), counts=(1, 2), worst=1.0),
     }
-    assert reactions == {"contact_to_break"}
+    robot.on_health("bridge", health(reactions=reactions), NOW_NS)
+    found = {
+        (dict(labels)["reaction"], dict(labels)["le"]): count
+        for (name, labels), count in values(robot).items()
+        if name == "t2_reaction_seconds_bucket"
+    }
+    assert found == {("reflex", "0.001"): 5, ("reflex", "0.01"): 5, ("reflex", "+Inf"): 7}
 
 
 def test_disk_full_is_exported_while_the_recorder_runs() -> None:

@@ -7,7 +7,7 @@ from common.freshness import Latest
 from common.messages import Bumper, Motion
 from services.safety.inputs import Inputs
 from services.safety.policy import brake_for_contact
-from services.safety.report import motion_message, with_times
+from services.safety.report import motion_message
 from tests.safety.policy_fixture import PolicyFixture, hit, link
 
 
@@ -25,7 +25,6 @@ def test_a_new_contact_brakes_as_its_decision_does(latched_by: int | None) -> No
     first = feed(fixture, pressed=True)
     fixture.decide()
     decided = motion_message(fixture.state, fixture.inputs)
-    decided = with_times(decided, fixture.state, fixture.inputs)
     assert first == replace(decided, source=None)  # the first BRAKE answers no source
     assert first is not None
     assert (first.command, first.judged, first.latched) == ("brake", fixture.seq, True)
@@ -45,4 +44,4 @@ def test_without_link_and_bumper_there_is_no_predecessor_and_no_brake() -> None:
     assert brake_for_contact(fixture.state, Inputs()) is None
     brake = brake_for_contact(fixture.state, Inputs(bumper=Latest(Bumper(pressed=True), 5)))
     assert brake is not None
-    assert (brake.predecessor, brake.judged_ns) == (None, 5)
+    assert brake.predecessor is None

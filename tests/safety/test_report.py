@@ -6,11 +6,11 @@ from msgspec.structs import replace
 
 from common.codec import decode, encode
 from common.freshness import NS_PER_S
-from common.messages import MAX_REASON, Direction, Drive, Limits, SafetyState
+from common.messages import MAX_REASON, Direction, Limits, SafetyState
 from common.operator import BUMPER_FREE
 from common.verdict import MAX_TEXT
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.inputs import DriveRequest, Estop, Event, Hold, Reset
+from services.safety.inputs import Estop, Event, Hold, Reset
 from services.safety.report import (
     Repetition,
     motion_message,
@@ -18,7 +18,6 @@ from services.safety.report import (
     signature,
     state_message,
     transitions,
-    with_times,
 )
 from services.safety.state import Reply
 from tests.safety.policy_fixture import PolicyFixture, hit
@@ -66,41 +65,6 @@ def test_the_motion_tells_what_was_judged() -> None:
     assert (motion.command, motion.source) == ("run", "teleop")
     assert motion.linear == pytest.approx(fixture.verdict.twist.linear)
     assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)
-
-
-REQUEST = Drive(linear=0.1, angular=0.0, echo=0, mono_ns=40)
-
-
-def timed_by(fixture: PolicyFixture, request: DriveRequest) -> tuple[int, int, int]:
-    inputs = replace(fixture.inputs, event=request)
-    motion = with_times(motion_message(fixture.state, fixture.inputs), fixture.state, inputs)
-    assert (motion.command, motion.judged) == ("run", fixture.seq)  # what was there stays
-    return motion.asked_ns, motion.heard_ns, motion.judged_ns
-
-
-def test_the_motion_carries_the_times_of_what_it_answers() -> None:
-    fixture = PolicyFixture().running()
-    judged_ns = fixture.now_ns
-    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, True)) == (40, 50, judged_ns)
-    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, False)) == (0, 50, judged_ns)
-
-
-def test_only_a_request_that_drives_is_answered() -> None:
-    fixture = PolicyFixture().running()
-    assert timed_by(fixture, DriveRequest("web", REQUEST, 50, True))[:2] == (0, 0)
-    assert timed_by(fixture, DriveRequest("teleop", None, 50, True))[:2] == (0, 0)
-    fixture.state = replace(fixture.state, verdict=replace(fixture.verdict, refused="late"))
-    assert timed_by(fixture, DriveRequest("teleop", REQUEST, 50, True))[:2] == (0, 0)
-
-
-def test_a_motion_that_answers_nothing_carries_no_times() -> None:
-    fixture = PolicyFixture()
-    motion = with_times(
-        motion_message(fixture.state, fixture.inputs),
-        fixture.state,
-        replace(fixture.inputs, event=Reset()),
-    )
-    assert (motion.asked_ns, motion.heard_ns, motion.judged_ns) == (0, 0, 0)
 
 
 def test_one_sentence_says_why() -> None:

@@ -268,7 +268,7 @@ class Process:
         self.calls: dict[str, Callable[[Any, Any], None]] = {}
         self.is_stopped: Callable[[], bool] = lambda: True
         self.on_exit: Callable[[], None] = lambda: None
-        self.timing: Callable[[], object] = lambda: None
+        self.reactions: Callable[[], object] = dict
         self._watch = watch
 
     @property
@@ -285,9 +285,6 @@ class Process:
         self.stalled_until_ns = self.net.now_ns + duration_ms * MS
         self.cut = duration_ms > SESSION_LEASE_MS
         self._reconnections += self.cut
-
-    def shares_clock(self, message: Message) -> bool:
-        return True
 
     def open_bus(self) -> "Process":
         return self

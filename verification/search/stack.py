@@ -14,8 +14,6 @@ from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.rx_timestamp import Receipt, WallClock
-from services.bridge.udp import Ancillary
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import LimitSource, Safety, SafetyConfig
@@ -49,12 +47,11 @@ class Sockets:
 
     def __init__(self, stack: "Stack", process: Process) -> None:
         self.sockets = [object() for _ in process.config.board.listen_ports]
-        self.wall = WallClock()
         self._stack = stack
         self._process = process
         self._framing = Framing()
 
-    def read(self, first: int, *ports: int) -> Iterator[tuple[int, bytes, Ancillary, int]]:
+    def read(self, first: int, *ports: int) -> Iterator[tuple[int, bytes, int]]:
         """Yield what waits at these ports, after the oracle has seen it."""
         for port in sorted(ports, key=lambda port: port != first):
             inbox = self._stack.vehicle.inboxes[port]
@@ -63,10 +60,7 @@ class Sockets:
                 parts = self._framing.read(datagram, FROM_BOARD)
                 frames = [part.frame for part in parts if isinstance(part, Received)]
                 self._stack.oracle.on_report(self._process, frames, port)
-                yield port, datagram, [], self._stack.net.now_ns
-
-    def receipt(self, _: Ancillary, read_ns: int) -> Receipt:
-        return Receipt(None, read_ns)
+                yield port, datagram, self._stack.net.now_ns
 
     def take_relay_report(self) -> bytes:
         """Return nothing: there is no relay."""

@@ -1,7 +1,7 @@
 """``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
 It shows the path, the velocities (requested, allowed, measured), sonar ranges, stops with their
-reasons, events, rates and gaps of each stream, and reaction times. It needs the extra ``report``.
+reasons, events, rates and gaps of each stream. It needs the extra ``report``.
 """
 
 import argparse

@@ -11,8 +11,8 @@ from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
 from cli.recordings.report.stops import Period
+from cli.recordings.report.streams import Stream
 from cli.recordings.report.timeline import Series, Timeline, VelocitySeries, downsampled
-from cli.recordings.report.timing import Stream
 
 WIDTH = 1100  # pixels
 REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#c5ccd3"

@@ -6,11 +6,9 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from cli.inspect.addressing import chunks
-from cli.latency import NAMES
 from cli.recordings.report import figures
 from cli.recordings.report.fixed_labels import chart
 from cli.recordings.report.timeline import Timeline
-from cli.recordings.report.timing import reactions
 from common.freshness import NS_PER_S
 from services.recorder.reader import Reader
 
@@ -31,7 +29,6 @@ def page(timeline: Timeline, reader: Reader) -> str:
     # The fastest streams first, event-driven keys last.
     streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
-    bridges = (ends for (name, _), ends in timeline.healths.items() if name == "bridge")
     has_ranges = any(series.times for series in timeline.ranges.values())
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters |= {"chart": chart, "clock": clock, "figure": figure, "ms": ms}
@@ -41,7 +38,6 @@ def page(timeline: Timeline, reader: Reader) -> str:
         about=summary(timeline, reader),
         warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
-        reactions=[(label(one.name), "." in one.name, one) for one in reactions(bridges)],
         events=timeline.events[:EVENTS_MAX],
         path=figures.path(timeline) if timeline.path else "",
         speeds=figures.speeds(timeline),
@@ -82,12 +78,6 @@ def warnings(timeline: Timeline, reader: Reader) -> list[str]:
     if len(timeline.events) > EVENTS_MAX:
         found.append(f"The first {EVENTS_MAX} of {len(timeline.events)} events are listed.")
     return found
-
-
-def label(name: str) -> str:
-    """Return the display name of a reaction or of a hop."""
-    last = name.rpartition(".")[2]
-    return NAMES.get(last, last)
 
 
 def clock(seconds: float) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from cli.recordings.report.stops import Phases, Stop, stops
-from cli.recordings.report.timing import Stream
+from cli.recordings.report.streams import Stream
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
@@ -99,8 +99,7 @@ class Timeline:
     verdicts: Phases[SafetyState] = field(default_factory=lambda: Phases(GAP_S))
     events: list[TimedEvent] = field(default_factory=list)
     streams: dict[str, Stream] = field(default_factory=dict)  # by key
-    # First and last health of each process, by service and boot.
-    healths: dict[tuple[str, int], tuple[Health, Health]] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)  # by service
 
     def add(self, key: str, message: Message | None, log_ns: int) -> None:
         """Add a message of a key; None for one that could not be decoded."""
@@ -115,11 +114,6 @@ class Timeline:
     def distance(self) -> float:
         """Return the distance driven in metres, by odometry."""
         return sum(segment.length for segment in self.path)
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Return the latest version of each service, from its health messages."""
-        return {service: last.version for (service, _), (_, last) in self.healths.items()}
 
     @property
     def stops(self) -> list[Stop]:
@@ -173,9 +167,7 @@ class Timeline:
             case Event():
                 self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
             case Health():
-                process = key.split("/")[-2], message.boot
-                first, _ = self.healths.get(process, (message, message))
-                self.healths[process] = first, message
+                self.versions[key.split("/")[-2]] = message.version
 
 
 def downsampled(

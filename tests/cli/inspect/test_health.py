@@ -14,6 +14,7 @@ from cli.inspect import health as command
 from cli.inspect import output
 from common import keys
 from common.bus.bus import Bus
+from common.messages import Durations, Health
 from tests.cli.inspect.tool import Tool, health, pretend
 from tests.common.bus_fixture import BusFixture
 
@@ -29,6 +30,25 @@ def test_health(buses: BusFixture, tool: Tool) -> None:
     assert rows["odom"] == ["hangs"]
     assert "odom of robot" in result.err
     assert "it hangs" in result.err
+
+
+def test_reactions(buses: BusFixture, tool: Tool) -> None:
+    reactions = {
+        "reflex": Durations(bounds=(0.001, 0.01), counts=(98, 1, 1), worst=0.5),
+        "judged_stop": Durations(bounds=(0.001, 0.01), counts=(0, 0, 0), worst=0.0),
+    }
+
+    def measured() -> Health:
+        return msgspec.structs.replace(health("bridge"), reactions=reactions)
+
+    pretend(buses, "bridge", {keys.HEALTH: measured}, service="bridge")
+    line = "reflex measured 100 times, in ms: p50 1.00, p99 10.00, worst 500.00"
+    assert tool("health", "--text").out.splitlines()[-1] == f"bridge of robot {buses.robot}: {line}"
+    (found,) = [line for line in tool("health").lines if line["service"] == "bridge"]
+    assert found["reactions"] == {
+        "reflex": {"count": 100, "p50": 0.001, "p99": 0.01, "worst": 0.5},
+        "judged_stop": {"count": 0, "p50": None, "p99": None, "worst": None},
+    }
 
 
 def test_health_of_another_service_is_refused(buses: BusFixture, tool: Tool) -> None:

@@ -6,10 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.bus.bus import Bus
 from common.bus.publisher import BOOT_ID, host_id
-from common.messages import Bumper
-from verification.harness.bus import at
 
 
 @pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")
@@ -33,12 +30,3 @@ def test_without_a_name_it_is_unknown(tmp_path: Path, text: str | None) -> None:
     if text is not None:
         file.write_text(text, encoding="ascii")
     assert host_id(file) == 0
-
-
-def test_only_a_known_host_shares_its_clock() -> None:
-    bus = Bus(at(), "001", lambda _: None)
-    bus.host = 5
-    assert bus.shares_clock(Bumper(pressed=True, host=5))
-    assert not bus.shares_clock(Bumper(pressed=True, host=6))
-    bus.host = 0
-    assert not bus.shares_clock(Bumper(pressed=True, host=0))

@@ -79,13 +79,8 @@ def event(name: str, level: m.Level, text: str) -> m.Event:
 
 
 def health(second: int) -> m.Health:
-    """Return the bridge's health: one more reaction each second, each of at most 2 ms."""
+    """Return the bridge's health."""
     return m.Health(
         boot=2, service="bridge", version="0.1.0", uptime=float(second), rates={}, counters={},
         lateness=0.0, rss=0,
-        timing=m.Timing(
-            bounds=(0.001, 0.002),
-            durations={"request_to_frame": m.Durations(counts=(0, second, 0), worst=0.0015)},
-            not_counted={},
-        ),
     )  # fmt: skip

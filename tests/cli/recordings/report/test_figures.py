@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from cli.recordings.report import figures
+from cli.recordings.report.streams import Stream
 from cli.recordings.report.timeline import Timeline
-from cli.recordings.report.timing import Stream
 from common.messages import Drive, Limits, SafetyState
 from tests.cli.recordings.report import drive_fixture
 from tests.cli.recordings.report.drive_fixture import BEGIN_NS, drive

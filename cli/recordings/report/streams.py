@@ -1,24 +1,16 @@
-"""Timing statistics of a recording: regularity of streams, reaction times of the bridge. Pure.
-
-The bridge publishes histograms since its start, so the counts before the recording are subtracted.
-The worst value belongs to the recording only if it rose meanwhile. Otherwise the bound of the
-slowest bucket replaces it.
-"""
+"""Regularity of the streams of a recording: rates, gaps and losses. Pure."""
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 from cli.inspect.addressing import topic_of
-from cli.inspect.stream_stats import quantile as sample_quantile
+from cli.inspect.stream_stats import quantile
 from common import keys
-from common.messages import Drive, Durations, Health, Message, Timing
-from services.bridge.timing import quantile
+from common.messages import Drive, Message
 
 MISSED = 3.0  # a gap is longer than this many periods
-EMPTY = Timing(bounds=(), durations={}, not_counted={})
 
 
 @dataclass(slots=True)
@@ -96,7 +88,7 @@ class Stream:
 
     def interval_s(self, share: float) -> float | None:
         """Return a quantile of the interval between samples, silences left out."""
-        return sample_quantile(sorted(self._intervals), share)
+        return quantile(sorted(self._intervals), share)
 
     @property
     def _intervals(self) -> list[float]:
@@ -114,48 +106,3 @@ class Stream:
 def _is_neutral(message: Message) -> bool:
     """Return whether it is a request of zero: with it a source ends, and may be silent after it."""
     return isinstance(message, Drive) and message.linear == 0 == message.angular
-
-
-@dataclass(frozen=True, slots=True)
-class Reaction:
-    """A reaction or one of its hops; durations in s, None if nothing was measured."""
-
-    name: str
-    count: int
-    p50: float | None
-    p99: float | None
-    worst: float | None
-
-
-def reactions(processes: Iterable[tuple[Health, Health]]) -> list[Reaction]:
-    """Return the sum over all bridge processes, from the first and last health of each."""
-    bounds: tuple[float, ...] = ()
-    sums: dict[str, Counter[int]] = {}
-    worst: dict[str, float] = {}
-    for first, last in processes:
-        early, late = first.timing or EMPTY, last.timing or EMPTY
-        bounds = late.bounds or bounds
-        for name, each in late.durations.items():
-            before = early.durations.get(name)
-            counts = sums.setdefault(name, Counter())
-            counts.update(dict(enumerate(each.counts)))
-            counts.subtract(dict(enumerate(before.counts if before else ())))
-            if before is None or each.worst > before.worst:
-                worst[name] = max(worst.get(name, 0.0), each.worst)
-    return [_reaction(name, bounds, counts, worst.get(name)) for name, counts in sums.items()]
-
-
-def _reaction(
-    name: str, bounds: tuple[float, ...], counts: Counter[int], worst: float | None
-) -> Reaction:
-    total = sum(counts.values())
-    if not total:
-        return Reaction(name, 0, None, None, None)
-    slowest = max(bucket for bucket, count in counts.items() if count)
-    bound = bounds[slowest] if slowest < len(bounds) else bounds[-1]
-    durations = Durations(
-        counts=tuple(counts[bucket] for bucket in range(len(bounds) + 1)),
-        worst=worst if worst is not None else bound,
-    )
-    p50, p99 = (quantile(bounds, durations, share) for share in (0.5, 0.99))
-    return Reaction(name, total, p50, p99, durations.worst)

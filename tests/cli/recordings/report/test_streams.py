@@ -1,10 +1,9 @@
-"""Regularity of streams, and reaction times of the bridge."""
+"""Regularity of streams."""
 
-import msgspec
 import pytest
 
-from cli.recordings.report.timing import Stream, reactions
-from common.messages import Drive, Durations, EstopKeepalive, Health, Timing, Velocity
+from cli.recordings.report.streams import Stream
+from common.messages import Drive, EstopKeepalive, Velocity
 
 
 def test_stream_rate_gaps_losses_and_restarts() -> None:
@@ -35,47 +34,6 @@ def test_an_unknown_key_is_only_counted() -> None:
     stream.add(9.0, None)
     assert stream.gaps == []
     assert stream.hz == pytest.approx(1 / 9)
-
-
-def timed(counts: tuple[int, ...], worst: float) -> Health:
-    """Return a health message of a bridge with this histogram of one reaction."""
-    durations = {"contact_to_break": Durations(counts=counts, worst=worst)}
-    return Health(
-        service="bridge", version="", uptime=0.0, rates={}, counters={}, lateness=0.0, rss=0,
-        timing=Timing(bounds=(0.001, 0.002), durations=durations, not_counted={}),
-    )  # fmt: skip
-
-
-def test_reactions_before_the_recording_are_subtracted() -> None:
-    (one,) = reactions([(timed((5, 0, 3), 0.5), timed((15, 1, 3), 0.5))])
-    assert (one.count, one.p50, one.p99) == (11, 0.001, 0.002)
-    assert one.worst == 0.002, "the worst was earlier; the bound of the slowest bucket replaces it"
-
-
-def test_a_risen_worst_counts_and_processes_add_up() -> None:
-    (one,) = reactions(
-        [(timed((1, 0, 0), 0.001), timed((1, 0, 1), 0.7)), (timed((0, 0, 0), 0.0),) * 2]
-    )
-    assert (one.count, one.worst) == (1, 0.7)
-
-
-def test_a_new_reaction_counts_in_full() -> None:
-    before = timed((), 0.0)
-    assert before.timing is not None
-    nothing = msgspec.structs.replace(
-        before, timing=msgspec.structs.replace(before.timing, durations={})
-    )
-    (one,) = reactions([(nothing, timed((2, 1, 0), 0.0015))])
-    assert (one.count, one.worst) == (3, 0.0015)
-
-
-def test_no_reactions_no_durations() -> None:
-    (one,) = reactions([(timed((1, 0, 0), 0.1), timed((1, 0, 0), 0.1))])
-    assert (one.count, one.p50, one.p99, one.worst) == (0, None, None, None)
-    silent = Health(
-        service="bridge", version="", uptime=0.0, rates={}, counters={}, lateness=0.0, rss=0
-    )
-    assert reactions([(silent, silent)]) == []
 
 
 def test_a_source_that_requested_nothing_lost_nothing() -> None:
