@@ -28,7 +28,7 @@ from services.bridge.core import Core
 from services.bridge.motion_output import MotionOutput
 from services.bridge.operator import Operator
 from services.odom.config import OdomConfig
-from services.odom.estimator import Estimator
+from services.odom.core.estimator import Estimator
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
 from services.safety.policy import Policy

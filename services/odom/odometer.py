@@ -1,6 +1,6 @@
 """Odometry on the bus: counters and velocities in, pose and twist out.
 
-Each counter sample is followed by an estimate. While counters are missing, each velocity is.
+An estimate follows each counter sample, or each velocity while counters are missing.
 Zenoh sends nothing to the router without a subscriber.
 """
 
@@ -15,8 +15,8 @@ from common.freshness import NS_PER_S
 from common.operator import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
-from services.odom.estimator import REFUSALS, RESTARTS, Estimator, Outcome
-from services.odom.pose import Pose, Trajectory
+from services.odom.core.estimator import Estimator
+from services.odom.core.pose import Pose, Trajectory
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.25  # between two checks for that
@@ -48,22 +48,25 @@ class Odometer:
         node.loop.every(CHECK_S, self._check_silence)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
-        now_ns = arrival.received_ns
-        self._note(self._estimator.on_velocity(arrival.message, now_ns))
+        velocity, now_ns = arrival.message, arrival.received_ns
+        if self._is_finite(velocity.linear, velocity.angular):
+            self._estimator.on_velocity(velocity, now_ns)
         if now_ns - self._counted_ns > NO_COUNTERS_NS:
             self._estimate()
 
     def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
-        self._counted_ns = arrival.received_ns
-        self._note(self._estimator.on_mileage(arrival.message, arrival.received_ns))
+        mileage, self._counted_ns = arrival.message, arrival.received_ns
+        is_finite = self._is_finite(mileage.distance, mileage.heading)
+        if is_finite and self._estimator.on_mileage(mileage, arrival.received_ns):
+            text = "the counters restarted: the pose is kept"
+            self._node.event("reanchored", "warning", text)
         self._estimate()
 
-    def _note(self, outcome: Outcome) -> None:
-        if outcome in REFUSALS:
-            self._node.counters[f"refused_{outcome}"] += 1
-        elif outcome in RESTARTS:
-            text = f"{outcome}: the pose is kept, counting restarts here"
-            self._node.event("reanchored", "warning", text)
+    def _is_finite(self, *values: float) -> bool:
+        """Return whether a sample is finite; count it if not."""
+        if not finite(*values):
+            self._node.counters["refused_not_finite"] += 1
+        return finite(*values)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
@@ -93,26 +96,22 @@ class Odometer:
         self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
         if self._silent:
             self._silent = False
-            self._node.event("heard", "info", "counters and velocities are received")
+            self._node.event("heard", "info", "velocities are received")
         self._report_slip(odometry)
 
     def _check_silence(self, now_ns: int) -> None:
         if self._silent or now_ns - self._estimated_ns < SILENT_NS:
             return
         self._silent = True
-        self._node.event(
-            "silent", "warning", "no counters, no velocities: no odometry is published"
-        )
+        self._node.event("silent", "warning", "no velocities: no odometry is published")
 
     def _report_slip(self, odometry: m.Odometry) -> None:
-        if odometry.slip == self._slip:
-            return
-        self._slip = odometry.slip
-        if odometry.slip:
+        if odometry.slip and not self._slip:
             text = "counters and velocities disagree: wheels slip, or a unit is wrong"
             self._node.event("slip", "warning", text, residual=odometry.residual)
-        else:
+        elif self._slip and not odometry.slip:
             self._node.event("slip_over", "info", "counters and velocities agree again")
+        self._slip = odometry.slip
 
     def _trajectory_json(self) -> bytes:
         return msgspec.json.encode(

@@ -1,7 +1,6 @@
 """A board that drives a known path, and an estimator that receives part of its samples."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pytest
@@ -10,9 +9,8 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Odometry, Velocity
 from services.odom.config import Odom
-from services.odom.estimator import Estimator, Outcome
-from services.odom.pose import Pose
-from services.odom.standstill import DISTANCE_WRAP_M
+from services.odom.core.estimator import Estimator
+from services.odom.core.pose import Pose
 
 TICK_NS = NS_PER_S // 50
 EXACT = pytest.approx((0.0, 0.0), abs=1e-6)
@@ -33,7 +31,6 @@ class Board:
     angular: float = 0.0
     epoch: int = 0
     boot: int = 1
-    seq: int = 0
     coarse: bool = False  # count in steps of 1 mm and 0.1 deg
     now_ns: int = NS_PER_S
 
@@ -49,18 +46,14 @@ class Board:
             self.truth = self.truth.moved(distance, turn)
 
     def mileage(self) -> Mileage:
-        self.seq += 1
-        distance = math.remainder(self.distance, DISTANCE_WRAP_M)
-        heading = math.remainder(self.heading, math.tau)
+        distance, heading = self.distance, math.remainder(self.heading, math.tau)
         if self.coarse:
             distance = round(distance, 3)
             heading = math.radians(round(math.degrees(heading), 1))
-        return Mileage(
-            distance=distance, heading=heading, epoch=self.epoch, boot=self.boot, seq=self.seq
-        )
+        return Mileage(distance=distance, heading=heading, epoch=self.epoch, boot=self.boot)
 
     def velocity(self) -> Velocity:
-        return Velocity(linear=self.linear, angular=self.angular, boot=self.boot)
+        return Velocity(linear=self.linear, angular=self.angular)
 
 
 class OdomFixture:
@@ -70,14 +63,12 @@ class OdomFixture:
         self.board = board
         self.estimator = Estimator(settings or Odom())
 
-    def update(self, *, counters: bool = True, velocity: bool = True) -> Outcome | None:
+    def update(self, *, counters: bool = True, velocity: bool = True) -> bool:
         """Take the samples of the board in the order in which the bridge publishes them."""
-        outcome = None
-        if counters:
-            outcome = self.estimator.on_mileage(self.board.mileage(), self.board.now_ns)
+        restarted = counters and self.estimator.on_mileage(self.board.mileage(), self.board.now_ns)
         if velocity:
             self.estimator.on_velocity(self.board.velocity(), self.board.now_ns)
-        return outcome
+        return restarted
 
     def drive(self, ticks: int, *, counters: bool = True, velocity: bool = True) -> None:
         for _ in range(ticks):
@@ -90,15 +81,12 @@ class OdomFixture:
         return odometry
 
     def pose(self) -> Pose:
-        return pose_of(self.odometry())
+        odometry = self.odometry()
+        return Pose(odometry.x, odometry.y, odometry.heading)
 
     def off(self) -> tuple[float, float]:
         """Return how far (m, rad) the estimate is from the truth."""
         return apart(self.pose(), self.board.truth)
-
-
-def pose_of(odometry: Odometry) -> Pose:
-    return Pose(odometry.x, odometry.y, odometry.heading)
 
 
 def apart(a: Pose, b: Pose) -> tuple[float, float]:
@@ -107,22 +95,15 @@ def apart(a: Pose, b: Pose) -> tuple[float, float]:
     return math.hypot(a.x - b.x, a.y - b.y), turned
 
 
-def minors(rows: Sequence[float]) -> list[float]:
-    """Return all principal minors of a 3x3 matrix: none is negative if it is semidefinite."""
-    a, b, c, _, d, e, _, _, f = rows
-    whole = a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)
-    return [a, d, f, a * d - b * b, a * f - c * c, d * f - e * e, whole]
-
-
 def started(**board: float) -> OdomFixture:
-    """Return an estimator after its first counter sample."""
+    """Return an estimator after its first samples."""
     odom = OdomFixture(Board(**board))  # type: ignore[arg-type]
     odom.update()
     return odom
 
 
 def driving() -> OdomFixture:
-    """Return a odom beside a board that has driven a while."""
+    """Return an estimator beside a board that has driven a while."""
     odom = started(distance=70.0, heading=2.0)
     odom.board.linear, odom.board.angular = 0.8, 0.3
     odom.drive(100)

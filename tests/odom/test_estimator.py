@@ -1,26 +1,35 @@
-"""The estimate against the truth: arcs, gaps and wraps."""
+"""The estimate against the truth: arcs, lost samples, restarts, poses that are set, slip."""
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from common.messages import Velocity
-from services.odom.estimator import SEGMENTS_MAX
-from services.odom.pose import Pose
-from services.odom.standstill import DISTANCE_WRAP_M
+from services.odom.config import Odom
+from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
+from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
+from services.odom.core.pose import ArcSegment, Pose, PoseEstimate
 from tests.odom.odom_fixture import (
     EXACT,
     TICK_NS,
+    Board,
+    OdomFixture,
     apart,
+    driving,
     parts,
     speeds,
     started,
     turnings,
 )
 
-# --- arcs -----------------------------------------------------------------------------------
+Parts = list[tuple[float, float, list[tuple[bool, bool]]]]
+
+# --- arcs and lost samples ------------------------------------------------------------------
 
 
 @given(speeds, turnings, st.integers(1, 60))
@@ -28,8 +37,7 @@ def test_an_arc_is_exact_by_counters_alone(linear: float, angular: float, ticks:
     odom = started()
     odom.board.linear, odom.board.angular = linear, angular
     odom.drive(ticks, velocity=False)
-    lead = odom.estimator._predicted.pose
-    assert apart(lead, odom.board.truth) == EXACT
+    assert apart(odom.estimator._predicted.pose, odom.board.truth) == EXACT
 
 
 @given(speeds, turnings, st.integers(1, 4))
@@ -39,21 +47,12 @@ def test_velocities_carry_the_pose_to_now(linear: float, angular: float, ticks: 
     odom.update(counters=False)
     odom.board.tick(ticks)
     assert odom.off() == EXACT
-
-
-def test_asking_does_not_change_the_answer() -> None:
-    odom = started()
-    odom.board.linear = 1.0
-    odom.drive(3)
     assert odom.odometry(10_000_000) == odom.odometry(10_000_000)
-
-
-# --- gaps -----------------------------------------------------------------------------------
 
 
 @given(parts, st.booleans())
 def test_after_lost_frames_distance_and_heading_are_those_of_the_counters(
-    way: list[tuple[float, float, list[tuple[bool, bool]]]], coarse: bool
+    way: Parts, coarse: bool
 ) -> None:
     """For any loss, the heading equals the counters' and the distance is at most theirs."""
     odom = started()
@@ -71,27 +70,8 @@ def test_after_lost_frames_distance_and_heading_are_those_of_the_counters(
     assert math.hypot(pose.x, pose.y) <= fastest * TICK_NS / NS_PER_S + 0.001 * (len(way) + 1)
 
 
-@given(st.lists(st.tuples(speeds, turnings, st.booleans()), max_size=40))
-def test_counters_alone_make_arcs_of_what_was_not_lost(
-    way: list[tuple[float, float, bool]],
-) -> None:
-    odom = started()
-    expected, distance, turn = Pose(0.0, 0.0, 0.0), 0.0, 0.0
-    for linear, angular, received in way:
-        odom.board.linear, odom.board.angular = linear, angular
-        odom.board.tick()
-        distance += linear * TICK_NS / NS_PER_S
-        turn += angular * TICK_NS / NS_PER_S
-        if received:
-            odom.update(velocity=False)
-            expected, distance, turn = expected.moved(distance, turn), 0.0, 0.0
-    assert apart(odom.estimator._predicted.pose, expected) == EXACT
-
-
 @given(parts)
-def test_lost_counters_leave_no_error_while_velocities_come(
-    way: list[tuple[float, float, list[tuple[bool, bool]]]],
-) -> None:
+def test_lost_counters_leave_no_error_while_velocities_come(way: Parts) -> None:
     """A gap in the counters costs nothing: the velocities know the shape of the way."""
     odom = started()
     for linear, angular, received in way:
@@ -122,7 +102,7 @@ def test_any_loss_on_a_constant_arc_leaves_no_error(
 def test_wrong_velocities_do_not_stay(
     linear: float, angular: float, wrong_linear: float, wrong_angular: float
 ) -> None:
-    """Velocities that are off by a constant are taken back by the counters, every one of them."""
+    """The counters take back velocities that are off by a constant."""
     odom = started()
     board = odom.board
     board.linear, board.angular = linear, angular
@@ -137,7 +117,7 @@ def test_wrong_velocities_do_not_stay(
     assert apart(odom.estimator._predicted.pose, board.truth) == EXACT
 
 
-def test_counters_in_their_own_steps_stay_within_them() -> None:
+def test_coarse_counters_stay_within_their_steps() -> None:
     odom = started()
     odom.board.coarse = True
     odom.board.linear, odom.board.angular = 0.7, 0.4
@@ -149,7 +129,7 @@ def test_counters_in_their_own_steps_stay_within_them() -> None:
 
 def test_a_long_gap_of_the_counters_is_bounded_and_exact() -> None:
     odom = started()
-    odom.board.linear, odom.board.angular = 1.0, 0.8
+    odom.board.linear, odom.board.angular = 1.0, 0.8  # more than half a turn
     odom.update(counters=False)
     odom.drive(SEGMENTS_MAX, counters=False)
     assert len(odom.estimator._segments) == SEGMENTS_MAX == 512
@@ -160,30 +140,247 @@ def test_a_long_gap_of_the_counters_is_bounded_and_exact() -> None:
     assert odom.off() == EXACT
 
 
-# --- wraps ----------------------------------------------------------------------------------
-
-
 @given(st.sampled_from([1.0, -1.0]), st.floats(0.0, 2 * math.pi))
-def test_heading_wraps_either_way(direction: float, offset: float) -> None:
+def test_the_heading_wraps_either_way(direction: float, offset: float) -> None:
     odom = started(heading=offset)
     odom.board.linear, odom.board.angular = 0.5, 4.0 * direction
     odom.drive(100)  # 8 rad
     assert odom.off() == EXACT
 
 
-@given(st.sampled_from([1.0, -1.0]), st.floats(0.0, 1.0))
-def test_distance_wraps_either_way(direction: float, short_of: float) -> None:
-    odom = started(distance=direction * (DISTANCE_WRAP_M / 2 - short_of))
-    odom.board.linear = direction
-    odom.drive(100)
+# --- published ------------------------------------------------------------------------------
+
+
+def test_a_velocity_is_valid_for_its_hold() -> None:
+    assert Estimator(Odom()).estimate(NS_PER_S) is None
+    odom = driving()
+    hold_ns = round(Odom().hold * NS_PER_S)
+    odometry = odom.odometry(hold_ns)
+    assert (odometry.linear, odometry.angular) == (0.8, 0.3)
+    assert odometry.twist_covariance == (0.02**2, 0.0, 0.0, 0.02**2)
+    assert odom.estimator.estimate(odom.board.now_ns + hold_ns + 1) is None
+
+
+def test_a_sample_from_before_the_last_one_does_not_move_time_back() -> None:
+    odom = driving()
+    odom.estimator.on_velocity(odom.board.velocity(), odom.board.now_ns - TICK_NS)
     assert odom.off() == EXACT
 
 
-def test_more_than_half_a_turn_in_a_gap_is_told_by_the_velocities() -> None:
+def minors(rows: Sequence[float]) -> list[float]:
+    """Return all principal minors of a 3x3 matrix: none is negative if it is semidefinite."""
+    a, b, c, _, d, e, _, _, f = rows
+    return [a, d, f, a * d - b * b, a * f - c * c, d * f - e * e,
+            float(np.linalg.det(np.reshape(rows, (3, 3))))]  # fmt: skip
+
+
+@given(parts)
+def test_covariance_is_symmetric_and_semidefinite(way: Parts) -> None:
     odom = started()
-    odom.board.linear, odom.board.angular = 0.5, 1.0
+    for linear, angular, received in way:
+        odom.board.linear, odom.board.angular = linear, angular
+        for counters, velocity in received:
+            odom.board.tick(2)
+            odom.update(counters=counters, velocity=velocity)
+    odom.update()
+    rows = odom.odometry().pose_covariance
+    assert (rows[1], rows[2], rows[5]) == (rows[3], rows[6], rows[7])
+    assert min(minors(rows)) >= -1e-12
+
+
+def test_covariance_grows_by_way_and_gap_whatever_the_rate() -> None:
+    often, rarely, gap = driving(), driving(), driving()
+    often.drive(100)
+    for _ in range(50):
+        rarely.board.tick(2)
+        rarely.update()
+    gap.board.tick(100)
+    gap.update()
+    before = driving().odometry().pose_covariance[0]
+    areas = [odom.odometry().pose_covariance[0] for odom in (often, rarely, gap)]
+    assert before < areas[0] == pytest.approx(areas[1], rel=0.01)
+    assert areas[2] > 2 * areas[0]
+
+
+def test_covariance_grows_in_a_gap_until_the_counters_end_it() -> None:
+    odom = started()
+    before = odom.odometry().pose_covariance
+    odom.board.tick(100)
     odom.update(counters=False)
-    odom.drive(250, counters=False)  # 5 rad
+    during = odom.odometry().pose_covariance
     odom.board.tick()
     odom.update()
+    after = odom.odometry().pose_covariance
+    for at in (0, 4, 8):
+        assert during[at] > before[at]
+        assert after[at] == pytest.approx(before[at])
+
+
+def test_time_before_and_after_a_valid_velocity_is_unseen() -> None:
+    estimator, noise = Estimator(Odom()), NoiseModel(Odom())
+    start = PoseEstimate(Pose(0.0, 0.0, 0.0), START)
+    assert (START.xx, START.yy, START.hh) == (1e-6, 1e-6, COUNTER_STEP_RAD**2)
+    assert COUNTER_STEP_M == 0.001
+    estimator.on_mileage(Board().mileage(), NS_PER_S)
+    estimator.on_velocity(Velocity(linear=0.5, angular=0.3), 2 * NS_PER_S)
+    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), 3 * NS_PER_S)
+    for segment in (
+        ArcSegment(0.0, 0.0, 1.0, seen=False),
+        ArcSegment(0.05, 0.03, 0.1, seen=True),
+        ArcSegment(0.0, 0.0, 0.9, seen=False),
+    ):
+        start = start.moved(segment.distance, segment.turn, noise.extrapolated(segment))
+    assert estimator._predicted == start
+    assert [segment.seen for segment in estimator._segments] == [False, True, False]
+
+
+# --- restarts, and a pose that is set -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"distance": 0.0, "heading": 0.0, "epoch": 1},  # the board
+        {"boot": 2, "epoch": 0},  # the bridge
+        {"distance": 0.0, "heading": 0.0, "boot": 2},  # both
+    ],
+)
+@pytest.mark.parametrize("pause", [0, 3, 300])
+def test_a_restart_does_not_move_the_pose(changes: dict[str, float], pause: int) -> None:
+    odom = driving()
+    for name, value in changes.items():
+        setattr(odom.board, name, value)
+    odom.board.now_ns += pause * TICK_NS
+    before = odom.estimator._predicted.pose
+    assert odom.update(velocity=False) is True
+    held_s = min(pause * TICK_NS / NS_PER_S, Odom().hold)
+    held = before.moved(0.8 * held_s, 0.3 * held_s)
+    assert apart(odom.estimator._corrected.pose, held) == EXACT
+    odom.board.truth = held
+    odom.update(counters=False)
+    odom.board.tick()
+    assert odom.update() is False
+    odom.drive(100)
     assert odom.off() == EXACT
+    assert odom.odometry().epoch == 0
+
+
+def test_the_start_is_zero_whatever_the_counters_show() -> None:
+    odom = OdomFixture(Board(distance=123.0, heading=-3.0))
+    assert odom.update() is False
+    assert odom.pose() == Pose(0.0, 0.0, 0.0)
+
+
+def test_covariance_grows_over_a_restart() -> None:
+    odom, other = driving(), driving()
+    odom.board.epoch = 1
+    for each in (odom, other):
+        each.board.now_ns += NS_PER_S
+        each.update()
+    assert odom.odometry().pose_covariance[8] > other.odometry().pose_covariance[8]
+
+
+poses = st.builds(Pose, st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9))
+
+
+@given(speeds, turnings, st.integers(0, 3), poses)
+def test_a_pose_set_while_driving_is_followed_exactly(
+    linear: float, angular: float, ticks: int, pose: Pose
+) -> None:
+    odom = started()
+    odom.board.linear, odom.board.angular = linear, angular
+    odom.drive(20)
+    odom.board.tick(ticks)
+    odom.estimator.place(pose, odom.board.now_ns)
+    odom.board.truth = pose
+    assert odom.off() == EXACT
+    assert odom.odometry().pose_covariance == START.rows()
+    assert abs(odom.pose().heading) <= math.pi
+    assert odom.update() is False
+    odom.drive(20)
+    assert odom.off() == EXACT
+    assert odom.odometry().epoch == 1
+
+
+def test_a_pose_can_be_set_before_any_sample() -> None:
+    odom = OdomFixture(Board())
+    odom.estimator.place(Pose(1.0, 2.0, 0.5), odom.board.now_ns)
+    odom.update()
+    assert odom.pose() == Pose(1.0, 2.0, 0.5)
+    odom.estimator.place(Pose(0.0, 0.0, 0.0), odom.board.now_ns)
+    assert odom.odometry().epoch == 2
+
+
+# --- slip -----------------------------------------------------------------------------------
+
+
+def arc(distance: float, turn: float = 0.0, *, seen: bool = True) -> ArcSegment:
+    return ArcSegment(distance, turn, 0.02, seen)
+
+
+def compared(ticks: int, counted: ArcSegment, integrated: ArcSegment) -> SlipDetector:
+    """Return a detector of so many samples."""
+    detector = SlipDetector(Odom(slip_distance=0.1, slip_turn=0.2))
+    for tick in range(1, ticks + 1):
+        detector.add(tick * TICK_NS, counted, integrated)
+    detector.update(ticks * TICK_NS)
+    return detector
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("counted", "turned", "slip"),
+    [(0.011, 0.0, True), (0.009, 0.0, False), (0.0, 0.021, True), (0.0, 0.019, False)],
+)
+def test_slip_by_distance_or_by_turn(sign: int, counted: float, turned: float, slip: bool) -> None:
+    detector = compared(10, arc(0.5 + sign * counted, sign * turned), arc(0.5))
+    assert detector.slip is slip
+    assert detector.residual == pytest.approx(10 * sign * counted)
+
+
+def test_the_limits_of_slip_are_exclusive() -> None:
+    detector = SlipDetector(Odom(slip_distance=0.125, slip_turn=0.25))
+    detector.add(0, arc(0.125, 0.25), arc(0.0))
+    detector.update(0)
+    assert not detector.slip
+
+
+def test_only_the_last_second_is_compared() -> None:
+    detector = compared(500, arc(0.02), arc(0.019))
+    assert detector.residual == pytest.approx(0.051)
+    detector.update(502 * TICK_NS + NS_PER_S)
+    assert detector.residual is None
+
+
+def test_slip_falls_at_half_of_its_limit() -> None:
+    detector, slips = SlipDetector(Odom(slip_distance=0.125)), []
+    for tick in range(1, 10):
+        detector.add(tick * TICK_NS, arc(1 / 64), arc(0.0))
+    for samples_left in (9, 5, 4):
+        detector.update((10 - samples_left) * TICK_NS + NS_PER_S)
+        slips.append(detector.slip)
+    assert slips == [True, True, False]
+    assert detector.residual == 1 / 16
+
+
+def test_a_motion_without_velocities_and_the_next_one_are_not_compared() -> None:
+    """After a stall of the counters, the next sample covers the gap."""
+    detector = compared(10, arc(0.02), arc(0.0, seen=False))
+    assert (detector.residual, detector.slip) == (None, False)
+    detector.add(11 * TICK_NS, arc(0.5), arc(0.01))
+    detector.add(12 * TICK_NS, arc(0.02), arc(0.01))
+    detector.update(12 * TICK_NS)
+    assert detector.residual == pytest.approx(0.01)
+
+
+def test_wheels_that_turn_without_counts_slip() -> None:
+    odom = driving()
+    assert odom.odometry().slip is False
+    odom.board.linear = 0.0
+    for _ in range(20):
+        odom.board.tick()
+        odom.update(velocity=False)
+        odom.estimator.on_velocity(Velocity(linear=1.0, angular=0.0), odom.board.now_ns)
+    odometry = odom.odometry()
+    assert odometry.slip is True
+    assert odometry.residual == pytest.approx(-0.4, abs=0.03)

@@ -1,28 +1,169 @@
-"""Odometry as a process of its own, behind a real router, beside a bridge that is played here."""
+"""Odometry on the bus: samples, calls and events on a fake bus, then the process on a real one."""
 
 import json
-import signal
+import math
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import zenoh
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config
+from common.config import Loaded
+from common.freshness import NS_PER_S
 from common.loop import Loop
+from common.service import Node
+from services.odom.config import OdomConfig
+from services.odom.odometer import Odometer
 from tests.factories import safety_state
+from tests.fake_bus import FakeBus
 from verification.harness.bus import at, bus_on, running
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 SPEED, TURNING = 0.5, 0.25
 PERIOD_S = 0.02
+BAD = float("nan")
+
+
+class FakeNode(Node[OdomConfig]):
+    """A node on a ``FakeBus``; its loop does not run."""
+
+    def __init__(self) -> None:
+        self.events: list[str] = []
+        super().__init__("odom", Loaded(OdomConfig(), {}))
+
+    def open_bus(self) -> FakeBus:
+        """Return the fake."""
+        self.fake = FakeBus()
+        return self.fake
+
+    def event(self, name: str, *args: Any, **about: Any) -> None:
+        """Record the event."""
+        self.events.append(name)
+
+
+class Odometry:
+    """Odometry on a fake bus, with the samples of a vehicle that drives straight on."""
+
+    def __init__(self) -> None:
+        self.node = FakeNode()
+        self.odometer = Odometer(self.node)
+        self.now_ns = 100 * NS_PER_S
+        self.distance = 100.0
+
+    def samples(self, *, counters: bool = True, slip: float = 0.0, **mileage: Any) -> None:
+        """Deliver the samples of one period."""
+        self.now_ns += NS_PER_S // 50
+        self.distance += SPEED / 50
+        velocity = m.Velocity(linear=SPEED + slip, angular=0.0)
+        self.node.fake.deliver(keys.VELOCITY, velocity, self.now_ns)
+        if counters:
+            usual: dict[str, Any] = {"distance": self.distance, "heading": 0.0, "epoch": 0}
+            self.node.fake.deliver(keys.MILEAGE, m.Mileage(**usual | mileage), self.now_ns)
+
+    @property
+    def published(self) -> tuple[int, m.Odometry | None]:
+        """The number of messages, and the last one."""
+        publisher = next(p for p in self.node.bus.publishers if p.topic is keys.ODOMETRY)
+        return publisher.next_seq - 1, publisher.last
+
+    def set_pose(self, **request: Any) -> str:
+        """Set the pose; return what was replied, or the refusal."""
+        answers: list[str] = []
+        caller: Any = SimpleNamespace(
+            refuse=answers.append, reply=lambda done: answers.append(done.text)
+        )
+        self.odometer._on_set_pose(m.PoseRequest(**request), caller)
+        return answers[0]
+
+
+@pytest.fixture
+def odometry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Odometry]:
+    odometry = Odometry()
+    monkeypatch.setattr(clock, "now_ns", lambda: odometry.now_ns)
+    yield odometry
+    odometry.node.loop.close()
+
+
+def test_an_estimate_follows_each_counter_sample_or_each_velocity_without(
+    odometry: Odometry,
+) -> None:
+    for _ in range(5):
+        odometry.samples()
+    count, _ = odometry.published
+    assert count == 6  # the first velocity has no counters yet
+    for _ in range(10):
+        odometry.samples(counters=False)
+    count, last = odometry.published
+    assert count == 6 + 5  # from 0.1 s after the last counters on
+    assert last is not None
+    assert last.x == pytest.approx(SPEED / 50 * 14, abs=1e-3)
+
+
+def test_silence_is_reported_once_and_ends(odometry: Odometry) -> None:
+    odometry.odometer._check_silence(odometry.now_ns + 9 * NS_PER_S)
+    odometry.samples()
+    for after_s in (0.4, 0.6, 0.9):
+        odometry.odometer._check_silence(odometry.now_ns + round(after_s * NS_PER_S))
+    odometry.samples()
+    assert odometry.node.events == ["heard", "silent", "heard"]
+
+
+def test_a_restart_and_slip_are_reported(odometry: Odometry) -> None:
+    for _ in range(3):
+        odometry.samples()
+    odometry.samples(epoch=1, distance=0.0)
+    assert odometry.node.events == ["heard", "reanchored"]
+    odometry.distance = 0.0
+    for slip in [3.0] * 10 + [0.0] * 60:
+        odometry.samples(slip=slip, epoch=1)
+    assert odometry.node.events == ["heard", "reanchored", "slip", "slip_over"]
+
+
+@pytest.mark.parametrize("bad", [BAD, math.inf, -math.inf])
+def test_samples_that_are_not_finite_are_refused(odometry: Odometry, bad: float) -> None:
+    odometry.samples()
+    odometry.samples(distance=bad)
+    odometry.samples(heading=bad)
+    for velocity in (m.Velocity(linear=bad, angular=0.0), m.Velocity(linear=0.0, angular=bad)):
+        odometry.node.fake.deliver(keys.VELOCITY, velocity, odometry.now_ns)
+    assert odometry.node.counters["refused_not_finite"] == 4
+    odometry.samples()
+    _, last = odometry.published
+    assert last is not None
+    assert (last.x, last.linear) == pytest.approx((SPEED / 50 * 3, SPEED), abs=1e-3)
+
+
+def test_a_pose_is_set_by_a_recent_call_with_finite_numbers(odometry: Odometry) -> None:
+    odometry.samples()
+    fresh = {"echo": 7, "x": 10.0, "y": -5.0, "heading": 3.0}
+    assert "unknown heartbeat" in odometry.set_pose(**fresh)
+    odometry.node.fake.deliver(keys.SAFETY, safety_state(heartbeat=7))
+    assert "no echo" in odometry.set_pose(x=10.0)
+    for name in ("x", "y", "heading"):
+        assert "NaN" in odometry.set_pose(**fresh | {name: BAD})
+    assert "x 10.000 m" in odometry.set_pose(**fresh)
+    path = json.loads(odometry.odometer._trajectory_json())
+    assert (path["frame_id"], path["epoch"], path["points"]) == ("odom", 1, [])
+    odometry.samples()
+    assert json.loads(odometry.odometer._trajectory_json())["points"][0][0] < 10.1
+
+
+def test_a_pose_that_was_asked_late_is_refused(odometry: Odometry) -> None:
+    sent_ns = odometry.now_ns - NS_PER_S - NS_PER_S // 10
+    odometry.node.fake.deliver(keys.SAFETY, safety_state(heartbeat=7), sent_ns)
+    assert "allowed is 1 s" in odometry.set_pose(x=10.0, echo=7)
+    assert "pose_set" not in odometry.node.events
+
+
+# --- the process ----------------------------------------------------------------------------
 
 
 class World:
@@ -30,12 +171,6 @@ class World:
 
     def __init__(self) -> None:
         self.received: list[m.Odometry] = []
-        self.events: list[str] = []
-        self.speaking = True
-        self.velocity: m.Velocity = m.Velocity(linear=SPEED, angular=TURNING)
-        self.epoch = 0
-        self.heartbeat = 500  # of the safety service that is played here, too
-        self.origin = 100.0  # where the counters stand at first
         self.ticks = 0
 
     def declare(self, bus: Bus) -> None:
@@ -44,28 +179,16 @@ class World:
         self.to_mileage = bus.publisher(keys.MILEAGE)
         self.to_safety = bus.publisher(keys.SAFETY)
         bus.subscribe(keys.ODOMETRY, self._on_odometry, depth=100)
-        bus.subscribe(keys.EVENTS, self._on_event, depth=100, service="odom")
 
     def _on_odometry(self, arrival: Arrival[m.Odometry]) -> None:
         self.received.append(arrival.message)
 
-    def _on_event(self, arrival: Arrival[m.Event]) -> None:
-        self.events.append(arrival.message.name)
-
     def tick(self, _: int) -> None:
-        self.heartbeat += 1
-        self.to_safety.put(safety_state(heartbeat=self.heartbeat))
-        if not self.speaking:
-            return
         self.ticks += 1
-        self.to_velocity.put(self.velocity)
-        self.to_mileage.put(self.mileage())
-
-    def mileage(self) -> m.Mileage:
         way = self.ticks * PERIOD_S
-        return m.Mileage(
-            distance=self.origin + SPEED * way, heading=TURNING * way, epoch=self.epoch
-        )
+        self.to_safety.put(safety_state(heartbeat=self.ticks))
+        self.to_velocity.put(m.Velocity(linear=SPEED, angular=TURNING))
+        self.to_mileage.put(m.Mileage(distance=100 + SPEED * way, heading=TURNING * way, epoch=0))
 
     def set_pose(self, request: m.PoseRequest) -> str:
         """Set the pose; return what was replied, or the refusal."""
@@ -81,29 +204,6 @@ class World:
         return answers[0]
 
 
-@pytest.fixture
-def service(endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run odometry as a process."""
-    sets = ["--set", f"bus.connect={endpoint}"]
-    with subprocess.Popen([sys.executable, "-m", "services.odom", *sets]) as process:
-        try:
-            yield process
-            process.terminate()
-            process.wait(PATIENCE_S)
-        finally:
-            process.kill()
-
-
-@pytest.fixture
-def world(endpoint: str, service: subprocess.Popen[bytes]) -> Iterator[World]:
-    """Play the bridge while the test lasts."""
-    world, loop = World(), Loop()
-    with running(loop), bus_on(endpoint, loop, world.declare):
-        loop.post(lambda: loop.every(PERIOD_S, world.tick))
-        wait_until(lambda: world.received, "odometry")
-        yield world
-
-
 def trajectory(endpoint: str) -> Any:
     """Return what ``info/odom/path`` answers."""
     with zenoh.open(client_config(at(endpoint))) as session:
@@ -113,73 +213,27 @@ def trajectory(endpoint: str) -> Any:
         return json.loads(reply.ok.payload.to_bytes())
 
 
-def test_the_drive_is_followed(endpoint: str, world: World) -> None:
-    wait_until(lambda: len(world.received) > 50 and world.received[-1].x > 0.5, "half a metre")
-    last = world.received[-1]
-    assert last.y > 0  # it turns to the left
-    assert (last.linear, last.angular) == (SPEED, TURNING)
-    assert (last.frame_id, last.child_frame_id, last.epoch) == ("odom", "base_link", 0)
-    assert world.received[0].x < 0.5  # the counters stand at 100 m
-    path = trajectory(endpoint)
-    assert path["frame_id"] == "odom"
-    assert len(path["points"]) >= 3
-    assert path["points"][0][0] < path["points"][-1][0]
-
-
-def test_a_pose_is_set_and_what_is_no_number_is_refused(endpoint: str, world: World) -> None:
-    bad = float("nan")
-    wait_until(
-        lambda: "NaN" in world.set_pose(m.PoseRequest(x=bad, echo=world.heartbeat)),
-        "a received heartbeat",
-    )
-    pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.heartbeat)
-    assert "x 10.000 m" in world.set_pose(pose)
-    wait_until(lambda: world.received[-1].epoch == 1, "the new pose")
-    first = next(odometry for odometry in world.received if odometry.epoch == 1)
-    assert first.x == pytest.approx(10.0, abs=2.0)
-    assert first.y == pytest.approx(-5.0, abs=2.0)
-    assert all(point[0] > 5 for point in trajectory(endpoint)["points"])
-
-
-def test_a_pose_that_was_asked_late_is_refused(world: World) -> None:
-    bad = float("nan")
-    wait_until(
-        lambda: "NaN" in world.set_pose(m.PoseRequest(x=bad, echo=world.heartbeat)),
-        "a received heartbeat",
-    )
-    late = m.PoseRequest(x=10.0, echo=world.heartbeat)
-    due_s = time.monotonic() + 1.1
-    wait_until(lambda: time.monotonic() > due_s, "a late call")
-    assert "allowed is 1 s" in world.set_pose(late)
-    assert "no echo" in world.set_pose(m.PoseRequest(x=10.0))
-    assert "unknown heartbeat" in world.set_pose(m.PoseRequest(x=10.0, echo=1))
-    assert world.received[-1].epoch == 0
-
-
-def test_silence_is_told_and_nothing_old_is_published_again(world: World) -> None:
-    world.speaking = False
-    wait_until(lambda: "silent" in world.events, "word of the silence")
-    count = len(world.received)
-    quiet_until = time.monotonic() + 0.3
-    wait_until(lambda: time.monotonic() > quiet_until, "a while")
-    assert len(world.received) == count
-    world.speaking = True
-    wait_until(lambda: world.events.count("heard") >= 2, "word of the return")
-    wait_until(lambda: len(world.received) > count, "odometry again")
-
-
-def test_restart_slip_and_refusal_are_told(world: World) -> None:
-    wait_until(lambda: len(world.received) > 25, "odometry that has received the counters, too")
-    world.epoch, world.origin = 1, -50.0
-    wait_until(lambda: "reanchored" in world.events, "word of the restart")
-    assert abs(world.received[-1].x) < 30
-    world.velocity = m.Velocity(linear=-SPEED, angular=TURNING)
-    wait_until(lambda: "slip" in world.events, "word of the slip")
-    wait_until(lambda: any(odometry.slip for odometry in world.received), "odometry that slips")
-    world.velocity = m.Velocity(linear=float("nan"), angular=0.0)
-    wait_until(lambda: "slip_over" in world.events, "the counters alone")
-
-
-def test_it_leaves_when_told(service: subprocess.Popen[bytes], world: World) -> None:
-    service.send_signal(signal.SIGTERM)
-    assert service.wait(PATIENCE_S) == 0
+def test_the_process_follows_the_drive_sets_the_pose_and_ends(endpoint: str) -> None:
+    world, loop = World(), Loop()
+    sets = ["--set", f"bus.connect={endpoint}"]
+    with (
+        subprocess.Popen([sys.executable, "-m", "services.odom", *sets]) as process,
+        running(loop),
+        bus_on(endpoint, loop, world.declare),
+    ):
+        try:
+            loop.post(lambda: loop.every(PERIOD_S, world.tick))
+            wait_until(lambda: world.received and world.received[-1].x > 0.5, "half a metre")
+            last = world.received[-1]
+            assert last.y > 0  # it turns to the left
+            assert (last.linear, last.angular) == (SPEED, TURNING)
+            assert (last.frame_id, last.child_frame_id, last.epoch) == ("odom", "base_link", 0)
+            assert trajectory(endpoint)["points"][0][0] < 0.5  # the counters started at 100 m
+            pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.ticks)
+            assert "x 10.000 m" in world.set_pose(pose)
+            wait_until(lambda: world.received[-1].epoch == 1, "the new pose")
+            assert all(point[0] > 5 for point in trajectory(endpoint)["points"])
+            process.terminate()
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()

@@ -1,91 +1,74 @@
-"""Arcs against closed form, covariance against numeric derivatives."""
+"""Arcs against closed form, covariance against numeric derivatives, fitted segments, trajectory."""
 
 import math
+from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.odom.pose import SMALL_TURN, Covariance, Pose, PoseEstimate, ProcessNoise, chord_ratio
+from services.odom.core.pose import (
+    SMALL_TURN,
+    ArcSegment,
+    Covariance,
+    Pose,
+    PoseEstimate,
+    ProcessNoise,
+    Trajectory,
+    chord_ratio,
+    fitted,
+    halved,
+    total,
+)
+from tests.odom.odom_fixture import apart
 
 distances = st.floats(-3.0, 3.0)
 turns = st.floats(-6.0, 6.0)
 headings = st.floats(-math.pi, math.pi)
 variances = st.floats(0.0, 0.5)
+segments = st.builds(
+    ArcSegment, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.001, 0.2), st.booleans()
+)
+ways = st.lists(segments, max_size=8)
 
-ORIGIN = Pose(0.0, 0.0, 0.0)
 CERTAIN = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-Matrix = list[list[float]]
+CLOSE = pytest.approx((0.0, 0.0), abs=1e-9)
+QUARTER = math.pi / 2
 
 
-def near(x: float, y: float, heading: float) -> "Near":
-    """Return what equals such a pose."""
-    return Near(Pose(x, y, heading))
-
-
-class Near:
-    """Equals a pose up to rounding, headings as directions."""
-
-    def __init__(self, pose: Pose, tolerance: float = 1e-9) -> None:
-        self.pose = pose
-        self.tolerance = tolerance
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Pose):
-            return NotImplemented
-        turned = math.remainder(other.heading - self.pose.heading, math.tau)
-        apart = math.hypot(other.x - self.pose.x, other.y - self.pose.y)
-        return apart < self.tolerance and abs(turned) < self.tolerance
-
-    def __hash__(self) -> int:
-        return hash(self.pose)
-
-    def __repr__(self) -> str:
-        return f"near {self.pose}"
-
-
-def test_straight_on() -> None:
-    assert Pose(1.0, 2.0, math.pi / 2).moved(3.0, 0.0) == near(1.0, 5.0, math.pi / 2)
-
-
-def test_a_quarter_circle_to_the_left() -> None:
-    assert ORIGIN.moved(math.pi / 2, math.pi / 2) == near(1.0, 1.0, math.pi / 2)
-
-
-def test_backward_along_a_quarter_circle() -> None:
-    assert ORIGIN.moved(-math.pi / 2, math.pi / 2) == near(-1.0, -1.0, math.pi / 2)
-
-
-def test_turning_on_the_spot_stays_there() -> None:
-    assert Pose(1.0, 1.0, 0.0).moved(0.0, 2.0) == near(1.0, 1.0, 2.0)
-
-
-def test_a_full_circle_comes_home() -> None:
-    assert ORIGIN.moved(2 * math.pi, 2 * math.pi) == near(0.0, 0.0, 0.0)
+@pytest.mark.parametrize(
+    ("start", "distance", "turn", "end"),
+    [
+        ((1.0, 2.0, QUARTER), 3.0, 0.0, (1.0, 5.0, QUARTER)),  # straight on
+        ((0.0, 0.0, 0.0), QUARTER, QUARTER, (1.0, 1.0, QUARTER)),  # a quarter circle to the left
+        ((0.0, 0.0, 0.0), -QUARTER, QUARTER, (-1.0, -1.0, QUARTER)),  # backward
+        ((1.0, 1.0, 0.0), 0.0, 2.0, (1.0, 1.0, 2.0)),  # turning on the spot
+        ((0.0, 0.0, 0.0), math.tau, math.tau, (0.0, 0.0, 0.0)),  # a full circle
+    ],
+)
+def test_known_arcs(
+    start: tuple[float, float, float],
+    distance: float,
+    turn: float,
+    end: tuple[float, float, float],
+) -> None:
+    assert apart(Pose(*start).moved(distance, turn), Pose(*end)) == CLOSE
 
 
 @given(headings, distances, turns, st.floats(0.0, 1.0))
-def test_an_arc_is_its_parts(heading: float, distance: float, turn: float, part: float) -> None:
-    start = Pose(4.0, -7.0, heading)
-    whole = start.moved(distance, turn)
-    parts = start.moved(distance * part, turn * part).moved(
-        distance * (1 - part), turn * (1 - part)
-    )
-    assert parts == Near(whole)
-
-
-@given(headings, distances, turns.filter(lambda turn: abs(turn) > 0.01))
-def test_an_arc_lies_on_its_circle(heading: float, distance: float, turn: float) -> None:
-    radius = distance / turn
-    after = Pose(0.0, 0.0, heading).moved(distance, turn)
-    x = radius * (math.sin(heading + turn) - math.sin(heading))
-    y = -radius * (math.cos(heading + turn) - math.cos(heading))
-    assert after == Near(Pose(x, y, heading + turn), 1e-6)
-
-
-@given(headings, distances, turns)
-def test_heading_stays_wrapped(heading: float, distance: float, turn: float) -> None:
-    assert abs(Pose(0.0, 0.0, heading).moved(distance, turn).heading) <= math.pi
+def test_an_arc_equals_its_parts_and_lies_on_its_circle(
+    heading: float, distance: float, turn: float, part: float
+) -> None:
+    whole = Pose(4.0, -7.0, heading).moved(distance, turn)
+    first = Pose(4.0, -7.0, heading).moved(distance * part, turn * part)
+    assert apart(first.moved(distance * (1 - part), turn * (1 - part)), whole) == CLOSE
+    assert abs(whole.heading) <= math.pi
+    if abs(turn) > 0.01:
+        radius = distance / turn
+        x = 4.0 + radius * (math.sin(heading + turn) - math.sin(heading))
+        y = -7.0 - radius * (math.cos(heading + turn) - math.cos(heading))
+        assert (whole.x, whole.y) == pytest.approx((x, y), abs=1e-6)
 
 
 def test_series_and_closed_form_meet() -> None:
@@ -101,37 +84,16 @@ def test_the_slope_is_the_derivative(turn: float) -> None:
     assert chord_ratio(turn)[1] == pytest.approx(numeric, abs=1e-8)
 
 
-def matrix(covariance: Covariance) -> Matrix:
-    rows = list(covariance.rows())
-    return [rows[0:3], rows[3:6], rows[6:9]]
-
-
-def product(a: Matrix, b: Matrix) -> Matrix:
-    return [
-        [sum(x * y for x, y in zip(row, col, strict=True)) for col in zip(*b, strict=True)]
-        for row in a
-    ]
-
-
-def derivative(start: Pose, distance: float, turn: float) -> Matrix:
+def derivative(start: Pose, distance: float, turn: float) -> np.ndarray:
     """Return d(x, y, heading) after the arc by (x, y, heading, distance, turn), numerically."""
     step = 1e-6
-    at = [start.x, start.y, start.heading, distance, turn]
+    at = np.array([start.x, start.y, start.heading, distance, turn])
     columns = []
-    for i in range(5):
-        ends = []
-        for sign in (1, -1):
-            moved = [value + sign * step * (i == j) for j, value in enumerate(at)]
-            ends.append(Pose(*moved[:3]).moved(moved[3], moved[4]))
+    for unit in np.eye(5) * step:
+        ends = [Pose(*moved[:3]).moved(*moved[3:]) for moved in (at + unit, at - unit)]
         turned = math.remainder(ends[0].heading - ends[1].heading, math.tau)
-        columns.append(
-            [
-                (ends[0].x - ends[1].x) / (2 * step),
-                (ends[0].y - ends[1].y) / (2 * step),
-                turned / (2 * step),
-            ]
-        )
-    return [list(row) for row in zip(*columns, strict=True)]
+        columns.append((ends[0].x - ends[1].x, ends[0].y - ends[1].y, turned))
+    return np.array(columns).T / (2 * step)
 
 
 @given(headings, distances, turns, st.builds(ProcessNoise, variances, variances, variances))
@@ -141,17 +103,82 @@ def test_covariance_follows_the_derivatives(
     start = Pose(2.0, 3.0, heading)
     before = CERTAIN.plus(0.3, 1.0, 0.2, 0.1).plus(0.2, -0.3, 1.0, 0.5).plus(0.1, 0.0, 0.0, 1.0)
     after = PoseEstimate(start, before).moved(distance, turn, noise)
-    whole = [[*row, 0.0, 0.0] for row in matrix(before)]
-    whole += [[0.0, 0.0, 0.0, noise.distance, 0.0], [0.0, 0.0, 0.0, 0.0, noise.turn]]
+    whole = np.zeros((5, 5))
+    whole[:3, :3] = np.reshape(before.rows(), (3, 3))
+    whole[3, 3], whole[4, 4] = noise.distance, noise.turn
     by = derivative(start, distance, turn)
-    expected = product(product(by, whole), [list(col) for col in zip(*by, strict=True)])
-    expected[0][0] += noise.place
-    expected[1][1] += noise.place
-    for row, wanted in zip(matrix(after.covariance), expected, strict=True):
-        assert row == pytest.approx(wanted, abs=1e-6)
+    expected = by @ whole @ by.T + np.diag([noise.place, noise.place, 0.0])
+    assert after.covariance.rows() == pytest.approx(expected.ravel(), abs=1e-6)
 
 
 def test_an_error_of_heading_leads_aside() -> None:
     before = CERTAIN.plus(0.01, 0.0, 0.0, 1.0)
-    after = PoseEstimate(ORIGIN, before).moved(10.0, 0.0, ProcessNoise(0.0, 0.0, 0.0)).covariance
+    start = PoseEstimate(Pose(0.0, 0.0, 0.0), before)
+    after = start.moved(10.0, 0.0, ProcessNoise(0.0, 0.0, 0.0)).covariance
     assert (after.xx, after.yy, after.yh) == pytest.approx((0.0, 1.0, 0.1))
+
+
+# --- segments -------------------------------------------------------------------------------
+
+
+@given(ways, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+def test_fitted_segments_sum_up_to_the_counters(
+    way: list[ArcSegment], distance: float, turn: float
+) -> None:
+    fit = total(fitted(way, distance, turn))
+    assert (fit.distance, fit.turn) == pytest.approx((distance, turn), abs=1e-9)
+    assert fit.time_s == pytest.approx(total(way).time_s)
+
+
+SEEN, UNSEEN = (ArcSegment(1.0, 0.0, 1.0, seen) for seen in (True, False))
+
+
+@pytest.mark.parametrize(
+    ("way", "distance", "turn", "expected"),
+    [
+        ([], 1.0, 0.5, [ArcSegment(1.0, 0.5, 0.0, seen=True)]),
+        ([SEEN, UNSEEN], 4.0, 0.5, [SEEN, ArcSegment(3.0, 0.5, 1.0, seen=False)]),
+        (
+            [SEEN, ArcSegment(1.0, 0.0, 3.0, seen=True)],
+            6.0,
+            -4.0,
+            [ArcSegment(2.0, -1.0, 1.0, seen=True), ArcSegment(4.0, -3.0, 3.0, seen=True)],
+        ),
+    ],
+)
+def test_the_difference_is_distributed_over_the_unseen_time_or_over_all(
+    way: list[ArcSegment], distance: float, turn: float, expected: list[ArcSegment]
+) -> None:
+    assert fitted(way, distance, turn) == expected
+
+
+@given(ways)
+def test_halved_segments_are_the_same_trajectory(way: list[ArcSegment]) -> None:
+    half, whole = total(halved(way)), total(way)
+    assert len(halved(way)) == (len(way) + 1) // 2
+    assert (half.distance, half.turn) == pytest.approx((whole.distance, whole.turn), abs=1e-9)
+    assert half.seen == whole.seen
+
+
+# --- trajectory -----------------------------------------------------------------------------
+
+
+def test_near_points_are_left_out_and_the_oldest_are_dropped() -> None:
+    trajectory = Trajectory(spacing=0.1, points=3)
+    for x in (0.0, 0.05, 0.099, 0.1, 0.15, 0.25):
+        trajectory.add(Pose(x, 0.0, 0.5))
+    assert trajectory.points() == [(0.0, 0.0, 0.5), (0.1, 0.0, 0.5), (0.25, 0.0, 0.5)]
+    trajectory.add(Pose(0.25, 1.0, 0.5))
+    assert [y for _, y, _ in trajectory.points()] == [0.0, 0.0, 1.0]
+    trajectory.clear()
+    assert trajectory.points() == []
+
+
+@given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5))))
+def test_points_are_never_nearer_than_the_spacing(places: list[tuple[float, float]]) -> None:
+    trajectory = Trajectory(spacing=0.5, points=20)
+    for x, y in places:
+        trajectory.add(Pose(x, y, 0.0))
+    points = trajectory.points()
+    assert len(points) <= 20
+    assert all(math.dist(a[:2], b[:2]) >= 0.5 for a, b in pairwise(points))
