@@ -9,16 +9,17 @@ file name is relative to the settings file that contains it.
 
 import difflib
 import os
-import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_origin, get_type_hints
+from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
 
 from common.errors import ConfigError
+from common.removed_settings import REMOVED
 
 C = TypeVar("C", bound=Struct)
 
@@ -26,19 +27,10 @@ Table = tuple[str, Mapping[str, Any]]  # origin, and settings by path
 
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
+DEFAULT = "default"  # the origin of a setting that no source names
 
 # File names that are relative to the settings file: a folder with certificates can be moved.
 FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
-
-# Replaced settings and their replacements.
-REPLACED = {
-    "wire.angular_unit": "wire.command_angular_unit and wire.feedback_angular_unit",
-    "sim.sonar_noise": "sim.sonar.noise",
-    "sim.sonar_cone": "sim.sonar.cone",
-} | {
-    f"{section}.i_accept": f"{section}.unsafe_overrides"
-    for section in ("safety", "bridge", "board", "bus", "teleop", "metrics")
-}
 
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
@@ -63,16 +55,19 @@ class Setting(Struct, frozen=True):
     origin: str
 
 
+Given = dict[str, Setting]  # by path
+
+
 class Loaded(Struct, Generic[C], frozen=True):
     """A valid configuration and its settings by path."""
 
     config: C
-    settings: dict[str, Setting]
+    settings: Given
 
 
 def load(root: type[C], sources: Sources) -> Loaded[C]:
     """Read the sections of ``root``; raise ``ConfigError`` naming origin, field, value, allowed."""
-    given: dict[str, Setting] = {}
+    given = {path: Setting(value, DEFAULT) for path, value in flatten(root())}
     for file in sources.files:
         given |= _from_file(file)
     for origin, table in sources.tables:
@@ -87,13 +82,14 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
             unknown = f"no section {section!r}{_suggestion(section, known)}"
             raise ConfigError(f"{setting.origin}: {path}: {unknown}")
     ours = {path: setting for path, setting in given.items() if path.split(".")[0] in names}
-    tree = _nest(ours)
-    try:
-        config = msgspec.convert(tree, root)
-    except msgspec.ValidationError as error:
-        raise _explain(str(error), root, tree, ours) from None
-    defaults = {path: Setting(value, "default") for path, value in flatten(config)}
-    return Loaded(config, defaults | {path: given[path] for path in given if path in defaults})
+    config = build(root, ours)
+    default = {path: Setting(value, DEFAULT) for path, value in flatten(config)}
+    return Loaded(config, default | {path: ours[path] for path in ours if path in default})
+
+
+def build(root: type[C], given: Given) -> C:
+    """Return a struct from its settings by path; raise ``ConfigError`` as ``load`` does."""
+    return _struct(root, _nest(given), "", given)
 
 
 def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
@@ -116,70 +112,54 @@ def read_toml(file: Path, shown: str) -> dict[str, Any]:
         raise ConfigError(f"{shown}: is no TOML: {error}") from None
 
 
-def _from_file(file: Path) -> dict[str, Setting]:
-    origin = _shown_path(file)
-    leaves = _leaves("", read_toml(file, origin), origin)
-    return {at: _resolved(file, at, leaf) for at, leaf in leaves.items()}
+# --- sources ------------------------------------------------------------------------------------
 
 
-def _resolved(file: Path, at: str, leaf: Setting) -> Setting:
-    """Resolve a file name relative to the settings file; empty stays empty."""
-    if at not in FILE_SETTINGS or not isinstance(leaf.value, str) or not leaf.value:
-        return leaf
-    return Setting(str(file.absolute().parent / leaf.value), leaf.origin)
-
-
-def _shown_path(file: Path) -> str:
-    """Return a file's name relative to the working directory if it is inside."""
+def _from_file(file: Path) -> Given:
     whole = file.absolute()
-    return str(whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else file)
-
-
-def _leaves(path: str, value: Any, origin: str) -> dict[str, Setting]:
-    """Return every setting in a value; an empty file has none."""
-    try:
-        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
-    except RecursionError:
-        raise ConfigError(f"{origin}: tables are nested too deep") from None
-
-
-def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> dict[str, Setting]:
-    given: dict[str, Setting] = {}
-    for name in sorted(name for name in environ if name.upper().startswith(ENV_PREFIX)):
-        _check_text(f"environment {name}", name + environ[name])
-        path = name[len(ENV_PREFIX) :].lower().replace("__", ".")
-        given |= _leaves(path, _parse(root, path, environ[name]), f"environment {name}")
+    origin = str(whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else file)
+    given = _leaves("", read_toml(file, origin), origin)
+    for path in given.keys() & FILE_SETTINGS:
+        name = given[path].value
+        if name and isinstance(name, str):
+            given[path] = Setting(str(whole.parent / name), origin)
     return given
 
 
-def _from_sets(root: type[Struct], sets: Sequence[str]) -> dict[str, Setting]:
-    given: dict[str, Setting] = {}
+def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> Given:
+    given: Given = {}
+    for name in sorted(name for name in environ if name.upper().startswith(ENV_PREFIX)):
+        path = name[len(ENV_PREFIX) :].lower().replace("__", ".")
+        given |= _from_text(root, path, environ[name], f"environment {name}")
+    return given
+
+
+def _from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
+    given: Given = {}
     for text in sets:
-        _check_text(f"--set {text}", text)
         path, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not path:
             raise ConfigError(f"--set {text}: should look like board.port=4002")
-        given |= _leaves(path, _parse(root, path, value), f"--set {text}")
+        given |= _from_text(root, path, value, f"--set {text}")
     return given
 
 
-def _check_text(origin: str, text: str) -> None:
-    """Refuse text from the system that is not UTF-8."""
+def _from_text(root: type[Struct], path: str, text: str, origin: str) -> Given:
+    """Parse a value by its field's type: text as is, tuples by commas, the rest as TOML."""
     try:
-        text.encode()
+        (origin + text).encode()
     except UnicodeEncodeError:
         shown = origin.encode(errors="backslashreplace").decode()
         raise ConfigError(f"{shown}: is no UTF-8") from None
-
-
-def _parse(root: type[Struct], path: str, text: str) -> Any:
-    """Parse a value by its field's type: text as is, tuples by commas, the rest as TOML."""
-    wanted = _type_at(root, path)
-    if wanted is str:
-        return text
+    wanted: Any = root
+    for name in path.split("."):
+        wanted = get_type_hints(wanted).get(name) if _is_struct(wanted) else None
+    value: Any = text
     if get_origin(wanted) is tuple and not text.startswith("["):
-        return [_toml(part.strip()) for part in text.split(",")] if text else []
-    return _toml(text)
+        value = [_toml(part.strip()) for part in text.split(",")] if text else []
+    elif wanted is not str:
+        value = _toml(text)
+    return _leaves(path, value, origin)
 
 
 def _toml(text: str) -> Any:
@@ -189,16 +169,15 @@ def _toml(text: str) -> Any:
         return text
 
 
-def _type_at(root: type[Struct], path: str) -> Any:
-    kind: Any = root
-    for name in path.split("."):
-        if not (isinstance(kind, type) and issubclass(kind, Struct)):
-            return None
-        kind = get_type_hints(kind).get(name)
-    return kind
+def _leaves(path: str, value: Any, origin: str) -> Given:
+    """Return every setting in a value; an empty file has none."""
+    try:
+        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
+    except RecursionError:
+        raise ConfigError(f"{origin}: tables are nested too deep") from None
 
 
-def _nest(settings: Mapping[str, Setting]) -> dict[str, Any]:
+def _nest(settings: Given) -> dict[str, Any]:
     tree: dict[str, Any] = {}
     for path, setting in settings.items():
         *tables, leaf = path.split(".")
@@ -210,8 +189,55 @@ def _nest(settings: Mapping[str, Setting]) -> dict[str, Any]:
             branch = inner
         # An empty table sets nothing, so it replaces nothing.
         if setting.value != {} or not isinstance(branch.get(leaf), dict):
-            branch[leaf] = setting.value
+            branch[leaf] = setting.value or copy(setting.value)  # an empty table gets rows
     return tree
+
+
+# --- types --------------------------------------------------------------------------------------
+
+
+def _value(kind: Any, value: Any, path: str, given: Given) -> Any:
+    """Return a value of an annotated type; raise ``ConfigError`` if it is none."""
+    bare = get_args(kind)[0] if hasattr(kind, "__metadata__") else kind
+    if _is_struct(bare) and isinstance(value, dict):
+        return _struct(bare, value, path, given)
+    if get_origin(bare) is dict and isinstance(value, dict):
+        row = get_args(bare)[1]
+        value = {name: _value(row, part, f"{path}.{name}", given) for name, part in value.items()}
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        what = str(error).partition(" - at `$")[0]  # the element of a tuple
+        shown = f" = {given[path].value!r}" if path in given else ""
+        raise ConfigError(
+            f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}"
+        ) from None
+
+
+def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) -> C:
+    """Return a struct of a table's values; raise ``ConfigError`` for unknown and missing fields."""
+    types = get_type_hints(kind, include_extras=True)
+    values = {}
+    for name, value in table.items():
+        at = f"{path}.{name}" if path else name
+        if at in REMOVED:
+            raise ConfigError(f"{_origin(at, given)}: {at}: {REMOVED[at]}")
+        if name not in types:
+            unknown = f"unknown{_suggestion(name, types)}"
+            raise ConfigError(f"{_origin(at, given)}: {at}: {unknown}")
+        values[name] = _value(types[name], value, at, given)
+    for field in msgspec.structs.fields(kind):
+        if field.required and field.name not in values:
+            raise ConfigError(f"{_origin(path, given)}: {path}: needs {field.name!r}")
+    try:
+        return kind(**values)
+    except ValueError as error:
+        shown = f"{path}: " if path else ""
+        raise ConfigError(f"{_origin(path, given)}: {shown}{error}") from None
+
+
+def _is_struct(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Struct)
 
 
 def _suggestion(word: str, known: Iterable[str]) -> str:
@@ -219,68 +245,21 @@ def _suggestion(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(sorted(known))}"
 
 
-def _explain(
-    error: str, root: type[Struct], tree: Any, given: Mapping[str, Setting]
-) -> ConfigError:
-    """Convert msgspec's error to origin, field, value and allowed range."""
-    head, mark, tail = error.rpartition(" - at `$")  # the last one: a field may be called so
-    what, at = (head, tail) if mark else (tail, "")
-    path, kind = _locate(at.rstrip("`"), root, tree)
-    unknown = re.search(r"unknown field `(.*)`", what)
-    if unknown:
-        known = [part.name for part in kind.fields]
-        path = f"{path}.{unknown[1]}"
-        if path in REPLACED:
-            text = f"was replaced by {REPLACED[path]}"
-            return ConfigError(f"{_origin(path, given)}: {path}: {text}")
-        return ConfigError(
-            f"{_origin(path, given)}: {path}: unknown{_suggestion(unknown[1], known)}"
-        )
-    shown = f" = {given[path].value!r}" if path in given else ""
-    return ConfigError(f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}")
-
-
-def _locate(at: str, root: type[Struct], tree: Any) -> tuple[str, Any]:
-    """Return the path of the invalid value, and its type.
-
-    msgspec writes ``[...]`` for a key of a table of tables; it is the first invalid one.
-    """
-    path: list[str] = []
-    kind: Any = msgspec.inspect.type_info(root)
-    for name in re.findall(r"\w+|\[\.\.\.\]", at):
-        if isinstance(kind, msgspec.inspect.DictType):
-            kind = kind.value_type
-            name = next(key for key, row in tree.items() if not _is_valid(row, kind.cls))
-        elif isinstance(kind, msgspec.inspect.VarTupleType):
-            kind = kind.item_type
-            continue
-        else:
-            kind = next(part.type for part in kind.fields if part.name == name)
-        path.append(name)
-        tree = tree[name]
-    return ".".join(path), kind
-
-
-def _is_valid(row: Any, kind: type[Struct]) -> bool:
-    try:
-        msgspec.convert(row, kind)
-    except msgspec.ValidationError:
-        return False
-    return True
-
-
-def _origin(path: str, given: Mapping[str, Setting]) -> str:
-    inside = [s.origin for p, s in given.items() if p == path or p.startswith(f"{path}.")]
-    return ", ".join(dict.fromkeys(inside)) or "defaults"
+def _origin(path: str, given: Given) -> str:
+    """Return the origins of a setting, or of all settings of a table."""
+    inside = [s for at, s in given.items() if f"{at}.".startswith(f"{path}." if path else "")]
+    named = [s for s in inside if s.value != {} and s.origin != DEFAULT] or inside
+    return ", ".join(dict.fromkeys(setting.origin for setting in named))
 
 
 def _allowed(kind: Any) -> str:
     """Describe the allowed values; msgspec's own error names one end of a range only."""
-    words = getattr(kind, "values", ())
+    info: Any = msgspec.inspect.type_info(kind)
+    words = getattr(info, "values", ())
     if words:
         return f"; allowed is {', '.join(map(repr, words))}"
-    low, high = getattr(kind, "ge", None), getattr(kind, "le", None)
-    over = getattr(kind, "gt", None)
+    low, high = getattr(info, "ge", None), getattr(info, "le", None)
+    over = getattr(info, "gt", None)
     if high is None or (low is None and over is None):
         return ""
     return f"; allowed is {low}..{high}" if over is None else f"; allowed is over {over}..{high}"

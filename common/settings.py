@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from ipaddress import ip_address
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct
 
@@ -18,9 +18,6 @@ Limits = Mapping[str, tuple[float, float]]
 AngularUnit = Literal["decidegree", "milliradian"]
 LogLevel = Literal["debug", "info", "warning", "error"]
 
-# See ``check_protections``.
-PROTECTIVE_OF_BUS: Limits = {"lease": (0.0, 2.0)}
-PROTECTIVE_OF_BOARD: Limits = {"any_source_port": (False, False)}
 Port = Annotated[int, Meta(ge=1, le=65535)]
 
 # Protocols of the eclipse-zenoh wheel; a client would retry any other one forever.
@@ -33,22 +30,32 @@ class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One table of the configuration file."""
 
 
-def check_protections(
-    given: Mapping[str, float], limits: Limits, unsafe_overrides: tuple[str, ...]
-) -> None:
-    """Raise ``ValueError`` for an unsafe setting that ``unsafe_overrides`` does not name.
+class ProtectedSection(Section, frozen=True, kw_only=True):
+    """A table with settings that can take a protection away.
 
-    Outside of its limits a protection is ineffective. Zero never means "off".
+    Outside of its protective limits a setting makes a protection ineffective. It is refused unless
+    ``unsafe_overrides`` names it. Zero never means "off".
     """
-    unknown = sorted(set(unsafe_overrides) - set(limits))
-    if unknown:
-        raise ValueError(f"unsafe_overrides names {unknown[0]!r}, which takes no protection away")
-    for name, (low, high) in limits.items():
-        if not low <= given[name] <= high and name not in unsafe_overrides:
+
+    protective: ClassVar[Limits] = {}
+    unsafe_overrides: tuple[str, ...] = ()  # settings outside their protective limits, on purpose
+
+    def __post_init__(self) -> None:
+        self.check(self.protective, {name: getattr(self, name) for name in self.protective})
+
+    def check(self, limits: Limits, given: Mapping[str, float]) -> None:
+        """Raise ``ValueError`` for a value outside its limits, and for an unknown override."""
+        unknown = sorted(set(self.unsafe_overrides) - set(limits))
+        if unknown:
             raise ValueError(
-                f"{name} = {given[name]} takes a protection away; "
-                f"allowed is {low}..{high}, or name it in unsafe_overrides"
+                f"unsafe_overrides names {unknown[0]!r}, which takes no protection away"
             )
+        for name, (low, high) in limits.items():
+            if not low <= given[name] <= high and name not in self.unsafe_overrides:
+                raise ValueError(
+                    f"{name} = {given[name]} takes a protection away; "
+                    f"allowed is {low}..{high}, or name it in unsafe_overrides"
+                )
 
 
 class Robot(Section, frozen=True, kw_only=True):
@@ -58,14 +65,14 @@ class Robot(Section, frozen=True, kw_only=True):
     realtime: bool = True  # whether the control chain requests SCHED_FIFO
 
 
-class BusSettings(Section, frozen=True, kw_only=True):
+class BusSettings(ProtectedSection, frozen=True, kw_only=True):
     """Zenoh router, endpoints and certificates."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
+    protective: ClassVar[Limits] = {"lease": (0.0, 2.0)}
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     connect: tuple[str, ...] = ()  # where services connect; empty means ``listen``
     uplink: tuple[str, ...] = ()  # the site's router, to which the robot's router connects
-    # The drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
+    # the drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
     drive: str = ""
     lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is detected
     # s for the router's answer to its probe: a router that misses it twice is restarted.
@@ -78,7 +85,7 @@ class BusSettings(Section, frozen=True, kw_only=True):
     laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
 
     def __post_init__(self) -> None:
-        check_protections({"lease": self.lease}, PROTECTIVE_OF_BUS, self.unsafe_overrides)
+        super().__post_init__()
         for endpoint in (*self.listen, *self.connect, *self.uplink):
             if not ENDPOINT.fullmatch(endpoint):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
@@ -175,21 +182,21 @@ def is_local(endpoint: str) -> bool:
         return host == "localhost"
 
 
-class Board(Section, frozen=True, kw_only=True):
+class Board(ProtectedSection, frozen=True, kw_only=True):
     """Addresses of the vehicle's main board and of this computer (manual 1)."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
+    protective: ClassVar[Limits] = {"any_source_port": (False, False)}
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
+    # the board sends to both; the first is preferred
     listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
     any_source_port: bool = False  # accept frames from every port of the board's address
     # UDP port at ``address`` that a relay reports from, 4010; 0: no relay (docs/relay.md).
     relay_port: Annotated[int, Meta(ge=0, le=65535)] = 0
 
     def __post_init__(self) -> None:
-        given = {"any_source_port": self.any_source_port}
-        check_protections(given, PROTECTIVE_OF_BOARD, self.unsafe_overrides)
+        super().__post_init__()
         for name in ("address", "listen_address"):
             _check_ipv4(name, getattr(self, name))
         if len(set(self.listen_ports)) < len(self.listen_ports):

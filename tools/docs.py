@@ -17,7 +17,7 @@ from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
 from services.safety.causes import RULES, SEVERITY, Clears
-from tools import rights_table, sdk
+from tools import rights_table, sdk, settings_file
 from verification.harness.results import filled, table
 
 ROOT = Path(__file__).parent.parent
@@ -60,7 +60,8 @@ def generated() -> dict[Path, str]:
     pages = {DOCS / f"{name}.md": tables for name, tables in blocks.items()}
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
     filled_pages = {page: filled(current(page), tables) for page, tables in pages.items()}
-    return filled_pages | schemas | sdk.generated()
+    settings = {ROOT / "config" / "t2.toml": settings_file.text()}
+    return filled_pages | schemas | settings | sdk.generated()
 
 
 def kinds() -> list[type[Struct]]:

@@ -18,7 +18,7 @@ from statistics import NormalDist, mean, stdev
 
 from cli.commission.stops import Kind, Stop
 from common.messages import Direction
-from services.safety.config import PROTECTIVE, Safety
+from services.safety.config import Safety
 from services.safety.stop_distance import stopping_distance
 
 MEAN, NEXT = 0.9875, 0.975  # quantiles: 97.5 % two-sided, 97.5 % one-sided
@@ -140,14 +140,14 @@ def propose(
     """
     slowest_reaction = max(fit.reaction.next_high for fit in found.values())
     weakest = min(fit.deceleration.next_low for fit in found.values())
-    least, most = PROTECTIVE["deceleration"]
+    least, most = Safety.protective["deceleration"]
     deceleration = min(most, _down(weakest))
     if deceleration < least:
         return (
             f"the next stop may decelerate with {weakest:.2f} m/s2 only, and safety accepts "
             f"{least:g} m/s2 or more: check the brakes, and record more stops"
         )
-    react = max(PROTECTIVE["react"][0], _up(slowest_reaction + sensing_s))
+    react = max(Safety.protective["react"][0], _up(slowest_reaction + sensing_s))
     over = max(s.distance - stopping_distance(s.speed, react, deceleration) for s in stops)
     return Settings(react, deceleration, _up(margin + max(0.0, over)))
 

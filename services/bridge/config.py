@@ -1,6 +1,6 @@
 """Settings of the bridge, and the queries and ports that follow from them."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -26,28 +26,24 @@ Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
 
-# See ``settings.check_protections``.
-PROTECTIVE: settings.Limits = {
-    "lease": (0.0, 0.5),
-    "silence": (0.0, 0.5),
-    "coast": (0.0, 3.0),
-    "deceleration": (0.1, 10.0),
-    "angular_deceleration": (0.1, 10.0),
-    "heartbeat": (0.0, 0.2),
-    "max_linear": (0.0, 1.5),
-    "max_angular": (0.0, 2.0),
-    "require_switches": (True, True),
-    # Lower rates delay the detection of a short hit, a near wall and a restarted board.
-    "bumper_rate": (20.0, 200.0),
-    "ultrasonic_rate": (10.0, 200.0),
-    "mileage_rate": (10.0, 200.0),
-}
-
-
-class Bridge(settings.Section, frozen=True, kw_only=True):
+class Bridge(settings.ProtectedSection, frozen=True, kw_only=True):
     """Parameters of the bridge."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings that may exceed their safe limits
+    protective: ClassVar[settings.Limits] = {
+        "lease": (0.0, 0.5),
+        "silence": (0.0, 0.5),
+        "coast": (0.0, 3.0),
+        "deceleration": (0.1, 10.0),
+        "angular_deceleration": (0.1, 10.0),
+        "heartbeat": (0.0, 0.2),
+        "max_linear": (0.0, 1.5),
+        "max_angular": (0.0, 2.0),
+        "require_switches": (True, True),
+        # Lower rates delay the detection of a short hit, a near wall and a restarted board.
+        "bumper_rate": (20.0, 200.0),
+        "ultrasonic_rate": (10.0, 200.0),
+        "mileage_rate": (10.0, 200.0),
+    }
     lease: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s that a motion message is valid
     silence: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.2  # s without a frame: link lost
     failover: Annotated[float, Meta(ge=0.02, le=0.4)] = 0.1  # s until the other port takes over
@@ -61,14 +57,13 @@ class Bridge(settings.Section, frozen=True, kw_only=True):
     answer_timeout: Annotated[float, Meta(ge=0.02, le=1.0)] = 0.1  # s for a query's answer
     echo_timeout: Annotated[float, Meta(ge=0.05, le=2.0)] = 0.5  # s for a switch or lamp's echo
     require_switches: bool = True  # the board must echo that its emergency brakes are on
-    bumper_rate: Rate = 50.0
-    ultrasonic_rate: Rate = 20.0
-    mileage_rate: Rate = 25.0
-    driver_rate: Rate = 2.0  # for each side
+    bumper_rate: Rate = 50.0  # Hz, of the queries
+    ultrasonic_rate: Rate = 20.0  # Hz
+    mileage_rate: Rate = 25.0  # Hz
+    driver_rate: Rate = 2.0  # Hz, for each side
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in PROTECTIVE}
-        settings.check_protections(given, PROTECTIVE, self.unsafe_overrides)
+        super().__post_init__()
         if self.failover >= self.silence:
             raise ValueError(f"failover {self.failover} s must be under silence {self.silence} s")
 

@@ -30,7 +30,7 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     token_file: str = ""  # one line; empty: a new token at each start, which is printed
     certificate: str = ""  # PEM files for https; both or none
     private_key: str = ""
-    source: SourceName = "web"
+    source: SourceName = "web"  # the name to drive under; safety knows its priority
     # A name in safety.estop_keepalive that an open and visible page keeps alive; empty: none.
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     # The URL of an MJPEG stream, and of a page in a frame; ``{robot}`` in the path is the id

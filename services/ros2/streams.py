@@ -20,6 +20,9 @@ from services.ros2.endpoints import Publisher
 SIDES = ("left", "right")
 Declare = Callable[..., Publisher]  # topic, interface, latched
 BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
+ODOM_HZ = 25.0  # at most, as the bridge counts the distance
+BUMPER_HZ = 10.0  # at most; a change is passed on at once
+DIAGNOSTICS_S = 1.0
 
 
 class Streams:
@@ -58,7 +61,7 @@ class Streams:
             if clock:
                 clock.put((translate.time(message.t_ns),))
 
-        self._pass_on(keys.ODOMETRY, settings.odom_rate, publish)
+        self._pass_on(keys.ODOMETRY, ODOM_HZ, publish)
 
     def _sonars(self) -> None:
         settings, vehicle = self._settings, self._node.config.vehicle
@@ -74,9 +77,8 @@ class Streams:
 
     def _stops(self) -> None:
         bumper = self._publisher("bumper", BOOL)
-        rate = self._settings.bumper_rate
         self._pass_on(
-            keys.BUMPER, rate, lambda it: bumper.put((it.pressed,)), lambda it: it.pressed
+            keys.BUMPER, BUMPER_HZ, lambda it: bumper.put((it.pressed,)), lambda it: it.pressed
         )
         stopped = self._publisher("hardware/e_stop", BOOL, latched=True)
 
@@ -101,7 +103,7 @@ class Streams:
             stamp = translate.header(time.time_ns(), "")
             array.put((stamp, self._diagnostics.statuses(now_ns)))
 
-        self._node.loop.every(1 / self._settings.diagnostics_rate, publish)
+        self._node.loop.every(DIAGNOSTICS_S, publish)
 
     def _description(self) -> None:
         vehicle, prefix = self._node.config.vehicle, self._settings.frame_prefix

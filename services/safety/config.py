@@ -1,6 +1,6 @@
 """Settings of the safety service; unsafe values need an explicit override."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -12,39 +12,6 @@ Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``verdict.Text``
 
-# A setting outside these limits removes a protection. It is refused unless ``unsafe_overrides``
-# names it. Zero never means "off".
-PROTECTIVE: dict[str, tuple[float, float]] = {
-    "margin": (0.05, 10.0),
-    "react": (0.1, 10.0),
-    "deceleration": (0.1, 1.0),
-    "angular_deceleration": (0.1, 3.0),
-    "max_linear": (0.0, 1.5),
-    "max_angular": (0.0, 2.0),
-    "linear_acceleration": (0.0, 1.5),
-    "angular_acceleration": (0.0, 4.0),
-    "bumper_age": (0.0, 0.25),
-    "ultrasonic_age": (0.0, 0.5),
-    "velocity_age": (0.0, 0.5),
-    "link_age": (0.0, 1.5),
-    "switches_age": (0.0, 5.0),
-    "driver_age": (0.0, 5.0),
-    "estop_path_age": (0.0, 0.5),
-    "settle": (0.1, 10.0),
-    "max_echo_age": (0.0, 1.0),
-    "max_call_age": (0.0, 1.5),
-    "runaway_linear": (0.0, 0.5),
-    "runaway_angular": (0.0, 1.0),
-    "runaway_time": (0.0, 1.0),
-    "release_speed": (0.0, 0.15),
-    "release_distance": (0.0, 0.3),
-    "release_lease": (0.0, 0.5),
-    "hysteresis": (0.02, 10.0),
-    "stuck_travel": (0.0, 1.0),
-    "creep_speed": (0.0, 0.25),
-    "estop_keepalive_timeout": (0.0, 2.0),
-    "require_switches": (True, True),
-}
 # Programs that stop requesting when the operator releases the controls. For any other source,
 # ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
@@ -81,13 +48,46 @@ def _sources() -> dict[str, Source]:
     }
 
 
-class Safety(settings.Section, frozen=True, kw_only=True):
+class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
     """When and how fast the vehicle may move; SI units."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # settings outside the protective limits, on purpose
+    protective: ClassVar[settings.Limits] = {
+        "margin": (0.05, 10.0),
+        "react": (0.1, 10.0),
+        "deceleration": (0.1, 1.0),
+        "angular_deceleration": (0.1, 3.0),
+        "max_linear": (0.0, 1.5),
+        "max_angular": (0.0, 2.0),
+        "linear_acceleration": (0.0, 1.5),
+        "angular_acceleration": (0.0, 4.0),
+        "bumper_age": (0.0, 0.25),
+        "ultrasonic_age": (0.0, 0.5),
+        "velocity_age": (0.0, 0.5),
+        "link_age": (0.0, 1.5),
+        "switches_age": (0.0, 5.0),
+        "driver_age": (0.0, 5.0),
+        "estop_path_age": (0.0, 0.5),
+        "settle": (0.1, 10.0),
+        "max_echo_age": (0.0, 1.0),
+        "max_call_age": (0.0, 1.5),
+        "runaway_linear": (0.0, 0.5),
+        "runaway_angular": (0.0, 1.0),
+        "runaway_time": (0.0, 1.0),
+        "release_speed": (0.0, 0.15),
+        "release_distance": (0.0, 0.3),
+        "release_lease": (0.0, 0.5),
+        "hysteresis": (0.02, 10.0),
+        "stuck_travel": (0.0, 1.0),
+        "creep_speed": (0.0, 0.25),
+        "estop_keepalive_timeout": (0.0, 2.0),
+        "require_switches": (True, True),
+    }
+    # sources on @cmd/drive/NAME; operator: a person holds it, and may creep past a faulty sonar
     sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
-    estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()  # names that must be received
-    estop_keepalive_timeout: Seconds = 1.0
+    # names that must be received on @cmd/estop_keepalive/NAME, or the robot brakes and latches
+    estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()
+    estop_keepalive_timeout: Seconds = 1.0  # s without one of them
+    # sources of speed limits on @cmd/limit/NAME, as lidar = { lease = 0.5, silence = "stop" }
     limits: Annotated[dict[SourceName, LimitSource], Sources] = msgspec.field(default_factory=dict)
 
     max_linear: Positive = 1.0  # m/s
@@ -99,20 +99,19 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m kept free around the vehicle
     react: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25  # s from reading to slowing down
-    hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = (
-        0.05  # m; a farther reading counts beyond this
-    )
+    # m; a farther reading counts beyond this
+    hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.05
     # m along a sonar's axis with a constant reading, until the sonar is suspect
     stuck_travel: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.5
     creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is doubtful
 
-    bumper_age: Seconds = 0.15
-    ultrasonic_age: Seconds = 0.3
-    velocity_age: Seconds = 0.2
-    link_age: Seconds = 0.6
-    switches_age: Seconds = 3.0
-    driver_age: Seconds = 2.0
-    estop_path_age: Seconds = 0.2  # of the own state, received back through the router
+    bumper_age: Seconds = 0.15  # s; an older sample stops the vehicle
+    ultrasonic_age: Seconds = 0.3  # s
+    velocity_age: Seconds = 0.2  # s
+    link_age: Seconds = 0.6  # s
+    switches_age: Seconds = 3.0  # s
+    driver_age: Seconds = 2.0  # s
+    estop_path_age: Seconds = 0.2  # s, of the own state, received back through the router
     settle: Seconds = 0.5  # s of good inputs until a cause clears
     max_echo_age: Seconds = 0.4  # s, of a request to move and of a held release
     max_call_age: Seconds = 1.0  # s, of a reset
@@ -120,7 +119,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
 
     runaway_linear: Positive = 0.3  # m/s over the commanded speed
     runaway_angular: Positive = 0.5  # rad/s
-    runaway_time: Seconds = 0.3
+    runaway_time: Seconds = 0.3  # s
 
     release_speed: Positive = 0.1  # m/s
     release_distance: Positive = 0.15  # m in total until a reset
@@ -132,8 +131,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
         return frozenset(name for name, source in self.sources.items() if source.operator)
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in PROTECTIVE}
-        allowed = dict(PROTECTIVE)
+        allowed = dict(self.protective)
+        given = {name: getattr(self, name) for name in allowed}
         for name, source in self.sources.items():
             given[f"sources.{name}.lease"] = source.lease
             allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
@@ -142,7 +141,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
         for name, limits in self.limits.items():
             given[f"limits.{name}.lease"] = limits.lease
             allowed[f"limits.{name}.lease"] = (0.0, MAX_LIMIT_LEASE_S)
-        settings.check_protections(given, allowed, self.unsafe_overrides)
+        self.check(allowed, given)
         if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
             raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
         priorities = [source.priority for source in self.sources.values()]

@@ -1,6 +1,6 @@
 """Teleop's settings."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -12,15 +12,15 @@ Hold = Annotated[float, Meta(ge=0.1, le=1.0)]  # s
 Index = Annotated[int, Meta(ge=0, le=31)]  # of an axis or a button, as SDL counts them
 GEARS = 5
 
-# See ``settings.check_protections``.
-PROTECTIVE: settings.Limits = {"round_trip": (0.02, 0.3), "gamepad_silence": (0.5, 3.0)}
 
-
-class Teleop(settings.Section, frozen=True, kw_only=True):
+class Teleop(settings.ProtectedSection, frozen=True, kw_only=True):
     """Settings of keys, gears and gamepad; slow by default."""
 
-    unsafe_overrides: tuple[str, ...] = ()  # protective settings outside of their limits, by intent
-    source: SourceName = "teleop"
+    protective: ClassVar[settings.Limits] = {
+        "round_trip": (0.02, 0.3),
+        "gamepad_silence": (0.5, 3.0),
+    }
+    source: SourceName = "teleop"  # the name to drive under; safety knows its priority
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
     turbo_linear: Speed = 1.0  # m/s
@@ -28,7 +28,7 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
     hold_first: Hold = 0.6  # s that a tap drives: most terminals send the first repeat after ~0.5 s
     hold: Hold = 0.3  # s that a repeat drives
     round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; slower: no driving keys
-    gamepad: bool = True
+    gamepad: bool = True  # use the first one that SDL finds
     gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s without an event
     deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's range
     expo: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5  # 0 is straight, 1 is cubic
@@ -38,8 +38,7 @@ class Teleop(settings.Section, frozen=True, kw_only=True):
     turbo_button: Index = 5  # right shoulder
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in PROTECTIVE}
-        settings.check_protections(given, PROTECTIVE, self.unsafe_overrides)
+        super().__post_init__()
         for name in ("gears_linear", "gears_angular"):
             gears = getattr(self, name)
             if len(gears) != GEARS or list(gears) != sorted(gears):

@@ -1,26 +1,30 @@
 """Sources of settings, their precedence, and the error texts."""
 
-import tomllib
+import re
 from pathlib import Path
 
 import pytest
 
 from cli.settings import Everything
-from common.config import DEFAULT_FILE, Sources, flatten, load
+from common.config import DEFAULT, DEFAULT_FILE, Sources, flatten, load
 from common.settings import Shared
 from tests.common.settings_fixture import SettingsFixture
 
 # --- the file that we ship ----------------------------------------------------------------------
 
 
-def test_the_shipped_file_names_every_setting() -> None:
-    table = tomllib.loads(DEFAULT_FILE.read_text(encoding="utf-8"))
-    assert {path for path, _ in flatten(table)} == {path for path, _ in flatten(Everything())}
+def test_the_shipped_file_sets_nothing() -> None:
+    settings = load(Everything, Sources(environ={})).settings
+    assert {setting.origin for setting in settings.values()} == {DEFAULT}
 
 
-def test_the_shipped_file_gives_every_setting_its_default() -> None:
-    loaded = load(Everything, Sources(environ={}))
-    assert dict(flatten(loaded.config)) == dict(flatten(Everything()))
+def test_the_lines_of_the_shipped_file_are_the_defaults(tmp_path: Path) -> None:
+    text = DEFAULT_FILE.read_text(encoding="utf-8")
+    file = tmp_path / "t2.toml"
+    file.write_text(re.sub(r"(?m)^# (?=\[|\w+ = )", "", text), encoding="utf-8")
+    loaded = load(Everything, Sources((file,), environ={}))
+    assert loaded.config == Everything()
+    assert DEFAULT not in {setting.origin for setting in loaded.settings.values()}
 
 
 # --- what wins ----------------------------------------------------------------------------------
@@ -49,7 +53,7 @@ def test_every_setting_knows_where_it_came_from(settings_dir: SettingsFixture) -
     assert settings["board.port"].origin == "over0.toml"
     assert settings["odom.hold"].origin == "environment T2__ODOM__HOLD"
     assert settings["log.level"].origin == "--set log.level=debug"
-    assert settings["robot.id"].origin == str(DEFAULT_FILE)  # not below the working directory
+    assert settings["robot.id"].origin == DEFAULT
     assert set(settings) == {path for path, _ in flatten(Everything())}
 
 
@@ -59,11 +63,12 @@ def test_what_nobody_names_is_a_default(settings_dir: SettingsFixture) -> None:
 
 
 def test_a_file_below_the_working_directory_is_called_by_its_short_name(
-    monkeypatch: pytest.MonkeyPatch,
+    settings_dir: SettingsFixture,
 ) -> None:
-    monkeypatch.chdir(DEFAULT_FILE.parent.parent)
-    loaded = load(Shared, Sources(environ={}))
-    assert loaded.settings["robot.id"].origin == "config/t2.toml"
+    settings_dir.file("[robot]\nid = 'x'")
+    for name in (Path("over.toml"), settings_dir.folder / "over.toml"):
+        loaded = load(Shared, Sources((name,), environ={}))
+        assert loaded.settings["robot.id"].origin == "over.toml"
 
 
 def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(
@@ -158,6 +163,10 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
             "over0.toml: wire.angular_unit: was replaced by wire.command_angular_unit and "
             "wire.feedback_angular_unit",
         ),
+        (
+            "[ros2]\nodom_rate = 10.0",
+            "over0.toml: ros2.odom_rate: is no setting any more, always 25 Hz",
+        ),
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
         ("[sim.drive]\nzzz = 1", "over0.toml: sim.drive.zzz: unknown; there are acceleration"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
@@ -177,7 +186,7 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
         ("[board]\nlisten_ports = [1, 70000]", "board.listen_ports = [1, 70000]: Expected `int`"),
         ("[board]\nlisten_ports = []", "board.listen_ports = []: Expected `array` of length >= 1"),
         ("[safety.sources.web]\nprio = 1", "over0.toml: safety.sources.web.prio: unknown; did you"),
-        ("[safety.sources.new]\nlease = 0.1", "over0.toml: safety.sources.new: Object missing"),
+        ("[safety.sources.new]\nlease = 0.1", "over0.toml: safety.sources.new: needs 'priority'"),
         ("[safety.sources]\nweb = 'x'", "safety.sources.web = 'x': Expected `object`, got `str`"),
         ("[safety.sources.web]\npriority = 'a'", "sources.web.priority = 'a': Expected `int`"),
         ("[safety]\nmargin = 0.0", "over0.toml: safety: margin = 0.0 takes a protection away"),
@@ -226,9 +235,9 @@ def test_a_wrong_environment_is_refused(
     assert sentence in settings_dir.refused(environ={name: value})
 
 
-def test_what_two_settings_break_together_names_both(settings_dir: SettingsFixture) -> None:
+def test_what_two_settings_break_together_names_the_table(settings_dir: SettingsFixture) -> None:
     said = settings_dir.refused("[board]\nport = 4001")
-    assert f"{DEFAULT_FILE}, over0.toml: board: port 4001 of 127.0.0.1 is both the board's" in said
+    assert "over0.toml: board: port 4001 of 127.0.0.1 is both the board's" in said
 
 
 def test_a_protection_may_be_taken_away_when_owned_up_to(settings_dir: SettingsFixture) -> None:

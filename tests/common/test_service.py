@@ -157,7 +157,7 @@ def test_it_tells_its_settings_and_where_they_came_from(lived: Lived) -> None:
     buses, _, _ = lived
     settings = info(buses, "config")
     assert settings["robot.id"] == {"value": buses.robot, "origin": f"--set robot.id={buses.robot}"}
-    assert settings["bus.lease"] == {"value": 1.0, "origin": "config/t2.toml"}
+    assert settings["bus.lease"] == {"value": 1.0, "origin": "default"}
 
 
 def test_it_tells_its_last_values(lived: Lived) -> None:

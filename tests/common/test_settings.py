@@ -1,14 +1,29 @@
 """Sections that two services share: what they refuse."""
 
 import re
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 import pytest
 
-from common.settings import Board, BusSettings, Robot, Section, Vehicle, Wire, check_protections
+from common.settings import (
+    Board,
+    BusSettings,
+    Limits,
+    ProtectedSection,
+    Robot,
+    Section,
+    Vehicle,
+    Wire,
+)
 
-LIMITS = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
+
+class Guarded(ProtectedSection, frozen=True, kw_only=True):
+    """A section with two protections."""
+
+    protective: ClassVar[Limits] = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
+    margin: float
+    lease: float
 
 
 @pytest.mark.parametrize(
@@ -23,7 +38,7 @@ LIMITS = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
 def test_protections_may_be_kept_or_owned_up_to(
     given: dict[str, float], unsafe_overrides: tuple[str, ...]
 ) -> None:
-    check_protections(given, LIMITS, unsafe_overrides)
+    Guarded(**given, unsafe_overrides=unsafe_overrides)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +55,7 @@ def test_protections_are_not_taken_away_by_accident(
     margin: float, lease: float, unsafe_overrides: tuple[str, ...], sentence: str
 ) -> None:
     with pytest.raises(ValueError, match=sentence):
-        check_protections({"margin": margin, "lease": lease}, LIMITS, unsafe_overrides)
+        Guarded(margin=margin, lease=lease, unsafe_overrides=unsafe_overrides)
 
 
 CERTIFIED: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_key": "c.key"}

@@ -29,8 +29,8 @@ def test_a_namespace_that_ros_refuses(namespace: str) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        "domain=233", "domain=-1", "cmd_vel=none", "no_echo=nan", "sonar_fov=0", "odom_rate=0",
-        "odom_rate=51", "frame_prefix=a b", "frame_prefix=/t2",
+        "domain=233", "domain=-1", "cmd_vel=none", "no_echo=nan", "sonar_fov=0", "sonar_rate=0",
+        "sonar_rate=51", "frame_prefix=a b", "frame_prefix=/t2",
     ],
 )  # fmt: skip
 def test_a_value_that_is_not_allowed(wrong: str) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from common.config import Sources, load
 from common.errors import ConfigError
-from services.safety.config import PROTECTIVE, LimitSource, Safety, SafetyConfig, Source
+from services.safety.config import LimitSource, Safety, SafetyConfig, Source
 
 
 def read(*sets: str) -> Safety:
@@ -84,7 +84,7 @@ def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
 
 def test_every_protection_is_a_setting_and_its_default_is_allowed() -> None:
     defaults = msgspec.structs.asdict(Safety())
-    assert all(low <= defaults[name] <= high for name, (low, high) in PROTECTIVE.items())
+    assert all(low <= defaults[name] <= high for name, (low, high) in Safety.protective.items())
 
 
 def test_a_limit_source_has_both_settings_and_a_short_lease() -> None:

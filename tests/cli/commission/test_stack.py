@@ -99,7 +99,7 @@ def test_a_complete_checkout(stack: RunningStack, tmp_path: Path) -> None:
     assert "**Passed.**" in text
     assert text.count(" passed |") == 7
     assert "| counted / commanded |" in text
-    assert "| wire.command_angular_unit | decidegree | config/t2.toml |" in text
+    assert "| wire.command_angular_unit | decidegree | default |" in text
     assert "T2 of bridge" in text
     assert text.rstrip().splitlines()[-1].startswith("Ada, ")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
