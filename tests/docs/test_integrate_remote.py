@@ -24,6 +24,7 @@ from tests.docs.integrator import (
 )
 from verification.harness.certificates import ADDRESS, Site
 from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 pytestmark = [pytest.mark.timed, pytest.mark.campaign, pytest.mark.timeout(300)]
 
@@ -73,6 +74,7 @@ def test_the_package_reports_a_certificate_that_may_not_drive(it: Integrator) ->
 
 def test_the_package_reports_a_certificate_that_may_not_limit(it: Integrator) -> None:
     with connected(it, "device.detector") as robot:
+        wait_until(lambda: robot.safety.latest(5.0).limit_sources[0].silent, "no other program")
         robot.limit("detector", linear=0.1, seconds=60)
     with (
         connected(it, "driver.planner") as robot,

@@ -22,6 +22,9 @@ from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
+from common.bus.bus import Arrival
+from common.messages import Ultrasonic
+from examples import limit_speed, nearest_obstacle, wall_follower
 from sim.requests import Bumper, Sonar
 from tests.sdk.library_robot import blocked, ready
 from verification.harness.stack import RunningStack, running_stack
@@ -84,6 +87,25 @@ def test_the_limit_slows_before_an_obstacle(robot: t2.Robot, stack: RunningStack
         stack.control.do(Sonar(name="front"))
 
 
+@pytest.mark.parametrize(
+    ("range_m", "status", "distance"),
+    [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
+)
+def test_a_sonar_that_cannot_measure_counts_as_0(
+    range_m: float | None, status: Any, distance: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a program that somebody copies does at 0.02 m, or with a faulty sonar."""
+    clear: list[Any] = ["no_echo"] * 8
+    ranges: list[float | None] = [None] * 8
+    clear[2], ranges[2] = status, range_m
+    sample: Any = Ultrasonic(ranges=tuple(ranges), status=tuple(clear))
+    assert limit_speed.front(sample) == distance
+    assert wall_follower.distance(sample, wall_follower.FRONT) == distance
+    nearest_obstacle.print_nearest(Arrival(sample, "", 0, b""))
+    shown = "nothing near\n" if distance == math.inf else f"{distance:.2f} m front\n"
+    assert capsys.readouterr().out == shown
+
+
 def limited(robot: t2.Robot) -> tuple[float | None, str]:
     (limit,) = robot.safety.latest().limit_sources
     return limit.linear, limit.reason
@@ -131,6 +153,10 @@ def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: Run
         async with Client(server) as client:
             tools = {tool.name for tool in (await client.list_tools()).tools}
             assert tools == {"state", "sonars", "incidents", "drive", "stop"}
+            stack.control.do(Sonar(name="rear", fault=True))
+            wait_until(lambda: "fault" in robot.ultrasonic.latest().status, "the fault")
+            sonars: Any = (await client.call_tool("sonars", {})).structured_content
+            assert sonars["rear"] == "fault"
             before: Any = (await client.call_tool("state", {})).structured_content
             driven: Any = (await client.call_tool("drive", {"distance": 0.3})).structured_content
             way = math.dist((before["x"], before["y"]), (driven["x"], driven["y"]))
@@ -141,6 +167,7 @@ def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: Run
             assert "Emergency stop" in refused.content[0].text
 
     asyncio.run(asyncio.wait_for(session(), 100.0))
+    stack.control.do(Sonar(name="rear"))
     wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
 
 
