@@ -43,7 +43,7 @@ class SimulatedStack(Stack):
     def __init__(self, world: str = "office") -> None:
         config = Config()
         plan = load_plan(world, config.vehicle)
-        super().__init__(config, plan, odometry=True, step_ns=TICK_MS * MS)
+        super().__init__(config, plan, step_ns=TICK_MS * MS)
         self.each_beat: list[Callable[[], object]] = []
         self.poses: list[m.Odometry] = []
         self.answers: list[tuple[str, bool]] = []
@@ -137,14 +137,10 @@ class SimulatedSession:
 
     def get(self, key: str, payload: bytes, **_: object) -> list[SimpleNamespace]:
         """Call safety."""
-        if key.endswith("reset"):
-            name = "reset"
-            caller = self._stack.call_reset(msgspec.msgpack.decode(payload, type=m.ResetRequest))
-        else:
-            name = "release"
-            request = msgspec.msgpack.decode(payload, type=m.ReleaseRequest)
-            caller = self._stack.call_release(request)
-        self._stack.answers.append((name, bool(caller.done)))
+        call = keys.RESET if key.endswith("reset") else keys.RELEASE
+        request = msgspec.msgpack.decode(payload, type=call.request)
+        caller = self._stack.call(call, request)
+        self._stack.answers.append((call.path.rpartition("/")[2], bool(caller.done)))
         if not caller.done:
             return [SimpleNamespace(ok=None, err=raw(caller.text.encode()))]
         return [SimpleNamespace(ok=raw(ENCODE(caller.answer)), err=None)]

@@ -35,10 +35,11 @@ from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
 from services.safety.state import State
 from services.safety.zones import Zones
+from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
 from verification.search.bus import ROBOT, Disturbance, DriveEnd, Envelope
 from verification.search.condition_books import IGNORED, NEEDED
-from verification.search.vehicle import FAULT_MM
+from verification.search.stack import PENDANT
 
 Script = tuple[Callable[[Stack], object], ...]
 # Owner, attribute and replacement of a protection; its scenario; the oracle's objection.
@@ -76,7 +77,7 @@ def successor(
     stack.stop(100)
     stack.kill("safety", 20)
     stack.run(25)
-    of_safety = [one for one in stack.net.subscriptions if one.owner is stack.safety]
+    of_safety = [one for one in stack.net.subscriptions if one.owner is stack.processes["safety"]]
     (link,) = [one for one in of_safety if one.key == keys.LINK.on(ROBOT)]
     link.take = partial(deliver, link.take)
 
@@ -126,7 +127,7 @@ SAFETY_HANGS: Script = (
 
 
 def authority_is_copied(stack: Stack) -> None:
-    copy = m.Motion(command=Command.RUN, linear=0.9, seq=2**19, boot=stack.safety.boot)
+    copy = m.Motion(command=Command.RUN, linear=0.9, seq=2**19, boot=stack.processes["safety"].boot)
     stack.forge(keys.MOTION, copy)
 
 
@@ -171,20 +172,20 @@ def driver_blinks(stack: Stack) -> None:
     """Report a driver fault and its end at the same time."""
     stack.driver(1)
     stack.driver(0)
-    stack.vehicle.send(Framing().pack(stack.vehicle.board.driver(Side.LEFT)))
+    stack.send(Framing().pack(stack.board.driver(Side.LEFT)))
 
 
 def rival_limit(stack: Stack) -> None:
-    limiter = stack.limiters[NEEDED]
+    limiter = stack.sources[NEEDED]
     limiter.put(m.Limit(linear=9.0, echo=limiter.echo, boot=5))
 
 
 def pendant_is_held(stack: Stack) -> None:
     """Deliver a sign of life almost too late, then none."""
-    echo = stack.pendant.echo
-    stack.silence(stack.pendant)
-    stack.run(850)
-    stack.pendant.put(m.EstopKeepalive(echo=echo))
+    pendant = stack.sources[PENDANT]
+    echo = pendant.echo
+    stack.silence(PENDANT, 850)
+    pendant.put(m.EstopKeepalive(echo=echo))
 
 
 def reset_is_granted(stack: Stack) -> None:
@@ -385,7 +386,7 @@ MUTATIONS: dict[str, Mutation] = {
         PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (
-        SpeedLimits, "_silent", lambda *_: [], (lambda s: s.silence(s.limiters[NEEDED]),),
+        SpeedLimits, "_silent", lambda *_: [], (lambda s: s.silence(NEEDED),),
         "no limit of lidar",
     ),
     "two publishers of a limit": (
@@ -393,7 +394,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "a pendant that fell silent does not latch": (
         Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),
-        (lambda s: s.silence(s.pendant),), "safety knows of estop_keepalive",
+        (lambda s: s.silence(PENDANT),), "safety knows of estop_keepalive",
     ),
     "a held sign of life counts from its reception": (
         Admission, "sent_ns", lambda self, _: self.now_ns, (pendant_is_held,),

@@ -1,29 +1,67 @@
 """The simulated stack with verbs for scenarios; each lets ``ms`` of time pass at its end."""
 
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
 from common import keys
 from common import messages as m
 from common.motion import Twist
-from common.wire.frame import Side
+from common.wire.reports import VelocityReport
 from sim import requests as q
-from verification.search.bus import ROBOT, Disturbance
-from verification.search.sources import Limiter, Pendant
+from sim.board import Board
+from sim.config import Config
+from sim.faults import Datagram
+from sim.sonar import Ranges
+from verification.search.bus import MS, ROBOT, Disturbance
 from verification.search.stack import Stack
 
 ALL_SONARS = range(8)
+NO_ECHO_MM, FAULT_MM, NEAREST_MM = 5000, 0xFFFF, 60
+SENSED, SHADES = 5, 5  # steps of 10 ms per sonar reading, readings until one repeats
+
+
+class OverriddenBoard(Board):
+    """A board whose measured speed and ranges may be replaced."""
+
+    measured: Twist | None = None
+    ranges: list[int | None] = [None] * 8  # mm
+    _steps = 0
+
+    def sense(self, twist: Twist, ranges: Ranges, pressed: bool) -> None:
+        self._steps += 1
+        pairs = zip(self.ranges, ranges, strict=True)
+        super().sense(twist, tuple(self._shown(*pair) for pair in pairs), pressed)
+
+    def velocity(self) -> VelocityReport:
+        if self.measured is None:
+            return super().velocity()
+        return VelocityReport(round(self.measured.linear * 1000), 0)
+
+    def _shown(self, mm: int | None, real: int) -> int:
+        if mm is None:
+            return real
+        # A wall that stays the same to the millimetre would be a stuck sensor.
+        noise = self._steps // SENSED % SHADES
+        return mm + noise if NEAREST_MM < mm < NO_ECHO_MM else mm
 
 
 class ScriptedStack(Stack):
     """A vehicle on an empty plane, with two sticks."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        config, simulation = Config(), self.vehicle.simulation
+        self.board = OverriddenBoard(config.wire, config.sim, (NO_ECHO_MM,) * 8)
+        self.board.ranges = [None] * 8
+        simulation.board = self.board
+
     def request(
         self, linear: float | None, ms: int = 0, *, angular: float = 0.0, source: str = "teleop"
     ) -> None:
         """Request a motion from now on; None: request nothing, as a source that has died."""
-        self.sticks[source].requested = None if linear is None else (linear, angular)
+        message = None if linear is None else m.Drive(linear=linear, angular=angular, echo=0)
+        self.sources[source].message = message
         self.run(ms)
 
     def drive(
@@ -35,23 +73,23 @@ class ScriptedStack(Stack):
 
     def press(self, pressed: bool, ms: int = 0) -> None:
         """Press the bumper, or free it."""
-        self.vehicle.pressed = pressed
+        self.vehicle.inject(q.Bumper(pressed=pressed))
         self.run(ms)
 
     def measure(self, linear: float | None, ms: int = 0) -> None:
         """Report a measured speed, None: the true one."""
-        self.vehicle.board.measured = None if linear is None else Twist(linear)
+        self.board.measured = None if linear is None else Twist(linear)
         self.run(ms)
 
     def sonars(self, mm: int | None, ms: int = 0, *, numbers: range = ALL_SONARS) -> None:
         """Report a range, or a fault; None: what is there."""
         for number in numbers:
-            self.vehicle.board.ranges[number] = mm
+            self.board.ranges[number] = mm
         self.run(ms)
 
-    def driver(self, bits: int, ms: int = 0, *, side: Side = Side.LEFT) -> None:
+    def driver(self, bits: int, ms: int = 0, *, side: Literal["left", "right"] = "left") -> None:
         """Report a fault of a motor driver, or its end."""
-        self.vehicle.fault(side, bits)
+        self.vehicle.inject(q.Driver(side=side, bits=bits))
         self.run(ms)
 
     def velocities(self, on: bool, ms: int = 0) -> None:
@@ -61,11 +99,31 @@ class ScriptedStack(Stack):
 
     def freeze(self, ms: int) -> None:
         """Freeze the board for so long."""
-        self.vehicle.freeze(ms)
+        self.vehicle.inject(q.Freeze(seconds=ms / 1000))
 
-    def garbage(self, garbage: bytes) -> None:
-        """Send the bridge bytes that begin as a frame does."""
-        self.vehicle.send(b"GS" + garbage)
+    def power_cycle(self, ms: int) -> None:
+        """Restart the board, and wait until it is back."""
+        self.vehicle.inject(q.PowerCycle(seconds=ms / 1000))
+        self.run(ms)
+
+    def send(self, datagram: bytes) -> None:
+        """Send any bytes to both ports of the bridge."""
+        for port in self.vehicle.ports:
+            self.vehicle.simulation.to_pc.put(Datagram(datagram, port), self.net.now_ns)
+
+    def cable(self, wire: q.Wire, ms: int) -> None:
+        """Delay, lose or duplicate datagrams for a while."""
+        slack_ms = wire.delay * 1000 + (150 if wire.drop else 0)
+        self.oracle.slack_ns = max(self.oracle.slack_ns, round(slack_ms * MS))
+        self.vehicle.inject(wire)
+        self.run(ms)
+
+    def switches(self, *, on: bool) -> bool:
+        """Ask the bridge to set the board's bumper brake."""
+        echo = self.seen.heartbeat if self.seen else None
+        request = m.SwitchesRequest(bumper_brake=on, echo=echo)
+        with self.time():
+            return self.processes["bridge"].call(keys.SET_SWITCHES, request).done is not False
 
     def stop(self, ms: int = 5) -> None:
         """Press the emergency stop."""
@@ -79,18 +137,16 @@ class ScriptedStack(Stack):
         self.router(True)
         self.run(5)
 
-    def silence(self, source: Limiter | Pendant) -> None:
+    def silence(self, source: str, ms: int = 0) -> None:
         """Silence a source from now on."""
-        if isinstance(source, Limiter):
-            source.caps = None
-        else:
-            source.alive = False
+        self.sources[source].message = None
+        self.run(ms)
 
     def limit(
         self, linear: float | None, ms: int = 0, *, angular: float | None = None, source: str
     ) -> None:
-        """Limit the speed from now on."""
-        self.limiters[source].caps = linear, angular
+        """Limit the speed from now on; None leaves an axis unlimited."""
+        self.sources[source].message = m.Limit(linear=linear, angular=angular, echo=0)
         self.run(ms)
 
     def disturb(self, route: str, disturbance: Disturbance, ms: int = 0) -> None:

@@ -8,7 +8,7 @@ In CI the search is the same each time. A longer one, another each time, half a 
 import math
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from hypothesis import HealthCheck, Phase, seed, settings
@@ -25,12 +25,12 @@ from msgspec.structs import replace
 from common import keys
 from common import messages as m
 from common.motion import Command
-from common.wire.frame import Side
-from tests.search.scripted_stack import ALL_SONARS, ScriptedStack
+from sim import requests as q
+from tests.search.scripted_stack import ALL_SONARS, FAULT_MM, NO_ECHO_MM, ScriptedStack
 from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance
 from verification.search.condition_books import IGNORED, NEEDED
 from verification.search.oracle import STEP_NS
-from verification.search.vehicle import FAULT_MM, NO_ECHO_MM
+from verification.search.stack import PENDANT
 
 PATIENCE = 3  # rules
 SEEDS, EXAMPLES_PER_SEED = 8, 9
@@ -44,17 +44,20 @@ DISTURBANCES = st.sampled_from(
      Disturbance(lose=3), Disturbance(double=2), Disturbance(hold=3),
      Disturbance(late_ms=20, lose=5, double=3, hold=4), Disturbance(lose=1)]
 )  # fmt: skip
-CABLES = st.sampled_from(["to_board", "from_board"])
-ON_CABLE = st.sampled_from(
-    [CLEAR, Disturbance(late_ms=20), Disturbance(lose=2), Disturbance(lose=3),
-     Disturbance(double=2)]
-)  # fmt: skip
+WIRES = st.builds(
+    q.Wire,
+    direction=st.sampled_from(["to_board", "to_pc"]),
+    drop=st.sampled_from([0.0, 0.0, 0.3]),
+    duplicate=st.sampled_from([0.0, 0.5]),
+    delay=st.sampled_from([0.0, 0.02]),
+)
 SPEEDS = st.sampled_from([0.0, 0.3, 1.0, -0.5, 5.0])
 FAST = st.sampled_from([1.0, 0.6, -1.0])
 TURNS = st.sampled_from([0.0, 0.0, 0.4, -1.0, 9.0])
 CAPS = st.sampled_from([None, 0.0, 0.1, 0.3, 0.6, 5.0])
 LIMITERS = st.sampled_from([NEEDED, IGNORED])
-SOURCES = st.sampled_from(["teleop", "nav"])
+STICKS = "teleop", "nav"
+SOURCES = st.sampled_from(STICKS)
 DIRECTIONS: st.SearchStrategy[m.Direction] = st.sampled_from(["backward", "forward"])
 KINDS = st.sampled_from(["estop", "bumper", "driver", "runaway", "router"])
 HASTY = st.sampled_from([5, 90, 320, 700, 1000])
@@ -62,7 +65,9 @@ SHORT = st.sampled_from([5, 20, 60, 150, 210, 320])
 LONG = st.sampled_from([400, 700, 1200])
 RANGES_MM = st.sampled_from([NO_ECHO_MM, FAULT_MM, 0, 120, 190, 210, 260, 400, 800, 1500])
 SONARS = st.sampled_from([ALL_SONARS, *(range(number, number + 1) for number in ALL_SONARS)])
+SIDES: tuple[Literal["left", "right"], ...] = "left", "right"
 BITS = st.sampled_from([0, 1, 1 << 31])
+GARBAGE = st.binary(max_size=40).map(b"GS".__add__)  # begins as a frame does
 RUNAWAY = st.sampled_from([1.5, -1.5, 0.0, None])
 PROCESSES = st.sampled_from(["safety", "bridge"])
 BOOT_MS = st.sampled_from([300, 600, 1000])
@@ -120,16 +125,17 @@ class StackMachine(RuleBasedStateMachine):
 
     press = rule(pressed=st.booleans(), ms=SHORT)(verb(ScriptedStack.press))
     sonars = rule(mm=RANGES_MM, numbers=SONARS)(verb(ScriptedStack.sonars, 60))
-    driver = rule(side=st.sampled_from(Side), bits=BITS, ms=SHORT)(verb(ScriptedStack.driver))
+    driver = rule(side=st.sampled_from(SIDES), bits=BITS, ms=SHORT)(verb(ScriptedStack.driver))
     measure = rule(linear=RUNAWAY, ms=SHORT)(verb(ScriptedStack.measure))
     velocities = rule(on=st.booleans(), ms=SHORT | LONG)(verb(ScriptedStack.velocities))
     switches = rule(on=st.booleans())(verb(ScriptedStack.switches, 60))
     freeze = rule(ms=SHORT | LONG)(verb(ScriptedStack.freeze, 60))
-    power_cycle = rule(duration_ms=BOOT_MS)(verb(ScriptedStack.power_cycle))
-    garbage = rule(garbage=st.binary(max_size=40))(verb(ScriptedStack.garbage, 5))
+    power_cycle = rule(ms=BOOT_MS)(verb(ScriptedStack.power_cycle))
+    send = rule(datagram=GARBAGE)(verb(ScriptedStack.send, 5))
     limit = rule(linear=CAPS, angular=CAPS, source=LIMITERS, ms=SHORT | LONG)(
         verb(ScriptedStack.limit)
     )
+    cable = rule(wire=WIRES, ms=SHORT)(verb(ScriptedStack.cable))
     kill = rule(name=PROCESSES, pause_ms=SHORT | LONG)(verb(ScriptedStack.kill, 60))
     stall = rule(name=st.just("bridge"), duration_ms=GUARDED_MS)(verb(ScriptedStack.stall, 60))
     outage = rule(ms=st.just(0) | SHORT | LONG)(verb(ScriptedStack.outage))
@@ -137,16 +143,13 @@ class StackMachine(RuleBasedStateMachine):
 
     @rule(source=LIMITERS, ms=SHORT | LONG)
     def silence_limit(self, source: str, ms: int) -> None:
-        limiter = self.stack.limiters[source]
-        before, limiter.caps = limiter.caps, None
-        self.stack.run(ms)
-        limiter.caps = before
+        before = self.stack.sources[source].message
+        self.stack.silence(source, ms)
+        self.stack.sources[source].message = before
 
     @rule(ms=st.sampled_from([400, 900, 1000, 1005, 1100, 2000]))
     def silence_pendant(self, ms: int) -> None:
-        self.stack.pendant.alive = False
-        self.stack.run(ms)
-        self.stack.pendant.alive = True
+        self.silence_limit(PENDANT, ms)
 
     @rule(ms=SHORT | LONG, estop_ms=st.none() | SHORT)
     def stall_safety(self, ms: int, estop_ms: int | None) -> None:
@@ -156,14 +159,6 @@ class StackMachine(RuleBasedStateMachine):
         if estop_ms is not None:
             self.stack.run(estop_ms)
             self.stack.stop()
-
-    @rule(route=CABLES, disturbance=ON_CABLE, ms=SHORT)
-    def disturb_cable(self, route: str, disturbance: Disturbance, ms: int) -> None:
-        """Delay, lose or duplicate datagrams; a cable keeps their order."""
-        # Every second one lost: a STOP of 20 Hz may be the third one that goes out.
-        slack_ms = disturbance.late_ms + (100 if disturbance.lose else 0)
-        self.oracle.slack_ns = max(self.oracle.slack_ns, slack_ms * MS)
-        self.stack.disturb(route, disturbance, ms)
 
     @rule(route=ROUTES, ms=SHORT)
     def cut(self, route: str, ms: int) -> None:
@@ -177,6 +172,7 @@ class StackMachine(RuleBasedStateMachine):
         """End all disturbances, before or after delayed messages arrive."""
         self.stack.run(ECHO_MS + HOLD_MS + 120 if settled else 0)
         self.stack.net.disturbances.clear()
+        self.stack.cable(q.Wire(), 0)
 
     @rule(hostile=HOSTILE, needed=st.booleans(), name=st.sampled_from(["", "", "nobody"]))
     def hostile_message(
@@ -185,23 +181,23 @@ class StackMachine(RuleBasedStateMachine):
         """Send a request or a limit that safety must refuse."""
         message, step = hostile
         stack = self.stack
-        source = stack.sticks["teleop" if needed else "nav"]
-        limiter = stack.limiters[NEEDED if needed else IGNORED]
-        sender = limiter if isinstance(message, m.Limit) else source
+        limits = isinstance(message, m.Limit)
+        names = (NEEDED, IGNORED) if limits else STICKS
+        sender = stack.sources[names[0] if needed else names[1]]
         sender.put(replace(message, echo=sender.echo + message.echo), name=name, step=step)
         stack.run(5)
 
     @rule(late=st.integers(0, 40), boot=st.sampled_from([0, 0, 7]))
     def hostile_keepalive(self, late: int, boot: int) -> None:
         """Send a sign of life with an old echo, or of another program."""
-        pendant = self.stack.pendant
+        pendant = self.stack.sources[PENDANT]
         pendant.put(m.EstopKeepalive(echo=pendant.echo - late, boot=boot))
         self.stack.run(5)
 
     @rule(forged=FORGED, seq=st.integers(1, 2**62), boot=st.sampled_from([None, 1]))
     def forged_motions(self, forged: list[m.Motion], seq: int, boot: int | None) -> None:
         """Publish motions as a client of the router, with safety's boot or another."""
-        boot = boot or self.stack.safety.boot
+        boot = boot or self.stack.processes["safety"].boot
         for step, motion in enumerate(forged):
             self.stack.forge(keys.MOTION, replace(motion, seq=seq + step, boot=boot))
         self.stack.run(5)
@@ -209,7 +205,7 @@ class StackMachine(RuleBasedStateMachine):
     @rule(pressed=st.booleans(), linear=st.sampled_from([0.0, 3.0]), seq=st.integers(1, 2**62))
     def forged_samples(self, pressed: bool, linear: float, seq: int) -> None:
         """Publish measurements as a client of the router, with the bridge's boot."""
-        stamp: dict[str, Any] = {"seq": seq, "boot": self.stack.bridge.boot}
+        stamp: dict[str, Any] = {"seq": seq, "boot": self.stack.processes["bridge"].boot}
         self.stack.forge(keys.BUMPER, m.Bumper(pressed=pressed, **stamp))
         self.stack.forge(keys.VELOCITY, m.Velocity(linear=linear, angular=0.0, **stamp))
         self.stack.run(60)
@@ -235,7 +231,7 @@ class StackMachine(RuleBasedStateMachine):
     def reset(self, lets_go: bool) -> None:
         """Ask for a reset, with the controls released or not."""
         if lets_go:
-            for source in self.stack.sticks:
+            for source in STICKS:
                 self.stack.request(None, source=source)
             self.stack.run(500)
         self.stack.reset()
@@ -319,7 +315,7 @@ class StackMachine(RuleBasedStateMachine):
     @rule(linear=FAST, gap_ms=st.sampled_from([450, 600, 1200]))
     def burst(self, linear: float, gap_ms: int) -> None:
         """Silence a source, then deliver its old requests all at once."""
-        stick = self.stack.sticks["teleop"]
+        stick = self.stack.sources["teleop"]
         echo = stick.echo
         self.stack.request(None, gap_ms)
         for speed in [0.0] * 5 + [linear] * 10:
@@ -363,10 +359,11 @@ class StackMachine(RuleBasedStateMachine):
         stack.measure(None)
         stack.velocities(True)
         stack.sonars(None)
-        for side in Side:
+        for side in SIDES:
             stack.driver(0, side=side)
-        stack.net.disturbances.clear()
-        stack.limiters[NEEDED].caps, stack.limiters[IGNORED].caps = (None, None), None
+        self.end_disturbances(settled=False)
+        stack.limit(None, source=NEEDED)
+        stack.silence(IGNORED)
         stack.run(1000)
         stack.switches(on=True)
         stack.run(60)
@@ -376,7 +373,7 @@ class StackMachine(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         """When all sources fall silent, the vehicle is stopped and stays stopped."""
-        for source in self.stack.sticks:
+        for source in STICKS:
             self.stack.request(None, source=source)
         self.stack.kill("safety", 10_000)
         self.stack.run(1200)

@@ -16,11 +16,10 @@ from sim.config import Config
 from sim.geometry import Pose, Rectangle
 from sim.trace import Truth
 from sim.world import World
-from tests.factories import safety_state
 from verification.search.draw import Draw, draw, ranges, room, shrink
 from verification.search.judge import Judge, Stop, normalised, pose_error
 from verification.search.page import page
-from verification.search.run import FAULTS, Result, Trial, fails_as, run
+from verification.search.run import FAULTS, Result, fails_as, run
 from verification.search.stack import START_NS, Stack
 
 BATCHES, BATCH = 25, 8
@@ -66,9 +65,8 @@ def test_a_safety_that_ignores_walls_is_found(monkeypatch: pytest.MonkeyPatch) -
 
 def test_every_parameter_is_known_and_both_ends_of_its_range_are_settings() -> None:
     others = {one.name for one in ranges() if not one.name.startswith("sim.")}
-    faults = {f"fault.{name}" for name in FAULTS}
-    assert others == OTHERS | faults
-    assert {one.name for one in ranges() if one.fault} >= faults
+    assert others == OTHERS | FAULTS.keys()
+    assert {one.name for one in ranges() if one.fault} >= FAULTS.keys()
     for one in ranges():
         for value in one.choices or (one.low, one.high):
             assert isinstance(value, bool | int | float | str)
@@ -111,14 +109,12 @@ class Judged:
     def __init__(self) -> None:
         self.judge = Judge(START_NS)
         self.truth: Truth = Stack().vehicle.truth
-        self.operator = Trial(Draw(1, {})).operator
-        self.operator.asks_since_ns = START_NS
+        self.asks_since_ns: int | None = START_NS
 
     def look(self, *causes: m.Cause, now_ns: int = NOW_NS, **truth: Any) -> list[str]:
         """Return the causes of all needless stops."""
         self.truth = replace(self.truth, **truth)
-        self.operator.seen = safety_state(causes=causes)
-        self.judge.look(self.operator, self.truth, now_ns)
+        self.judge.look(causes, self.asks_since_ns, self.truth, now_ns)
         return [stop.cause for stop in self.judge.stops]
 
 
@@ -148,7 +144,7 @@ def test_a_slope_justifies_the_brake_for_a_roll() -> None:
 
 def test_nobody_is_blocked_who_asks_for_nothing() -> None:
     judged = Judged()
-    judged.operator.asks_since_ns = None
+    judged.asks_since_ns = None
     judged.look(cause("blocked"), cause("no_request"))
     assert judged.look(cause("starting"), now_ns=START_NS + NS_PER_S) == []  # coming up
 
@@ -173,7 +169,7 @@ def test_the_error_of_odometry_is_taken_in_the_frame_of_the_start() -> None:
 def result(seed: int, **fields: Any) -> Result:
     usual = Result(
         seed=seed, values={}, faulty=False, violations=[], stops=[], finished=True, seconds=10.0,
-        cpu_s=1.0, metres=3.0, contacts=0, errors=[],
+        cpu_s=1.0, metres=3.0, contacts=0, error=None,
     )  # fmt: skip
     return replace(usual, **fields)
 

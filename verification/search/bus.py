@@ -1,4 +1,4 @@
-"""Simulated bus and the processes on it: one thread, simulated time, a disturbance per route.
+"""Simulated bus, the processes and sources on it: one thread, simulated time.
 
 A process stands in for ``common.service.Node``. Messages are delivered as Python objects:
 MessagePack and Zenoh are tested elsewhere.
@@ -6,19 +6,18 @@ MessagePack and Zenoh are tested elsewhere.
 
 import heapq
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from typing import Any, Protocol, TypeVar
 
-import msgspec
+from msgspec.structs import replace
 
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.keys import Call, Topic
+from common.keys import SAFETY, Call, Topic
 from common.loop import Timer
-from common.messages import Message
+from common.messages import Message, SourceMessage
 
 MS = NS_PER_S // 1000
 ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbours
@@ -56,7 +55,6 @@ class Envelope:
     key: str
     message: Message
     sender: int  # ``boot`` of the process that sent it
-    sent_ns: int
     private: bool = False  # also sent on the drive link
 
 
@@ -110,8 +108,8 @@ class Net:
         self.connections = 1  # since the start
         self.disturbances: dict[str, Disturbance] = {}
         self.subscriptions: list[Subscription] = []
-        self._under_way: list[tuple[int, int, Subscription | None, Callable[[], None]]] = []
-        self._counts: Counter[tuple[str, str]] = Counter()
+        self._under_way: list[tuple[int, int, Subscription, Envelope]] = []  # by the due time
+        self._counts: Counter[str] = Counter()
         self._order = 0
 
     @property
@@ -120,33 +118,24 @@ class Net:
         return self.connections if self.up else 0
 
     def put(self, envelope: Envelope) -> None:
-        """Send an envelope to all matching subscriptions."""
+        """Send an envelope to all matching subscriptions, under the disturbance of its route."""
         route = route_of(envelope.key)
+        disturbance = self.disturbances.get(route, CLEAR)
         for subscription in self.subscriptions:
             reached = envelope.private if subscription.private else self.up
             if reached and subscription.owner.alive and matches(subscription.key, envelope.key):
-                self.later(route, partial(subscription.hand_over, envelope), subscription)
-
-    def later(
-        self,
-        route: str,
-        arrive: Callable[[], None],
-        subscription: Subscription | None = None,
-        kind: str = "",
-    ) -> None:
-        """Deliver something under the disturbance of a route; each kind is counted separately."""
-        self._counts[route, kind] += 1
-        for delay_ms in self.disturbances.get(route, CLEAR).delays_ms(self._counts[route, kind]):
-            self._order += 1
-            entry = (self.now_ns + delay_ms * MS, self._order, subscription, arrive)
-            heapq.heappush(self._under_way, entry)
+                self._counts[route] += 1
+                for delay_ms in disturbance.delays_ms(self._counts[route]):
+                    self._order += 1
+                    due_ns = self.now_ns + delay_ms * MS
+                    heapq.heappush(self._under_way, (due_ns, self._order, subscription, envelope))
 
     def turn(self) -> None:
         """Deliver everything that is due."""
         while self._under_way and self._under_way[0][0] <= self.now_ns:
-            _, _, subscription, arrive = heapq.heappop(self._under_way)
-            if self.up or subscription is None or subscription.private:
-                arrive()
+            _, _, subscription, envelope = heapq.heappop(self._under_way)
+            if self.up or subscription.private:
+                subscription.hand_over(envelope)
 
     def wake(self, owner: "Process") -> None:
         """Deliver what queued up during the stall of a process."""
@@ -191,8 +180,8 @@ class Publisher:
         """Send a message to all subscriptions."""
         self._seq += 1
         now_ns, boot = self._process.net.now_ns, self._process.boot
-        sent = msgspec.structs.replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
-        self._process.send(Envelope(self.key, sent, boot, now_ns, self._private))
+        sent = replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
+        self._process.send(Envelope(self.key, sent, boot, self._private))
         return sent
 
 
@@ -266,9 +255,6 @@ class Process:
         self.log = Silent()
         self.counters: Counter[str] = Counter()
         self.calls: dict[str, Callable[[Any, Any], None]] = {}
-        self.is_stopped: Callable[[], bool] = lambda: True
-        self.on_exit: Callable[[], None] = lambda: None
-        self.reactions: Callable[[], object] = dict
         self._watch = watch
 
     @property
@@ -302,7 +288,7 @@ class Process:
 
     def post(self, key: str, message: Message) -> None:
         """Send any message on any key as this process."""
-        self.send(Envelope(key, message, self.boot, self.net.now_ns))
+        self.send(Envelope(key, message, self.boot))
 
     def subscribe(
         self,
@@ -316,23 +302,28 @@ class Process:
         **names: str,
     ) -> None:
         """Call the handler for each message."""
-
-        def take(envelope: Envelope) -> None:
-            with self._handling(envelope):
-                handler(Arrival(envelope.message, envelope.key, self.net.now_ns, None))
-
-        self.net.subscriptions.append(
-            Subscription(self, topic.on(ROBOT, **names), take, depth, private)
+        key = topic.on(ROBOT, **names)
+        self._take(
+            key,
+            lambda it: handler(Arrival(it.message, it.key, self.net.now_ns, None)),
+            depth,
+            private,
         )
 
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler for anything on a key."""
+        self._take(key, lambda _: handler(self.net.now_ns))
 
+    def _take(
+        self, key: str, handle: Callable[[Envelope], None], depth: int = 1, private: bool = False
+    ) -> None:
         def take(envelope: Envelope) -> None:
-            with self._handling(envelope):
-                handler(self.net.now_ns)
+            self._watch.on_delivery(self, envelope)
+            self.taking = envelope
+            handle(envelope)
+            self.taking = None
 
-        self.net.subscriptions.append(Subscription(self, key, take, 1))
+        self.net.subscriptions.append(Subscription(self, key, take, depth, private))
 
     def announce(self, key: str) -> None:
         """Do nothing: every key reaches every subscription here."""
@@ -353,14 +344,6 @@ class Process:
             self.calls[call.path](request, caller)
         return caller
 
-    @contextmanager
-    def _handling(self, envelope: Envelope) -> Iterator[None]:
-        """Record the envelope while it is being handled."""
-        self._watch.on_delivery(self, envelope)
-        self.taking = envelope
-        yield
-        self.taking = None
-
     def turn(self) -> None:
         """Do what is due, unless stalled."""
         if not self.alive or self.stalled:
@@ -368,3 +351,37 @@ class Process:
         self.loop.read()
         self.net.wake(self)
         self.loop.call_due()
+
+
+class Source:
+    """Publishes its message 20 times a second, with safety's newest heartbeat as its echo."""
+
+    def __init__(
+        self,
+        name: str,
+        topic: Topic[Any],
+        process: Process,
+        message: SourceMessage | None = None,
+    ) -> None:
+        self.process = process
+        self.message = message  # None: it is silent
+        self.echo = 0
+        self._name = name
+        self._topic = topic
+        self._seq = 0
+        process.subscribe(SAFETY, self._listen)
+
+    def _listen(self, arrival: Any) -> None:
+        self.echo = arrival.message.heartbeat
+
+    def publish(self) -> None:
+        """Publish the message, if there is one."""
+        if self.message is not None:
+            self.put(replace(self.message, echo=self.echo))
+
+    def put(self, message: SourceMessage, *, name: str = "", step: int = 1) -> None:
+        """Put any message, with the next number unless ``step`` says otherwise."""
+        self._seq += step
+        boot = message.boot or self.process.boot
+        key = self._topic.on(ROBOT, source=name or self._name)
+        self.process.post(key, replace(message, boot=boot, seq=self._seq))

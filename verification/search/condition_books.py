@@ -1,4 +1,4 @@
-"""Oracle's books on speed limits, signs of life and standstill, as one safety service knows them.
+"""Oracle's books on sources, limits, signs of life and standstill, as one safety service has them.
 
 As in ``safety_book.py``, nothing is taken from the code under test.
 """
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
-from common.messages import Limit, Motion, SourceMessage, Velocity
+from common.messages import Drive, Limit, Motion, SourceMessage, Velocity
 
 LEASE_S, ECHO_AGE_S, RIVAL_S = 0.5, 0.4, 0.5
 NEEDED, IGNORED = "lidar", "fleet"  # whose silence stops; whose silence has no effect
@@ -29,43 +29,71 @@ GAP_S, FRESH_S = 0.1, 0.2
 
 
 @dataclass(slots=True)
-class GoodLimit:
-    """The newest good limit of one source."""
+class Channel:
+    """The newest good request or limit of one source."""
 
-    boot: int
-    seq: int
-    at_ns: int
-    caps: tuple[float, float]  # m/s, rad/s
+    lease_s: float
+    message: Drive | Limit | None = None
+    at_ns: int = 0
+    rival_ns: int | None = None  # the last message of a second publisher
+
+    def take(self, message: Drive | Limit, sent_ns: int | None, now_ns: int) -> bool:
+        """Take a message in, whose echo was sent then; return whether it is a good one."""
+        given = [one for one in (message.linear, message.angular) if one is not None]
+        late = sent_ns is None or now_ns - sent_ns > ECHO_AGE_S * NS_PER_S
+        if late or not all(map(math.isfinite, given)):
+            return False
+        if self.message is not None and self.message.boot != message.boot:
+            if self.is_fresh(now_ns):
+                self.rival_ns = now_ns
+                return False
+        elif self.message is not None and message.seq <= self.message.seq:
+            return False
+        self.message, self.at_ns = message, now_ns
+        return True
+
+    def is_fresh(self, now_ns: int) -> bool:
+        """Return whether the newest message is still valid."""
+        return self.message is not None and now_ns - self.at_ns <= self.lease_s * NS_PER_S
+
+    def has_rival(self, now_ns: int) -> bool:
+        """Return whether a second publisher was there of late."""
+        return self.rival_ns is not None and now_ns - self.rival_ns < RIVAL_S * NS_PER_S
+
+    @property
+    def is_still(self) -> bool:
+        """Whether the newest message asks for no motion."""
+        return self.message is not None and self.message.linear == 0 == self.message.angular
+
+
+def channels(leases_s: dict[str, float]) -> dict[str, Channel]:
+    """Return a channel for each source."""
+    return {name: Channel(lease_s) for name, lease_s in leases_s.items()}
 
 
 @dataclass(slots=True)
 class LimitBook:
     """Limits delivered to one safety service, and the speed that they permit."""
 
-    newest: dict[str, GoodLimit] = field(default_factory=dict)
-    rivals: dict[str, int] = field(default_factory=dict)
+    sources: dict[str, Channel] = field(
+        default_factory=lambda: channels({NEEDED: LEASE_S, IGNORED: LEASE_S})
+    )
     permitted: tuple[float, float] = NO_CAP  # m/s, rad/s; falls at the normal deceleration
     looked_ns: int = 0
 
-    def on_limit(self, source: str, limit: Limit, sent_ns: int | None, now_ns: int) -> None:
-        """Take a limit in, if it is a good one."""
-        given = [one for one in (limit.linear, limit.angular) if one is not None]
-        late = sent_ns is None or now_ns - sent_ns > ECHO_AGE_S * NS_PER_S
-        if source not in (NEEDED, IGNORED) or late or not all(map(math.isfinite, given)):
-            return
-        old = self.newest.get(source)
-        if old is not None and old.boot != limit.boot and _is_valid(old, now_ns):
-            self.rivals[source] = now_ns
-        elif old is None or old.boot != limit.boot or limit.seq > old.seq:
-            linear = math.inf if limit.linear is None else limit.linear
-            angular = math.inf if limit.angular is None else limit.angular
-            self.newest[source] = GoodLimit(limit.boot, limit.seq, now_ns, (linear, angular))
+    def valid(self, now_ns: int) -> dict[str, tuple[float, float]]:
+        """Return the caps of the valid limits, in m/s and rad/s."""
+        return {
+            name: (_cap(one.message.linear), _cap(one.message.angular))
+            for name, one in self.sources.items()
+            if one.message is not None and one.is_fresh(now_ns)
+        }
 
     def look(self, now_ns: int) -> None:
         """Update the permitted speed, at the time of a decision."""
         step_s = min((now_ns - self.looked_ns) / NS_PER_S, STEP_S)
         self.looked_ns = now_ns
-        valid = [one.caps for one in self.newest.values() if _is_valid(one, now_ns)]
+        valid = self.valid(now_ns).values()
         linear, angular = (
             max(
                 min((caps[axis] for caps in valid), default=math.inf),
@@ -77,10 +105,10 @@ class LimitBook:
 
     def stops(self, now_ns: int) -> Iterator[str]:
         """Yield why the vehicle must stand, whatever is requested."""
-        valid = {name for name, one in self.newest.items() if _is_valid(one, now_ns)}
+        valid = self.valid(now_ns)
         if NEEDED not in valid:
             yield f"no limit of {NEEDED}"
-        yield from (f"protective stop of {one}" for one in valid if 0 in self.newest[one].caps)
+        yield from (f"protective stop of {name}" for name, caps in valid.items() if 0 in caps)
 
     def complaints(self, motion: Motion, now_ns: int) -> Iterator[str]:
         """Yield the reasons why a motion must not run."""
@@ -88,12 +116,12 @@ class LimitBook:
         linear, angular = self.permitted
         if abs(motion.linear) > linear + ROUNDING or abs(motion.angular) > angular + ROUNDING:
             yield f"faster than a limit: {motion.linear} m/s, {motion.angular} rad/s"
-        if any(now_ns - at_ns < RIVAL_S * NS_PER_S for at_ns in self.rivals.values()):
+        if any(one.has_rival(now_ns) for one in self.sources.values()):
             yield "two publishers of one limit"
 
 
-def _is_valid(limit: GoodLimit, now_ns: int) -> bool:
-    return now_ns - limit.at_ns <= LEASE_S * NS_PER_S
+def _cap(given: float | None) -> float:
+    return math.inf if given is None else given
 
 
 @dataclass(slots=True)

@@ -10,7 +10,6 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from sim.geometry import Pose
 from sim.trace import Truth
-from verification.search.operator import Operator
 
 # A wall nearer than this justifies a stop: safety's margin of 0.20 m, its reaction at 1 m/s, the
 # hysteresis of 0.05 m and the errors of the sonars.
@@ -43,15 +42,16 @@ class Judge:
         self._near_ns = self._contact_ns = self._moved_ns = -NS_PER_S * 10
         self._stood_m: float | None = None  # the way driven when it came to stand
 
-    def look(self, operator: Operator, truth: Truth, now_ns: int) -> None:
-        """Judge the causes of the state that operators see."""
+    def look(
+        self, causes: Sequence[m.Cause], asks_since_ns: int | None, truth: Truth, now_ns: int
+    ) -> None:
+        """Judge the causes that an operator sees; who asks for motion since then, or does not."""
         self._note(truth, now_ns)
-        state, at_s = operator.seen, (now_ns - self._start_ns) / NS_PER_S
-        if state is None or at_s < READY_S:
+        at_s = (now_ns - self._start_ns) / NS_PER_S
+        if at_s < READY_S:
             return
-        asked = operator.asks_since_ns
-        asks = asked is not None and now_ns - asked > ASKED_S * NS_PER_S
-        for cause in state.causes:
+        asks = asks_since_ns is not None and now_ns - asks_since_ns > ASKED_S * NS_PER_S
+        for cause in causes:
             if cause.id in self._judged or cause.action == "slow":
                 continue
             if cause.name in TRANSIENT and not asks:

@@ -14,17 +14,18 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.controls import Controls, Deflection, Stick
-from verification.search import sources
-from verification.search.bus import Process
+from verification.search.bus import MS, Source
 from verification.search.draw import Draw
+from verification.search.stack import Stack as Robot
 
 KEYS = ("w", "w", "w", "w", "s", "s", "a", "d", "z", "c", "end", "pagedown")
 PATIENCE_S = 0.7  # without room, until the next manoeuvre
 LET_GO_S = 0.4  # for a neutral request
 LOOK_S = 1.2  # from a stop that is latched to the first call
 BACK_OFF_S = 5.0  # of holding the release
-CLEAR_S = 0.4  # after the bumper is free
+CLEAR_NS = 400 * MS  # after the bumper is free
 GIVE_UP_S = 25.0  # of trying to reset
+RESET_NS = 500 * MS  # from one call to the next
 
 
 class Manoeuvre(Struct, frozen=True):
@@ -51,18 +52,17 @@ def script(draw: Draw) -> list[Manoeuvre]:
     ]
 
 
-class Operator(sources.Stick):
+class Operator(Source):
     """A source that sends what teleop's controls make of the script; ``act`` runs at 20 Hz."""
 
-    def __init__(self, process: Process, draw: Draw) -> None:
-        super().__init__("teleop", process)
-        self.seen: m.SafetyState | None = None
-        self.pressed = False  # the bumper, as shown
+    def __init__(self, robot: Robot, draw: Draw) -> None:
+        super().__init__("teleop", keys.DRIVE, robot.process("stick"))
         self.gave_up = False
         self.muted_until_ns: float = 0
-        self.held: m.Direction | None = None  # the release, for the caller to send
-        self.wants_reset = False  # the same
         self.asks_since_ns: int | None = None  # of motion
+        self._robot = robot
+        self._pressed = False  # the bumper, as shown
+        self._held: m.Direction | None = None  # the release
         self._script = script(draw)[::-1]
         self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
         self._controls = Controls(Teleop())
@@ -73,33 +73,30 @@ class Operator(sources.Stick):
         self._blocked_ns: int | None = None
         self._latched_ns: int | None = None
         self._free_ns: int | None = None  # the bumper, after a contact
-        process.subscribe(keys.BUMPER, self._on_bumper)
+        self.process.subscribe(keys.BUMPER, self._on_bumper)
 
     @property
     def done(self) -> bool:
         """Whether the script is finished, or cannot be."""
         return self.gave_up or not self._script
 
-    def _listen(self, arrival: Any) -> None:
-        super()._listen(arrival)
-        self.seen = arrival.message
-
     def _on_bumper(self, arrival: Any) -> None:
-        self.pressed = arrival.message.pressed
+        self._pressed = arrival.message.pressed
 
-    def act(self, now_ns: int) -> None:
-        """Decide what to hold until the next act."""
-        self.held, self.wants_reset = None, False
-        if self.seen is None or self.done:
-            return
-        if self.seen.latched:
-            self._recover(self.seen, now_ns)
-            return
-        self._latched_ns = self._free_ns = None
-        if self._began_ns is None and now_ns >= self._idle_until_ns:
-            self._began_ns = now_ns
-        if self._began_ns is not None:
-            self._drive(self.seen, now_ns)
+    def act(self) -> None:
+        """Hold a key or the release, let go, or reset, until the next act."""
+        now_ns, state = self.process.net.now_ns, self._robot.seen
+        held = None
+        if state is not None and not self.done:
+            if state.latched:
+                held = self._recover(state, now_ns)
+            else:
+                self._drive(state, now_ns)
+        if held is not None:
+            self._robot.hold(True, held)
+        elif self._held is not None:
+            self._robot.hold(False, self._held)
+        self._held = held
 
     def publish(self) -> None:
         """Publish the request of this tick, if there is one."""
@@ -108,14 +105,20 @@ class Operator(sources.Stick):
         push = self._script[-1].push if driving and self._script else Deflection()
         stick = Stick(push, deadman=driving, turbo=False, events=self._events)
         twist = self._controls.tick(stick if self._gamepad else None, now_ns)
-        self.requested = None if twist is None else (twist.linear, twist.angular)
-        moves = self.requested not in (None, (0.0, 0.0))
+        self.message = None
+        if twist is not None:
+            self.message = m.Drive(linear=twist.linear, angular=twist.angular, echo=0)
+        moves = twist is not None and not twist.is_zero
         self.asks_since_ns = (self.asks_since_ns or now_ns) if moves else None
         if now_ns >= self.muted_until_ns:
             super().publish()
 
     def _drive(self, state: m.SafetyState, now_ns: int) -> None:
-        assert self._began_ns is not None
+        self._latched_ns = self._free_ns = None
+        if self._began_ns is None:
+            if now_ns < self._idle_until_ns:
+                return
+            self._began_ns = now_ns
         causes = {cause.name for cause in state.causes}
         held_s = (now_ns - self._began_ns) / NS_PER_S
         if self._gamepad:
@@ -134,8 +137,8 @@ class Operator(sources.Stick):
         self._began_ns = self._blocked_ns = None
         self._idle_until_ns = now_ns + round(pause_s * NS_PER_S)
 
-    def _recover(self, state: m.SafetyState, now_ns: int) -> None:
-        """Wait, back off, reset."""
+    def _recover(self, state: m.SafetyState, now_ns: int) -> m.Direction | None:
+        """Wait, return the release to hold, reset."""
         if self._latched_ns is None:
             self._latched_ns = now_ns
             self._let_go(now_ns, LET_GO_S)
@@ -145,17 +148,17 @@ class Operator(sources.Stick):
         if since_s > GIVE_UP_S:
             self.gave_up = True
         elif since_s > LOOK_S:
-            self._free_ns = None if self.pressed else self._free_ns or now_ns
+            self._free_ns = None if self._pressed else self._free_ns or now_ns
             if self._free_ns is None and since_s < LOOK_S + BACK_OFF_S:
-                self.held = self._direction(state)
-            elif now_ns - (self._free_ns or now_ns) > CLEAR_S * NS_PER_S:
-                self.wants_reset = True
+                return way_off(state.release)
+            if now_ns % RESET_NS == 0 and now_ns - (self._free_ns or now_ns) > CLEAR_NS:
+                self._robot.reset()
+        return None
 
-    @staticmethod
-    def _direction(state: m.SafetyState) -> m.Direction | None:
-        if state.release is None:
-            return None
-        ways: list[m.Direction] = ["backward", "forward"]
-        if state.release.believed_free is not None:
-            ways.insert(0, state.release.believed_free)
-        return next((way for way in ways if way not in state.release.forbidden), None)
+
+def way_off(release: m.Release | None) -> m.Direction | None:
+    """Return the direction in which to move off the bumper; None without any."""
+    if release is None:
+        return None
+    ways: tuple[m.Direction | None, ...] = release.believed_free, "backward", "forward"
+    return next((way for way in ways if way and way not in release.forbidden), None)

@@ -31,6 +31,7 @@ class OperatorBook:
     began: dict[str, int] = field(default_factory=dict)  # when the newest occurrence began
     seen: dict[str, int] = field(default_factory=dict)
     hold: Hold | None = None  # granted last
+    held_before: Hold | None = None  # the last call
     clears: int = GOOD_SAMPLES  # bumper samples since the last pressed one
     crept: float = 0.0  # m since the contact was latched
     moved: Hold | None = None  # by a release, last
@@ -83,6 +84,7 @@ class OperatorBook:
 
     def on_hold(self, request: ReleaseRequest, now_ns: int) -> None:
         """Record a call that may be granted."""
+        self.held_before = self.hold
         sent_ns = self.beats.get(request.echo or 0)
         if not request.held:
             self.hold = None

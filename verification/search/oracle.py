@@ -1,10 +1,9 @@
-"""Oracle: checks every frame that the board receives against the messages delivered before.
+"""Oracle: checks every frame that leaves a bridge against the messages delivered before.
 
 A RUN that moves is traced back to its motion message, the verdict behind it, and the request and
-samples behind the verdict. Each error on that path is a *complaint*. A complaint counts when its
-frame reaches the board. A *trip* is an event that latches. Its *holders* are the processes that
-know of it. The trip is dropped with its last holder: the safety case accepts that for two processes
-that die at once.
+samples behind the verdict. Each error on that path is a *complaint*, and a violation when the RUN
+leaves. A *trip* is an event that latches. Its *holders* are the processes that know of it. The trip
+is dropped with its last holder: the safety case accepts that for two processes that die at once.
 """
 
 from collections.abc import Iterable
@@ -13,11 +12,12 @@ from dataclasses import dataclass, field
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
+from common.wire.reports import FROM_BOARD
+from sim import requests as q
+from sim import trace as t
 from verification.search.bridge_book import BridgeBook
 from verification.search.bus import MS, Envelope, Process
-from verification.search.operator_book import Hold
 from verification.search.safety_book import FAST_S, SafetyBook
 
 # The bridge's lease and tick; the guard needs less.
@@ -60,6 +60,7 @@ class Oracle:
     _records: dict[tuple[int, int], Record] = field(default_factory=dict)
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
     _moved_ns: int | None = None  # when the board last took a RUN that moves
+    _deaf_until_ns: int = 0  # the board receives nothing
     _framing: Framing = field(default_factory=Framing)
 
     # --- deliveries -------------------------------------------------------------------------
@@ -130,14 +131,12 @@ class Oracle:
         if not any(trip.name == "contact" for trip in self._held_by(book.boot)):
             self.trip("contact", book.boot)
 
-    def on_report(self, process: Process, frames: Iterable[Frame], port: int) -> None:
-        """Record frames of the board, on this port, before the bridge handles them."""
+    def on_report(self, process: Process, datagram: bytes, port: int) -> None:
+        """Record a datagram of the board, on this port, before the bridge handles it."""
         bridge_book = self.bridge_books[process.boot]
-        for frame in frames:
-            if bridge_book.on_report(frame, port, self.now_ns):
-                self.trip(
-                    "contact", bridge_book.boot, (bridge_book.boot, bridge_book.published + 1)
-                )
+        for part in self._framing.read(datagram, FROM_BOARD):
+            if isinstance(part, Received) and bridge_book.on_report(part.frame, port, self.now_ns):
+                self.trip("contact", process.boot, (process.boot, bridge_book.published + 1))
 
     def on_router(self, up: bool) -> None:
         """Record that the router is gone or back."""
@@ -146,11 +145,27 @@ class Oracle:
             if book.estop_session_was_up and not up:
                 self.trip("estop_reader", book.boot)
 
-    def on_reset(self, process: Process, request: m.ResetRequest) -> None:
-        """Record a granted reset; trips that it must not clear stay."""
+    def on_call(self, process: Process, request: m.ResetRequest | m.ReleaseRequest) -> None:
+        """Record a call before safety decides: it may move the vehicle at once."""
         book = self.safety_books.get(process.boot)
-        if book is None or not self.estop_session_up or not book.may_reset(self.now_ns):
+        if book is not None and isinstance(request, m.ReleaseRequest):
+            book.operators.on_hold(request, self.now_ns)
+
+    def on_answer(
+        self, process: Process, request: m.ResetRequest | m.ReleaseRequest, done: bool
+    ) -> None:
+        """Record the answer: a refused hold changes nothing, a granted reset clears trips."""
+        book = self.safety_books.get(process.boot)
+        if book is None:
             return
+        if isinstance(request, m.ResetRequest):
+            if done and self.estop_session_up and book.may_reset(self.now_ns):
+                self._clear(book, request)
+        elif not done:
+            book.operators.hold = book.operators.held_before
+
+    def _clear(self, book: SafetyBook, request: m.ResetRequest) -> None:
+        """Clear trips; those that the request must not clear stay."""
         cleared = [
             trip
             for trip in self._held_by(book.boot)
@@ -160,29 +175,12 @@ class Oracle:
         if any(trip.name == "contact" for trip in cleared):
             book.operators.on_cleared()
 
-    def on_hold(self, process: Process, request: m.ReleaseRequest) -> None:
-        """Record a call that holds or ends the release."""
-        book = self.safety_books.get(process.boot)
-        if book is not None:
-            book.operators.on_hold(request, self.now_ns)
-
-    def holds(self, process: Process) -> Hold | None:
-        """Return the last granted release."""
-        book = self.safety_books.get(process.boot)
-        return book.operators.hold if book is not None else None
-
-    def on_refusal(self, process: Process, before: Hold | None) -> None:
-        """Record a refused call: the previous release stays granted."""
-        book = self.safety_books.get(process.boot)
-        if book is not None:
-            book.operators.hold = before
-
     def on_start(self, process: Process) -> None:
         """Open the book of a started process."""
         self.comeback_ns = self.now_ns
         if process.name == "safety":
             self.safety_books[process.boot] = SafetyBook(process.boot, bad_ns=self.now_ns)
-        else:
+        if process.name == "bridge":
             self.bridge_books[process.boot] = BridgeBook(process.boot)
 
     def on_end(self, process: Process) -> None:
@@ -241,20 +239,20 @@ class Oracle:
             complaints.append("no source was neutral since a restart")
         return complaints
 
-    def on_leaving(self, process: Process, datagram: bytes) -> tuple[str, ...]:
-        """Check a datagram that leaves a bridge; return the complaints that travel with it."""
+    def on_leaving(self, process: Process, datagram: bytes) -> None:
+        """Check a datagram that leaves a bridge."""
         bridge_book = self.bridge_books[process.boot]
         for part in self._framing.read(datagram, TO_BOARD):
             assert isinstance(part, Received), part
-            if not isinstance(part.frame, MotionCommand):
+            if not isinstance(frame := part.frame, MotionCommand):
                 continue
-            if bridge_book.brake_due and part.frame.kind is not MotionKind.BREAK:
+            brakes = frame.kind is MotionKind.BREAK
+            if bridge_book.brake_due and not brakes:
                 self.violations.append("a hit or an emergency stop without a BRAKE at once")
-            bridge_book.brake_due = False
-            bridge_book.braked = part.frame.kind is MotionKind.BREAK
-            if part.frame.kind is MotionKind.RUN and moves_vehicle(part.frame):
-                return tuple(self._of_frame(bridge_book, process.taking, part.frame))
-        return ()
+            bridge_book.brake_due, bridge_book.braked = False, brakes
+            if frame.kind is MotionKind.RUN and (frame.linear_mmps or frame.angular_raw):
+                complaints = self._of_frame(bridge_book, process.taking, frame)
+                self.violations += [f"{frame.linear_mmps} mm/s: {one}" for one in complaints]
 
     def _of_frame(
         self, bridge_book: BridgeBook, cause: Envelope | None, frame: MotionCommand
@@ -277,21 +275,24 @@ class Oracle:
         ]
         return complaints
 
-    def on_board(self, frame: MotionCommand, complaints: tuple[str, ...]) -> None:
-        """Record a frame at the board: its complaints count now."""
-        moves = frame.kind is MotionKind.RUN and moves_vehicle(frame)
-        self._moved_ns = self.now_ns if moves else None
-        self.runs += moves
-        self.violations += [f"{frame.linear_mmps} mm/s: {one}" for one in complaints]
+    def _on_board(self, line: t.Line) -> None:
+        match line:
+            case t.Command():
+                moves = line.kind == "run" and bool(line.linear or line.angular)
+                self._moved_ns = self.now_ns if moves else None
+                self.runs += moves
+            case t.Power(on=on):
+                self._moved_ns = None  # it has lost its command
+                self.comeback_ns = self.now_ns if on else self.comeback_ns
+            case t.Disturbed(request=q.Freeze(seconds=s) | q.PowerCycle(seconds=s)):
+                self._deaf_until_ns = self.now_ns + round(s * NS_PER_S)
 
-    def on_power_cycle(self) -> None:
-        """Record a power cycle: the board has lost its command."""
-        self._moved_ns = None
-
-    def on_step(self, deaf: bool) -> None:
-        """Check the command that the board holds (invariant 2); ``deaf``: it receives nothing."""
+    def on_step(self, trace: Iterable[t.Line]) -> None:
+        """Check the command that the board holds (invariant 2) after these lines of its trace."""
+        for line in trace:
+            self._on_board(line)
         budget_ns = BUDGET_NS + self.slack_ns
-        if deaf and self._moved_ns is not None:
+        if self._moved_ns is not None and self.now_ns < self._deaf_until_ns:
             self._moved_ns = self.now_ns
         if self._moved_ns is not None and self.now_ns - self._moved_ns > budget_ns:
             self.violations.append(f"a RUN is held for more than {budget_ns / MS:.0f} ms")
@@ -303,11 +304,6 @@ class Oracle:
 def moves(motion: m.Motion) -> bool:
     """Return whether a motion message moves the vehicle."""
     return motion.command == "run" and not (motion.linear == 0 == motion.angular)
-
-
-def moves_vehicle(frame: MotionCommand) -> bool:
-    """Return whether a RUN frame moves the vehicle."""
-    return frame.linear_mmps != 0 or frame.angular_raw != 0
 
 
 def follows(frame: MotionCommand, motion: m.Motion) -> bool:

@@ -119,7 +119,7 @@ def by_fault(results: Sequence[Result]) -> str:
 
 def odometry(sound: Sequence[Result]) -> str:
     """Return the table of odometry's errors at the end of the runs."""
-    last = [result.errors[-1] for result in sound if result.errors]
+    last = [result.error for result in sound if result.error]
     rows = []
     for name, unit in (("position", " m"), ("heading", " rad"), ("nees", "")):
         values = [float(getattr(error, name)) for error in last]

@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from common import keys
+from common import messages as m
 from common.freshness import NS_PER_S
 from sim import requests as q
 from sim.config import Config
@@ -22,7 +23,7 @@ from verification.search.operator import Operator
 from verification.search.stack import START_NS, Stack
 
 STEP_NS = 10 * MS
-ACT_MS, RESET_MS = 50, 500
+ACT_MS = 50
 LONGEST_S = 90.0
 TAIL_MS = 1200  # after the script: everything must stand
 
@@ -40,7 +41,7 @@ class Result(Struct, frozen=True, kw_only=True):
     cpu_s: float
     metres: float  # driven
     contacts: int
-    errors: list[PoseError]  # once a second
+    error: PoseError | None  # of odometry, at the end
     held: dict[str, float] = {}  # of an unfinished run: causes that held the vehicle, in seconds
 
     @property
@@ -78,7 +79,7 @@ def run(draw: Draw) -> Result:
         cpu_s=round(time.process_time() - began_s, 3),
         metres=round(stack.vehicle.truth.distance, 3),
         contacts=trial.contacts,
-        errors=trial.errors,
+        error=trial.pose_error(),
         held={} if finished else trial.held(),
     )
 
@@ -106,21 +107,21 @@ class Trial:
 
     def __init__(self, draw: Draw) -> None:
         config = msgspec.convert(draw.settings(), Config)
-        plan = room(draw, config.vehicle)
-        self.stack = Stack(config, plan, odometry=True, step_ns=STEP_NS)
-        self.operator = Operator(self.stack.process("stick"), draw)
-        self.stack.sticks = {"teleop": self.operator}
+        self.stack = Stack(config, room(draw, config.vehicle), step_ns=STEP_NS)
+        self.operator = Operator(self.stack, draw)
+        self.stack.sources["teleop"] = self.operator
         self.judge = Judge(START_NS)
         self.contacts = 0
-        self.errors: list[PoseError] = []
         self._origin = self.stack.vehicle.simulation.pose
-        self._faults = [
-            (START_NS + round((float(value) + after_s) * NS_PER_S), number, step)
-            for name, value in draw.values.items()
-            if name.startswith("fault.")
-            for number, (after_s, step) in enumerate(FAULTS[name.removeprefix("fault.")])
-        ]
-        self._faults.sort(key=lambda fault: fault[:2])
+        self._odometry: m.Odometry | None = None
+        self._faults = sorted(
+            (
+                (START_NS + round((float(value) + after_s) * NS_PER_S), number, step)
+                for name, value in draw.values.items()
+                for number, (after_s, step) in enumerate(FAULTS.get(name, ()))
+            ),
+            key=lambda fault: fault[:2],
+        )
         self._held: Counter[str] = Counter()  # looks at each cause
         self.stack.hand.subscribe(keys.ODOMETRY, self._on_odometry)
 
@@ -130,7 +131,7 @@ class Trial:
         while not self.operator.done and self.stack.net.now_ns < end_ns:
             while self._faults and self._faults[0][0] <= self.stack.net.now_ns:
                 self._faults.pop(0)[2](self)
-            self._act()
+            self.operator.act()
             self._advance()
         self.operator.muted_until_ns = math.inf
         for _ in range(TAIL_MS // ACT_MS):
@@ -140,31 +141,24 @@ class Trial:
         """Return the causes that operators saw, and for how many seconds; the longest first."""
         return {name: count * ACT_MS / 1000 for name, count in self._held.most_common()}
 
-    def _act(self) -> None:
-        """Ask the operator what to hold, and make the calls."""
-        operator, before = self.operator, self.operator.held
-        operator.act(self.stack.net.now_ns)
-        if operator.held is not None:
-            self.stack.hold(True, operator.held)
-        elif before is not None:
-            self.stack.hold(False, before)
-        if operator.wants_reset and self.stack.net.now_ns % (RESET_MS * MS) == 0:
-            self.stack.reset()
+    def pose_error(self) -> PoseError | None:
+        """Return the error of the newest odometry."""
+        if self._odometry is None:
+            return None
+        pose = self.stack.vehicle.simulation.pose
+        return pose_error(self._odometry, pose, self._origin)
 
     def _advance(self) -> None:
         """Advance to the next act."""
         stack, before = self.stack, self.stack.vehicle.truth
         stack.run(ACT_MS - stack.net.now_ns // MS % ACT_MS)
-        truth = stack.vehicle.truth
+        truth, causes = stack.vehicle.truth, stack.seen.causes if stack.seen else ()
         self.contacts += truth.contact and not before.contact
-        self.judge.look(self.operator, truth, stack.net.now_ns)
-        seen = self.operator.seen
-        self._held.update(cause.name for cause in (seen.causes if seen else ()))
+        self.judge.look(causes, self.operator.asks_since_ns, truth, stack.net.now_ns)
+        self._held.update(cause.name for cause in causes)
 
     def _on_odometry(self, arrival: Any) -> None:
-        if (self.stack.net.now_ns - START_NS) // NS_PER_S > len(self.errors):
-            pose = self.stack.vehicle.simulation.pose
-            self.errors.append(pose_error(arrival.message, pose, self._origin))
+        self._odometry = arrival.message
 
 
 # --- faults -----------------------------------------------------------------------------------
@@ -176,6 +170,10 @@ def _inject(request: q.Asked) -> Step:
     return lambda trial: trial.stack.vehicle.inject(request)
 
 
+def _mute(report: q.ReportName, seconds: float) -> tuple[tuple[float, Step], ...]:
+    return (0.0, _inject(q.Mute(reports=(report,)))), (seconds, _inject(q.Mute()))
+
+
 def _silence(trial: Trial) -> None:
     trial.operator.muted_until_ns = trial.stack.net.now_ns + NS_PER_S
 
@@ -184,47 +182,35 @@ def _late(trial: Trial) -> None:
     trial.stack.net.disturbances["drive"] = Disturbance(late_ms=400, lose=3)
 
 
-def _restart(trial: Trial) -> None:
-    trial.stack.vehicle.power_cycle(800)
-    trial.stack.oracle.on_power_cycle()
-
-
-def _returned(trial: Trial) -> None:
-    trial.stack.oracle.comeback_ns = trial.stack.net.now_ns
-
-
 # Steps of each fault of ``ranges.toml``: seconds after its begin, and what happens.
 FAULTS: dict[str, tuple[tuple[float, Step], ...]] = {
-    "bridge_killed": ((0.0, lambda trial: trial.stack.kill("bridge", 200)),),
-    "safety_killed": ((0.0, lambda trial: trial.stack.kill("safety", 200)),),
-    "bridge_stalled": ((0.0, lambda trial: trial.stack.stall("bridge", 150)),),
-    "safety_stalled": ((0.0, lambda trial: trial.stack.stall("safety", 400)),),
-    "router_down": (
+    "fault.bridge_killed": ((0.0, lambda trial: trial.stack.kill("bridge", 200)),),
+    "fault.safety_killed": ((0.0, lambda trial: trial.stack.kill("safety", 200)),),
+    "fault.bridge_stalled": ((0.0, lambda trial: trial.stack.stall("bridge", 150)),),
+    "fault.safety_stalled": ((0.0, lambda trial: trial.stack.stall("safety", 400)),),
+    "fault.router_down": (
         (0.0, lambda trial: trial.stack.router(False)),
         (1.0, lambda trial: trial.stack.router(True)),
     ),
-    "operator_silent": ((0.0, _silence),),
-    "requests_late": (
+    "fault.operator_silent": ((0.0, _silence),),
+    "fault.requests_late": (
         (0.0, _late),
         (0.5, lambda trial: trial.stack.net.disturbances.clear()),
     ),
-    "estop": ((0.0, lambda trial: trial.stack.estop()),),
-    "board_frozen": ((0.0, lambda trial: trial.stack.vehicle.freeze(600)),),
-    "board_restarted": ((0.0, _restart), (0.8, _returned)),
-    "bumper_pressed": (
+    "fault.estop": ((0.0, lambda trial: trial.stack.estop()),),
+    "fault.board_frozen": ((0.0, _inject(q.Freeze(seconds=0.6))),),
+    "fault.board_restarted": ((0.0, _inject(q.PowerCycle(seconds=0.8))),),
+    "fault.bumper_pressed": (
         (0.0, _inject(q.Bumper(pressed=True))),
         (0.1, _inject(q.Bumper(pressed=False))),
     ),
-    "bumper_muted": ((0.0, _inject(q.Mute(reports=("bumper",)))), (0.5, _inject(q.Mute()))),
-    "velocity_muted": ((0.0, _inject(q.Mute(reports=("velocity",)))), (0.5, _inject(q.Mute()))),
-    "ultrasonic_muted": (
-        (0.0, _inject(q.Mute(reports=("ultrasonic",)))),
-        (0.8, _inject(q.Mute())),
-    ),
-    "driver": (
+    "fault.bumper_muted": _mute("bumper", 0.5),
+    "fault.velocity_muted": _mute("velocity", 0.5),
+    "fault.ultrasonic_muted": _mute("ultrasonic", 0.8),
+    "fault.driver": (
         (0.0, _inject(q.Driver(side="left", bits=1))),
         (0.5, _inject(q.Driver(side="left", bits=0))),
     ),
-    "sonar_faulty": ((0.0, _inject(q.Sonar(name="front", fault=True))),),
-    "sonar_stuck": ((0.0, _inject(q.Sonar(name="front", stuck=True))),),
+    "fault.sonar_faulty": ((0.0, _inject(q.Sonar(name="front", fault=True))),),
+    "fault.sonar_stuck": ((0.0, _inject(q.Sonar(name="front", stuck=True))),),
 }

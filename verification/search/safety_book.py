@@ -11,13 +11,19 @@ from dataclasses import dataclass, field
 
 from common import messages as m
 from common.freshness import NS_PER_S
-from verification.search.condition_books import KeepaliveBook, LimitBook, StandstillBook
+from verification.search.condition_books import (
+    Channel,
+    KeepaliveBook,
+    LimitBook,
+    StandstillBook,
+    channels,
+)
 from verification.search.operator_book import OperatorBook
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
-GOOD_SAMPLES, ECHO_AGE_S, SETTLE_S, RIVAL_S = 3, 0.4, 0.5, 0.5
+GOOD_SAMPLES, SETTLE_S = 3, 0.5
 LAPSE_S = 1.0  # after its lease a source is as new
 MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
@@ -39,23 +45,6 @@ FLANKS = (0, 4)
 
 
 @dataclass(slots=True)
-class SourceRequest:
-    """The newest good request of one source."""
-
-    boot: int
-    seq: int
-    at_ns: int
-    linear: float
-    angular: float
-    still_ns: int  # since when its source asks for no motion
-
-    @property
-    def still(self) -> bool:
-        """Whether it asks for no motion."""
-        return self.linear == 0 == self.angular
-
-
-@dataclass(slots=True)
 class SafetyBook:
     """Messages delivered to one safety service, by the time of delivery."""
 
@@ -63,10 +52,10 @@ class SafetyBook:
     samples: dict[str, tuple[int, m.Message]] = field(default_factory=dict)
     ranges: deque[tuple[int, m.Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
     bumpers: deque[m.Bumper] = field(default_factory=lambda: deque(maxlen=3))
-    requests: dict[str, SourceRequest] = field(default_factory=dict)
+    requests: dict[str, Channel] = field(default_factory=lambda: channels(LEASES_S))
+    still_ns: dict[str, int] = field(default_factory=dict)  # source: since when it asks for none
     zeros: dict[str, int] = field(default_factory=dict)  # source: its last request of zero
     unseen: dict[int, int] = field(default_factory=dict)  # sonar: since when it shows nothing
-    rivals: dict[str, int] = field(default_factory=dict)
     operators: OperatorBook = field(default_factory=OperatorBook)
     bad_ns: int = 0  # when inputs were last seen to be bad
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
@@ -81,35 +70,25 @@ class SafetyBook:
     def on_source(self, name: str, message: m.SourceMessage, now_ns: int) -> bool:
         """Take a message of a source in; return whether an emergency stop was lost."""
         sent_ns = self.operators.beats.get(message.echo)
-        if isinstance(message, m.Drive):
-            self.on_drive(name, message, now_ns)
-        elif isinstance(message, m.Limit):
-            self.limits.on_limit(name, message, sent_ns, now_ns)
+        if isinstance(message, m.Drive) and name in self.requests:
+            self._on_drive(name, message, sent_ns, now_ns)
+        elif isinstance(message, m.Limit) and name in self.limits.sources:
+            self.limits.sources[name].take(message, sent_ns, now_ns)
         pendant = isinstance(message, m.EstopKeepalive)
         return pendant and self.keepalive.on_message(message, sent_ns, now_ns)
 
-    def on_drive(self, source: str, drive: m.Drive, now_ns: int) -> None:
-        """Take a request in, if it is a good one."""
-        sent_ns = self.operators.beats.get(drive.echo)
-        finite = math.isfinite(drive.linear) and math.isfinite(drive.angular)
-        if source not in LEASES_S or not finite or sent_ns is None:
+    def _on_drive(self, source: str, drive: m.Drive, sent_ns: int | None, now_ns: int) -> None:
+        channel = self.requests[source]
+        lapsed = now_ns - channel.at_ns > (channel.lease_s + LAPSE_S) * NS_PER_S
+        if not channel.take(drive, sent_ns, now_ns):
             return
-        if now_ns - sent_ns > ECHO_AGE_S * NS_PER_S:
-            return
-        old = self.requests.get(source)
-        if old is not None and old.boot != drive.boot and self.is_fresh(source, now_ns):
-            self.rivals[source] = now_ns
-            return
-        if old is not None and old.boot == drive.boot and drive.seq <= old.seq:
-            return
-        if drive.linear == 0 == drive.angular:
-            self.zeros[source] = now_ns
-        if old is not None and now_ns - old.at_ns > (LEASES_S[source] + LAPSE_S) * NS_PER_S:
+        if lapsed:
             self.neutral.pop(source, None)  # a program that was suspended
-        since_ns = old.still_ns if old is not None and old.still else now_ns
-        self.requests[source] = SourceRequest(
-            drive.boot, drive.seq, now_ns, drive.linear, drive.angular, since_ns
-        )
+        if channel.is_still:
+            self.zeros[source] = now_ns
+            self.still_ns.setdefault(source, now_ns)
+        else:
+            self.still_ns.pop(source, None)
 
     def on_sample(self, name: str, message: m.Message, now_ns: int) -> None:
         """Take a sample in."""
@@ -178,7 +157,7 @@ class SafetyBook:
             self.neutral.clear()
             return
         for source, request in self.requests.items():
-            if request.still and self.is_fresh(source, now_ns):
+            if request.is_still and request.is_fresh(now_ns):
                 self.neutral[source] = request.at_ns
         for source in [source for source in self.neutral if self._better(source, now_ns)]:
             del self.neutral[source]  # overruled
@@ -186,11 +165,7 @@ class SafetyBook:
     def _better(self, source: str, now_ns: int) -> list[str]:
         """Return the sources above this one that hold the wheel."""
         higher = (one for one in self.requests if PRIORITIES[one] > PRIORITIES[source])
-        return [one for one in higher if self.is_fresh(one, now_ns)]
-
-    def is_fresh(self, source: str, now_ns: int) -> bool:
-        """Return whether the newest request of a source is still valid."""
-        return now_ns - self.requests[source].at_ns <= LEASES_S[source] * NS_PER_S
+        return [one for one in higher if self.requests[one].is_fresh(now_ns)]
 
     def complaints(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
         """Yield the reasons why a motion must not run, except trips."""
@@ -212,10 +187,7 @@ class SafetyBook:
         at_ns, velocity = self.samples.get("velocity", (0, None))
         fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
         stands = fresh and isinstance(velocity, m.Velocity) and abs(velocity.linear) < 0.02
-        asked = any(
-            self.is_fresh(source, now_ns) and not request.still
-            for source, request in self.requests.items()
-        )
+        asked = any(one.is_fresh(now_ns) and not one.is_still for one in self.requests.values())
         return stands and not asked
 
     def is_gone(self, trip: str) -> bool:
@@ -251,17 +223,16 @@ class SafetyBook:
         return bad
 
     def _of_source(self, source: str, now_ns: int) -> Iterator[str]:
-        if source not in self.requests or not self.is_fresh(source, now_ns):
+        if source not in self.requests or not self.requests[source].is_fresh(now_ns):
             yield f"no fresh request of {source!r}"
             return
-        request = self.requests[source]
-        if request.still and now_ns - request.still_ns > RAMP_S * NS_PER_S:
+        if now_ns - self.still_ns.get(source, now_ns) > RAMP_S * NS_PER_S:
             yield "no source requests motion"
         if better := self._better(source, now_ns):
             yield f"{better} go before {source}"
         if source not in self.neutral:
             yield f"{source} was not neutral since the last cause"
-        if now_ns - self.rivals.get(source, -now_ns) < RIVAL_S * NS_PER_S:
+        if self.requests[source].has_rival(now_ns):
             yield "two publishers on one source"
 
     def _of_release(self, motion: m.Motion, now_ns: int) -> Iterator[str]:

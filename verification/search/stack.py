@@ -1,5 +1,6 @@
 """The real shells of bridge, safety and odometry, a vehicle and sources, in simulated time."""
 
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -8,35 +9,77 @@ from unittest.mock import patch
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
-from common.operator import release_request, reset_request
 from common.wire.commands import MotionCommand, MotionKind
-from common.wire.framing import Framing, Received
-from common.wire.reports import FROM_BOARD
+from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from sim import trace as t
 from sim.config import Config
+from sim.injection import Injection
+from sim.requests import Asked, Script
+from sim.simulation import Simulation
 from sim.world import Plan
-from verification.search.bus import MS, ROBOT, Caller, Net, Process
+from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
 from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle
-from verification.search.sources import PENDANT, Limiter, Pendant, Stick
-from verification.search.vehicle import Vehicle
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
 PLANE = Plan(title="an empty plane")
-THIRD_PARTIES = Safety(
-    limits={
-        NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
-        IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
-    },
-    estop_keepalive=(PENDANT,),
-)
+PENDANT = "pendant"
+CONFIGS = {
+    "bridge": BridgeConfig(),
+    "safety": SafetyConfig(
+        safety=Safety(
+            limits={
+                NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
+                IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
+            },
+            estop_keepalive=(PENDANT,),
+        )
+    ),
+    "odom": OdomConfig(),
+}  # in the order of their turns
+
+
+class Vehicle:
+    """The simulated vehicle at the other end of the cable."""
+
+    def __init__(self, net: Net, config: Config, plan: Plan) -> None:
+        self.simulation = Simulation(config, plan, net.now_ns)
+        self.ports = config.board.listen_ports
+        self.inboxes: tuple[deque[bytes], ...] = tuple(deque() for _ in self.ports)  # the bridge's
+        self.truth = self.simulation.truth(net.now_ns)  # the newest, 20 times a second
+        self.records: list[t.Line] = []
+        self._injection = Injection(self.simulation, Script(), net.now_ns)
+        self._net = net
+
+    def inject(self, request: Asked) -> None:
+        """Inject a fault of the simulator."""
+        self._injection.handle(request, self._net.now_ns)
+
+    def receive(self, datagram: bytes, port: int) -> None:
+        """Send a datagram to the board, from a port of the bridge."""
+        self.simulation.receive(datagram, self.ports[port], self._net.now_ns)
+
+    def turn(self) -> None:
+        """Advance to the current time."""
+        self.simulation.advance(self._net.now_ns)
+        for datagram in self.simulation.take_sent(self._net.now_ns):
+            if not datagram.foreign:
+                self.inboxes[self.ports.index(datagram.port)].append(datagram.payload)
+
+    def take_records(self) -> list[t.Line]:
+        """Return what has happened since the last call."""
+        records = list(self.simulation.take_records())
+        self.records += records
+        self.truth = next((one for one in records[::-1] if isinstance(one, t.Truth)), self.truth)
+        return records
 
 
 class Sockets:
@@ -46,10 +89,9 @@ class Sockets:
     last_foreign_source = None
 
     def __init__(self, stack: "Stack", process: Process) -> None:
-        self.sockets = [object() for _ in process.config.board.listen_ports]
+        self.sockets = [object() for _ in stack.vehicle.ports]
         self._stack = stack
         self._process = process
-        self._framing = Framing()
 
     def read(self, first: int, *ports: int) -> Iterator[tuple[int, bytes, int]]:
         """Yield what waits at these ports, after the oracle has seen it."""
@@ -57,9 +99,7 @@ class Sockets:
             inbox = self._stack.vehicle.inboxes[port]
             while inbox:
                 datagram = inbox.popleft()
-                parts = self._framing.read(datagram, FROM_BOARD)
-                frames = [part.frame for part in parts if isinstance(part, Received)]
-                self._stack.oracle.on_report(self._process, frames, port)
+                self._stack.oracle.on_report(self._process, datagram, port)
                 yield port, datagram, self._stack.net.now_ns
 
     def take_relay_report(self) -> bytes:
@@ -67,9 +107,9 @@ class Sockets:
         return b""
 
     def send(self, datagram: bytes, port: int, attempts: int = 1) -> bool:
-        """Send to the board, with the oracle's complaints."""
-        complaints = self._stack.oracle.on_leaving(self._process, datagram)
-        self._stack.vehicle.receive(datagram, port, complaints)
+        """Send to the board, after the oracle has seen it."""
+        self._stack.oracle.on_leaving(self._process, datagram)
+        self._stack.vehicle.receive(datagram, port)
         return True
 
 
@@ -80,12 +120,7 @@ class Stack:
     """
 
     def __init__(
-        self,
-        config: Config | None = None,
-        plan: Plan = PLANE,
-        *,
-        odometry: bool = False,
-        step_ns: int = STEP_NS,
+        self, config: Config | None = None, plan: Plan = PLANE, *, step_ns: int = STEP_NS
     ) -> None:
         config = config or Config()
         self.net = Net(START_NS)
@@ -94,18 +129,21 @@ class Stack:
         for line in (config.sim.cable.to_board, config.sim.cable.to_pc):
             self.oracle.slack_ns += round((line.delay + line.jitter) * 1e9)
             self.oracle.slack_ns += 150 * MS if line.drop or line.corrupt else 0
-        self.vehicle = Vehicle(self.net, self.oracle.on_board, config, plan)
+        self.vehicle = Vehicle(self.net, config, plan)
         self._step_ns = step_ns
         self._boots = 1000
-        self._brake_ns: int | None = None  # when the guard brakes next
+        self._brake_ns = 0  # when the guard brakes next
         self._starts: dict[str, int] = {}
-        self.safety = self._start("safety")
-        self.bridge = self._start("bridge")
-        self.odometry = [self._start_odometry()] if odometry else []
-        self.sticks = {name: Stick(name, self.process(name)) for name in ("teleop", "nav")}
-        self.limiters = {name: Limiter(name, self.process(name)) for name in (NEEDED, IGNORED)}
-        self.limiters[NEEDED].caps = (None, None)
-        self.pendant = Pendant(PENDANT, self.process(PENDANT))
+        self.processes = {name: self._start(name) for name in CONFIGS}
+        self.sources = {
+            "teleop": Source("teleop", keys.DRIVE, self.process("teleop")),
+            "nav": Source("nav", keys.DRIVE, self.process("nav")),
+            NEEDED: Source(NEEDED, keys.LIMIT, self.process(NEEDED), m.Limit(echo=0)),
+            IGNORED: Source(IGNORED, keys.LIMIT, self.process(IGNORED)),
+            PENDANT: Source(
+                PENDANT, keys.ESTOP_KEEPALIVE, self.process(PENDANT), m.EstopKeepalive(echo=0)
+            ),
+        }
         self.hand = self.process("hand")  # sees what operators see, and sends what has no source
         self.seen: m.SafetyState | None = None
         self.hand.subscribe(keys.SAFETY, self._look)
@@ -128,79 +166,65 @@ class Stack:
     def _turn(self) -> None:
         for name, due_ns in list(self._starts.items()):
             if due_ns <= self.net.now_ns:
-                setattr(self, name, self._start(name))
+                self.processes[name] = self._start(name)
                 del self._starts[name]
         self.vehicle.turn()
         self._guard()
         self.net.turn()
-        for process in (self.bridge, self.safety, *self.odometry):
+        for process in self.processes.values():
             process.turn()
             self.net.turn()
         if self.net.now_ns % ASK_NS == 0:
-            for source in (*self.sticks.values(), *self.limiters.values(), self.pendant):
+            for source in self.sources.values():
                 source.publish()
             self.net.turn()
-        self.oracle.on_step(self.vehicle.silent)
+        self.oracle.on_step(self.vehicle.take_records())
 
     def _guard(self) -> None:
         """Brake while there is no bridge."""
-        if self.bridge.alive or (self._brake_ns or 0) > self.net.now_ns:
-            return
-        self._brake_ns = self.net.now_ns + BREAK_NS
-        self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), 0, ())
+        if not self.processes["bridge"].alive and self._brake_ns <= self.net.now_ns:
+            self._brake_ns = self.net.now_ns + BREAK_NS
+            self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), 0)
 
     # --- processes --------------------------------------------------------------------------
 
-    def process(self, name: str, config: Any = None) -> Process:
+    def process(self, name: str) -> Process:
         """Return a new process on the bus."""
         self._boots += 1
-        return Process(name, self.net, config, self._boots, self.oracle)
+        return Process(name, self.net, CONFIGS.get(name), self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
-        config = SafetyConfig(safety=THIRD_PARTIES) if name == "safety" else BridgeConfig()
-        process = self.process(name, config)
+        process: Any = self.process(name)
         self.oracle.on_start(process)
         with self.time():
             if name == "safety":
-                SafetyService(process, process)  # type: ignore[arg-type]
+                SafetyService(process, process)
+            elif name == "odom":
+                Odometer(process)
             else:
                 made = Sockets(self, process)
                 with patch("services.bridge.bridge.Sockets", lambda *_, **__: made):
-                    Bridge(process)  # type: ignore[arg-type]
-        return process
-
-    def _start_odometry(self) -> Process:
-        process = self.process("odom", OdomConfig())
-        with self.time():
-            Odometer(process)  # type: ignore[arg-type]
-        return process
+                    Bridge(process)
+        return process  # type: ignore[no-any-return]
 
     def kill(self, name: str, pause_ms: int) -> None:
         """Kill a process; another one starts after a pause."""
-        process: Process = getattr(self, name)
+        process = self.processes[name]
         if not process.alive:
             return
         process.alive = False
         self.oracle.on_end(process)
         self._starts[name] = self.net.now_ns + pause_ms * MS
-        self._brake_ns = None
+        self._brake_ns = 0
         if name == "bridge":
             for inbox in self.vehicle.inboxes:
                 inbox.clear()
 
     def stall(self, name: str, duration_ms: int) -> None:
         """Stall a process for this time."""
-        process: Process = getattr(self, name)
-        process.stall(duration_ms)
+        self.processes[name].stall(duration_ms)
         if name == "bridge":
             self.oracle.slack_ns = max(self.oracle.slack_ns, duration_ms * MS)
-
-    def power_cycle(self, duration_ms: int) -> None:
-        """Restart the board, and wait until it is back."""
-        self.vehicle.power_cycle(duration_ms)
-        self.oracle.on_power_cycle()
-        self.run(duration_ms)
-        self.oracle.comeback_ns = self.net.now_ns
 
     def router(self, up: bool) -> None:
         """Take the router away, or bring it back."""
@@ -220,37 +244,26 @@ class Stack:
     def reset(self, seen: m.SafetyState | None = None) -> Caller:
         """Ask for a reset of what is latched, as it is seen now or as it was seen earlier."""
         seen = seen or self.seen
-        return self.call_reset(reset_request(seen) if seen else m.ResetRequest())
-
-    def call_reset(self, request: m.ResetRequest) -> Caller:
-        """Call safety, and wait until it has decided."""
-        with self.time():
-            caller = self.safety.call(keys.RESET, request)
-        if caller.done:
-            self.oracle.on_reset(self.safety, request)
-        self.run(5)
-        return caller
+        request = m.ResetRequest()
+        if seen is not None:
+            latched = tuple(cause.id for cause in seen.causes if cause.name in seen.latched)
+            request = m.ResetRequest(echo=seen.heartbeat, causes=latched)
+        return self.call(keys.RESET, request)
 
     def hold(
         self, held: bool, direction: m.Direction = "backward", seen: m.SafetyState | None = None
     ) -> Caller:
         """Hold the release, or let it go, by what is seen now or was seen earlier."""
-        return self.call_release(release_request(seen or self.seen, direction, held=held))
+        seen = seen or self.seen
+        echo = seen.heartbeat if seen else None
+        return self.call(keys.RELEASE, m.ReleaseRequest(held=held, direction=direction, echo=echo))
 
-    def call_release(self, request: m.ReleaseRequest) -> Caller:
+    def call(self, call: keys.Call[Any, Any], request: m.ResetRequest | m.ReleaseRequest) -> Caller:
         """Call safety, and wait until it has decided."""
-        before = self.oracle.holds(self.safety)
-        self.oracle.on_hold(self.safety, request)  # a verdict comes along with the answer
+        safety = self.processes["safety"]
+        self.oracle.on_call(safety, request)
         with self.time():
-            caller = self.safety.call(keys.RELEASE, request)
-        if not caller.done:
-            self.oracle.on_refusal(self.safety, before)
+            caller = safety.call(call, request)
+        self.oracle.on_answer(safety, request, bool(caller.done))
         self.run(5)
         return caller
-
-    def switches(self, *, on: bool) -> bool:
-        """Ask the bridge to set the board's bumper brake."""
-        echo = self.seen.heartbeat if self.seen else None
-        request = m.SwitchesRequest(bumper_brake=on, echo=echo)
-        with self.time():
-            return self.bridge.call(keys.SET_SWITCHES, request).done is not False

@@ -9,7 +9,7 @@ import pytest
 import t2
 from cli.demo.driver import Driver, LapEndedError
 from cli.demo.record import LapRecord
-from sim.requests import Sonar
+from sim.requests import Bumper, Sonar
 from tests.simulated_robot import SimulatedStack, simulated_robot
 
 
@@ -95,7 +95,7 @@ def test_an_expected_cause_ends_the_motion(vehicle: Vehicle) -> None:
 
 
 def test_a_refused_call_is_repeated_and_its_answer_kept_once(vehicle: Vehicle) -> None:
-    vehicle.stack.vehicle.pressed = True
+    vehicle.stack.vehicle.inject(Bumper(pressed=True))
     vehicle.stack.estop()
     vehicle.when(vehicle.after(8.0), vehicle.ended.set)
     with pytest.raises(LapEndedError):
