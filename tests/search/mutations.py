@@ -1,7 +1,10 @@
-"""Mutations: each removes one protection; the oracle must object to its scenario."""
+"""Mutations: each removes one protection; the oracle must object to its scenario.
+
+Most change a setting, or what a service receives. The others replace a part of a core.
+"""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -9,41 +12,34 @@ from msgspec.structs import replace
 
 from common import keys
 from common import messages as m
+from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.heartbeat import Heartbeat
-from common.motion import Command, Twist
-from common.wire.frame import Side
+from common.motion import Command
+from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
-from common.wire.reports import BumperReport
+from common.wire.reports import BumperBrakeReport, BumperReport
 from services.bridge import lease as leases
-from services.bridge import readiness
-from services.bridge.core import Core
 from services.bridge.lease import Lease
-from services.bridge.output import Output, Send
-from services.bridge.readiness import Readiness
-from services.bridge.reflex import Hit
 from services.safety import arbiter, causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
-from services.safety.channel import Admission
+from services.safety.config import LimitSource
 from services.safety.inputs import Inputs
-from services.safety.keepalive import Keepalives
 from services.safety.latches import Held, Observation
-from services.safety.limits import SpeedLimits
 from services.safety.release import Release
 from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
 from services.safety.standstill import Standstill, Supervisor
 from services.safety.state import State
-from services.safety.zones import Zones
 from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
-from verification.search.bus import ROBOT, Disturbance, DriveEnd, Envelope
-from verification.search.condition_books import IGNORED, NEEDED
-from verification.search.stack import PENDANT
+from verification.search import bus
+from verification.search.bus import ROBOT, Disturbance, DriveEnd, Envelope, Process
+from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
+from verification.search.stack import CONFIGS, PENDANT, Sockets
 
 Script = tuple[Callable[[Stack], object], ...]
-# Owner, attribute and replacement of a protection; its scenario; the oracle's objection.
-Mutation = tuple[object, str, object, Script, str]
+Patch = tuple[Any, str, object]  # owner, attribute (or key of a dict) and its replacement
+Mutation = tuple[Patch, Script, str]  # what removes a protection; a scenario; the objection to it
 
 # --- scenarios: what happens to a vehicle that drives at 0.5 m/s ----------------------------------
 
@@ -66,7 +62,7 @@ FRONT = range(2, 3)
 def brakes_go_off_and_on(stack: Stack) -> None:
     """Report to safety too late that the board's brake was off."""
     for on in (False, True):
-        assert stack.switches(on=on)
+        stack.send(Framing().pack(BumperBrakeReport(on)))
         stack.run(60)
 
 
@@ -192,11 +188,72 @@ def reset_is_granted(stack: Stack) -> None:
     assert stack.reset().done
 
 
-# --- replacements ---------------------------------------------------------------------------------
+# --- what removes a protection --------------------------------------------------------------------
 
-ORDER, EXPIRE, ON_MOTION = leases._order, leases.expire, leases.on_motion
+
+def configured(service: str, **settings: Any) -> Patch:
+    """Change settings of a service."""
+    config: Any = CONFIGS[service]
+    section = getattr(config, service)
+    unsafe = tuple(settings.keys() & section.protective.keys())
+    changed = replace(section, unsafe_overrides=unsafe, **settings)
+    return CONFIGS, service, replace(config, **{service: changed})
+
+
+def received(kind: type[m.Message], change: Callable[[Any], m.Message]) -> Patch:
+    """Change each message of a kind on its way from the oracle to its receiver."""
+
+    def arrive(message: Any, *rest: Any) -> Arrival[Any]:
+        return Arrival(change(message) if isinstance(message, kind) else message, *rest)
+
+    return bus, "Arrival", arrive
+
+
+def reported(frame: Frame, instead: Frame) -> Patch:
+    """Replace a frame of the board on its way from the oracle to the bridge."""
+    read, replaced = Sockets.read, Framing().pack(frame)
+
+    def misread(sockets: Sockets, *ports: int) -> Iterator[tuple[Any, ...]]:
+        for port, datagram, *rest in read(sockets, *ports):
+            yield port, Framing().pack(instead) if datagram == replaced else datagram, *rest
+
+    return Sockets, "read", misread
+
+
+def always_connected(process: Process) -> int:
+    """Return the first connection to the router while there is any."""
+    return int(process.net.up)
+
+
+def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
+    """Subscribe on the router as well."""
+    link._process.subscribe(topic, handler, **names)
+
+
+ON_ANY = Process.on_any
+
+
+def deaf_bridge(process: Process, key: str, handler: Callable[[int], None]) -> None:
+    """Subscribe to emergency stops; the bridge ignores them."""
+    ON_ANY(process, key, handler if process.name != "bridge" else lambda _: None)
+
+
+def newest_echo() -> Callable[[Any], Any]:
+    """Return a change that gives a sign of life the newest heartbeat as its echo."""
+    beats = [0]
+
+    def change(message: Any) -> Any:
+        if isinstance(message, m.SafetyState):
+            beats[0] = message.heartbeat
+        return replace(message, echo=beats[0]) if isinstance(message, m.EstopKeepalive) else message
+
+    return change
+
+
+FIRST_SAFETY = Stack().processes["safety"].boot
+SILENT = LimitSource(lease=LEASE_S, silence="ignore")
+ON_MOTION, EXPIRE = leases.on_motion, leases.expire
 AFTER, STORE = Release.after, SafetyService._store
-HIT_FRAME = Framing().pack(BumperReport(True))
 
 
 def never(*_: Any) -> bool:
@@ -207,44 +264,20 @@ def unchanged(first: Any, *_: Any) -> Any:
     return first
 
 
-def claims_to_brake(core: Core, datagram: bytes) -> Hit | None:
-    sent = Send(b"", core.motions.port)
-    return Hit(HIT_FRAME, sent) if HIT_FRAME in datagram else None
-
-
 def still_armed(lease: Lease, ready: bool) -> Lease:
     return replace(lease, ready=ready)
-
-
-def unacknowledged(lease: Lease, received_ns: int) -> tuple[Lease, Command]:
-    return replace(lease, sent_ns=received_ns), Command.BRAKE
-
-
-def unjudged(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
-    return replace(lease, sent_ns=now_ns), Command.BRAKE
-
-
-def overwritten(lease: Lease, motion: m.Motion) -> int | None:
-    if motion.latched:
-        return motion.boot
-    return None if lease.latched_by == motion.boot else lease.latched_by
-
-
-def whoever(lease: Lease, motion: m.Motion) -> Any:
-    return ORDER(replace(lease, latched_by=None), motion)
-
-
-def untold(lease: Lease, motion: m.Motion, *rest: Any, **more: Any) -> Any:
-    return ON_MOTION(lease, replace(motion, latched=False), *rest, **more)
 
 
 def still_neutral(lease: Lease, now_ns: int, lease_ns: int) -> Lease:
     return replace(EXPIRE(lease, now_ns, lease_ns), neutral=lease.neutral)
 
 
-def from_anybody(link: DriveEnd, topic: keys.Topic[Any], handler: Any, **names: Any) -> None:
-    """Subscribe on the router as well."""
-    link._process.subscribe(topic, handler, **names)
+def whoever(lease: Lease, *rest: Any, **more: Any) -> Any:
+    return ON_MOTION(replace(lease, latched_by=None), *rest, **more)
+
+
+def unacknowledged(lease: Lease, received_ns: int) -> tuple[Lease, Command]:
+    return replace(lease, sent_ns=received_ns), Command.BRAKE
 
 
 def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) -> Release:
@@ -261,10 +294,6 @@ def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False)
     return STORE(ports, field)
 
 
-def however_old(inputs: Inputs, *_: object) -> Twist | None:
-    return inputs.measured
-
-
 def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
     lost = state.estop_connection > 0 and not inputs.estop_connection
     return Observation("estop_reader", lost, (0, now_ns))
@@ -274,154 +303,161 @@ def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
 
 MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
-        leases, "expire", unchanged, (lambda s: s.kill("safety", 5000),), "a RUN is held",
+        configured("bridge", lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
     ),
     "no neutral after a lease": (
-        leases, "expire", still_neutral,
+        (leases, "expire", still_neutral),
         (*LATE_STREAMS, lambda s: s.disturb("motion", Disturbance(lose=1), 250),
          lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
     ),
     "silence is not noticed": (
-        readiness, "link_on_tick", unchanged, (*LATE_STREAMS, lambda s: s.freeze(240)),
+        configured("bridge", silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
         "the board is silent",
     ),
     "brakes that are off": (
-        Readiness, "ready", property(lambda self: self.link.state == "up"),
+        reported(BumperBrakeReport(False), BumperBrakeReport(True)),
         (*LATE_STREAMS, brakes_go_off_and_on), "its brakes are not both on",
     ),
     "no neutral after brakes that were off": (
-        leases, "on_ready", still_armed, (*LATE_STREAMS, brakes_go_off_and_on),
+        (leases, "on_ready", still_armed), (*LATE_STREAMS, brakes_go_off_and_on),
         "no neutral motion came",
     ),
     "the bridge remembers no latch": (
-        leases, "on_motion", untold,
+        received(m.Motion, lambda motion: replace(motion, latched=False)),
         (lambda s: s.stop(100), lambda s: s.kill("safety", 20), lambda s: s.run(1500),
          lambda s: s.request(0.0, 700), *GO), "bridge knows of estop",
     ),
     "a successor's own latch hides the one that is due": (
-        leases, "_latched_by", overwritten, (successor_hits_something,), "safety knows of estop",
+        received(m.Motion, lambda motion: replace(motion, predecessor=FIRST_SAFETY)),
+        (successor_hits_something,), "safety knows of estop",
     ),
     "a successor need not know of the latch": (
-        leases, "_order", whoever, (successor_hears_of_no_latch, *GO_ON), "bridge knows of estop",
+        (leases, "on_motion", whoever), (successor_hears_of_no_latch, *GO_ON),
+        "bridge knows of estop",
     ),
     "a hit needs no judgement": (
-        leases, "on_hit", unjudged, (*LATE_MOTIONS, *HIT), "bridge knows of contact",
+        received(m.Motion, lambda motion: replace(motion, judged=2**62)),
+        (*LATE_MOTIONS, *HIT), "bridge knows of contact",
     ),
     "an emergency stop needs no acknowledgement": (
-        leases, "on_estop", unacknowledged, SAFETY_HANGS, "bridge knows of estop",
+        (leases, "on_estop", unacknowledged), SAFETY_HANGS, "bridge knows of estop",
     ),
     "the bridge does not brake for an emergency stop": (
-        Core, "estop", lambda *_: Output(), SAFETY_HANGS, "without a BRAKE",
+        (Process, "on_any", deaf_bridge), SAFETY_HANGS, "without a BRAKE",
     ),
     "the drive link takes messages of the router": (
-        DriveEnd, "subscribe", from_anybody, (authority_is_copied,), "a RUN that no safety sent",
+        (DriveEnd, "subscribe", from_anybody), (authority_is_copied,), "a RUN that no safety sent",
     ),
     "the reflex does not brake": (
-        Core, "reflex", claims_to_brake, (*LATE_MOTIONS, *HIT), "without a BRAKE",
+        reported(BumperReport(True), BumperReport(False)), (*LATE_MOTIONS, *HIT),
+        "without a BRAKE",
     ),
     "late calls are obeyed": (
-        Heartbeat, "refusal", lambda *_: "", (*STUCK, late_holds), "no operator holds the release",
+        configured("safety", max_echo_age=10.0), (*STUCK, late_holds),
+        "no operator holds the release",
     ),
     "a late reset is obeyed": (
-        Heartbeat, "refusal", lambda *_: "", (*STAND, late_reset, *GO), "safety knows of contact",
+        configured("safety", max_call_age=10.0), (*STAND, late_reset, *GO),
+        "safety knows of contact",
     ),
     "a reset clears what it does not name": (
-        latches, "named", lambda held, _: latches.latched(held),
+        (latches, "named", lambda held, _: latches.latched(held)),
         (*STAND, reset_of_what_was_seen, *GO), "safety knows of contact",
     ),
     "each press has its full distance again": (
-        Release, "after", unforgetting, (*STUCK, pressed_again_and_again), "farther than its way",
+        (Release, "after", unforgetting), (*STUCK, pressed_again_and_again), "farther than its way",
     ),
     "no direction is forbidden": (
-        Release, "after", unforgetting,
+        (Release, "after", unforgetting),
         (*STUCK, lambda s: s.creep(), lambda s: s.press(False, 150), lambda s: s.press(True, 700),
          lambda s: s.creep()), "in which the bumper was pressed",
     ),
     "latches clear by time": (
-        latches, "_is_over", lambda *_: True,
+        (latches, "_is_over", lambda *_: True),
         (lambda s: s.stop(700), lambda s: s.request(0.0, 700), *GO), "safety knows of estop",
     ),
     "no neutral after a return": (
-        Arbiter, "disarmed", unchanged, (lambda s: s.freeze(400),), "was not neutral",
+        (Arbiter, "disarmed", unchanged), (lambda s: s.freeze(400),), "was not neutral",
     ),
     "a reset clears what is not gone": (
-        latches, "GOOD_SAMPLES", 0,
+        (latches, "GOOD_SAMPLES", 0),
         (*STAND, lambda s: s.driver(1, 20), lambda s: s.driver(0, 600), *RESET, *GO),
         "safety knows of driver",
     ),
     "no input is too old": (
-        conditions, "_is_old", never, (lambda s: s.velocities(False),), "old velocity",
+        configured("safety", velocity_age=10.0), (lambda s: s.velocities(False),), "old velocity",
     ),
     "an old velocity is as good as a new one": (
-        Inputs, "known_velocity", however_old,
+        configured("safety", velocity_age=10.0),
         (*STAND, lambda s: s.estop(), lambda s: s.velocities(False, 1000), *RESET,
          lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",
     ),
     "samples are not decided upon one by one": (
-        SafetyService, "_store", at_the_next_tick, (driver_blinks,), "safety knows of driver",
+        (SafetyService, "_store", at_the_next_tick), (driver_blinks,), "safety knows of driver",
     ),
     "the margin is ignored": (
-        Zones, "allowed", lambda *_: 1.0, (lambda s: s.sonars(250, numbers=FRONT),),
+        configured("safety", margin=0.0), (lambda s: s.sonars(250, numbers=FRONT),),
         "toward sonar 2",
     ),
     "a stop is not supervised": (
-        Standstill, "is_late", never, (lambda s: s.measure(0.28), lambda s: s.request(None)),
+        (Standstill, "is_late", never), (lambda s: s.measure(0.28), lambda s: s.request(None)),
         "no BRAKE while",
     ),
     "a standstill is not supervised": (
-        Supervisor, "_stay", lambda self, standstill, *_: standstill,
+        (Supervisor, "_stay", lambda self, standstill, *_: standstill),
         (lambda s: s.request(None, 2500), lambda s: s.measure(0.28)), "no BRAKE while",
     ),
     "a limit does not slow": (
-        SpeedLimits, "limited", lambda _, twist, __: (twist, None),
+        received(m.Limit, lambda limit: replace(limit, linear=None)),
         (lambda s: s.limit(0.2, source=IGNORED),), "faster than a limit",
     ),
     "a protective stop does not stop": (
-        SpeedLimits, "observations", lambda *_: iter(()), PROTECTIVE_STOP,
-        "protective stop of fleet",
+        received(m.Limit, lambda it: replace(it, linear=0.05 if it.linear == 0 else it.linear)),
+        PROTECTIVE_STOP, "protective stop of fleet",
     ),
     "a protective stop wants no neutral": (
-        policy, "wants_neutral", lambda name: name != "limit_stop" and causes.wants_neutral(name),
+        (policy, "wants_neutral", lambda name: name != "limit_stop" and causes.wants_neutral(name)),
         PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (
-        SpeedLimits, "_silent", lambda *_: [], (lambda s: s.silence(NEEDED),),
-        "no limit of lidar",
+        configured("safety", limits=dict.fromkeys((NEEDED, IGNORED), SILENT)),
+        (lambda s: s.silence(NEEDED),), "no limit of lidar",
     ),
     "two publishers of a limit": (
-        SpeedLimits, "_in_conflict", lambda *_: [], (rival_limit,), "two publishers of one limit",
+        received(m.Limit, lambda limit: replace(limit, boot=1)), (rival_limit,),
+        "two publishers of one limit",
     ),
     "a pendant that fell silent does not latch": (
-        Keepalives, "observation", lambda *_: Observation("estop_keepalive", False, (0, 0)),
+        configured("safety", estop_keepalive_timeout=10.0),
         (lambda s: s.silence(PENDANT),), "safety knows of estop_keepalive",
     ),
     "a held sign of life counts from its reception": (
-        Admission, "sent_ns", lambda self, _: self.now_ns, (pendant_is_held,),
+        received(m.Message, newest_echo()), (pendant_is_held,),
         "safety knows of estop_keepalive",
     ),
     "a connection that was lost in between does not latch": (
-        conditions, "_estop_reader", only_if_down,
+        (Process, "connection", property(always_connected)),
         (lambda s: s.router(False), lambda s: s.router(True), *GO_ON),
         "safety knows of estop_reader",
     ),
     "a stall of safety does not latch": (
-        conditions, "_estop_reader", only_if_down,
+        (conditions, "_estop_reader", only_if_down),
         (lambda s: s.stall("safety", 1500), lambda s: s.request(0.0, 2500), reset_is_granted,
          *GO_ON),
         "safety knows of estop_reader",
     ),
     "a suspended program drives on": (
-        arbiter, "LAPSE_S", 1e9, (*LET_GO, *GO), "was not neutral",
+        (arbiter, "LAPSE_S", 1e9), (*LET_GO, *GO), "was not neutral",
     ),
     "an override does not hold": (
-        Arbiter, "overruled", unchanged,
+        (Arbiter, "overruled", unchanged),
         (lambda s: s.request(None), lambda s: s.request(0.0, 1000, source="nav"),
          lambda s: s.request(0.3, 300, source="nav"), lambda s: s.request(0.0, 300),
          lambda s: s.request(None)), "nav was not neutral",
     ),
     "a hold that was meant for a good sonar drives on blind": (
-        SonarOverrides, "updated", knows_at_once,
+        (SonarOverrides, "updated", knows_at_once),
         (lambda s: s.sonars(FAULT_MM, numbers=FRONT),), "toward sonar 2",
     ),
 }  # fmt: skip

@@ -114,8 +114,9 @@ def test_a_restarted_part_drives_after_a_neutral_request_and_not_before(name: st
 def test_the_oracle_objects_to_a_missing_protection(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    owner, attribute, broken, scenario, objection = MUTATIONS[name]
-    monkeypatch.setattr(owner, attribute, broken)
+    (owner, attribute, broken), scenario, objection = MUTATIONS[name]
+    change = monkeypatch.setitem if isinstance(owner, dict) else monkeypatch.setattr
+    change(owner, attribute, broken)
     stack = driving()
     assert stack.oracle.violations == []
     for step in scenario:
@@ -127,7 +128,7 @@ def test_the_oracle_objects_to_a_missing_protection(
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_the_same_scenario_is_harmless_with_the_protection(name: str) -> None:
     stack = driving()
-    for step in MUTATIONS[name][3]:
+    for step in MUTATIONS[name][1]:
         step(stack)
     stack.run(2000)
     assert stack.oracle.violations == []

@@ -171,7 +171,7 @@ class Publisher:
     """Stamps messages as the real one does."""
 
     def __init__(self, process: "Process", key: str, private: bool) -> None:
-        self.key = key
+        self._key = key
         self._process = process
         self._private = private
         self._seq = 0
@@ -181,7 +181,7 @@ class Publisher:
         self._seq += 1
         now_ns, boot = self._process.net.now_ns, self._process.boot
         sent = replace(message, seq=self._seq, boot=boot, mono_ns=now_ns)
-        self._process.send(Envelope(self.key, sent, boot, self._private))
+        self._process.send(Envelope(self._key, sent, boot, self._private))
         return sent
 
 
@@ -271,9 +271,6 @@ class Process:
         self.stalled_until_ns = self.net.now_ns + duration_ms * MS
         self.cut = duration_ms > SESSION_LEASE_MS
         self._reconnections += self.cut
-
-    def open_bus(self) -> "Process":
-        return self
 
     def open_drive(self, *, listens: bool) -> DriveEnd:
         return self.drive

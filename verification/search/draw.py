@@ -47,12 +47,6 @@ class Range(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return float(f"{chance.uniform(self.low, self.high):.3g}")
 
 
-class Ranges(Struct, frozen=True, forbid_unknown_fields=True):
-    """The file of ranges."""
-
-    range: tuple[Range, ...]
-
-
 class Draw(Struct, frozen=True):
     """The parameters of a run; ``seed`` is also that of noise, world and script."""
 
@@ -88,18 +82,17 @@ class Draw(Struct, frozen=True):
 @cache
 def ranges() -> tuple[Range, ...]:
     """Return all ranges."""
-    return msgspec.toml.decode(FILE.read_bytes(), type=Ranges).range
+    return tuple(msgspec.toml.decode(FILE.read_bytes(), type=dict[str, list[Range]])["range"])
 
 
-def draw(seed: int, *, faulty: bool | None = None) -> Draw:
-    """Draw the parameters of a run; every second one has faults by default.
+def draw(seed: int) -> Draw:
+    """Draw the parameters of a run; every second one has faults.
 
     Each parameter has its own random numbers, so a new range without a fault changes no other
     parameter of a seed.
     """
     chance = random.Random(seed)
-    if faulty is None:
-        faulty = chance.random() < FAULTY
+    faulty = chance.random() < FAULTY
     usual = [one for one in ranges() if not one.fault and _own(seed, one).random() < one.chance]
     faults = [one for one in ranges() if one.fault]
     faults = chance.sample(faults, chance.randint(1, MOST_FAULTS)) if faulty else []
