@@ -7,13 +7,11 @@ a dead terminal may hang; the process then ends without restoring the terminal.
 """
 
 import argparse
-import contextlib
 import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import FrameType
 
 from common import log
@@ -23,9 +21,8 @@ from common.errors import RobotError
 from common.service import STOP_TIMEOUT_S, Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
-from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
-from services.teleop.round_trip import multiplexer
+from services.teleop.view import EventLog
 
 EXIT_HANGUP = 128 + signal.SIGHUP
 TERMINAL_POLL_S = 0.2
@@ -62,9 +59,7 @@ class TeleopProcess:
         event_log.capture_logs(loaded.config.log)
         self._settings = loaded.config
         self._node = node = Node("teleop", loaded)
-        self._controller = controller = Controller(
-            node, event_log, multiplexer(os.environ, ancestors())
-        )
+        self._controller = controller = Controller(node, event_log)
         node.announce()
         node.loop.every(TERMINAL_POLL_S, self._check_terminal)
         node.loop.post(lambda: controller.use_gamepad(find(self._settings.teleop)))
@@ -116,18 +111,6 @@ class TeleopProcess:
 def terminal_is_there() -> bool:
     """Return whether standard input and output are still a terminal."""
     return os.isatty(0) and os.isatty(1)
-
-
-def ancestors() -> list[str]:
-    """Return the names of the parent processes, the nearest first; empty without /proc."""
-    names, pid = [], os.getppid()
-    with contextlib.suppress(OSError, ValueError, IndexError):
-        while pid:
-            status = Path(f"/proc/{pid}/stat").read_text(errors="replace")
-            name, _, rest = status.partition("(")[2].rpartition(")")
-            names.append(name)
-            pid = int(rest.split()[1])
-    return names
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -19,16 +19,15 @@ from common import clock
 from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
 from common.text import printable
-from services.teleop import motion_panel, panels
+from services.teleop import panels
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
-from services.teleop.hold import Press
-from services.teleop.round_trip import NUMBERS, PROBE_S
+from services.teleop.core.hold import Press
+from services.teleop.core.round_trip import NUMBERS, PROBE_S
 from services.teleop.sonar_view import around
 
 QUERY = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
-SCROLL = {"[": 1, "]": -1}  # events
 REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
 
 
@@ -77,7 +76,6 @@ class TeleopApp(App[None]):
         self._safety, self._around = titled("safety"), titled("around")
         self._motion, self._events = titled("motion"), titled("events")
         self._help = titled("help")
-        self._skipped = 0  # newest events that are scrolled out
 
     def compose(self) -> ComposeResult:
         """Lay out the panels."""
@@ -110,15 +108,13 @@ class TeleopApp(App[None]):
         self._view = view = self._controller.view
         size = self._around.content_size
         self._header.show(panels.header(view))
-        self.set_class(panels.release(view) is not None, "contact")
+        self.set_class(bool(panels.release(view)), "contact")
         self.set_class(bool(view.alarm), "alarm")
         self._safety.show(panels.safety(view, self._safety.content_size.height))
         self._around.show(around(view.ultrasonic, view.bumper, size.width, size.height))
-        self._motion.show(motion_panel.motion(view))
+        self._motion.show(panels.motion(view))
         size = self._events.content_size
-        self._skipped = min(self._skipped, max(0, len(view.lines) - size.height))
-        self._events.border_title = f"events, {self._skipped} newer" if self._skipped else "events"
-        self._events.show(panels.events(view, size.height, size.width, self._skipped))
+        self._events.show(panels.events(view, size.height, size.width))
         self._hints.show(panels.hints(view, self._hold.hold_first, self._hold.hold))
 
     def probe(self) -> None:
@@ -146,22 +142,11 @@ class TeleopApp(App[None]):
 
     def on_key(self, event: events.Key) -> None:
         """Post a key to the controller; CapsLock and shift make no difference."""
-        if event.character in SCROLL:
-            self._skipped = max(0, self._skipped + SCROLL[event.character])
-            return
         helps = event.character == "?" and not self.has_class("help")
         self.set_class(helps, "help")  # any other key closes it, and counts
         key = event.key.removeprefix("shift+").lower()
         press = Press(key, self._received_ns(event), self._view.safety)
         self._post(lambda: self._controller.press(press, self._clock()))
-
-    def on_mouse_scroll_up(self) -> None:
-        """Show older events."""
-        self._skipped += 1
-
-    def on_mouse_scroll_down(self) -> None:
-        """Show newer events."""
-        self._skipped = max(0, self._skipped - 1)
 
     def _received_ns(self, event: events.Event) -> int:
         """Return the time when an event was read from the terminal."""

@@ -14,17 +14,15 @@ from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
 from services.teleop.controls import DIRECTIONS, RELEASE, STOP, Controls, Deflection, Stick, twist
-from services.teleop.event_log import EventLog
+from services.teleop.core.hold import Press
+from services.teleop.core.round_trip import ADVICE, RoundTrip
 from services.teleop.gamepad import Gamepad, NoGamepad
-from services.teleop.hold import Press
 from services.teleop.operator_calls import OperatorCalls
-from services.teleop.round_trip import ADVICE, RoundTrip
-from services.teleop.view import LatestTopic, View
+from services.teleop.view import LINES, EventLog, LatestTopic, View
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
 MAX_PRESS_AGE_S = 0.5  # an older press is ignored, except a stop
-LINES = 100  # of the event log, to scroll through
 UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
 ESTOP, RESET = "e", "r"
 BY_TERMINAL = {*DIRECTIONS, *RELEASE, RESET}  # the keys that need a fast terminal
@@ -34,9 +32,7 @@ FAST_S, LINK_S, SLOW_S = 0.5, 1.0, 2.0  # how long a stream's last value is show
 class Controller:
     """Key presses in, requests out, and a view of the state; all methods in the loop's thread."""
 
-    def __init__(
-        self, node: Node[TeleopConfig], event_log: EventLog, unmeasurable: str = ""
-    ) -> None:
+    def __init__(self, node: Node[TeleopConfig], event_log: EventLog) -> None:
         self._node = node
         self._bus = bus = node.bus
         self._settings = node.config.teleop
@@ -46,7 +42,7 @@ class Controller:
         self._drawn_ns = 0  # the last redraw of the screen
         self._requested: Twist | None = None
         self._leaving = False
-        self.terminal = RoundTrip(self._settings.round_trip, unmeasurable)
+        self.terminal = RoundTrip(self._settings.round_trip)
         self._slow = False  # the warning about the slow terminal was shown
         self._dropped_ns: int | None = None  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before the first state of safety
@@ -273,5 +269,5 @@ class Controller:
             link=self._link.at(now_ns),
             left=self._left.at(now_ns),
             right=self._right.at(now_ns),
-            lines=self._event_log.last(LINES),
+            lines=self._event_log.lines(),
         )

@@ -17,7 +17,7 @@ from common.messages import Direction
 from common.motion import Twist, clamp
 from common.operator import DriveRequests, Phase
 from services.teleop.config import Teleop
-from services.teleop.hold import Deadman, GamepadWatchdog, Keys
+from services.teleop.core.hold import Deadman, GamepadWatchdog, Keys
 
 RELEASE: dict[str, Direction] = {"f": "forward", "b": "backward"}
 TURBO = "t"

@@ -10,7 +10,7 @@ from common.operator import ReleaseCalls, ResetCheck, no_answer, not_allowed, re
 from common.service import Node
 from common.source import call_release
 from services.teleop.config import TeleopConfig
-from services.teleop.event_log import EventLog
+from services.teleop.view import EventLog
 
 RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
 NO_STATE = "no fresh state of safety"

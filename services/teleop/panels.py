@@ -1,18 +1,19 @@
-"""The panels of the screen: pure functions from the view to styled text.
+"""The panels of the screen: functions from the view to styled text."""
 
-The motion panel is in ``motion_panel.py``.
-"""
-
+import math
 from datetime import datetime
 from textwrap import wrap
 
 from rich.text import Text
 
-from common.messages import Cause, Direction, Release, SafetyState, Verdict
-from services.teleop.motion_panel import BAD, DIM, GOOD, WARN, Part
-from services.teleop.round_trip import ADVICE
+from common.messages import Cause, Direction, Driver, Release, SafetyState, Verdict
+from services.teleop.core.round_trip import ADVICE
 from services.teleop.view import Line, View
 
+Part = tuple[str, str]  # text and its style
+
+GOOD, WARN, BAD, DIM = "green", "bold yellow", "bold red", "grey58"
+NO_DATA, MOVE_STICK = ("no data", DIM), ("no event: MOVE THE STICK", WARN)
 KEY = "bold black on cyan"
 HELD = "bold black on yellow"
 DIRECTIONS: dict[Direction, tuple[str, Direction]] = {  # key and opposite direction
@@ -27,6 +28,7 @@ BADGES: dict[Verdict, str] = {
 }
 PREFIX, MIN_TEXT = len("00:00:00 safety  "), 20  # columns of an event line
 LEVELS = {"info": "", "warning": WARN, "error": BAD}
+SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
 KEYS = (
     ("WASD", "drive"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"), ("E", "ESTOP"),
     ("R", "reset"), ("FB", "release"), ("Q", "quit"), ("?", "help"),
@@ -40,12 +42,15 @@ HELP = (
     ("F B, held", "move forward or backward off a pressed bumper"),
     ("1 to 5", "gear: 0.2 to 0.8 m/s"),
     ("T", "turbo for the next hold; T, a gear or space cancels it"),
-    ("[ ], mouse wheel", "scroll the events to older and newer ones"),
     ("Q, ctrl-c", "stop and quit"),
     ("gamepad", "left shoulder held: sticks drive; right shoulder: turbo"),
     ("?", "close this help; any other key closes it and counts"),
 )
-SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
+
+
+def rows_of(*rows: Text) -> Text:
+    """Return texts one below the other."""
+    return Text("\n", no_wrap=True).join(rows)
 
 
 def header(view: View) -> Text:
@@ -53,12 +58,11 @@ def header(view: View) -> Text:
     bus = ("● bus", GOOD) if view.connected else ("○ no router yet", WARN)
     gear = ("TURBO", BAD) if view.turbo else (f"gear {view.gear}/5", "bold")
     top = (f"{view.top.linear:.2f} m/s {view.top.angular:.2f} rad/s", "")
-    parts = [(f"T2 {view.robot}", "bold"), bus, board(view), bumper(view), gear, top]
+    parts = [(f"T2 {view.robot}", "bold"), bus, _board(view), _bumper(view), gear, top]
     return Text("  ", no_wrap=True).join(Text(*part) for part in parts)
 
 
-def board(view: View) -> Part:
-    """Return the state of the link between bridge and board."""
+def _board(view: View) -> Part:
     if view.link is None:
         return ("○ no bridge", WARN)
     if view.link.state == "up":
@@ -66,43 +70,74 @@ def board(view: View) -> Part:
     return ("○ board lost" if view.link.state == "lost" else "○ board never seen", BAD)
 
 
-def bumper(view: View) -> Part:
-    """Return the state of the bumper."""
+def _bumper(view: View) -> Part:
     if view.bumper is None:
         return ("○ bumper", WARN)
     return ("● bumper PRESSED", BAD) if view.bumper.pressed else ("● bumper", GOOD)
 
 
+def help_text() -> Text:
+    """Return the keys and what they do."""
+    return rows_of(*(Text.assemble((f"{key:<21}", "bold cyan"), action) for key, action in HELP))
+
+
+def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
+    """Return the keys, and the limit of key repeats or why keys are refused."""
+    keys = SLOW_KEYS if view.keys_refused else KEYS
+    row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in keys)
+    if view.keys_refused:
+        return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
+    limit = (
+        f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
+        f"a hold {hold_s:g} s past its last repeat"
+    )
+    return row.append(limit, style=DIM)
+
+
+def events(view: View, rows: int, width: int = 200) -> Text:
+    """Return the newest event lines that fit, the newest last, wrapped to the width."""
+    shown: list[Text] = []
+    for line in reversed(view.lines):
+        if len(shown) >= rows:
+            break
+        shown = [*_wrapped(line, max(MIN_TEXT, width - PREFIX))[: rows - len(shown)], *shown]
+    return rows_of(*shown)
+
+
+def _wrapped(line: Line, width: int) -> list[Text]:
+    first, *rest = wrap(line.text, width) or [""]
+    style = LEVELS[line.level]
+    time = f"{datetime.fromtimestamp(line.t_ns / 1e9):%H:%M:%S} "
+    head = Text.assemble((time, DIM), (f"{line.service:<7} ", "cyan"), (first, style))
+    return [head, *(Text(" " * PREFIX + more, style=style) for more in rest)]
+
+
+# --- safety ---------------------------------------------------------------------------------
+
+
 def safety(view: View, rows: int) -> Text:
-    """Return verdict, text and causes, latched ones first; causes by name if rows are short."""
-    if view.alarm:
-        alarm = Text(view.alarm, style=BAD)
-        return Text("\n").join([alarm, _safety(view, rows - 1)])
-    return _safety(view, rows)
-
-
-def _safety(view: View, rows: int) -> Text:
-    state = view.safety
-    if state is None and not view.connected:
-        return Text.assemble((" NO ROUTER ", BADGES["inhibited"]), "  no connection to the router")
+    """Return alarm, verdict, release and causes, latched ones first; by name if rows are short."""
+    state, lines = view.safety, [Text(view.alarm, style=BAD)] if view.alarm else []
     if state is None:
-        return Text.assemble(
-            (" NO SAFETY ", BADGES["inhibited"]),
-            "  no state of safety received; check it with `t2 doctor`",
+        badge, text = (
+            (" NO SAFETY ", "no state of safety received; check it with `t2 doctor`")
+            if view.connected
+            else (" NO ROUTER ", "no connection to the router")
         )
-    text = Text.assemble((f" {state.verdict.upper()} ", BADGES[state.verdict]), f"  {state.text}")
-    if (lines := release(view)) is not None:
-        return Text("\n").join([text, *lines, *_causes(state, rows - 1 - len(lines))])
-    return Text("\n").join([text, *_causes(state, rows - 1)])
+        return rows_of(*lines, Text.assemble((badge, BADGES["inhibited"]), f"  {text}"))
+    badge = f" {state.verdict.upper()} "
+    lines.append(Text.assemble((badge, BADGES[state.verdict]), f"  {state.text}"))
+    lines += release(view)
+    return rows_of(*lines, *_causes(state, rows - len(lines)))
 
 
-def release(view: View) -> tuple[Text, Text] | None:
-    """Return how to move off a pressed bumper, in two rows; None if none is pressed."""
+def release(view: View) -> list[Text]:
+    """Return how to move off a pressed bumper, in two rows; nothing if none is pressed."""
     known = view.safety.release if view.safety else None
     if known is None or (view.bumper is not None and not view.bumper.pressed):
-        return None
+        return []
     keys = Text("   ").join(_key(known, direction, view.release) for direction in DIRECTIONS)
-    return _believed(known), keys.append(f"   {known.left:.2f} m left until reset", style="bold")
+    return [_believed(known), keys.append(f"   {known.left:.2f} m left until reset", style="bold")]
 
 
 def _believed(known: Release) -> Text:
@@ -138,47 +173,100 @@ def _cause(cause: Cause, text: str, state: SafetyState) -> Text:
     return Text.assemble(tag, text, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
 
 
-def help_text() -> Text:
-    """Return the keys and what they do."""
-    return Text("\n", no_wrap=True).join(
-        Text.assemble((f"{key:<21}", "bold cyan"), action) for key, action in HELP
-    )
-
-
-def events(view: View, rows: int, width: int = 200, skipped: int = 0) -> Text:
-    """Return event lines, the newest last, wrapped to the width, without the newest ``skipped``."""
-    shown: list[Text] = []
-    for line in reversed(view.lines[: len(view.lines) - skipped]):
-        room = rows - len(shown)
-        if room <= 0:
-            break
-        shown = [*_wrapped(line, max(MIN_TEXT, width - PREFIX))[:room], *shown]
-    return Text("\n", no_wrap=True).join(shown)
-
-
-def _wrapped(line: Line, width: int) -> list[Text]:
-    first, *rest = wrap(line.text, width) or [""]
-    style = LEVELS[line.level]
-    head = Text.assemble(
-        (f"{datetime.fromtimestamp(line.t_ns / 1e9):%H:%M:%S} ", DIM),
-        (f"{line.service:<7} ", "cyan"),
-        (first, style),
-    )
-    return [head, *(Text(" " * PREFIX + more, style=style) for more in rest)]
-
-
-def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
-    """Return the keys, and the limit of key repeats or why keys are refused."""
-    keys = [hint for hint in KEYS if hint in SLOW_KEYS or not view.keys_refused]
-    row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in keys)
-    if view.keys_refused:
-        return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
-    limit = (
-        f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
-        f"a hold {hold_s:g} s past its last repeat"
-    )
-    return row.append(limit, style=DIM)
-
-
 def _age(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+
+
+# --- motion ---------------------------------------------------------------------------------
+
+
+def motion(view: View) -> Text:
+    """Return the table: eleven rows, or ten during a contact, whose panel needs the room."""
+    rows = {
+        "": Text(f"{'request':>8}{'allowed':>9}{'measured':>10}", style=DIM),
+        **_speeds(view),
+        **_pose(view),
+        "board": _link(view),
+        "rates": _rates(view),
+        "motor L": Text(*_faults(view.left)),
+        "motor R": Text(*_faults(view.right)),
+        "driver": _driver(view),
+        "gamepad": Text("no event: MOVE THE STICK", WARN)
+        if view.move_stick
+        else Text(view.gamepad),
+    }
+    if view.safety and view.safety.release:
+        del rows["rates"]
+    return rows_of(*(Text.assemble((f"{name:<8}", DIM), row) for name, row in rows.items()))
+
+
+def _speeds(view: View) -> dict[str, Text]:
+    requested, measured = view.requested, view.velocity
+    linear = angular = None
+    if view.safety:
+        limits = view.safety.limits
+        backward = requested is not None and requested.linear < 0
+        linear, angular = limits.backward if backward else limits.forward, limits.angular
+    return {
+        name: _triple(getattr(requested, axis, None), allowed, getattr(measured, axis, None))
+        for name, axis, allowed in (("m/s", "linear", linear), ("rad/s", "angular", angular))
+    }
+
+
+def _triple(requested: float | None, allowed: float | None, measured: float | None) -> Text:
+    short = requested is not None and allowed is not None and abs(requested) > allowed + 0.005
+    return Text.assemble(
+        (f"{_signed(requested):>8}", "bold" if requested else ""),
+        (f"{'-' if allowed is None else f'{allowed:.2f}':>9}", WARN if short else ""),
+        (f"{_signed(measured):>10}", "bold cyan" if measured else ""),
+    )
+
+
+def _signed(value: float | None) -> str:
+    return "-" if value is None else f"{value + 0.0:+.2f}"
+
+
+def _pose(view: View) -> dict[str, Text]:
+    at = view.odometry
+    if at is None:
+        return {name: Text(*NO_DATA) for name in ("pose", "odom")}
+    residual = "-" if at.residual is None else f"{at.residual:+.3f} m"
+    slip = ("SLIP", WARN) if at.slip else ("no slip", GOOD)
+    return {
+        "pose": Text(f"x {at.x:+.2f}  y {at.y:+.2f} m  {math.degrees(at.heading):+.0f}°"),
+        "odom": Text.assemble(f"residual {residual}  ", slip),
+    }
+
+
+def _link(view: View) -> Text:
+    link = view.link
+    if link is None:
+        return Text(*NO_DATA)
+    if link.state != "up":
+        return Text(f"{link.state}: {link.board}", style=BAD)
+    if not link.armed:
+        return Text(link.waiting or "not armed", style=WARN)
+    trip = "" if link.round_trip is None else f"  {link.round_trip * 1e3:.1f} ms"
+    return Text(f"{link.board}{trip}", style=GOOD)
+
+
+def _rates(view: View) -> Text:
+    if view.link is None:
+        return Text(*NO_DATA)
+    fastest = sorted(view.link.rates.items(), key=lambda rate: -rate[1])[:4]
+    return Text(" ".join(f"{name[:4].lower()} {rate:.0f}" for name, rate in fastest) or "none")
+
+
+def _faults(driver: Driver | None) -> Part:
+    if driver is None:
+        return NO_DATA
+    return (" ".join(driver.faults), BAD) if driver.faults else ("ok", GOOD)
+
+
+def _driver(view: View) -> Text:
+    if view.release:
+        return Text(f"you, release {view.release}", style=WARN)
+    driving = view.safety.source if view.safety else None
+    if driving is None:
+        return Text("none", style=DIM)
+    return Text(f"{driving} (you)" if driving == view.source else driving, style="bold")

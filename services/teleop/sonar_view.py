@@ -10,9 +10,9 @@
     -  ┃ ┃  │       │  ┃ ┃  2.10 m
 """
 
-from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
+from typing import NamedTuple
 
 from rich.text import Text
 
@@ -40,123 +40,98 @@ BODY = (
     " │       │ ",
     "█╰───────╯█",
 )
-BODY_WIDTH, BODY_HEIGHT = len(BODY[0]), len(BODY)
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """A sonar's reading, ready to draw: label, colour and lit arcs."""
 
     label: str
     style: str
-    lit: frozenset[int]  # 0 is the nearest band
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Positions on the canvas; ``ahead`` and ``side`` as in ``SONARS``."""
-
-    middle: int  # column of the vehicle's centre
-    top: int  # row of its front
-    bands: int  # arcs that fit
-
-    def row(self, ahead: int, band: int) -> int:
-        """Return the row at ``band`` rows from the front or the rear."""
-        return self.top - 1 - band if ahead < 0 else self.top + BODY_HEIGHT + band
-
-    def arc(self, ahead: int, side: int, band: int) -> list[tuple[int, int, str]]:
-        """Return row, column and text of each part of a sonar's arc."""
-        row, column = self.row(ahead, band), self.middle + side * (7 + 2 * band)
-        if not side:
-            return [(row, self.middle - 3 - band, "━" * (7 + 2 * band))]
-        if ahead:
-            return [(row, column, "╱" if ahead == side else "╲")]
-        return [(self.top + each, column, "┃") for each in range(1, BODY_HEIGHT - 1)]
-
-    def label(self, ahead: int, side: int, label: str) -> tuple[int, int]:
-        """Return row and column of a label beside a sonar's outermost arc."""
-        if not side:
-            return self.row(ahead, self.bands), self.middle - len(label) // 2
-        row = self.row(ahead, self.bands - 1) if ahead else self.top + 2
-        gap = 7 + 2 * self.bands
-        return row, self.middle + gap if side > 0 else self.middle - gap - len(label) + 1
-
-
-class Canvas:
-    """A grid of styled characters; text outside of it is clipped."""
-
-    def __init__(self, width: int, height: int) -> None:
-        self._cells = [[(" ", "")] * width for _ in range(height)]
-
-    def put(self, row: int, column: int, text: str, style: str) -> None:
-        """Write a text from left to right."""
-        for at, character in enumerate(text, column):
-            if 0 <= row < len(self._cells) and 0 <= at < len(self._cells[0]):
-                self._cells[row][at] = (character, style)
-
-    def text(self) -> Text:
-        """Return all lines."""
-        return Text("\n", no_wrap=True).join(self._line(row) for row in self._cells)
-
-    @staticmethod
-    def _line(row: list[tuple[str, str]]) -> Text:
-        runs = groupby(row, key=itemgetter(1))
-        return Text.assemble(*(("".join(cell[0] for cell in run), style) for style, run in runs))
+    lit: range = range(0)  # 0 is the nearest band
 
 
 def reading(distance: float | None, status: RangeStatus) -> Reading:
     """Return how a sonar's reading (metres) is drawn."""
-    all_arcs = frozenset(range(len(BANDS)))
     if status == "fault":
-        return Reading("fault", FAULT, all_arcs)
+        return Reading("fault", FAULT, range(len(BANDS)))
     if status == "too_near":
-        return Reading("near", BANDS[0][1], all_arcs)
+        return Reading("near", BANDS[0][1], range(len(BANDS)))
     if status == "no_echo" or distance is None:
-        return Reading(UNKNOWN, DIM, frozenset())
+        return Reading(UNKNOWN, DIM)
     for band, (end, style) in enumerate(BANDS):
         if distance < end:
-            return Reading(f"{distance:.2f} m", style, frozenset({band}))
-    return Reading(f"{distance:.2f} m", FAR, frozenset())
-
-
-def readings(ultrasonic: Ultrasonic | None) -> dict[str, Reading]:
-    """Return all eight readings by name; unknown without a fresh message."""
-    if ultrasonic is None:
-        return {name: Reading("?", DIM, frozenset()) for name in SONAR_NAMES}
-    seen = zip(SONAR_NAMES, ultrasonic.ranges, ultrasonic.status, strict=True)
-    return {name: reading(distance, status) for name, distance, status in seen}
+            return Reading(f"{distance:.2f} m", style, range(band, band + 1))
+    return Reading(f"{distance:.2f} m", FAR)
 
 
 def around(
     ultrasonic: Ultrasonic | None, bumper: Bumper | None, width: int = 38, height: int = 11
 ) -> Text:
-    """Return the sonar view, ``width`` by ``height`` characters."""
-    top = (height - BODY_HEIGHT) // 2
-    room = min(top - 1, (width // 2 - 13) // 2)  # a row, or six columns, for the labels
-    plan = Plan(width // 2, top, max(1, min(len(BANDS), room)))
-    canvas = Canvas(width, height)
-    seen = readings(ultrasonic)
-    _body(canvas, plan, bumper)
-    for name, at in SONARS.items():
-        _sonar(canvas, plan, at, seen[name])
-    return canvas.text()
+    """Return the sonar view, ``width`` by ``height`` characters; "?" without a fresh message."""
+    view = SonarView(width, height)
+    view.draw_body(bumper is not None and bumper.pressed)
+    for at, name in enumerate(SONAR_NAMES):
+        shown = Reading("?", DIM)
+        if ultrasonic is not None:
+            shown = reading(ultrasonic.ranges[at], ultrasonic.status[at])
+        view.draw_sonar(*SONARS[name], shown)
+    return view.text()
 
 
-def _body(canvas: Canvas, plan: Plan, bumper: Bumper | None) -> None:
-    hit = bumper is not None and bumper.pressed
-    style = HIT if hit else "bold cyan"
-    left = plan.middle - BODY_WIDTH // 2
-    for row, line in enumerate(BODY):
-        canvas.put(plan.top + row, left, line, style)
-    label = "BUMPER" if hit else "T2"
-    canvas.put(plan.top + 2, left + (BODY_WIDTH - len(label)) // 2, label, style)
+class SonarView:
+    """A grid of styled characters; text outside of it is clipped."""
 
+    def __init__(self, width: int, height: int) -> None:
+        self._cells = [[(" ", "")] * width for _ in range(height)]
+        self._middle = width // 2  # column of the vehicle's centre
+        self._top = (height - len(BODY)) // 2  # row of its front
+        # A row, or six columns, are for the labels.
+        self._bands = max(1, min(len(BANDS), self._top - 1, (self._middle - 13) // 2))
 
-def _sonar(canvas: Canvas, plan: Plan, at: tuple[int, int], sonar: Reading) -> None:
-    ahead, side = at
-    for band in range(plan.bands):
-        style = sonar.style if band in sonar.lit else DIM
-        for row, column, text in plan.arc(ahead, side, band):
-            canvas.put(row, column, text, style)
-    row, column = plan.label(ahead, side, sonar.label)
-    canvas.put(row, column, sonar.label, sonar.style)
+    def draw_body(self, is_hit: bool) -> None:
+        """Draw the vehicle."""
+        style, label = (HIT, "BUMPER") if is_hit else ("bold cyan", "T2")
+        left = self._middle - len(BODY[0]) // 2
+        for row, line in enumerate(BODY, self._top):
+            self._put(row, left, line, style)
+        self._put(self._top + 2, left + (len(BODY[0]) - len(label)) // 2, label, style)
+
+    def draw_sonar(self, ahead: int, side: int, shown: Reading) -> None:
+        """Draw the arcs of a sonar, the nearest first, and its label beside the outermost."""
+        for band in range(self._bands):
+            style = shown.style if band in shown.lit else DIM
+            row, column = self._row(ahead, band), self._middle + side * (7 + 2 * band)
+            if not side:
+                self._put(row, self._middle - 3 - band, "━" * (7 + 2 * band), style)
+            elif ahead:
+                self._put(row, column, "╱" if ahead == side else "╲", style)
+            else:
+                for each in range(1, len(BODY) - 1):
+                    self._put(self._top + each, column, "┃", style)
+        gap, length = 7 + 2 * self._bands, len(shown.label)
+        row = self._row(ahead, self._bands - 1) if ahead else self._top + 2
+        if not side:
+            row, gap, side = self._row(ahead, self._bands), -(length // 2), 1
+        column = self._middle + (gap if side > 0 else 1 - gap - length)
+        self._put(row, column, shown.label, shown.style)
+
+    def text(self) -> Text:
+        """Return all lines."""
+        return Text("\n", no_wrap=True).join(
+            Text.assemble(
+                *(
+                    ("".join(cell[0] for cell in run), style)
+                    for style, run in groupby(row, itemgetter(1))
+                )
+            )
+            for row in self._cells
+        )
+
+    def _row(self, ahead: int, band: int) -> int:
+        """Return the row at ``band`` rows from the front or the rear."""
+        return self._top - 1 - band if ahead < 0 else self._top + len(BODY) + band
+
+    def _put(self, row: int, column: int, text: str, style: str) -> None:
+        for at, character in enumerate(text, column):
+            if 0 <= row < len(self._cells) and 0 <= at < len(self._cells[0]):
+                self._cells[row][at] = (character, style)

@@ -1,8 +1,16 @@
-"""The state on the screen as one frozen value: made in the loop's thread, drawn in another."""
+"""What the screen shows: made in the loop's thread, drawn in another.
 
-from dataclasses import dataclass
+While the screen is up it owns the terminal: no log line may go to standard error. Log lines and
+the events of all services go to the event log.
+"""
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from common import log
 from common.bus.bus import Arrival, Bus
 from common.freshness import Latest, fresh
 from common.keys import Topic
@@ -19,6 +27,12 @@ from common.messages import (
     Velocity,
 )
 from common.motion import Twist
+from common.settings import Log, LogLevel
+from common.text import printable
+from common.verdict import MAX_TEXT
+
+LINES = 40  # of the event log: more than a screen has
+ANSWER_NS = 1_000_000_000  # between the answer to a call and its event
 
 M = TypeVar("M", bound=Message)
 
@@ -75,3 +89,40 @@ class View:
     left: Driver | None = None
     right: Driver | None = None
     lines: tuple[Line, ...] = ()  # the newest last
+
+
+class EventLog:
+    """The newest lines; any thread may add one."""
+
+    def __init__(self) -> None:
+        self._lines: deque[Line] = deque(maxlen=LINES)
+        self._lock = threading.Lock()
+
+    def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
+        """Append a line with its wall clock time, by default now; a repeat replaces the last.
+
+        An answer of safety comes twice, to the call ("reset refused: ...") and as an event.
+        """
+        text = printable(text)[:MAX_TEXT]
+        line = Line(time.time_ns() if t_ns is None else t_ns, printable(service), level, text)
+        with self._lock:
+            last = self._lines[-1] if self._lines else None
+            if last and (last.service, last.level) == (line.service, level):
+                longer, shorter = sorted((last.text, text), key=len, reverse=True)
+                is_answer = shorter and line.t_ns - last.t_ns < ANSWER_NS
+                if longer == shorter or (is_answer and longer.endswith(shorter)):
+                    self._lines.pop()
+                    line = replace(line, text=longer)
+            self._lines.append(line)
+
+    def lines(self) -> tuple[Line, ...]:
+        """Return the lines, the newest last."""
+        with self._lock:
+            return tuple(self._lines)
+
+    def capture_logs(self, settings: Log) -> None:
+        """Redirect all log lines of this process to this log only."""
+        log.redirect(self._on_log, settings.level)
+
+    def _on_log(self, level: LogLevel, event: str, _: log.Fields) -> None:
+        self.add("teleop", "info" if level == "debug" else level, event)

@@ -11,9 +11,8 @@ from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
 from services.teleop.controls import Stick
-from services.teleop.event_log import EventLog
-from services.teleop.hold import Press
-from services.teleop.view import View
+from services.teleop.core.hold import Press
+from services.teleop.view import EventLog, View
 from tests.factories import contact_state, safety_state
 from tests.fake_bus import FakeBus
 
@@ -123,4 +122,4 @@ class Operator:
 
     @property
     def lines(self) -> list[str]:
-        return [line.text for line in self.node.event_log.last(99)]
+        return [line.text for line in self.node.event_log.lines()]

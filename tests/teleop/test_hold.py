@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from services.teleop.hold import Deadman, GamepadWatchdog, Keys, Press
+from services.teleop.core.hold import Deadman, GamepadWatchdog, Keys, Press
 
 
 def at(seconds: float) -> int:

@@ -1,10 +1,8 @@
 """The whole program in a pseudo terminal, on a real bus."""
 
-import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
@@ -152,15 +150,3 @@ def test_a_missing_extra_is_reported(
     monkeypatch.setitem(sys.modules, "textual", None)
     assert teleop.main(["--no-gamepad"]) == 1
     assert "install the extra `teleop`" in capsys.readouterr().err
-
-
-def test_the_names_of_the_parent_processes() -> None:
-    parent = Path(f"/proc/{os.getppid()}/comm")
-    if not parent.exists():
-        pytest.skip("there is no /proc")
-    assert teleop.ancestors()[0] == parent.read_text().strip()
-
-
-def test_without_proc_there_are_no_ancestors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "getppid", lambda: -5)
-    assert teleop.ancestors() == []

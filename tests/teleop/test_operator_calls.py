@@ -49,7 +49,7 @@ def test_a_reset_that_another_program_answers_is_not_confirmed(operator: Operato
 
 def assert_unconfirmed(operator: Operator) -> None:
     operator.ticks(3)
-    (line,) = (line for line in operator.node.event_log.last(99) if "NOT CONFIRMED" in line.text)
+    (line,) = (line for line in operator.node.event_log.lines() if "NOT CONFIRMED" in line.text)
     assert line.level == "error"
 
 
@@ -144,7 +144,7 @@ def test_a_held_release_reports_once_that_the_bumper_is_free(operator: Operator)
         operator.press("b")
         operator.ticks(1)
         operator.node.fake.answers[-1][0](Done(text=text))
-    lines = operator.node.event_log.last(9)
+    lines = operator.node.event_log.lines()
     assert [(line.level, line.text) for line in lines] == [
         ("info", "release: 0.15 m left"),
         ("info", f"release: {BUMPER_FREE}"),

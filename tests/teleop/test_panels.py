@@ -1,13 +1,15 @@
 """Texts of the panels."""
 
+from typing import Any
+
 import pytest
 
-from common.messages import Bumper, Cause, Direction
+from common.messages import Bumper, Cause, Direction, Driver, Limits, Velocity
 from common.motion import Twist
 from services.teleop import panels
-from services.teleop.round_trip import UNKNOWN, multiplexer
-from services.teleop.view import Line
-from tests.factories import contact_state, link, release, safety_state
+from services.teleop.core.round_trip import UNKNOWN
+from services.teleop.view import Line, View
+from tests.factories import contact_state, link, odometry, release, safety_state
 from tests.teleop.support import view
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
@@ -15,89 +17,30 @@ SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too ol
 IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
 
 
-def test_the_header_shows_the_connections() -> None:
-    words = panels.header(view(link=link(), bumper=Bumper(pressed=False))).plain
-    assert words == "T2 001  ● bus  ● board  ● bumper  gear 1/5  0.20 m/s 0.30 rad/s"
-
-
-def test_the_header_fits_without_data() -> None:
-    words = panels.header(view(connected=False)).plain
-    assert "no router yet" in words
-    assert "no bridge" in words
-    assert len(words) <= 78
-
-
-@pytest.mark.parametrize(("state", "words"), [("lost", "board lost"), ("never", "never seen")])
-def test_the_header_shows_a_missing_board(state: str, words: str) -> None:
-    assert words in panels.header(view(link=link(state=state))).plain
-
-
-def test_the_header_shows_turbo_and_a_pressed_bumper() -> None:
-    words = panels.header(view(turbo=True, top=Twist(1, 1), bumper=Bumper(pressed=True))).plain
-    assert "TURBO  1.00 m/s" in words
-    assert "PRESSED" in words
-
-
-def test_a_missing_safety_is_shown() -> None:
-    assert "NO SAFETY" in panels.safety(view(), 2).plain
-
-
-def test_without_a_router_the_connection_is_named() -> None:
-    assert "no connection to the router" in panels.safety(view(connected=False), 2).plain
-
-
-def test_an_alarm_comes_first() -> None:
-    words = panels.safety(view(alarm="NOT CONFIRMED", safety=safety_state(text="Stands.")), 3)
-    assert words.plain.split("\n")[0] == "NOT CONFIRMED"
-    assert "Stands." in words.plain
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        (
+            {"link": link(), "bumper": Bumper(pressed=False)},
+            "T2 001  ● bus  ● board  ● bumper  gear 1/5  0.20 m/s 0.30 rad/s",
+        ),
+        ({"connected": False}, "○ no router yet  ○ no bridge  ○ bumper  gear"),
+        ({"link": link(state="lost")}, "○ board lost"),
+        ({"link": link(state="never")}, "○ board never seen"),
+        ({"bumper": Bumper(pressed=True), "gear": 5}, "● bumper PRESSED  gear 5/5"),
+    ],
+)
+def test_the_header_shows_connections_and_gear(fields: dict[str, Any], words: str) -> None:
+    shown = panels.header(view(**fields)).plain
+    assert words in shown
+    assert len(shown) <= 78
 
 
 def test_the_help_names_every_key_of_the_hints() -> None:
     words = panels.help_text().plain
-    for key in ("W A S D", "Z C", "space", "E", "R", "F B", "1 to 5", "T", "[ ]", "Q"):
+    for key in ("W A S D", "Z C", "space", "E", "R", "F B", "1 to 5", "Q", "gamepad", "?"):
         assert f"\n{key}" in f"\n{words}", key
     assert max(map(len, words.split("\n"))) <= 76
-
-
-def test_the_text_of_safety_is_shown() -> None:
-    words = panels.safety(view(safety=safety_state(verdict="slow", text="Slowed.")), 2).plain
-    assert words == " SLOW   Slowed."
-
-
-def test_latched_causes_come_first_with_advice() -> None:
-    state = safety_state(
-        verdict="brake", latched=("contact",), causes=(SILENT, CONTACT, IDLE), text="No."
-    )
-    assert panels.safety(view(safety=state), 5).plain.split("\n")[1:] == [
-        "LATCHED The bumper was hit. 12 s, R resets",
-        "stop An input is too old. 5 min",
-    ]
-
-
-def test_with_few_rows_causes_are_named_in_one_line() -> None:
-    state = safety_state(latched=("contact",), causes=(SILENT, CONTACT))
-    lines = panels.safety(view(safety=state), 2).plain.split("\n")
-    assert lines[1:] == ["LATCHED contact 12 s, R resets  stop silent 5 min"]
-
-
-def test_the_newest_events_are_shown() -> None:
-    lines = tuple(Line(0, "bridge", "warning", f"event {number}") for number in range(5))
-    shown = panels.events(view(lines=lines), 2).plain.split("\n")
-    assert [line[9:] for line in shown] == ["bridge  event 3", "bridge  event 4"]
-    assert panels.events(view(lines=lines), 0).plain == ""
-    older = panels.events(view(lines=lines), 2, skipped=2).plain.split("\n")
-    assert [line[9:] for line in older] == ["bridge  event 1", "bridge  event 2"]
-    assert panels.events(view(lines=lines), 9).plain.count("event") == 5
-
-
-def test_a_long_line_is_wrapped() -> None:
-    lines = (Line(0, "bridge", "info", "short"), Line(0, "safety", "error", "word " * 30))
-    shown = panels.events(view(lines=lines), 5, 76).plain.split("\n")
-    assert [len(row) for row in shown] == [22, 76, 76, 46]
-    assert shown[2].startswith(" " * 17 + "word")
-    cut = panels.events(view(lines=lines), 2, 76).plain.split("\n")
-    assert cut == shown[1:3]  # the beginning has the most important part
-    assert panels.events(view(lines=(Line(0, "safety", "info", ""),)), 2, 10).plain.strip()
 
 
 def test_the_hints_explain_key_repeats_and_fit() -> None:
@@ -108,20 +51,68 @@ def test_the_hints_explain_key_repeats_and_fit() -> None:
     assert max(len(keys), len(limit)) <= 78
 
 
-@pytest.mark.parametrize(
-    "reason",
-    [
-        "terminal too slow: 10.42 s, allowed 0.15 s",
-        UNKNOWN,
-        multiplexer({"ZELLIJ": "0", "SSH_TTY": "/dev/pts/0"}, ()),
-        multiplexer({}, ["mosh-server"]),
-    ],
-)
+@pytest.mark.parametrize("reason", ["terminal too slow: 10.42 s, allowed 0.15 s", UNKNOWN])
 def test_on_a_slow_terminal_the_hints_give_the_reason_and_the_accepted_keys(reason: str) -> None:
     keys, advice = panels.hints(view(keys_refused=reason), 0.6, 0.3).plain.split("\n")
     assert keys == f"␣ stop E ESTOP Q quit  KEYS OFF: {reason}"
     assert "dashboard" in advice
     assert max(len(keys), len(advice)) <= 78
+
+
+def test_the_newest_events_are_shown_and_long_ones_wrapped() -> None:
+    lines = (
+        *(Line(0, "bridge", "warning", f"event {number}") for number in range(5)),
+        Line(0, "safety", "error", "word " * 30),
+    )
+    shown = panels.events(view(lines=lines), 5, 76).plain.split("\n")
+    assert [line[9:] for line in shown[:2]] == ["bridge  event 3", "bridge  event 4"]
+    assert [len(row) for row in shown[2:]] == [76, 76, 46]
+    assert shown[3].startswith(" " * 17 + "word")
+    # The beginning has the most important part.
+    assert panels.events(view(lines=lines), 2, 76).plain.split("\n") == shown[2:4]
+    assert panels.events(view(lines=lines), 0).plain == ""
+    assert panels.events(view(lines=(Line(0, "safety", "info", ""),)), 2, 10).plain.strip()
+
+
+# --- safety ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "rows", "expected"),
+    [
+        ({}, 2, [" NO SAFETY   no state of safety received; check it with `t2 doctor`"]),
+        ({"connected": False}, 2, [" NO ROUTER   no connection to the router"]),
+        ({"safety": safety_state(verdict="slow", text="Slowed.")}, 2, [" SLOW   Slowed."]),
+        (
+            {"alarm": "NOT CONFIRMED", "safety": safety_state(text="Stands.")},
+            3,
+            ["NOT CONFIRMED", " RUN   Stands."],
+        ),
+        (
+            {
+                "safety": safety_state(
+                    verdict="brake",
+                    latched=("contact",),
+                    causes=(SILENT, CONTACT, IDLE),
+                    text="No.",
+                )
+            },
+            3,
+            [
+                " BRAKE   No.",
+                "LATCHED The bumper was hit. 12 s, R resets",
+                "stop An input is too old. 5 min",
+            ],
+        ),
+        (  # with few rows the causes are named in one line
+            {"safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT))},
+            2,
+            [" RUN   Driving.", "LATCHED contact 12 s, R resets  stop silent 5 min"],
+        ),
+    ],
+)
+def test_alarm_verdict_and_causes(fields: dict[str, Any], rows: int, expected: list[str]) -> None:
+    assert panels.safety(view(**fields), rows).plain.split("\n") == expected
 
 
 def contact_rows(rows: int = 4, held: Direction | None = None, **fields: object) -> list[str]:
@@ -138,26 +129,36 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
     ]
 
 
-def test_the_other_way_and_an_unknown_age() -> None:
-    row = contact_rows(believed_free="forward", travelled=-0.2, age=None)[1]
-    assert row == "RELEASE  believed free: FORWARD (moved backward; net -0.20 m)"
+@pytest.mark.parametrize(
+    ("fields", "row", "words"),
+    [
+        (
+            {"believed_free": "forward", "travelled": -0.2, "age": None},
+            1,
+            "RELEASE  believed free: FORWARD (moved backward; net -0.20 m)",
+        ),
+        (
+            {"believed_free": None, "age": None},
+            1,
+            "RELEASE  free direction unknown: look at the vehicle",
+        ),
+        (
+            {"held": "backward", "forbidden": ("forward",), "left": 0.0},
+            2,
+            " F  forward FORBIDDEN    B  backward, held   0.00 m left until reset",
+        ),
+    ],
+)
+def test_the_release_shows_directions_and_distance(
+    fields: dict[str, Any], row: int, words: str
+) -> None:
+    assert contact_rows(**fields)[row] == words
 
 
-def test_an_unknown_free_direction_is_shown() -> None:
-    row = contact_rows(believed_free=None, age=None)[1]
-    assert row == "RELEASE  free direction unknown: look at the vehicle"
-
-
-def test_a_forbidden_direction_and_the_held_one_are_shown() -> None:
-    row = contact_rows(held="backward", forbidden=("forward",), left=0.0)[2]
-    assert row == " F  forward FORBIDDEN    B  backward, held   0.00 m left until reset"
-
-
-def test_a_free_bumper_needs_no_release() -> None:
-    state = contact_state(release=release())
-    for pressed in (True, False):
-        text = panels.safety(view(safety=state, bumper=Bumper(pressed=pressed)), 6).plain
-        assert ("RELEASE" in text) == pressed
+@pytest.mark.parametrize("pressed", [True, False])
+def test_a_free_bumper_needs_no_release(pressed: bool) -> None:
+    of = view(safety=contact_state(release=release()), bumper=Bumper(pressed=pressed))
+    assert ("RELEASE" in panels.safety(of, 6).plain) == pressed
 
 
 def test_the_release_fits() -> None:
@@ -166,3 +167,65 @@ def test_the_release_fits() -> None:
     )
     assert len(rows) == 4
     assert max(map(len, rows)) <= 76
+
+
+# --- motion ---------------------------------------------------------------------------------
+
+
+def table(of: View) -> dict[str, str]:
+    """Return the motion panel by the names of its rows."""
+    lines = panels.motion(of).plain.split("\n")
+    assert max(map(len, lines)) <= 40
+    return {line[:8].strip(): line[8:].strip() for line in lines}
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({}, {"pose": "no data", "odom": "no data", "board": "no data", "rates": "no data"}),
+        ({}, {"motor L": "no data", "driver": "none", "m/s": "-        -         -"}),
+        ({"odometry": odometry()}, {"pose": "x +1.23  y -0.40 m  +90°"}),
+        ({"odometry": odometry()}, {"odom": "residual +0.004 m  no slip"}),
+        ({"odometry": odometry(residual=None, slip=True)}, {"odom": "residual -  SLIP"}),
+        ({"link": link()}, {"board": "10.7.5.224:4002  0.8 ms", "rates": "velo 50 driv 2"}),
+        ({"link": link(round_trip=None, rates={})}, {"board": "10.7.5.224:4002", "rates": "none"}),
+        ({"link": link(state="lost")}, {"board": "lost: 10.7.5.224:4002"}),
+        ({"link": link(armed=False, waiting="a neutral motion")}, {"board": "a neutral motion"}),
+        ({"link": link(armed=False)}, {"board": "not armed"}),
+        (
+            {
+                "left": Driver(faults=(), bits=0),
+                "right": Driver(faults=("encoder", "bit_9"), bits=516),
+            },
+            {"motor L": "ok", "motor R": "encoder bit_9"},
+        ),
+        ({"safety": safety_state(source="teleop")}, {"driver": "teleop (you)"}),
+        ({"safety": safety_state(source="nav")}, {"driver": "nav"}),
+        ({"release": "forward"}, {"driver": "you, release forward"}),
+        ({"gamepad": "Pad"}, {"gamepad": "Pad"}),
+        ({"gamepad": "Pad", "move_stick": True}, {"gamepad": "no event: MOVE THE STICK"}),
+        ({"requested": Twist(-0.0, -0.0)}, {"m/s": "+0.00        -         -"}),
+    ],
+)
+def test_rows_of_the_motion_panel(fields: dict[str, Any], expected: dict[str, str]) -> None:
+    shown = table(view(**fields))
+    assert len(shown) == 11
+    assert {name: shown[name] for name in expected} == expected
+
+
+@pytest.mark.parametrize(("linear", "allowed"), [(0.35, "0.22"), (0.0, "0.22"), (-0.35, "0.50")])
+def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> None:
+    limits = Limits(forward=0.22, backward=0.5, angular=0.9)
+    shown = table(
+        view(
+            requested=Twist(linear, 0.1),
+            safety=safety_state(limits=limits),
+            velocity=Velocity(linear=0.21, angular=-0.02),
+        )
+    )
+    assert shown["m/s"].split() == [f"{linear:+.2f}", allowed, "+0.21"]
+    assert shown["rad/s"].split() == ["+0.10", "0.90", "-0.02"]
+
+
+def test_a_contact_takes_the_row_of_the_rates() -> None:
+    assert "rates" not in table(view(link=link(), safety=contact_state()))

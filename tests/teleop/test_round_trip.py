@@ -7,17 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from services.teleop.round_trip import (
+from services.teleop.core.round_trip import (
     NUMBERS,
     PROBE_S,
     RECOVER_S,
     UNKNOWN,
     RoundTrip,
-    multiplexer,
 )
 
 LIMIT_S = 0.15
-SSH = {"SSH_CONNECTION": "10.0.0.1 5 10.0.0.2 22"}
 
 
 def at(seconds: float) -> int:
@@ -100,12 +98,6 @@ def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
     assert len(trip._answers) == NUMBERS
 
 
-def test_an_unmeasurable_terminal_is_always_refused() -> None:
-    trip = RoundTrip(LIMIT_S, "tmux hides it")
-    probe(trip, 1, 10, 0.0)
-    assert trip.refusal(at(10)) == "tmux hides it"
-
-
 DELAYS = st.lists(st.floats(0.0, 2.0) | st.floats(0.0, 0.1), min_size=5, max_size=60)
 
 
@@ -127,23 +119,3 @@ def test_no_key_that_counts_is_older_than_the_limit_allows(
         trip.answered(number, at(received_s))
         if age_s > LIMIT_S + 2 * PROBE_S + 0.001:
             assert refused_before
-
-
-@pytest.mark.parametrize(
-    ("environ", "ancestors", "program"),
-    [
-        ({}, [], ""),
-        (SSH, ["bash", "sshd", "systemd"], ""),
-        ({"TMUX": "tmux.sock"}, ["bash", "tmux: server"], ""),
-        ({"TMUX": "tmux.sock", **SSH}, [], "tmux over ssh"),
-        ({"STY": "1.pts", "SSH_TTY": "/dev/pts/1"}, [], "screen over ssh"),
-        ({"ZELLIJ": "0", "SSH_CLIENT": "10.0.0.1 5 22"}, [], "zellij over ssh"),
-        ({}, ["bash", "mosh-server", "systemd"], "mosh"),
-    ],
-)
-def test_a_multiplexer_hides_a_remote_terminal(
-    environ: dict[str, str], ancestors: list[str], program: str
-) -> None:
-    reason = multiplexer(environ, ancestors)
-    assert reason.startswith(program)
-    assert bool(reason) is bool(program)

@@ -35,23 +35,6 @@ def test_help_opens_and_any_other_key_closes_it(screen: Screen) -> None:
     play(screen, act)
 
 
-def test_events_scroll(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        for number in range(30):
-            screen.node.event_log.add("safety", "info", f"event {number}.")
-        screen.controller.tick(screen.now_ns)
-        await until(lambda: "event 29." in screen.text_of("events"), "the newest")
-        for _ in range(20):
-            await pilot.press("left_square_bracket")
-        await until(lambda: "event 9." in screen.text_of("events"), "older ones")
-        assert "event 29." not in screen.text_of("events")
-        for _ in range(20):
-            await pilot.press("right_square_bracket")
-        await until(lambda: "event 29." in screen.text_of("events"), "the newest again")
-
-    play(screen, act)
-
-
 def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("e")

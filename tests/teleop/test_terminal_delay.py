@@ -3,9 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from services.teleop.controller import Controller
-from services.teleop.hold import Press
-from tests.teleop.support import FakeNode, Operator, answer
+from tests.teleop.support import Operator
 
 
 @pytest.mark.parametrize("key", ["w", "r", "f", "b", "t", "5"])
@@ -90,13 +88,3 @@ def test_a_terminal_that_stops_answering_releases_its_keys(operator: Operator) -
         speeds += operator.speeds(1)
     assert speeds[1] == 0.2
     assert speeds[-5:] == [None] * 5
-
-
-def test_a_multiplexer_over_ssh_does_not_drive() -> None:
-    node = FakeNode()
-    controller = Controller(node, node.event_log, "tmux over ssh hides the terminal's delay")
-    answer(controller, NS_PER_S)
-    controller.press(Press("w", NS_PER_S), NS_PER_S)
-    controller.tick(NS_PER_S)
-    assert node.requests == (0, None)
-    node.loop.close()

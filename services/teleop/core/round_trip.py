@@ -17,12 +17,11 @@ in time                       one over the limit      refused: too slow
 in time                       all within the limit    accepted
 ============================= ======================= ==================================
 
-A terminal multiplexer answers the query itself: over ssh its answers do not measure the
-operator's terminal, see ``multiplexer``.
+A terminal multiplexer (tmux, screen, mosh) answers the query itself: over ssh its answers do not
+measure the operator's terminal.
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from common.freshness import NS_PER_S
@@ -32,9 +31,6 @@ RECOVER_S = 1.0  # that the terminal must be fast before its keys count again
 NUMBERS = 64  # distinct numbers of open queries: 6.4 s
 ADVICE = "use `t2 drive` on a machine near the robot, or the dashboard"
 UNKNOWN = "terminal delay unknown: no answer yet"
-
-MULTIPLEXERS = {"TMUX": "tmux", "STY": "screen", "ZELLIJ": "zellij"}
-OVER_SSH = ("SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +49,8 @@ class Answer:
 class RoundTrip:
     """Decides whether a key that was read at a given time is accepted."""
 
-    def __init__(self, limit_s: float, unmeasurable: str = "") -> None:
+    def __init__(self, limit_s: float) -> None:
         self._limit_ns = round(limit_s * NS_PER_S)
-        self._unmeasurable = unmeasurable
         self._sent_ns: dict[int, int] = {}  # by number
         self._answers: deque[Answer] = deque(maxlen=NUMBERS)
 
@@ -72,8 +67,6 @@ class RoundTrip:
 
     def refusal(self, at_ns: int) -> str:
         """Return why a key that was read at this time is refused, as text; empty if accepted."""
-        if self._unmeasurable:
-            return self._unmeasurable
         before = [answer for answer in self._answers if answer.received_ns <= at_ns]
         if not before:
             return UNKNOWN
@@ -90,14 +83,3 @@ class RoundTrip:
     def _least_ns(newest: Answer, at_ns: int) -> int:
         """Return a lower bound of the round trip from the time since the newest answered query."""
         return round(at_ns - newest.sent_ns - 2 * PROBE_S * NS_PER_S)
-
-
-def multiplexer(environ: Mapping[str, str], ancestors: Iterable[str]) -> str:
-    """Return which program hides the delay of a remote terminal, as text; empty if none."""
-    if "mosh-server" in ancestors:
-        return "mosh hides the terminal's delay"
-    if any(name in environ for name in OVER_SSH):
-        for name, program in MULTIPLEXERS.items():
-            if name in environ:
-                return f"{program} over ssh hides the terminal's delay"
-    return ""

@@ -1,0 +1,1 @@
+"""What teleop decides: which keys and sticks count, and what they request. Pure."""
