@@ -26,7 +26,7 @@ from common.loop import Loop
 from services.safety.config import SafetyConfig
 from sim.requests import Wire
 from sim.trace import Command
-from verification.faults.namespaces import enter, missing
+from verification.faults.namespaces import enter
 from verification.faults.remote_host import Address, net
 from verification.faults.stack_fixture import QUICK
 from verification.harness.bus import bus_on, running
@@ -205,8 +205,10 @@ LIMITS: Limits = [
 
 
 if __name__ == "__main__":
-    if reason := missing(enter()).get("remote driver"):
-        sys.stderr.write(reason)
+    try:
+        enter()
+    except OSError as error:
+        sys.stderr.write(str(error))
         sys.exit(UNAVAILABLE)
     with tempfile.TemporaryDirectory() as temporary:
         sys.stdout.write(msgspec.json.encode(measure_here(Path(temporary))).decode())

@@ -16,18 +16,21 @@ from pathlib import Path
 from common import clock
 from common.freshness import NS_PER_S
 from verification.faults.independent_board import Command, IndependentBoard
-from verification.faults.independent_client import LINK, STATE, Client, Source, session
+from verification.faults.independent_client import (
+    BUMPER,
+    HEALTH,
+    LINK,
+    MOTION,
+    ODOMETRY,
+    Client,
+    Source,
+    session,
+)
+from verification.harness.bus import set_options
 from verification.harness.host import StallRecorder
-from verification.harness.ports import accepts_connections, free_port, udp_ports
-from verification.harness.results import table
+from verification.harness.ports import free_port, udp_ports
 from verification.harness.waiting import becomes_true, wait_until
 
-HEADING = "\n## Black box\n"
-INTRODUCTION = """
-An independent board and plain Zenoh clients, written from the manual and [bus.md](bus.md), that
-import nothing of this project. Each row has its own stack with the shipped limits. BRAKE in time is
-BRAKE within 0.1 s.
-"""
 HEAD = ["scenario", "given", "when", "then", "on", ""]
 
 TRIES, STALL_S = 3, 0.06
@@ -35,8 +38,8 @@ BRAKE_S = 0.1
 UNDER_WAY_S = 0.15  # a RUN that was sent before a stop may arrive later
 READY_S = 0.6  # safety needs good inputs for 0.5 s before a neutral request
 NEUTRAL_S = 0.3
-END_S = 3.0
-SERVICES = ("bridge", "safety", "odom")
+MODULES = "cli router", "services.bridge", "services.safety", "services.odom"
+READ = LINK, HEALTH, ODOMETRY, BUMPER, MOTION
 
 
 @dataclass
@@ -124,48 +127,37 @@ class Scenario:
         """The name in the table."""
         return self.run.__name__.replace("_", " ")
 
+    def line(self, error: str, date: str) -> str:
+        """Return the row of the page's table."""
+        cells = [self.name, self.given, self.when, self.then, date, "WRONG" if error else "ok"]
+        return f"| {' | '.join(cells)} |"
+
 
 @contextlib.contextmanager
 def black_box(sets: Sequence[str] = ()) -> Iterator[BlackBox]:
     """Run board, processes and client."""
     port, first, second = udp_ports(3)
-    bus = free_port()
-    endpoint = f"tcp/127.0.0.1:{bus}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    words = set_options(
+        f"bus.listen={endpoint}", f"board.port={port}", f"board.listen_ports=[{first}, {second}]",
+        *sets,
+    )  # fmt: skip
     with contextlib.ExitStack() as ends:
         folder = ends.enter_context(tempfile.TemporaryDirectory())
+        log = ends.enter_context((Path(folder) / "log").open("wb"))
         board = ends.enter_context(contextlib.closing(IndependentBoard(port, (first, second))))
         # The runtime directory has the sockets of the processes: each run has its own.
         env = {**os.environ, "XDG_RUNTIME_DIR": folder}
-        settings = [
-            f"bus.listen={endpoint}", f"board.port={port}",
-            f"board.listen_ports=[{first}, {second}]", *sets,
-        ]  # fmt: skip
-        words = [word for each in settings for word in ("--set", each)]
         processes: dict[str, subprocess.Popen[bytes]] = {}
-
-        def start(name: str, *command: str) -> None:
-            with (Path(folder) / "log").open("ab") as log:
-                processes[name] = subprocess.Popen(
-                    [sys.executable, "-m", *command, *words],
-                    env=env, stdout=log, stderr=log, start_new_session=True,
-                )  # fmt: skip
-            ends.callback(_end, processes[name])
-
-        start("router", "cli", "router")
-        wait_until(lambda: accepts_connections(bus), "router up")
-        for name in SERVICES:
-            start(name, f"services.{name}")
-        client = Client(ends.enter_context(session(endpoint)))
-        wait_until(lambda: client.last(STATE) and client.last(LINK), "services up")
+        for module in MODULES:
+            process = subprocess.Popen(
+                [sys.executable, "-m", *module.split(), *words], env=env, stdout=log, stderr=log
+            )
+            processes[module] = ends.enter_context(process)
+            ends.callback(process.kill)
+        client = Client(ends.enter_context(session(endpoint)), *READ)
+        wait_until(lambda: client.state and client.last(LINK), "services up")
         yield BlackBox(board, client, endpoint, processes)
-
-
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(END_S)
-    process.kill()
-    process.wait()
 
 
 def tried(one: Scenario, stalls: StallRecorder) -> str:
@@ -182,14 +174,3 @@ def tried(one: Scenario, stalls: StallRecorder) -> str:
         if stalls.worst_s(begin_ns, (clock.now_ns() - begin_ns) / NS_PER_S) < STALL_S:
             break
     return error
-
-
-def section(found: Sequence[tuple[Scenario, str]], date: str, old: str = "") -> str:
-    """Return the part of the document; rows that did not run keep their old result."""
-    rows = {line.split(" | ")[0]: line for line in old.splitlines() if line.startswith("| ")}
-    new = table(HEAD, [
-        [one.name, one.given, one.when, one.then, date, "WRONG" if error else "ok"]
-        for one, error in found
-    ])  # fmt: skip
-    rows |= {line.split(" | ")[0]: line for line in new.splitlines()}
-    return "\n".join([HEADING + INTRODUCTION, *rows.values(), ""])

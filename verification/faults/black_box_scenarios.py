@@ -9,7 +9,15 @@ from collections.abc import Callable
 import msgpack
 
 from verification.faults.black_box import BRAKE_S, UNDER_WAY_S, BlackBox, Scenario
-from verification.faults.independent_client import BUMPER, HEALTH, MOTION, ODOMETRY, Map, session
+from verification.faults.independent_client import (
+    BUMPER,
+    HEALTH,
+    MOTION,
+    ODOMETRY,
+    STATE,
+    Map,
+    session,
+)
 from verification.harness.waiting import becomes_true, wait_until
 
 TICK_S = 0.02
@@ -250,7 +258,7 @@ def wall_ahead(box: BlackBox) -> None:
     board = box.board
     with box.driving(0.4):
         board.wall_m = board.distance + 1.5
-        wait_until(lambda: "blocked" in box.client.causes, "blocked by the wall", 15.0)
+        wait_until(lambda: b"blocked" in box.client.newest[STATE], "blocked by the wall", 15.0)
         time.sleep(1.0)
         gap_m = board.wall_m - board.distance
     assert board.linear == 0.0, f"moves at {board.linear:.2f} m/s"
@@ -279,7 +287,7 @@ def rolling_away(box: BlackBox) -> None:
 @scenario("standing, safety killed", "rolls at 0.1 m/s", "BRAKE of the bridge within 0.05 m")
 def rolling_away_without_safety(box: BlackBox) -> None:
     box.armed()
-    box.processes["safety"].kill()
+    box.processes["services.safety"].kill()
     time.sleep(0.5)
     rolls(box)
 

@@ -1,22 +1,27 @@
-"""A fault of the catalogue, and the budgets of its reaction.
+"""A fault of the catalogue, the samples of its trials, and their verdict. Pure.
 
 A budget is the effective time limit plus the time to detect it: 50 ms where a timeout has to
 expire, less where the fault is signalled.
 """
 
-from collections.abc import Callable
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from statistics import median_low
 from typing import Literal
 
 from cli.settings import Everything
-from verification.faults.namespaces import Requirement
-from verification.faults.stack_fixture import StackFixture
+from verification.faults.stack_fixture import Requirement, StackFixture
 
 # How the vehicle drives again, by rising effort.
 Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
 Budget = Callable[[Everything], float]  # s from the fault to the last command to move
+# Returns the time of the fault, in ns of the monotonic clock; None: the time of the call.
+Injector = Callable[[StackFixture], int | None]
 
 NOTICE_S = 0.05
+HEAD = "fault", "n", "budget", "median", "worst", "stall", "then", "date", ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +29,7 @@ class Fault:
     """One kind of fault."""
 
     name: str
-    # Returns the time of the fault, in ns of the monotonic clock; None: the time of the call.
-    inject: Callable[[StackFixture], int | None]
+    inject: Injector
     outcome: tuple[Outcome, ...]  # allowed by docs/safety.md
     budget: Budget | None = None  # None where the vehicle may drive on
     hold_s: float = 0.6  # how long requests go on after the fault
@@ -42,3 +46,72 @@ def by_limit(limit: Callable[[Everything], float]) -> Budget:
 def within(seconds: float) -> Budget:
     """Return a fixed budget."""
     return lambda _: seconds
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The result of a trial."""
+
+    stopped_s: float | None  # until the first STOP or BRAKE
+    moved_s: float  # until the last command that moves the vehicle, while the fault lasted
+    outcome: Outcome | None  # None: it does not drive again
+    fault_ns: int
+    unrequested: bool = False  # a motion command that no driver requested
+    ended: tuple[str, ...] = ()  # processes that had to survive
+    death_s: float = 0.0  # that the kernel took to end the killed process
+
+    @property
+    def reaction_s(self) -> float:
+        """The later one of the first STOP or BRAKE and the last command that moves the vehicle."""
+        return max(math.inf if self.stopped_s is None else self.stopped_s, self.moved_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One fault and its trials."""
+
+    fault: Fault
+    budget_s: float | None
+    samples: Sequence[Sample]
+    stalls_s: Sequence[float]  # longest stall of the host during each sample
+
+    @property
+    def allowances_s(self) -> list[float]:
+        """Time that the host took in each sample: a stall, or ending a killed process."""
+        pairs = zip(self.samples, self.stalls_s, strict=True)
+        return [stall + sample.death_s for sample, stall in pairs]
+
+    @property
+    def violations(self) -> list[str]:
+        """Return the violations of all samples."""
+        allowed = " or ".join(self.fault.outcome)
+        found = []
+        for sample, allowance_s in zip(self.samples, self.allowances_s, strict=True):
+            if sample.outcome not in self.fault.outcome:
+                found.append(f"{sample.outcome or 'does not drive again'}, not {allowed}")
+            if sample.unrequested:
+                found.append("a motion command without a request")
+            found += [f"{name} ended" for name in sample.ended]
+            if self.budget_s is not None and sample.reaction_s > self.budget_s + allowance_s:
+                limit = _ms(self.budget_s + allowance_s)
+                found.append(f"{_ms(sample.reaction_s)}, {limit} are allowed")
+        return found
+
+    def line(self, date: str) -> str:
+        """Return the row of the page's table."""
+        times = ["", "", ""]
+        if self.budget_s is not None:
+            took = [sample.reaction_s for sample in self.samples]
+            times = [_ms(self.budget_s), _ms(median_low(took)), _ms(max(took))]
+        count = len(self.samples)
+        outcomes = Counter(sample.outcome or "does not drive again" for sample in self.samples)
+        then = ", ".join(name if n == count else f"{name} {n}" for name, n in outcomes.items())
+        cells = [
+            self.fault.name, str(count), *times, _ms(max(self.allowances_s)), then, date,
+            "WRONG" if self.violations else "ok",
+        ]  # fmt: skip
+        return f"| {' | '.join(cells)} |"
+
+
+def _ms(seconds: float) -> str:
+    return f"{1000 * seconds:.1f} ms" if math.isfinite(seconds) else "never"

@@ -13,15 +13,19 @@ import zenoh
 ROOT = "t2/v1/001"
 STATE, LINK, HEALTH = "tel/safety/state", "tel/bridge/link", "tel/safety/health"
 ODOMETRY, BUMPER, MOTION = "tel/odom/odometry", "tel/bridge/bumper", "@cmd/motion"
+VELOCITY = "tel/bridge/velocity"
 PERIOD_S = 0.05
+UP_MS = 20_000  # until the router listens
 Map = dict[str, Any]
 
 
 def session(endpoint: str, mode: str = "client") -> "zenoh.Session":
     """Open a session with the router."""
+    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
     config = {
         "mode": mode,
-        "connect": {"endpoints": [endpoint], "timeout_ms": 1500},
+        "connect": {"endpoints": [endpoint], "timeout_ms": UP_MS, "retry": retry},
+        "transport": {"link": {"tx": {"lease": 1000}}},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
     }
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
@@ -30,12 +34,11 @@ def session(endpoint: str, mode: str = "client") -> "zenoh.Session":
 class Client:
     """An operator's program: reads what the services publish, stops, calls."""
 
-    def __init__(self, bus: "zenoh.Session") -> None:
+    def __init__(self, bus: "zenoh.Session", *keys: str) -> None:
         self.bus = bus
         self.newest: dict[str, bytes] = {}  # by key
         self._subscribers = [
-            bus.declare_subscriber(f"{ROOT}/{key}", self._on_sample)
-            for key in (STATE, LINK, HEALTH, ODOMETRY, BUMPER, MOTION)
+            bus.declare_subscriber(f"{ROOT}/{key}", self._on_sample) for key in (STATE, *keys)
         ]
 
     def _on_sample(self, sample: "zenoh.Sample") -> None:
@@ -55,11 +58,6 @@ class Client:
     def latched(self) -> list[str]:
         """The causes that need a reset."""
         return list(self.state.get("latched", ()))
-
-    @property
-    def causes(self) -> list[str]:
-        """All active causes."""
-        return [cause["name"] for cause in self.state["causes"]]
 
     def put(self, key: str, payload: bytes = b"") -> float:
         """Publish on a key of the robot; return the time."""

@@ -1,8 +1,7 @@
 """Namespaces for faults of network, disk and clock.
 
 The campaign moves into its own network and mount namespaces, so that it can cut the network and
-fill a disk without affecting the machine. Faults whose requirement is not available are left out,
-with the reason.
+fill a disk without affecting the machine.
 """
 
 import contextlib
@@ -12,25 +11,14 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
 
 from common.freshness import NS_PER_S
 from verification.harness.network_hosts import ip
 
-Requirement = Literal[
-    "none",
-    "teleop",
-    "remote driver",
-    "third parties",
-    "small disk",
-    "separate clocks",
-    "relay",
-    "site",
-]
-
 CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
+TOOLS = {"ip": "iproute2", "mount": "mount", "cc": "gcc"}  # and their Debian packages
 TUN = Path("/dev/net/tun")
 CLOCK = Path(__file__).with_name("clock.c")
 SMALL = "256k"
@@ -39,33 +27,20 @@ RELAY_HOST = f"t2relay{os.getpid()}"
 RELAY_CABLES = {"pc": ("10.7.6.2", "10.7.6.1"), "board": ("10.7.5.224", "10.7.5.220")}
 
 
-def enter() -> str:
-    """Enter new network and mount namespaces; return the reason when that is impossible.
+def enter() -> None:
+    """Enter new network and mount namespaces; raise OSError with the reason when it is impossible.
 
     Call it before any thread starts: only later threads share the namespaces.
     """
-    if not (shutil.which("ip") and shutil.which("mount")):
-        return (
-            "the commands ip and mount are not installed (Debian: apt-get install iproute2 mount)"
-        )
+    lacking = [package for tool, package in TOOLS.items() if not shutil.which(tool)]
+    if lacking:
+        raise OSError(f"not installed: apt-get install {' '.join(lacking)}")
+    if not os.access(TUN, os.W_OK):
+        raise OSError(f"{TUN} cannot be opened; root is required")
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNS | CLONE_NEWNET):
-        return f"cannot create a network namespace: {os.strerror(ctypes.get_errno())}"
+        raise OSError(f"cannot create a network namespace: {os.strerror(ctypes.get_errno())}")
     subprocess.run(["mount", "--make-rprivate", "/"], check=True)
     ip("link", "set", "lo", "up")
-    return ""
-
-
-def missing(outside: str) -> Mapping[Requirement, str]:
-    """Return the missing requirements with reasons; ``outside`` is the reason of ``enter``."""
-    reasons: dict[Requirement, str] = {
-        "remote driver": outside or ("" if os.access(TUN, os.W_OK) else f"{TUN} cannot be opened"),
-        "small disk": outside,
-        "relay": outside,
-        "separate clocks": ""
-        if shutil.which("cc")
-        else "no C compiler (Debian: apt-get install gcc libc6-dev)",
-    }
-    return {need: reason for need, reason in reasons.items() if reason}
 
 
 @contextlib.contextmanager

@@ -4,18 +4,14 @@
 """
 
 import contextlib
-import os
 import select
 import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
-from common.bus.bus import Bus
-from common.loop import Loop
-from common.source import DriveSource, KeepalivePublisher, LimitPublisher
-from verification.harness.bus import at
+from verification.faults.independent_client import Client, Source, session
 from verification.harness.teleop_terminal import STRICT, Terminal, terminal
 
 REPEAT_S = 0.03  # of a held key
@@ -23,23 +19,32 @@ FIFTH_GEAR = "5"
 PER_MS = 20  # datagrams of the flood
 
 
+@contextlib.contextmanager
+def source(endpoint: str, key: str) -> Iterator[Source]:
+    """Connect a source of this key."""
+    with session(endpoint) as bus, contextlib.closing(Source(Client(bus), key)) as made:
+        yield made
+
+
 def driver(endpoint: str) -> None:
     """Request the last speed at 20 Hz."""
-    loop = Loop()
-    bus = Bus(at(endpoint), "001", loop.post)
-    source = DriveSource(bus, "teleop")
-    requested = [0.0]
-
-    def read_speeds() -> None:
+    with source(endpoint, "@cmd/drive/teleop") as made:
         for line in sys.stdin:
-            requested[0] = float(line)
-        loop.stop()
+            made.repeat(linear=float(line), angular=0.0)
 
-    threading.Thread(target=read_speeds, daemon=True).start()
-    bus.open()
-    loop.every(0.05, lambda _: source.request(requested[0], 0.0))
-    loop.run()
-    bus.close()
+
+def limiter(endpoint: str) -> None:
+    """Publish a limit without a restriction."""
+    with source(endpoint, "@cmd/limit/lidar") as made:
+        made.repeat()
+        threading.Event().wait()
+
+
+def pendant(endpoint: str) -> None:
+    """Publish the keepalive of a pendant."""
+    with source(endpoint, "@cmd/estop_keepalive/pendant") as made:
+        made.repeat()
+        threading.Event().wait()
 
 
 def keyboard(endpoint: str) -> None:
@@ -47,19 +52,17 @@ def keyboard(endpoint: str) -> None:
 
     ``stall SECONDS`` stalls the terminal in both directions. Ends with teleop or with its input.
     """
-    held, partial = False, b""
-    with terminal(endpoint, *STRICT) as teleop:
+    held = False
+    with terminal(endpoint, *STRICT) as teleop, open(0, "rb", buffering=0) as stdin:
         while not teleop.shows(b"ESTOP") and not teleop.ends():
             time.sleep(REPEAT_S)
         teleop.type(FIFTH_GEAR)
         while not teleop.ends():
-            if select.select([sys.stdin], [], [], REPEAT_S)[0]:
-                new = os.read(sys.stdin.fileno(), 4096)
-                if not new:
+            if select.select([stdin], [], [], REPEAT_S)[0]:
+                line = stdin.readline()
+                if not line:
                     return
-                *lines, partial = (partial + new).split(b"\n")
-                for line in lines:
-                    held = _execute(line, teleop, held)
+                held = _execute(line, teleop, held)
             if held:
                 teleop.type("w")
 
@@ -70,25 +73,6 @@ def _execute(line: bytes, teleop: Terminal, held: bool) -> bool:
         teleop.stall(float(line.removeprefix(b"stall ")))
         return held
     return float(line) > 0
-
-
-def limiter(endpoint: str) -> None:
-    """Publish a limit without a restriction at 10 Hz."""
-    _publish(endpoint, lambda bus: LimitPublisher(bus, "lidar").limit)
-
-
-def pendant(endpoint: str) -> None:
-    """Publish the keepalive of a pendant at 10 Hz."""
-    _publish(endpoint, lambda bus: KeepalivePublisher(bus, "pendant").beat)
-
-
-def _publish(endpoint: str, declare: Callable[[Bus], Callable[[], object]]) -> None:
-    loop = Loop()
-    bus = Bus(at(endpoint), "001", loop.post)
-    publish = declare(bus)
-    bus.open()
-    loop.every(0.1, lambda _: publish())
-    loop.run()
 
 
 def flood(address: str) -> None:

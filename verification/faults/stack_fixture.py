@@ -6,37 +6,36 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 import msgspec
 
 from cli.settings import Everything
-from common import keys
-from common.bus.bus import Arrival, Bus
-from common.loop import Loop
-from common.messages import Done, SafetyState
-from common.operator import reset_request
 from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Sonar, Wire
+from verification.faults.independent_client import BUMPER, MOTION, VELOCITY, Client, session
 from verification.faults.namespaces import (
     RELAY_CABLES,
     RELAY_HOST,
-    Requirement,
     clock,
     relay_host,
     small_disk,
     step_clock,
 )
-from verification.harness.bus import bus_on, running
 from verification.harness.ports import free_port
 from verification.harness.process_stats import tree
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
 from verification.harness.waiting import becomes_true
 
+# What a fault needs beside or in place of the usual stack.
+Requirement = Literal[
+    "none", "teleop", "remote driver", "third parties", "small disk", "separate clocks", "relay",
+    "site",
+]  # fmt: skip
 # Reach the speed sooner. No time limit changes.
 QUICK = [
     "safety.unsafe_overrides=linear_acceleration",
@@ -52,7 +51,9 @@ NORMAL = (
     Wire(), Mute(), Firmware(), Lose(), Bumper(pressed=False), Driver(side="left", bits=0),
     Driver(side="right", bits=0), Sonar(name="front"), Sonar(name="rear"),
 )  # fmt: skip
-PROGRAMS = "verification.faults.programs"
+MODULE = [sys.executable, "-m"]
+PROGRAMS = [*MODULE, "verification.faults.programs"]
+REMOTE_HOST = "verification.faults.remote_host"
 (PC, RELAY_TO_PC), (BOARD, RELAY_TO_BOARD) = RELAY_CABLES.values()
 RELAY_PORT = 4010  # of its reports
 SIM_BEHIND_RELAY = [
@@ -66,30 +67,29 @@ class StackFixture:
     def __init__(
         self,
         stack: RunningStack,
-        bus: Bus,
-        folder: Path,
-        driver: Sequence[str],
-        env: Mapping[str, str],
-        *,
-        need: Requirement = "none",
+        client: Client,
+        driver: list[str],
+        env: Mapping[str, str] | None,
     ) -> None:
         self.running = stack
-        self._need = need
-        self._driver, self._env = [sys.executable, "-m", *driver], env
-        self.bus = bus
-        self.folder = folder
+        self.client = client
         self.frames = TraceFollower(stack.trace_file)
-        self.state: SafetyState | None = None
         self.asked = 0.0
         self.death_s = 0.0  # that the kernel took to end the last killed process
+        self.driver, self._env = driver, env
         self.start_driver()
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the stack."""
+        return self.running.trace_file.parent
 
     def start_driver(self) -> None:
         """Start or restart the driver."""
         if "driver" in self.running.processes:
             self.running.processes["driver"].communicate()  # also closes its pipe
         self.running.processes["driver"] = subprocess.Popen(
-            self._driver, stdin=subprocess.PIPE, env=self._env
+            self.driver, stdin=subprocess.PIPE, env=self._env
         )
         self.request(self.asked)
 
@@ -139,21 +139,10 @@ class StackFixture:
         last = self.frames.commands[-1:]
         return bool(last) and last[0].kind == "run" and not moves(last[0])
 
-    def latched(self) -> bool:
-        """Return whether a reset is due."""
-        return self.state is not None and bool(self.state.latched)
-
-    def flapping(self) -> bool:
-        """Return whether a reset is due only because of the campaign's repeated faults."""
-        return self.state is not None and self.state.latched == ("flapping",)
-
     def reset(self) -> None:
         """Call safety's reset as the operator."""
-        done: list[Done | str] = []
-        if self.state is None:
-            return
-        self.bus.call(keys.RESET, reset_request(self.state), done.append, done.append, 1.0)
-        becomes_true(lambda: done, 1.5)
+        if self.client.state:
+            self.client.call("safety/reset", self.client.reset_request())
 
     def rearm(self, patience_s: float) -> bool:
         """Request zero, then the speed again; return whether the vehicle drives."""
@@ -166,11 +155,11 @@ class StackFixture:
         """Bring the vehicle to speed; raise AssertionError after ``READY_S``."""
         self.restart_ended().restore()
         end_s = time.monotonic() + READY_S
-        while not self.at_speed() or self.latched():
+        while not self.at_speed() or self.client.latched:
             if time.monotonic() > end_s:
                 log = self.running.log.read_text()[-2000:]
-                raise AssertionError(f"does not drive: {self.state}\n{log}")
-            if self.restart_ended().latched():
+                raise AssertionError(f"does not drive: {self.client.state}\n{log}")
+            if self.restart_ended().client.latched:
                 self.request(0.0)
                 time.sleep(0.1)
                 self.reset()
@@ -187,10 +176,11 @@ class StackFixture:
             process = self.running.others.pop()
             process.terminate()
             process.communicate(timeout=20)
-        if self._need == "remote driver":
+        if REMOTE_HOST in self.driver:
             self.disturb_network(Wire())
-        for name in CLOCKS if self._need == "separate clocks" else ():
-            step_clock(self.folder / name, 0)
+        for clock_file in (self.folder / name for name in CLOCKS):
+            if clock_file.exists():
+                step_clock(clock_file, 0)
         for request in NORMAL:
             self.running.control.do(request)
         if abs(self.running.control.truth().x) > ROOM_M:
@@ -220,26 +210,24 @@ def _settings(need: Requirement) -> list[str]:
 
 def _beside(need: Requirement, config: Everything) -> dict[str, list[str]]:
     """Return the commands of the processes that a requirement adds."""
-    python = [sys.executable, "-m"]
     if need == "third parties":
-        program = [*python, PROGRAMS, config.bus.endpoints[0]]
+        program = [*PROGRAMS, config.bus.endpoints[0]]
         return {name: [*program, name] for name in ("limiter", "pendant")}
     if need == "relay":
         words = ["--board-port", str(config.board.port), "--ports"]
         words += map(str, config.board.listen_ports)
-        return {"relay": ["ip", "netns", "exec", RELAY_HOST, *python, "services.relay", *words]}
+        return {"relay": ["ip", "netns", "exec", RELAY_HOST, *MODULE, "services.relay", *words]}
     if need == "site":
         listen = f"bus.listen={operators_endpoint(config)}"
-        return {"site router": [*python, "cli", "router", "--set", listen]}
+        return {"site router": [*MODULE, "cli", "router", "--set", listen]}
     return {}
 
 
-def _driver(need: Requirement, config: Everything) -> list[str]:
-    """Return the driver's module and its words."""
-    endpoint = operators_endpoint(config)
+def _driver(need: Requirement, endpoint: str) -> list[str]:
+    """Return the command of the driver."""
     if need == "remote driver":
-        return ["verification.faults.remote_host", endpoint, PROGRAMS, "driver"]
-    return [PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
+        return [*MODULE, REMOTE_HOST, endpoint, PROGRAMS[-1], "driver"]
+    return [*PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
 
 
 @contextlib.contextmanager
@@ -248,6 +236,7 @@ def stack_fixture(
 ) -> Iterator[StackFixture]:
     """Run a stack fixture that meets the requirement of a fault."""
     clocks = need == "separate clocks"
+    robot, driver = (clock(folder / name) if clocks else None for name in CLOCKS)
     with contextlib.ExitStack() as stack:
         if need == "small disk":
             stack.enter_context(small_disk(folder / "disk"))
@@ -262,29 +251,9 @@ def stack_fixture(
                 beside=partial(_beside, need),
                 log="disk/log.jsonl" if need == "small disk" else "log.jsonl",
                 listen=f"tcp/{'0.0.0.0' if need == 'remote driver' else '127.0.0.1'}:{{port}}",
-                env=clock(folder / "robot") if clocks else None,
+                env=robot,
             )
         )
-        env = clock(folder / "driver") if clocks else os.environ
-        yield stack.enter_context(driven(made, folder, _driver(need, made.config), env, need))
-
-
-@contextlib.contextmanager
-def driven(
-    stack: RunningStack,
-    folder: Path,
-    driver: Sequence[str],
-    env: Mapping[str, str],
-    need: Requirement = "none",
-) -> Iterator[StackFixture]:
-    """Add a driver and an operator to a running stack."""
-    with running(Loop()) as loop:
-        it: list[StackFixture] = []
-
-        def take(arrival: Arrival[SafetyState]) -> None:
-            if it:
-                it[0].state = arrival.message
-
-        with bus_on(stack.endpoint, loop, lambda bus: bus.subscribe(keys.SAFETY, take)) as bus:
-            it.append(StackFixture(stack, bus, folder, driver, env, need=need))
-            yield it[0]
+        endpoint = operators_endpoint(made.config)
+        client = Client(stack.enter_context(session(endpoint)), MOTION, BUMPER, VELOCITY)
+        yield StackFixture(made, client, _driver(need, endpoint), driver)

@@ -5,10 +5,10 @@ import time
 from collections.abc import Sequence
 
 from common import clock
+from common.freshness import NS_PER_S
 from sim.trace import Command
-from verification.faults.fault import Fault, Outcome
+from verification.faults.fault import Fault, Outcome, Sample
 from verification.faults.stack_fixture import SPEED_MPS, StackFixture
-from verification.faults.table import Sample
 from verification.harness.trace import first_stop_s, last_move_s, moves
 from verification.harness.waiting import becomes_true
 
@@ -33,7 +33,7 @@ def run_trial(fixture: StackFixture, fault: Fault) -> Sample:
     fixture.death_s = 0.0
     called_ns = clock.now_ns()
     fault_ns = fault.inject(fixture) or called_ns
-    time.sleep(max(0.0, fault.hold_s - (clock.now_ns() - fault_ns) / 1e9))
+    time.sleep(max(0.0, fault.hold_s - (clock.now_ns() - fault_ns) / NS_PER_S))
     fixture.frames.follow()
     commands = list(fixture.frames.commands)
     moving = fixture.moving()
@@ -55,14 +55,15 @@ def run_trial(fixture: StackFixture, fault: Fault) -> Sample:
 def _outcome(fixture: StackFixture) -> Outcome | None:
     if becomes_true(lambda: fixture.restart_ended().moving(), HOLD_ON_S):
         return "by itself"
-    if fixture.rearm(LATCHED_S if fixture.latched() else REARM_S):
+    if fixture.rearm(LATCHED_S if fixture.client.latched else REARM_S):
         return "after a neutral"
-    latched = False
+    needs_reset = False
     for _ in range(10):
         fixture.restart_ended().request(0.0)
         time.sleep(0.1)
-        latched = latched or (fixture.latched() and not fixture.flapping())
+        # The campaign's repeated faults latch "flapping".
+        needs_reset = needs_reset or fixture.client.latched not in ([], ["flapping"])
         fixture.reset()
         if fixture.rearm(REARM_S):
-            return "after a reset" if latched else "after a neutral"
+            return "after a reset" if needs_reset else "after a neutral"
     return None

@@ -12,14 +12,11 @@ from random import Random
 import msgspec
 
 from cli.settings import Everything
-from common import child_process, clock, keys
-from common.bus.bus import Arrival, Bus
+from common import child_process, clock
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
-from common.loop import Loop
-from common.messages import Health
 from sim.requests import Asked
-from verification.harness.bus import bus_on, running, set_options
+from verification.harness.bus import set_options
 from verification.harness.host import StallRecorder
 from verification.harness.process_stats import GONE, PROC, stat, tree
 from verification.harness.results import table
@@ -46,8 +43,7 @@ class Soak:
         self._stack, self._stalls, self._record = stack, stalls, record
         self._faults, self._random = faults(Random(seed)), Random(seed)
         self._log = Tail(stack.log)
-        self._began_ns = clock.now_ns()
-        self._sampled_ns = self._began_ns
+        self._began_s = time.monotonic()
         self._seen: dict[str, int] = {}  # pids by name
         self._doomed: set[int] = set()  # pids that were killed on purpose
         self._held = ""  # the process that stays dead until the fault is over
@@ -55,27 +51,19 @@ class Soak:
     def run(self, seconds: float) -> None:
         """Inject faults until the time is over."""
         self._wait(FIRST_S)
-        while (past_s := self._at_s(clock.now_ns())) < seconds:
+        while (past_s := self._at_s()) < seconds:
             kills = past_s < KILLS_PART * seconds
             self.inject(next(fault for fault in self._faults if kills or not fault.kills))
             self._wait(self._random.uniform(*PAUSE_S))
 
-    def subscribe(self, bus: Bus) -> None:
-        """Record health messages."""
-
-        def take(arrival: Arrival[Health]) -> None:
-            times = self._record.health.setdefault(arrival.message.service, [])
-            times.append(self._at_s(arrival.received_ns))
-
-        bus.subscribe(keys.HEALTH, take, depth=16, service="*")
-
     def inject(self, fault: Fault) -> None:
         """Begin a fault, wait, and remove it."""
+        print(f"{self._at_s():7.1f} s  {fault.name}, {fault.seconds:.1f} s", flush=True)
+        self._record.faults += 1
         if fault.begin is not None:
             self._request(fault.begin)
-        name = self._kill(fault.kills) if fault.kills else fault.name
-        self._record.faults += 1
-        print(f"{self._at_s(clock.now_ns()):7.1f} s  {name}, {fault.seconds:.1f} s", flush=True)
+        if fault.kills:
+            self._kill(fault.kills)
         self._wait(fault.seconds)
         if fault.end is not None:
             self._request(fault.end)
@@ -96,45 +84,43 @@ class Soak:
 
         wait_until(taken, f"the simulator takes {request}", PATIENCE_S)
 
-    def _kill(self, service: str) -> str:
-        """Kill one of a service's processes; return its name."""
-        main = self._stack.processes[service].pid
-        processes = list(tree(service, main))
-        name, pid = self._random.choice(processes)
+    def _kill(self, name: str) -> None:
+        """Kill a process; its parent restarts it, or the end of the fault."""
+        pid = wait_until(lambda: self._pids().get(name, 0), f"{name} to kill", PATIENCE_S)
         # Orphans end as well.
-        self._doomed |= {one for child, one in processes if child.startswith(name)}
-        if pid == main:
-            self._held = service
-            self._stack.kill(service)
-        else:
-            os.kill(pid, signal.SIGKILL)  # its parent restarts it
-        return f"kill {name}"
+        self._doomed |= {one for child, one in self._pids().items() if child.startswith(name)}
+        if name in self._stack.processes:
+            self._held = name
+        os.kill(pid, signal.SIGKILL)
 
     def _wait(self, seconds: float) -> None:
         """Sample once a second meanwhile."""
-        end_ns = clock.now_ns() + round(seconds * NS_PER_S)
-        while (now_ns := clock.now_ns()) < end_ns:
-            if now_ns - self._sampled_ns >= NS_PER_S:
-                self._sampled_ns = now_ns
+        end_s = self._at_s() + seconds
+        while (now_s := self._at_s()) < end_s:
+            if now_s - self._record.seconds >= 1.0:
                 self.sample()
             time.sleep(0.05)
+
+    def _pids(self) -> dict[str, int]:
+        """Return all living processes, the children of services included."""
+        return {
+            name: pid
+            for service, process in self._stack.processes.items()
+            if process.poll() is None
+            for name, pid in tree(service, process.pid)
+        }
 
     def sample(self) -> None:
         """Take one sample of all processes and of the log."""
         record = self._record
-        record.seconds = self._at_s(clock.now_ns())
-        pids: dict[str, int] = {}
-        for name, process in self._stack.processes.items():
-            if process.poll() is None:
-                pids |= dict(tree(name, process.pid))
-            elif name != self._held:
-                self._stack.start(name)
+        record.seconds = self._at_s()
+        pids = self._pids()
         for name, pid in pids.items():
             self._sample_process(name, pid)
         self._find_crashes(pids)
         for line in self._log.read().splitlines():
             self._take_line(line)
-        record.log.append((record.seconds, self._log.bytes))
+        record.log_bytes = self._log.bytes
 
     def _sample_process(self, name: str, pid: int) -> None:
         try:
@@ -158,6 +144,8 @@ class Soak:
                 self._record.crashes.append(name)
                 print(f"{name} has crashed", flush=True)
         self._seen = pids
+        for name in self._stack.processes.keys() - pids.keys() - {self._held}:
+            self._stack.start(name)
 
     def _take_line(self, line: bytes) -> None:
         self._record.tracebacks += b"Traceback" in line
@@ -166,8 +154,8 @@ class Soak:
             if (what := str(event["event"])) in DRIVER_EVENTS:
                 self._record.events.append((self._record.seconds, what))
 
-    def _at_s(self, now_ns: int) -> float:
-        return (now_ns - self._began_ns) / NS_PER_S
+    def _at_s(self) -> float:
+        return time.monotonic() - self._began_s
 
 
 def main() -> int:
@@ -176,7 +164,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=30.0, help="duration, 30")
     parser.add_argument("--seed", type=int, default=1, help="seed of the faults, 1")
     parser.add_argument(
-        "--out", type=Path, default=Path("out/soak"), help="folder for log, trace and samples"
+        "--out", type=Path, default=Path("out/soak"), help="folder for log and trace"
     )
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -188,7 +176,6 @@ def main() -> int:
         soak(options.out, record, options.seed, options.minutes * 60)
     except KeyboardInterrupt:
         print("interrupted", flush=True)
-    (options.out / "samples.json").write_bytes(msgspec.json.encode(list(record.lives.items())))
     rows = [(what, text, "ok" if fine else "WRONG") for what, text, fine in results(record)]
     print(table(("result", "value", ""), rows))
     return int(any(mark == "WRONG" for *_, mark in rows))
@@ -203,14 +190,8 @@ def soak(out: Path, record: Record, seed: int, seconds: float) -> None:
         )
         return {"driver": list(child_process.command("verification.soak.driver", *where))}
 
-    with (
-        StallRecorder() as stalls,
-        running_stack(out, "office", beside=driver) as stack,
-        running(Loop()) as loop,
-    ):
-        made = Soak(stack, stalls, record, seed)
-        with bus_on(stack.endpoint, loop, made.subscribe):
-            made.run(seconds)
+    with StallRecorder() as stalls, running_stack(out, "office", beside=driver) as stack:
+        Soak(stack, stalls, record, seed).run(seconds)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 """``python -m verification.soak.driver``: drive laps and recover from faults.
 
-The driver resets latches, waits while odometry is silent, sets the vehicle's true pose after a
-restart of odometry (as a localization does), and puts the vehicle back to its start when a lap is
-stuck. It is a separate process, so that it can be killed.
+The driver resets latches and waits while odometry is silent. When odometry restarts or a step takes
+too long, it begins the lap again. It is a separate process, so that it can be killed.
 """
 
 import argparse
@@ -24,35 +23,23 @@ from sim.requests import Place
 from sim.sockets import Control
 from t2.messages import Odometry
 
-TRY_S = 0.5  # between two attempts to recover
+TRY_S = 0.5  # until the next attempt
 STEP_S = 75.0  # timeout; the longest step of a lap takes a third of that
 
 
-class LocatedDriver(Driver):
-    """A driver that sets the true pose after each restart of odometry."""
+class LapDriver(Driver):
+    """A driver that ends the lap when odometry restarts: its pose is then another one."""
 
-    def __init__(self, robot: t2.Robot, timeout: "StepTimeout", control: Control) -> None:
+    def __init__(self, robot: t2.Robot, timeout: "StepTimeout") -> None:
         super().__init__(robot, LapRecord(timeout.restart), timeout)
-        self._control = control
-        self._boot: int | None = None  # of the odometry whose pose is set
+        self._boot = robot.odometry.latest().boot
 
     def located(self) -> Odometry:
-        """Return the pose; after a restart of odometry set it first, at standstill."""
+        """Return the pose."""
         pose = super().located()
         if pose.boot != self._boot:
-            self._set_pose()
-            self._boot = pose.boot
-            raise t2.NoData("the pose was set: the next one shows it")
+            raise LapEndedError("odometry has restarted")
         return pose
-
-    def _set_pose(self) -> None:
-        try:
-            truth = self._control.truth()
-        except (LinkError, MessageError) as error:
-            raise t2.NoData(str(error)) from None
-        if truth.linear or truth.angular:
-            raise t2.NoData("the vehicle still moves")
-        self.robot.set_pose(truth.x, truth.y, truth.heading)
 
 
 class StepTimeout(threading.Event):
@@ -74,17 +61,15 @@ class StepTimeout(threading.Event):
 
 def drive(robot: t2.Robot, control: Control) -> None:
     """Drive one lap from the start of the world; give it up when a step takes too long."""
-    driver = LocatedDriver(robot, StepTimeout(), control)
     try:
         control.do(Place(x=0.0, y=0.0))
-        drive_lap(driver, PATIENT)
-    except (LapEndedError, LinkError, MessageError) as error:
-        why = [str(error), *(text for *_, text in driver.record.answers[-1:])]
-        stuck = "".join(driver.record.steps[-1:])
-        log.Logger().warning("lap restarted", stuck=stuck, why=" ".join(why))
+        robot.set_pose()
+        drive_lap(LapDriver(robot, StepTimeout()), PATIENT)
+    except (LapEndedError, t2.T2Error, LinkError, MessageError) as error:
+        log.Logger().warning("lap restarted", why=str(error))
         time.sleep(TRY_S)
     else:
-        log.Logger().info("lap finished", latches=driver.record.unplanned)
+        log.Logger().info("lap finished")
 
 
 def main() -> int:

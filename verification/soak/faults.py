@@ -1,21 +1,14 @@
-"""Random faults of a soak, reproducible by their seed.
-
-Each kind is drawn once, in random order, before any kind is drawn again, so that a short soak has
-all kinds. A fault begins, lasts, and is removed.
-"""
+"""Random faults of a soak, reproducible by their seed."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from random import Random
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from msgspec.structs import replace
 
 from sim import requests as q
 
 DIRECTIONS: tuple[Literal["to_pc", "to_board", "both"], ...] = ("to_pc", "to_board", "both")
-SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
-NO_FAULT = q.Wire()
 WIRE = {
     "drop": q.Wire(drop=0.3),
     "duplicate": q.Wire(duplicate=0.5),
@@ -23,11 +16,10 @@ WIRE = {
     "corrupt": q.Wire(corrupt=0.2),
     "delay": q.Wire(delay=0.08, jitter=0.05),
 }
-KILLED = "router", "safety", "bridge", "driver", "sim", "odom"
+KILLED = "router", "safety", "bridge", "bridge/1", "driver", "sim", "odom"  # bridge/1: its child
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(NamedTuple):
     """One fault: a request to the simulated vehicle, or SIGKILL of a process."""
 
     name: str
@@ -38,7 +30,7 @@ class Fault:
 
 
 def faults(random: Random) -> Iterator[Fault]:
-    """Yield faults without end."""
+    """Yield faults without end: each kind once, in random order, then all of them again."""
     while True:
         drawn = one_of_each(random)
         random.shuffle(drawn)
@@ -53,17 +45,16 @@ def one_of_each(random: Random) -> list[Fault]:
 
     frozen_s, off_s = random.uniform(0.1, 3.0), seconds()
     sonar: q.SonarName = random.choice(get_args(q.SonarName))
-    side, bits = random.choice(SIDES), 1 << random.randrange(5)  # those that the manual names
-    broken, whole = q.Driver(side=side, bits=bits), q.Driver(side=side, bits=0)
-    faulty, good = q.Sonar(name=sonar, fault=True), q.Sonar(name=sonar)
+    bits = 1 << random.randrange(5)  # those that the manual names
     cable = {
         name: replace(wire, direction=random.choice(DIRECTIONS)) for name, wire in WIRE.items()
     }
     return [
-        *(Fault(f"wire {name}", seconds(), wire, NO_FAULT) for name, wire in cable.items()),
+        *(Fault(f"wire {name}", seconds(), wire, q.Wire()) for name, wire in cable.items()),
         Fault("freeze", frozen_s, q.Freeze(seconds=frozen_s)),
         Fault("power cycle", off_s, q.PowerCycle(seconds=off_s)),
-        Fault("sonar fault", seconds(), faulty, good),
-        Fault("driver fault", seconds(), broken, whole),
+        Fault("sonar fault", seconds(), q.Sonar(name=sonar, fault=True), q.Sonar(name=sonar)),
+        Fault("driver fault", seconds(), q.Driver(side="left", bits=bits),
+              q.Driver(side="left", bits=0)),
         *(Fault(f"kill {name}", seconds(), kills=name) for name in KILLED),
-    ]
+    ]  # fmt: skip

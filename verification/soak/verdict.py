@@ -1,4 +1,4 @@
-"""Verdict of a soak: growth of resources, stuck laps, crashes, and silent services.
+"""Verdict of a soak: growth of resources, log, crashes, and stuck laps.
 
 A process is judged by its longest life: shorter ones end with a kill, and sessions come and go in
 them. After the warm-up the median of the first fifth is compared with that of the last fifth.
@@ -14,9 +14,6 @@ from cli.demo.score import Result
 
 GROWTH_MAX = 2 * 2**20  # bytes of memory
 LOG_MAX = 2000.0  # bytes/s on average, all services together, faults included
-LOG_PEAK_MAX = 10_000.0  # bytes/s in the worst ten seconds
-PEAK_S = 10
-SILENCE_MAX_S = 20.0  # of health: a killed service is restarted after some seconds
 SAMPLES_MIN = 10  # of a life that is judged; a fifth of it is 2
 WARM_UP_S = 60.0  # at most; of a short soak a tenth
 LAP_S = 240.0  # in each such period one lap must be finished; it takes a third without faults
@@ -38,10 +35,9 @@ class Record:
 
     lives: dict[tuple[str, int], list[Sample]] = field(default_factory=dict)  # by name and pid
     events: list[tuple[float, str]] = field(default_factory=list)  # of the driver
-    log: list[tuple[float, int]] = field(default_factory=list)  # bytes so far
+    log_bytes: int = 0
     tracebacks: int = 0
     crashes: list[str] = field(default_factory=list)
-    health: dict[str, list[float]] = field(default_factory=dict)  # times by service
     faults: int = 0
     seconds: float = 0.0  # duration
 
@@ -51,14 +47,11 @@ def results(record: Record) -> Iterator[Result]:
     for name in dict.fromkeys(name for name, _ in record.lives):
         longest = max((it for (each, _), it in record.lives.items() if each == name), key=len)
         yield from growth(name, longest, min(WARM_UP_S, record.seconds / 10))
-    yield _log(record.log)
+    rate = record.log_bytes / max(1.0, record.seconds)
+    amount = f"{record.log_bytes / 1000:.0f} kB, {rate:.0f} bytes/s"
+    yield "log", amount, 0 < rate <= LOG_MAX
     yield "tracebacks in the log", str(record.tracebacks), record.tracebacks == 0
     yield "crashes", ", ".join(record.crashes) or "none", not record.crashes
-    for service, times in sorted(record.health.items()):
-        silence = max(b - a for a, b in pairwise([*times, record.seconds]))
-        amount = f"{len(times)} messages, silent for {silence:.1f} s at most"
-        yield f"{service}: health", amount, silence <= SILENCE_MAX_S
-    yield "services with health", str(len(record.health)), bool(record.health)
     yield "faults", str(record.faults), record.faults > 0
     yield from _laps(record)
 
@@ -79,15 +72,6 @@ def growth(name: str, samples: Sequence[Sample], warm_up_s: float) -> Iterator[R
     yield f"{name}: memory", amount, grown < GROWTH_MAX
     held = f"{last.threads:.0f} {threads:+.0f}, {last.descriptors:.0f} {descriptors:+.0f}"
     yield f"{name}: threads, descriptors", held, threads < 1 and descriptors < 1
-
-
-def _log(log: Sequence[tuple[float, int]]) -> Result:
-    total = log[-1][1] if log else 0
-    rate = total / max(1.0, log[-1][0]) if log else 0.0
-    pairs = zip(log, log[PEAK_S:], strict=False)
-    peak = max(((b[1] - a[1]) / PEAK_S for a, b in pairs), default=rate)
-    amount = f"{total / 1000:.0f} kB, {rate:.0f} bytes/s, {peak:.0f} in the worst {PEAK_S} s"
-    return "log", amount, total > 0 and rate <= LOG_MAX and peak <= LOG_PEAK_MAX
 
 
 def _laps(record: Record) -> Iterator[Result]:

@@ -1,4 +1,4 @@
-"""The independent board by golden bytes, two black-box rows, and their part of the document."""
+"""The independent board by golden bytes, and two black-box rows."""
 
 import contextlib
 import socket
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from verification.faults.black_box import HEADING, BlackBox, Scenario, section, tried
+from verification.faults.black_box import Scenario, tried
 from verification.faults.black_box_scenarios import SCENARIOS
 from verification.faults.independent_board import BUMPER, IndependentBoard, crc16, frame, frames
 from verification.harness.host import StallRecorder
@@ -106,14 +106,3 @@ def test_a_damaged_frame_ends_a_datagram() -> None:
 def test_two_rows(one: Scenario) -> None:
     with StallRecorder() as stalls:
         assert tried(one, stalls) == ""
-
-
-def test_the_document_keeps_the_rows_that_did_not_run() -> None:
-    def some_row(box: BlackBox) -> None: ...
-    def other_row(box: BlackBox) -> None: ...
-
-    some, other = (Scenario("a", "b", "c", run, ()) for run in (some_row, other_row))
-    first = section([(some, ""), (other, "late")], "2026-01-01")
-    assert first.startswith(HEADING)
-    renewed = first.replace("| 2026-01-01 | WRONG |", "| 2026-01-02 | ok |")
-    assert section([(other, "")], "2026-01-02", first) == renewed

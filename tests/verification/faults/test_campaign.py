@@ -1,5 +1,6 @@
 """Rows of the fault campaign on real processes, once each; `make faults` runs all of them."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -12,10 +13,9 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from verification.faults.catalogue import FAULTS
-from verification.faults.fault import Fault
+from verification.faults.fault import Fault, Row
 from verification.faults.namespaces import step_clock
 from verification.faults.stack_fixture import StackFixture, stack_fixture
-from verification.faults.table import Row
 from verification.faults.trial import run_trial
 from verification.harness.host import StallRecorder
 from verification.harness.waiting import wait_until
@@ -87,12 +87,13 @@ def test_a_computer_that_slept_does_not_drive_on(tmp_path: Path) -> None:
         fixture.ready()
         step_clock(tmp_path / "robot", SLEPT_S, SLEPT_S)
         wait_until(lambda: not fixture.moving(), "the end of the motion")
-        wait_until(lambda: fixture.state and "estop_reader" in fixture.state.latched, "the latch")
+        wait_until(lambda: "estop_reader" in fixture.client.latched, "the latch")
         assert not fixture.rearm(1.0)
 
 
 @pytest.mark.campaign
-def test_each_fault_is_tried_or_listed_as_left_out(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.geteuid() != 0, reason="namespaces need root")
+def test_the_campaign_renews_its_rows_of_the_page(tmp_path: Path) -> None:
     only = [word for name in WITH_NAMESPACES for word in ("--only", name)]
     out = tmp_path / "faults.md"
     out.write_text("| estop | 20 |  |  |  |  |  | after a reset | 2026-01-02 | ok |\n" * 3)
@@ -101,9 +102,8 @@ def test_each_fault_is_tried_or_listed_as_left_out(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     page = out.read_text(encoding="utf-8")
-    assert done.stdout.strip() == page.strip()
     for name in WITH_NAMESPACES:
-        line = rf"^\| {re.escape(name)} \| 1 \|.*\| ok \|$|^Left out: {re.escape(name)}: "
+        line = rf"^\| {re.escape(name)} \| 1 \|.*\| ok \|$"
         assert len(re.findall(line, page, re.MULTILINE)) == 1, name
     assert "| estop | 20 |" in page
 

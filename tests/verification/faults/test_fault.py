@@ -1,14 +1,13 @@
 """Rows of the fault campaign: reaction times, violations, the page."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from common import motion
 from sim.trace import Command
-from verification.faults.fault import Fault
-from verification.faults.table import Row, Sample, lines_of, render
+from verification.faults.__main__ import lines_of, page
+from verification.faults.fault import Fault, Row, Sample
 from verification.faults.trial import unrequested
 
 RUN, STOP, BRAKE = motion.Command
@@ -69,14 +68,15 @@ def test_violations(made: Row, found: list[str]) -> None:
     assert made.violations == found
 
 
-def test_the_page_keeps_the_rows_of_an_earlier_page() -> None:
+def test_the_page_has_the_rows_of_the_catalogue() -> None:
     good = row(sample(0.001), sample(0.002)).line(DATE)
-    wrong = replace(row(sample(outcome=None)), fault=replace(FAULT, name="that")).line(DATE)
     assert good == (
         "| it | 2 | 20.0 ms | 1.0 ms | 2.0 ms | 0.0 ms | after a neutral | 2026-01-02 | ok |"
     )
-    lines = {"it": good, "that": wrong}
-    page = render("a machine", lines, ["a third: no disk"])
-    assert lines_of(page) == lines
-    assert page.endswith("\nLeft out: a third: no disk.\n\nOutside their limits: that.\n")
-    assert render("a machine", {"it": good}, []).endswith("\n\nAll rows are within their limits.\n")
+    lines = {"estop": good.replace("it", "estop", 1), "rolling away": "| rolling away | ok |"}
+    text = page(lines | {"no such row": good})
+    assert lines_of(text).items() >= lines.items()
+    assert "no such row" not in text
+    assert "All rows are within their limits." in text
+    wrong = row(sample(outcome=None)).line(DATE).replace("it", "estop", 1)
+    assert "Outside their limits: estop." in page(lines | {"estop": wrong})
