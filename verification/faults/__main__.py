@@ -142,7 +142,7 @@ def _arguments() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--out", type=Path, metavar="FILE",
-        help="renew these rows of a page",
+        help="renew these rows of a page"
     )  # fmt: skip
     return parser
 

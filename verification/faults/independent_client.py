@@ -15,7 +15,7 @@ STATE, LINK, HEALTH = "tel/safety/state", "tel/bridge/link", "tel/safety/health"
 ODOMETRY, BUMPER, MOTION = "tel/odom/odometry", "tel/bridge/bumper", "@cmd/motion"
 VELOCITY = "tel/bridge/velocity"
 PERIOD_S = 0.05
-UP_MS = 20_000  # until the router listens
+UP_MS = 60_000  # until the router listens
 Map = dict[str, Any]
 
 

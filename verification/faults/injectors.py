@@ -111,9 +111,8 @@ def start_again(fixture: StackFixture, name: str) -> None:
 
 @injector
 def second(fixture: StackFixture, name: str) -> None:
-    """Start a second instance of a process of the stack, or of the driver."""
-    commands = fixture.running.commands | {"driver": fixture.driver}
-    _start(fixture, commands[name])
+    """Start a second instance of a process of the stack."""
+    _start(fixture, fixture.running.commands[name])
 
 
 def flood(fixture: StackFixture) -> None:

@@ -55,15 +55,16 @@ def small_disk(folder: Path) -> Iterator[None]:
 
 
 def clock(file: Path) -> dict[str, str]:
-    """Return an environment whose processes have a time of day shifted by the content of a file."""
+    """Return variables whose processes have a time of day shifted by the content of a file."""
     library = file.with_suffix(".so")
     subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, CLOCK, "-ldl"], check=True)
-    env = {**os.environ, "LD_PRELOAD": str(library), "T2_CLOCK": str(file)}
+    own = {"LD_PRELOAD": str(library), "T2_CLOCK": str(file)}
     step_clock(file, 3600)  # to detect a library that the loader ignores
-    seen = subprocess.run(["date", "+%s"], env=env, capture_output=True, text=True, check=True)
+    date = ["date", "+%s"]
+    seen = subprocess.run(date, env=os.environ | own, capture_output=True, text=True, check=True)
     assert int(seen.stdout) - time.time() > 3000, f"the clock does not step: {seen.stderr}"
     step_clock(file, 0)
-    return env
+    return own
 
 
 def step_clock(file: Path, seconds: int, slept: int = 0) -> None:

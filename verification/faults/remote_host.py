@@ -9,6 +9,7 @@ devices, one in each network, and disturbs them. It reads lines from standard in
 passes all other lines on to the program.
 """
 
+import contextlib
 import ctypes
 import fcntl
 import os
@@ -29,6 +30,7 @@ from common.bus.publisher import BOOT_ID
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.requests import Wire
+from verification.harness.network_hosts import ip
 
 TUNSETIFF = 0x400454CA  # linux/if_tun.h
 IFF_TUN, IFF_NO_PI = 0x0001, 0x1000
@@ -37,6 +39,8 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PACKET_MAX = 2048
 IDLE_S = 0.1
 AHEAD_S = 86_400  # of the remote host's clocks since boot: it booted a day earlier
+# Loss-based: a new network namespace has no cubic.
+CONGESTION = Path("/proc/sys/net/ipv4/tcp_congestion_control")
 OFFSETS = Path("/proc/self/timens_offsets")
 
 
@@ -59,35 +63,34 @@ class Link:
 
     def forward(self) -> None:
         """Forward packets until standard input ends."""
-        said = b""
-        while True:
-            stdin = sys.stdin.fileno()
-            ready, _, _ = select.select([self.near, self.far, stdin], [], [], self._wait_s())
-            self._forward(self.near, self.to_far, self.far)
-            self._forward(self.far, self.to_near, self.near)
-            if stdin in ready:
-                new = os.read(stdin, PACKET_MAX)
-                if not new:
-                    return
-                *lines, said = (said + new).split(b"\n")
-                for line in lines:
+        with open(0, "rb", buffering=0) as stdin:
+            while True:
+                ends = [self.near, self.far, stdin.fileno()]
+                ready, _, _ = select.select(ends, [], [], self._wait_s())
+                self._forward(self.near, self.to_far, self.far)
+                self._forward(self.far, self.to_near, self.near)
+                if stdin.fileno() in ready:
+                    line = stdin.readline()
+                    if not line:
+                        return
                     self._execute(line)
 
     def _forward(self, source: int, cable: Cable, sink: int) -> None:
         now_ns = clock.now_ns()
-        for packet in _waiting(source):
-            cable.put(Datagram(packet, 0), now_ns)
+        with contextlib.suppress(BlockingIOError):  # no more packets
+            while True:
+                cable.put(Datagram(os.read(source, PACKET_MAX), 0), now_ns)
         for datagram in cable.take(now_ns):
             os.write(sink, datagram.payload)
 
     def _execute(self, line: bytes) -> None:
         if not line.startswith(b"{"):
-            os.write(self.program, line + b"\n")
+            os.write(self.program, line)
             return
         what = msgspec.json.decode(line, type=Wire | Address)
         if isinstance(what, Address):
-            _ip("addr", "flush", "dev", "far")
-            _ip("addr", "add", f"{self.net}.{what.last}/24", "dev", "far")
+            ip("addr", "flush", "dev", "far")
+            ip("addr", "add", f"{self.net}.{what.last}/24", "dev", "far")
             return
         if what.direction in ("to_pc", "both"):
             self.to_near.faults = what
@@ -108,11 +111,11 @@ def main() -> None:
     """Run the remote host until standard input ends."""
     endpoint, module, *words = sys.argv[1:]
     protocol, port = endpoint.partition("/")[0], int(endpoint.rpartition(":")[2])
-    set_congestion_control()
+    CONGESTION.write_text("reno\n")
     near = _end(f"near{port}", f"{net(port)}.1")
     _enter_namespaces()
     far = _end("far", f"{net(port)}.2")
-    _ip("link", "set", "lo", "up")
+    ip("link", "set", "lo", "up")
     command = [sys.executable, "-m", module, f"{protocol}/{net(port)}.1:{port}", *words]
     with subprocess.Popen(command, stdin=subprocess.PIPE, preexec_fn=die_with_parent) as process:
         assert process.stdin is not None
@@ -120,11 +123,6 @@ def main() -> None:
             Link(near, far, net(port), process.stdin.fileno()).forward()
         finally:
             process.kill()
-
-
-def set_congestion_control() -> None:
-    """Set loss-based TCP congestion control: a new network namespace has no cubic."""
-    Path("/proc/sys/net/ipv4/tcp_congestion_control").write_text("reno\n")
 
 
 def die_with_parent() -> None:
@@ -137,7 +135,7 @@ def _enter_namespaces() -> None:
     timed = CLONE_NEWTIME if OFFSETS.exists() else 0  # older kernels have one clock for all
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET | CLONE_NEWNS | timed):
         raise OSError(ctypes.get_errno(), "cannot create the remote host's namespaces")
-    set_congestion_control()
+    CONGESTION.write_text("reno\n")
     if timed:
         OFFSETS.write_text(f"monotonic {AHEAD_S} 0\nboottime {AHEAD_S} 0\n")
     subprocess.run(["mount", "--make-rprivate", "/"], check=True)
@@ -150,22 +148,9 @@ def _end(name: str, address: str) -> int:
     """Create one end of the link in the current network namespace."""
     device = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(device, TUNSETIFF, struct.pack("16sH", name.encode(), IFF_TUN | IFF_NO_PI))
-    _ip("addr", "add", f"{address}/24", "dev", name)
-    _ip("link", "set", name, "up")
+    ip("addr", "add", f"{address}/24", "dev", name)
+    ip("link", "set", name, "up")
     return device
-
-
-def _ip(*words: str) -> None:
-    subprocess.run(["ip", *words], check=True)
-
-
-def _waiting(device: int) -> list[bytes]:
-    packets = []
-    while True:
-        try:
-            packets.append(os.read(device, PACKET_MAX))
-        except BlockingIOError:
-            return packets
 
 
 if __name__ == "__main__":

@@ -3,10 +3,9 @@
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -64,34 +63,17 @@ SIM_BEHIND_RELAY = [
 class StackFixture:
     """One stack, driven at ``SPEED_MPS``; reads the board's trace and safety's state."""
 
-    def __init__(
-        self,
-        stack: RunningStack,
-        client: Client,
-        driver: list[str],
-        env: Mapping[str, str] | None,
-    ) -> None:
+    def __init__(self, stack: RunningStack, client: Client) -> None:
         self.running = stack
         self.client = client
         self.frames = TraceFollower(stack.trace_file)
         self.asked = 0.0
         self.death_s = 0.0  # that the kernel took to end the last killed process
-        self.driver, self._env = driver, env
-        self.start_driver()
 
     @property
     def folder(self) -> Path:
         """The folder of the stack."""
         return self.running.trace_file.parent
-
-    def start_driver(self) -> None:
-        """Start or restart the driver."""
-        if "driver" in self.running.processes:
-            self.running.processes["driver"].communicate()  # also closes its pipe
-        self.running.processes["driver"] = subprocess.Popen(
-            self.driver, stdin=subprocess.PIPE, env=self._env
-        )
-        self.request(self.asked)
 
     def request(self, speed: float) -> None:
         """Request a speed, m/s."""
@@ -118,10 +100,9 @@ class StackFixture:
     def restart_ended(self) -> Self:
         """Restart processes that have ended, as a supervisor does."""
         for name in self.ended():
+            self.running.start(name)
             if name == "driver":
-                self.start_driver()
-            else:
-                self.running.start(name)
+                self.request(self.asked)
         return self
 
     def moving(self) -> bool:
@@ -176,7 +157,7 @@ class StackFixture:
             process = self.running.others.pop()
             process.terminate()
             process.communicate(timeout=20)
-        if REMOTE_HOST in self.driver:
+        if REMOTE_HOST in self.running.commands["driver"]:
             self.disturb_network(Wire())
         for clock_file in (self.folder / name for name in CLOCKS):
             if clock_file.exists():
@@ -208,26 +189,25 @@ def _settings(need: Requirement) -> list[str]:
     }.get(need, [])  # fmt: skip
 
 
-def _beside(need: Requirement, config: Everything) -> dict[str, list[str]]:
-    """Return the commands of the processes that a requirement adds."""
+def _beside(need: Requirement, folder: Path, config: Everything) -> dict[str, list[str]]:
+    """Return the commands of the driver, and of the processes that a requirement adds."""
+    endpoint = operators_endpoint(config)
+    driver = [*PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
+    if need == "remote driver":
+        driver = [*MODULE, REMOTE_HOST, endpoint, PROGRAMS[-1], "driver"]
+    if need == "separate clocks":
+        own = [f"{name}={value}" for name, value in clock(folder / CLOCKS[1]).items()]
+        driver = ["env", *own, *driver]
+    made = {"driver": driver}
     if need == "third parties":
-        program = [*PROGRAMS, config.bus.endpoints[0]]
-        return {name: [*program, name] for name in ("limiter", "pendant")}
+        made |= {name: [*PROGRAMS, endpoint, name] for name in ("limiter", "pendant")}
     if need == "relay":
         words = ["--board-port", str(config.board.port), "--ports"]
         words += map(str, config.board.listen_ports)
-        return {"relay": ["ip", "netns", "exec", RELAY_HOST, *MODULE, "services.relay", *words]}
+        made["relay"] = ["ip", "netns", "exec", RELAY_HOST, *MODULE, "services.relay", *words]
     if need == "site":
-        listen = f"bus.listen={operators_endpoint(config)}"
-        return {"site router": [*MODULE, "cli", "router", "--set", listen]}
-    return {}
-
-
-def _driver(need: Requirement, endpoint: str) -> list[str]:
-    """Return the command of the driver."""
-    if need == "remote driver":
-        return [*MODULE, REMOTE_HOST, endpoint, PROGRAMS[-1], "driver"]
-    return [*PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
+        made["site router"] = [*MODULE, "cli", "router", "--set", f"bus.listen={endpoint}"]
+    return made
 
 
 @contextlib.contextmanager
@@ -235,8 +215,6 @@ def stack_fixture(
     folder: Path, *, shipped: bool = True, need: Requirement = "none"
 ) -> Iterator[StackFixture]:
     """Run a stack fixture that meets the requirement of a fault."""
-    clocks = need == "separate clocks"
-    robot, driver = (clock(folder / name) if clocks else None for name in CLOCKS)
     with contextlib.ExitStack() as stack:
         if need == "small disk":
             stack.enter_context(small_disk(folder / "disk"))
@@ -248,12 +226,11 @@ def stack_fixture(
                 shipped=shipped,
                 sets=[*QUICK, *_settings(need)],
                 sim_sets=SIM_BEHIND_RELAY if need == "relay" else (),
-                beside=partial(_beside, need),
+                beside=partial(_beside, need, folder),
                 log="disk/log.jsonl" if need == "small disk" else "log.jsonl",
                 listen=f"tcp/{'0.0.0.0' if need == 'remote driver' else '127.0.0.1'}:{{port}}",
-                env=robot,
+                env=os.environ | clock(folder / CLOCKS[0]) if need == "separate clocks" else None,
             )
         )
-        endpoint = operators_endpoint(made.config)
-        client = Client(stack.enter_context(session(endpoint)), MOTION, BUMPER, VELOCITY)
-        yield StackFixture(made, client, _driver(need, endpoint), driver)
+        bus = stack.enter_context(session(operators_endpoint(made.config)))
+        yield StackFixture(made, Client(bus, MOTION, BUMPER, VELOCITY))

@@ -23,26 +23,24 @@ ABSENT = (
 
 
 def main() -> int:
-    """Fuzz one target or all; return 0 without a finding."""
+    """Fuzz one target in this process, or each in its own; return 0 without a finding."""
     parser = argparse.ArgumentParser(prog="python -m verification.fuzz", description=__doc__)
     parser.add_argument("--seconds", type=int, default=60, help="duration of each target, 60")
     parser.add_argument("target", nargs="?", choices=TARGETS, help="default: all")
-    parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.here:
-        fuzz(options.target, options.seconds)
     if importlib.util.find_spec("atheris") is None:
         print(ABSENT, file=sys.stderr)
         return 69
-    targets = [options.target] if options.target else TARGETS
-    return max([run(target, options.seconds) for target in targets])
+    if options.target:
+        fuzz(options.target, options.seconds)
+    return max([run(target, options.seconds) for target in TARGETS])
 
 
 def run(target: str, seconds: int) -> int:
     """Fuzz a target in its own process and print a summary; return 1 for a finding."""
-    (OUT / target / "inputs").mkdir(parents=True, exist_ok=True)
-    log = OUT / target / "log.txt"
-    command = [sys.executable, "-m", "verification.fuzz", target, f"--seconds={seconds}", "--here"]
+    OUT.mkdir(parents=True, exist_ok=True)
+    log = OUT / f"{target}.log"
+    command = [sys.executable, "-m", "verification.fuzz", target, f"--seconds={seconds}"]
     with log.open("wb") as output:
         code = subprocess.run(command, stdout=output, stderr=output, check=False).returncode
     executed = re.search(r"number_of_executed_units: *(\d+)", log.read_text(errors="replace"))
@@ -59,6 +57,7 @@ def fuzz(target: str, seconds: int) -> None:
         from verification.fuzz import seeds, targets
     raws = list(seeds.seeds(target))
     inputs = OUT / target / "inputs"  # libFuzzer adds those with new coverage
+    inputs.mkdir(parents=True, exist_ok=True)
     for number, raw in enumerate(raws):
         (inputs / f"{number:03}").write_bytes(raw)
     words = [f"-max_total_time={seconds}", f"-max_len={LONGEST}", "-print_final_stats=1",
@@ -68,8 +67,8 @@ def fuzz(target: str, seconds: int) -> None:
     def mutate(raw: bytes, max_size: int, seed: int) -> bytes:
         random = Random(seed)
         if random.random() < 0.5:
-            raw = seeds.mutated(raws, random)[:max_size]
-        damaged: bytes = atheris.Mutate(raw, max_size) if random.random() < 0.5 else raw
+            return seeds.mutated(raws, random)[:max_size]
+        damaged: bytes = atheris.Mutate(raw, max_size)
         return damaged
 
     # msgspec decodes in C, where libFuzzer has no coverage: alone it keeps two inputs only.

@@ -18,13 +18,13 @@ from cli.settings import Everything
 from common import keys
 from common.codec import decode, encode
 from common.config import Sources, flatten, load
-from common.errors import ConfigError, MessageError, RobotError
+from common.errors import ConfigError, MessageError
 from common.wire.commands import TO_BOARD
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 
-PAYLOAD, ALL = Framing("crc-16", "payload"), Framing("crc-16", "header_and_payload")
-FRAMINGS = list(product((PAYLOAD, ALL), (FROM_BOARD, TO_BOARD)))
+CRCS = Framing("crc-16", "payload"), Framing("crc-16", "header_and_payload")
+FRAMINGS = list(product(CRCS, (FROM_BOARD, TO_BOARD)))
 CALLED = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
 KINDS: list[type[Struct]] = [*dict.fromkeys([topic.message for topic in keys.TOPICS] + CALLED)]
 SEPARATOR = b"\0"  # cannot occur in arguments and environment variables
@@ -83,7 +83,7 @@ def _settings(files: Sequence[Path], given: Mapping[str, str], words: Sequence[s
     assert not non_finite, f"non-finite settings: {non_finite}"
 
 
-def _check(error: RobotError, words: str) -> None:
+def _check(error: Exception, words: str) -> None:
     """Check that the error names its subject."""
     assert words in str(error), error
 

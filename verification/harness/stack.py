@@ -45,7 +45,11 @@ class RunningStack:
         """Start or restart a process."""
         with self.log.open("ab") as output:
             self.processes[name] = subprocess.Popen(
-                self.commands[name], stdout=output, stderr=output, env=self.env
+                self.commands[name],
+                stdin=subprocess.PIPE,
+                stdout=output,
+                stderr=output,
+                env=self.env,
             )
 
     def kill(self, name: str) -> int:

@@ -53,8 +53,8 @@ class Stack:
 
     def compose(self, *words: str, **environ: str) -> str:
         """Run a command of Compose."""
-        files = [word for file in self.files for word in ("--file", str(file))]
-        options = ("--project-name", self.name, *files, "--profile", "sim", "--profile", "laptop")
+        files = [f"--file={file}" for file in self.files]
+        options = (f"--project-name={self.name}", *files, "--profile=sim", "--profile=laptop")
         return run(*compose(), *options, *words, **self.variables | environ)
 
     def __getitem__(self, service: str) -> Container:
@@ -63,32 +63,26 @@ class Stack:
         words = [f"--filter=label=com.docker.compose.{k}={v}" for k, v in labels.items()]
         return Container(run("docker", "ps", "--all", "--quiet", "--no-trunc", *words))
 
-    def began(self) -> dict[str, tuple[str, str]]:
-        """Return the container of each service, and its start time."""
-        found = {name: self[name].about() for name in SERVICES}
-        return {name: (it["Id"], it["State"]["StartedAt"]) for name, it in found.items()}
+    def began(self) -> dict[str, str]:
+        """Return the start time of each container."""
+        return {name: self[name].state()["StartedAt"] for name in SERVICES}
 
-    def changed(self, before: dict[str, tuple[str, str]]) -> list[str]:
+    def changed(self, before: dict[str, str]) -> list[str]:
         """Return the services that were started again."""
         return [name for name, began in self.began().items() if began != before[name]]
 
-    def wait_for(self, health: str, *services: str) -> None:
-        """Wait until the health checks of these services have a result."""
+    def wait_healthy(self, service: str) -> None:
+        """Wait until the health check of a service passes."""
+        state = "the health of " + service
+        wait_until(lambda: self[service].state()["Health"]["Status"] == "healthy", state, HEALTHY_S)
 
-        def reached() -> bool:
-            states = [self[name].about()["State"] for name in services]
-            return all(each["Health"]["Status"] == health for each in states)
-
-        wait_until(reached, f"{health}: {', '.join(services)}", HEALTHY_S)
-
-    def signal(self, number: int, service: str, module: str = "") -> None:
-        """Send a signal to the processes of a container, except its init."""
+    def kill(self, service: str) -> None:
+        """Kill all processes of a container, except its init."""
         container = self[service]
-        init = str(container.about()["State"]["Pid"])
-        for line in run("docker", "top", container.name, "-eo", "pid,args").splitlines()[1:]:
-            pid, *words = line.split()
-            if pid != init and (not module or module in words):
-                os.kill(int(pid), number)
+        init = container.pid()
+        for pid in run("docker", "top", container.name, "-eo", "pid").split()[1:]:
+            if pid != init:
+                os.kill(int(pid), signal.SIGKILL)
 
 
 @contextmanager
@@ -104,7 +98,8 @@ def started() -> Iterator[Stack]:
         try:
             stack.compose("build")
             stack.compose("up", "--detach", *SERVICES)
-            stack.wait_for("healthy", *HEALTHY)
+            for name in HEALTHY:
+                stack.wait_healthy(name)
             with Vehicle(stack["sim"], stack.control_port) as stack.vehicle:
                 yield stack
         except BaseException:
@@ -153,9 +148,9 @@ def image_is_minimal(stack: Stack) -> str:
     safety = stack["safety"]
     assert safety.run("python", "-c", "import os; print(os.getuid())") == str(USER)
     assert not [each for each in TOOLS if not safety.attempt(each, "--help").returncode]
-    image = json.loads(run("docker", "image", "inspect", safety.about()["Image"]))[0]
-    assert image["Size"] < ROBOT_MB * 1e6, image["Size"]
-    return f"{image['Size'] / 1e6:.1f} MB, no shell, no installer"
+    size = int(run("docker", "image", "inspect", "--format={{.Size}}", f"t2-robot:{stack.name}"))
+    assert size < ROBOT_MB * 1e6, size
+    return f"{size / 1e6:.1f} MB, no shell, no installer"
 
 
 def laptop_connects(stack: Stack) -> str:
@@ -175,70 +170,17 @@ def restart_when_killed(stack: Stack) -> str:
     seen = []
     for name in HEALTHY:
         before = stack.began()
-        kill = partial(stack.signal, signal.SIGKILL, name)
+        kill = partial(stack.kill, name)
         if name in CHAIN:  # the guard brakes once the bridge's container runs again
             limit_s = RESTARTS_S if name == "bridge" else STOPS_S
             seen.append(f"{name} {stack.vehicle.stops_after(kill, limit_s)}")
         else:
             kill()
         wait_until(partial(stack.changed, before), f"a restarted {name}", RESTARTS_S)
-        stack.wait_for("healthy", name)
+        stack.wait_healthy(name)
         assert stack.changed(before) == [name]
     stack.vehicle.drive()
     return f"{'; '.join(seen)}; drives again"
 
 
-def supervisor_restarts_the_guard(stack: Stack) -> str:
-    """Kill the guard: the vehicle stops, and the container keeps running."""
-    before = stack.began()
-    kill = partial(stack.signal, signal.SIGKILL, "bridge", "services.bridge")
-    seen = stack.vehicle.stops_after(kill, STOPS_S)
-    stack.vehicle.drive()
-    assert stack.began() == before
-    return f"{seen}; drives again"
-
-
-def hang_is_detected(stack: Stack) -> str:
-    """Stop a process by SIGSTOP: its health check detects it, and the vehicle drives."""
-    stack.signal(signal.SIGSTOP, "odom", "services.odom")
-    try:
-        stack.vehicle.drive()
-        stack.wait_for("unhealthy", "odom")
-    finally:
-        stack.signal(signal.SIGCONT, "odom", "services.odom")
-    stack.wait_for("healthy", "odom")
-    return "odom is unhealthy while it hangs, healthy after"
-
-
-def one_service_is_upgraded(stack: Stack) -> str:
-    """Change the image of one service and back: only its container is replaced."""
-    upgraded = f"{stack.name}-next"
-    run("docker", "commit", stack["odom"].name, f"t2-robot:{upgraded}")
-    for tag in (upgraded, stack.name):
-        before = stack.began()
-        stack.compose("up", "--detach", "--no-deps", "--no-build", "odom", T2_TAG=tag)
-        assert stack.changed(before) == ["odom"]
-        assert stack["odom"].about()["Config"]["Image"] == f"t2-robot:{tag}"
-        stack.wait_for("healthy", "odom")
-        stack.vehicle.drive()
-    run("docker", "image", "rm", f"t2-robot:{upgraded}")
-    return "odom only, upgrade and rollback; drives"
-
-
-def logs_are_valid(stack: Stack) -> str:
-    """Check that each line of the logs is JSON, without a traceback."""
-    count = 0
-    for name in (*SERVICES, "router-settings"):
-        done = attempt("docker", "logs", stack[name].name)
-        for line in (done.stdout + done.stderr).splitlines():
-            assert isinstance(json.loads(line), dict), (name, line)
-            assert "Traceback" not in line, (name, line)
-            count += 1
-    return f"{count} lines of JSON"
-
-
-CHECKS = (
-    drives_and_records, image_is_minimal, laptop_connects, restart_when_killed,
-    supervisor_restarts_the_guard, hang_is_detected, one_service_is_upgraded,
-    logs_are_valid,
-)  # fmt: skip
+CHECKS = drives_and_records, image_is_minimal, laptop_connects, restart_when_killed

@@ -89,14 +89,16 @@ class Container:
         """Return the output of a command in it; raise AssertionError when it fails."""
         return run("docker", "exec", self.name, *words)
 
-    def about(self) -> dict[str, Any]:
-        """Return the output of ``docker inspect``."""
-        about: dict[str, Any] = json.loads(run("docker", "inspect", self.name))[0]
-        return about
+    def state(self) -> dict[str, Any]:
+        """Return its state, as ``docker inspect`` prints it."""
+        state: dict[str, Any] = json.loads(
+            run("docker", "inspect", "--format={{json .State}}", self.name)
+        )
+        return state
 
     def pid(self) -> str:
         """Return the id of its first process on this host."""
-        return str(self.about()["State"]["Pid"])
+        return str(self.state()["Pid"])
 
     def unit(self, name: str) -> dict[str, str]:
         """Return the properties of a systemd unit."""
