@@ -15,10 +15,9 @@ from typing import TypeVar
 from verification.faults import black_box, fault
 from verification.faults.black_box_scenarios import SCENARIOS
 from verification.faults.catalogue import FAULTS, GROUPS
-from verification.faults.fault import Fault, Row
+from verification.faults.fault import Fault, Row, run_trial
 from verification.faults.namespaces import enter
 from verification.faults.stack_fixture import Requirement, stack_fixture
-from verification.faults.trial import run_trial
 from verification.harness.host import StallRecorder, short_description
 from verification.harness.results import table
 from verification.harness.stack import SETTINGS_FILE

@@ -1,10 +1,12 @@
-"""A fault of the catalogue, the samples of its trials, and their verdict. Pure.
+"""A fault of the catalogue, one trial of it, and the verdict on its samples.
 
 A budget is the effective time limit plus the time to detect it: 50 ms where a timeout has to
 expire, less where the fault is signalled.
 """
 
 import math
+import random
+import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +14,12 @@ from statistics import median_low
 from typing import Literal
 
 from cli.settings import Everything
-from verification.faults.stack_fixture import Requirement, StackFixture
+from common import clock
+from common.freshness import NS_PER_S
+from sim.trace import Command
+from verification.faults.stack_fixture import SPEED_MPS, Requirement, StackFixture
+from verification.harness.trace import first_stop_s, last_move_s, moves
+from verification.harness.waiting import becomes_true
 
 # How the vehicle drives again, by rising effort.
 Outcome = Literal["drives on", "by itself", "after a neutral", "after a reset"]
@@ -21,6 +28,10 @@ Budget = Callable[[Everything], float]  # s from the fault to the last command t
 Injector = Callable[[StackFixture], int | None]
 
 NOTICE_S = 0.05
+# After the fault, with motion still requested: the vehicle may only drive on by itself.
+HOLD_ON_S = 0.7
+REARM_S = 2.5
+LATCHED_S = 0.3
 HEAD = "fault", "n", "budget", "median", "worst", "stall", "then", "date", ""
 
 
@@ -115,3 +126,54 @@ class Row:
 
 def _ms(seconds: float) -> str:
     return f"{1000 * seconds:.1f} ms" if math.isfinite(seconds) else "never"
+
+
+def unrequested(commands: Sequence[Command]) -> bool:
+    """Return whether any command moves the vehicle in a way that no driver requested."""
+    return any(
+        moves(c) and not (0.0 <= c.linear <= SPEED_MPS + 0.01 and c.angular == 0.0)
+        for c in commands
+    )
+
+
+def run_trial(fixture: StackFixture, fault: Fault) -> Sample:
+    """Bring the vehicle to speed, inject the fault, restore, and observe."""
+    fixture.ready()
+    time.sleep(random.random() * 0.06)  # at a random phase of the requests
+    fixture.death_s = 0.0
+    called_ns = clock.now_ns()
+    fault_ns = fault.inject(fixture) or called_ns
+    time.sleep(max(0.0, fault.hold_s - (clock.now_ns() - fault_ns) / NS_PER_S))
+    fixture.frames.follow()
+    commands = list(fixture.frames.commands)
+    moving = fixture.moving()
+    ended = fixture.ended() if fault.harmless else ()
+    fixture.restore()
+    stopped_s = first_stop_s(commands, fault_ns, fault.stops)
+    outcome = "drives on" if moving and stopped_s is None else _outcome(fixture)
+    return Sample(
+        stopped_s,
+        last_move_s(commands, fault_ns),
+        outcome,
+        fault_ns,
+        unrequested(fixture.frames.commands),
+        ended,
+        fixture.death_s,
+    )
+
+
+def _outcome(fixture: StackFixture) -> Outcome | None:
+    if becomes_true(lambda: fixture.restart_ended().moving(), HOLD_ON_S):
+        return "by itself"
+    if fixture.rearm(LATCHED_S if fixture.client.latched else REARM_S):
+        return "after a neutral"
+    needs_reset = False
+    for _ in range(10):
+        fixture.restart_ended().request(0.0)
+        time.sleep(0.1)
+        # The campaign's repeated faults latch "flapping".
+        needs_reset = needs_reset or fixture.client.latched not in ([], ["flapping"])
+        fixture.reset()
+        if fixture.rearm(REARM_S):
+            return "after a reset" if needs_reset else "after a neutral"
+    return None

@@ -22,7 +22,7 @@ HEADER = struct.Struct("<2sHHH")
 
 VELOCITY_S, STEP_S = 0.02, 0.005
 NO_ECHO_MM = 20_000
-CORNER = math.sqrt(2)  # a wall straight ahead is so much farther at 45 degrees
+FRONT = 2  # of the eight sonars
 ACCELERATION, COAST, BRAKE = 1.2, 0.8, 5.0  # m/s^2
 TURNING = 2.5  # rad/s^2 of turning for each m/s^2
 DECIDEGREES = 1800 / math.pi  # of a radian
@@ -175,9 +175,7 @@ class IndependentBoard:
     def _ranges(self) -> list[int]:
         ranges = [NO_ECHO_MM] * 8
         if self.wall_m is not None:
-            gap_mm = max(1, round(1000 * (self.wall_m - self.distance)))
-            for index, share in ((1, CORNER), (2, 1.0), (3, CORNER)):
-                ranges[index] = min(NO_ECHO_MM, round(gap_mm * share))
+            ranges[FRONT] = max(1, round(1000 * (self.wall_m - self.distance)))
         return ranges
 
     def _report(self) -> None:

@@ -13,10 +13,9 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from verification.faults.catalogue import FAULTS
-from verification.faults.fault import Fault, Row
+from verification.faults.fault import Fault, Row, run_trial
 from verification.faults.namespaces import step_clock
 from verification.faults.stack_fixture import StackFixture, stack_fixture
-from verification.faults.trial import run_trial
 from verification.harness.host import StallRecorder
 from verification.harness.waiting import wait_until
 

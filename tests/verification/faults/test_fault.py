@@ -7,8 +7,7 @@ import pytest
 from common import motion
 from sim.trace import Command
 from verification.faults.__main__ import lines_of, page
-from verification.faults.fault import Fault, Row, Sample
-from verification.faults.trial import unrequested
+from verification.faults.fault import Fault, Row, Sample, unrequested
 
 RUN, STOP, BRAKE = motion.Command
 FAULT = Fault("it", lambda _: 0, ("after a neutral",))
