@@ -16,16 +16,7 @@ from pathlib import Path
 from common import clock
 from common.freshness import NS_PER_S
 from verification.faults.independent_board import Command, IndependentBoard
-from verification.faults.independent_client import (
-    BUMPER,
-    HEALTH,
-    LINK,
-    MOTION,
-    ODOMETRY,
-    Client,
-    Source,
-    session,
-)
+from verification.faults.independent_client import LINK, MOTION, Client, Source, session
 from verification.harness.bus import set_options
 from verification.harness.host import StallRecorder
 from verification.harness.ports import free_port, udp_ports
@@ -39,7 +30,6 @@ UNDER_WAY_S = 0.15  # a RUN that was sent before a stop may arrive later
 READY_S = 0.6  # safety needs good inputs for 0.5 s before a neutral request
 NEUTRAL_S = 0.3
 MODULES = "cli router", "services.bridge", "services.safety", "services.odom"
-READ = LINK, HEALTH, ODOMETRY, BUMPER, MOTION
 
 
 @dataclass
@@ -155,7 +145,7 @@ def black_box(sets: Sequence[str] = ()) -> Iterator[BlackBox]:
             )
             processes[module] = ends.enter_context(process)
             ends.callback(process.kill)
-        client = Client(ends.enter_context(session(endpoint)), *READ)
+        client = Client(ends.enter_context(session(endpoint)), "tel/**", MOTION)
         wait_until(lambda: client.state and client.last(LINK), "services up")
         yield BlackBox(board, client, endpoint, processes)
 

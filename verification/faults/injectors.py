@@ -20,7 +20,7 @@ from common import clock, keys
 from common.freshness import NS_PER_S
 from sim.requests import Asked, Bumper
 from verification.faults.fault import Injector
-from verification.faults.independent_client import ROOT, VELOCITY, session
+from verification.faults.independent_client import ROOT, VELOCITY, Client, session
 from verification.faults.namespaces import step_clock
 from verification.faults.stack_fixture import PROGRAMS, SPEED_MPS, StackFixture, operators_endpoint
 from verification.harness.dashboard import Server, dashboard
@@ -305,7 +305,7 @@ HOSTILE = {
 @injector
 def forged(fixture: StackFixture, /, key: str, **fields: object) -> int:
     """Publish forgeries of a key's newest message, at 50 Hz for ``FORGED_S``."""
-    client = fixture.client
+    client = Client(fixture.client.bus, key)
     message = wait_until(lambda: client.last(key), f"a message of {key}")
     at_ns = clock.now_ns()
     while clock.now_ns() - at_ns < FORGED_S * NS_PER_S:

@@ -15,7 +15,7 @@ import msgspec
 
 from cli.settings import Everything
 from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Sonar, Wire
-from verification.faults.independent_client import BUMPER, MOTION, VELOCITY, Client, session
+from verification.faults.independent_client import Client, session
 from verification.faults.namespaces import (
     RELAY_CABLES,
     RELAY_HOST,
@@ -233,4 +233,4 @@ def stack_fixture(
             )
         )
         bus = stack.enter_context(session(operators_endpoint(made.config)))
-        yield StackFixture(made, Client(bus, MOTION, BUMPER, VELOCITY))
+        yield StackFixture(made, Client(bus))
