@@ -42,7 +42,9 @@ class RunningStack:
     others: list["subprocess.Popen[bytes]"] = field(default_factory=list)  # beside the stack
 
     def start(self, name: str) -> None:
-        """Start or restart a process."""
+        """Start a process, or start it again after its end; it reads a pipe."""
+        if name in self.processes:
+            self.processes[name].communicate()  # closes the pipe of the ended one
         with self.log.open("ab") as output:
             self.processes[name] = subprocess.Popen(
                 self.commands[name],
