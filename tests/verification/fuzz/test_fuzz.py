@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Struct, inspect
 
-from common import codec, config
+from common import codec
 from common.wire.framing import Framing
 from verification.fuzz import targets
 from verification.fuzz.seeds import CORPUS, example, mutated, seeds
@@ -71,11 +71,11 @@ def _crash(*_: object) -> None:
 @pytest.mark.parametrize(
     ("name", "owner", "attribute"),
     [
-        ("frames", Framing, "part_at"),
-        ("messages", codec, "_decoder"),
-        ("toml", config, "_leaves"),
-        ("environ", config, "_parse"),
-        ("sets", config, "_parse"),
+        ("frames", Framing, "read"),
+        ("messages", targets, "decode"),
+        ("toml", targets, "load"),
+        ("environ", targets, "load"),
+        ("sets", targets, "load"),
     ],
 )
 def test_another_exception_is_a_finding(
