@@ -29,7 +29,6 @@ from verification.harness.dashboard import (
     connected,
     dashboard,
     half_open,
-    is_closed,
 )
 from verification.harness.waiting import wait_until
 
@@ -37,6 +36,17 @@ ESTOP_S = 0.5  # from the request to the bus, at worst
 TRIES = 4
 HALF_OPEN = 500
 FILES = 512  # that the dashboard may have open, about half of what systemd allows
+
+
+def is_closed(it: socket.socket) -> bool:
+    """Return whether the server has ended a connection."""
+    it.setblocking(False)
+    try:
+        return it.recv(4096) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
 
 
 def report(text: str) -> None:

@@ -33,7 +33,7 @@ from verification.faults.injectors import (
     steps,
 )
 from verification.faults.stack_fixture import CLOCKS, LIMIT_LEASE_S, Requirement
-from verification.harness.dashboard import FLOODS, flooded, half_open
+from verification.harness.dashboard import flooded, half_open
 
 ON: tuple[Outcome, ...] = ("drives on",)
 ITSELF: tuple[Outcome, ...] = ("by itself",)
@@ -225,7 +225,7 @@ GREEDY = [
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), hold_s=1.0, harmless=True),
     Fault("browser's estop while a viewer sends 50 000 messages/s",
-          injectors.browser_estop(lambda server: flooded(server, FLOODS["look"])), RESET,
+          injectors.browser_estop(flooded), RESET,
           within(0.3)),
     Fault("browser's estop while 500 requests do not end",
           injectors.browser_estop(lambda server: half_open(server, 500)), RESET, within(0.3)),

@@ -22,7 +22,8 @@ from websockets.typing import Origin
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-TEXT, PING = 0x81, 0x89  # first bytes of WebSocket frames
+LOOK_TEXT = b'{"k":"look","robot":"001"}'
+LOOK = bytes([0x81, 0x80 | len(LOOK_TEXT)]) + bytes(4) + LOOK_TEXT  # a frame, masked with zeros
 BATCH = 500
 PER_SECOND = 50_000
 
@@ -130,48 +131,35 @@ def connected(server: Server, robot: str = "001") -> Iterator[Client]:
         yield it
 
 
-def frame(text: bytes, kind: int = TEXT) -> bytes:
-    """Return a short WebSocket frame, masked with zeros."""
-    return bytes([kind, 0x80 | len(text)]) + bytes(4) + text
-
-
-FLOODS = {
-    "hold": frame(b'{"k":"hold","n":1,"x":0.1,"y":0.2}'),
-    "look": frame(b'{"k":"look","robot":"001"}'),
-    "free": frame(b'{"k":"free"}'),
-    "ping": frame(b"", PING),
-}
-
-
-def flood(server: Server, message: bytes, stop: threading.Event) -> None:
-    """Send a frame at ``PER_SECOND``, reconnecting as needed, until stopped."""
-    batch = message * BATCH
-    origin = Origin(server.url.rstrip("/"))
-    while not stop.is_set():
-        with (
-            contextlib.suppress(OSError, WebSocketException, TimeoutError),
-            connect(f"ws://127.0.0.1:{server.port}/live", origin=origin, open_timeout=5) as viewer,
-        ):
-            began = time.monotonic()
-            sent = 0
-            while not stop.is_set():
-                viewer.socket.sendall(batch)
-                sent += BATCH
-                time.sleep(max(0.0, began + sent / PER_SECOND - time.monotonic()))
-        stop.wait(0.05)
-
-
 @contextlib.contextmanager
-def flooded(server: Server, message: bytes) -> Iterator[None]:
-    """Flood the server while the context lasts."""
+def flooded(server: Server) -> Iterator[None]:
+    """Send requests to the server at ``PER_SECOND`` while the context lasts."""
     stop = threading.Event()
-    thread = threading.Thread(target=flood, args=(server, message, stop), daemon=True)
+
+    def flood() -> None:
+        while not stop.is_set():
+            with contextlib.suppress(OSError, WebSocketException, TimeoutError):
+                _flood(server, stop)
+            stop.wait(0.05)
+
+    thread = threading.Thread(target=flood, daemon=True)
     thread.start()
     try:
         yield
     finally:
         stop.set()
         thread.join(10)
+
+
+def _flood(server: Server, stop: threading.Event) -> None:
+    """Send requests on one connection until it ends."""
+    address, origin = f"ws://127.0.0.1:{server.port}/live", Origin(server.url.rstrip("/"))
+    with connect(address, origin=origin, open_timeout=5) as viewer:
+        began, sent = time.monotonic(), 0
+        while not stop.is_set():
+            viewer.socket.sendall(LOOK * BATCH)
+            sent += BATCH
+            time.sleep(max(0.0, began + sent / PER_SECOND - time.monotonic()))
 
 
 @contextlib.contextmanager
@@ -187,14 +175,3 @@ def half_open(server: Server, count: int) -> Iterator[list[socket.socket]]:
                 it.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
             opened.append(it)
         yield opened
-
-
-def is_closed(it: socket.socket) -> bool:
-    """Return whether the server has ended a connection."""
-    it.setblocking(False)
-    try:
-        return it.recv(4096) == b""
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True

@@ -1,4 +1,4 @@
-"""CPU time, memory and children of processes, and UDP drops, from ``/proc`` of Linux."""
+"""CPU time, memory and children of processes, from ``/proc`` of Linux."""
 
 import contextlib
 import os
@@ -24,17 +24,7 @@ class Stat:
     state: str
     cpu_s: float  # user and system, all threads
     threads: int
-    started: int  # clock ticks since boot
     rss: int  # bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """CPU time of all cores since boot."""
-
-    busy_s: float
-    idle_s: float
-    stolen_s: float  # taken by other virtual machines on the same host
 
 
 def stat(pid: int) -> Stat:
@@ -42,14 +32,7 @@ def stat(pid: int) -> Stat:
     text = (PROC / str(pid) / "stat").read_text(encoding="ascii", errors="replace")
     rest = text.rpartition(")")[2].split()  # from field 3 of proc(5) on
     cpu_s = (int(rest[11]) + int(rest[12])) / TICKS
-    return Stat(rest[0], cpu_s, int(rest[17]), int(rest[19]), int(rest[21]) * PAGE)
-
-
-def machine() -> Machine:
-    """Return the CPU time of the machine."""
-    line = (PROC / "stat").read_text(encoding="ascii").splitlines()[0]
-    user, nice, system, idle, wait, irq, soft, steal = (int(n) / TICKS for n in line.split()[1:9])
-    return Machine(user + nice + system + irq + soft, idle + wait, steal)
+    return Stat(rest[0], cpu_s, int(rest[17]), int(rest[21]) * PAGE)
 
 
 def children(pid: int) -> list[int]:
@@ -77,20 +60,10 @@ def memory(pid: int) -> dict[str, int]:
     return {name.lower(): 1024 * int(kb) for name, kb in found}
 
 
-def udp_drops(port: int) -> int:
-    """Return how many datagrams the kernel dropped at a UDP port of this host (buffer full)."""
-    for line in (PROC / "net" / "udp").read_text(encoding="ascii").splitlines()[1:]:
-        fields = line.split()
-        if int(fields[1].rpartition(":")[2], 16) == port:
-            return int(fields[-1])
-    raise LookupError(f"no process has UDP port {port}")
-
-
 class CpuShares:
     """CPU share of processes over the context: user and system, all threads.
 
-    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile; its entry
-    ``machine`` is the sum of all cores, of all processes.
+    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile.
     """
 
     def __init__(self, pids: Mapping[str, int]) -> None:
@@ -110,7 +83,7 @@ class CpuShares:
         }
 
     def _read(self) -> dict[str, float]:
-        found = {"machine": machine().busy_s}
+        found: dict[str, float] = {}
         for name, pid in self._pids.items():
             with contextlib.suppress(*GONE):
                 found[name] = stat(pid).cpu_s
