@@ -243,6 +243,8 @@ BUS = [
     Fault("safety hangs for 2 s, then estop",
           steps(kill("safety", signal.SIGSTOP), pause(2.0), estop), RESET, within(0.02),
           stops=("brake",)),
+    Fault("safety SIGKILL, then estop", steps(kill("safety"), estop), RESET, within(0.02),
+          stops=("brake",)),
     # No driver of the campaign requests to back away.
     Fault("safety's authority copied", forged(MOTION, command="run", linear=-0.5), ON,
           harmless=True),

@@ -30,7 +30,7 @@ ROWS = (
 MORE_ROWS = (
     "bridge SIGSTOP", "driver SIGKILL", "odom SIGKILL", "board restart in 0.3 s",
     "left driver fault", "front sonar faulty", "NaN on every key", "safety hangs, then contact",
-    "safety's number overtaken", "bridge's measurements copied",
+    "safety's number overtaken", "bridge's measurements copied", "safety SIGKILL, then estop",
     "limit source SIGKILL, silence = stop", "pendant SIGKILL",
 )  # fmt: skip
 WITH_NAMESPACES = (
