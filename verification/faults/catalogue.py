@@ -11,7 +11,7 @@ from common.motion import Command
 from sim.requests import Driver, Firmware, Flood, Freeze, Lose, Mute, PowerCycle, Sonar, Wire
 from verification.faults import injectors
 from verification.faults.fault import NOTICE_S, Budget, Fault, Outcome, by_limit, within
-from verification.faults.independent_client import BUMPER, MOTION, VELOCITY
+from verification.faults.independent_client import BUMPER, MOTION, VELOCITY, Client
 from verification.faults.injectors import (
     ESTOP,
     cable,
@@ -139,11 +139,14 @@ PROCESSES = [
     Fault("disk full, then contact", injectors.fill_disk, RESET, within(0.05), harmless=True,
           needs="small disk"),
     # Delayed calls have no effect: no frame moves the vehicle, and the latch stays.
+    # Safety refuses a reset while motion is requested.
     Fault("contact, then 20 resets 1.3 s late",
-          # Safety refuses a reset while motion is requested.
-          steps(hit(0.1), request(0.0), late_calls("safety/reset")), RESET, within(0.02)),
+          steps(hit(0.1), request(0.0), late_calls("safety/reset", Client.reset_request)),
+          RESET, within(0.02)),
+    # Safety refuses a release while motion is requested, and until the vehicle stands.
     Fault("contact, then 20 releases 1.3 s late",
-          steps(press, late_calls("safety/release", held=True, direction="backward")),
+          steps(press, request(0.0), pause(1.5),
+                late_calls("safety/release", injectors.held_release)),
           RESET, within(0.02)),
 ]  # fmt: skip
 

@@ -20,7 +20,7 @@ from common import clock, keys
 from common.freshness import NS_PER_S
 from sim.requests import Asked, Bumper
 from verification.faults.fault import Injector
-from verification.faults.independent_client import ROOT, VELOCITY, Client, session
+from verification.faults.independent_client import ROOT, VELOCITY, Client, Map, session
 from verification.faults.namespaces import step_clock
 from verification.faults.stack_fixture import PROGRAMS, SPEED_MPS, StackFixture, operators_endpoint
 from verification.harness.dashboard import Server, dashboard
@@ -210,15 +210,20 @@ def cable(_: StackFixture, side: Literal["pc", "board"], state: Literal["up", "d
 
 
 @injector
-def late_calls(fixture: StackFixture, /, name: str, **fields: object) -> None:
-    """Make 20 calls that the operator made for the latched causes, too late."""
+def late_calls(fixture: StackFixture, name: str, request_of: Callable[[Client], Map]) -> None:
+    """Make 20 calls that the operator made when the contact was latched, too late."""
     client = fixture.client
     becomes_true(lambda: client.latched, 2.0)
-    payload = msgpack.packb(client.reset_request() | fields)
+    payload = msgpack.packb(request_of(client))
     time.sleep(LATE_S)
     for _ in range(20):
         client.bus.get(f"{ROOT}/srv/{name}", payload=payload, timeout=1.0)
         time.sleep(0.02)
+
+
+def held_release(client: Client) -> Map:
+    """Return the request of a held release."""
+    return {"echo": client.state["heartbeat"], "held": True, "direction": "backward"}
 
 
 @injector
