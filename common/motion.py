@@ -14,10 +14,6 @@ STANDING_RADPS = 0.05  # 3 deg/s: the board resolves 0.1 deg/s, its sensor is no
 # Half of the resolution of a motion frame: 1 mm/s and 0.1 deg/s.
 ROUNDED_MPS = 0.0005
 ROUNDED_RADPS = math.radians(0.05)
-# Supervision of a standstill, by safety and by the bridge.
-AWAY_M, AWAY_RAD = 0.05, 0.05  # from the place of the standstill
-LEAK_S = 5.0  # time constant of the integrated velocities
-DRIFT_RADPS = 0.001  # of the heading counter
 
 
 class Command(StrEnum):

@@ -53,10 +53,6 @@ DOWNSAMPLED = (
 )
 NOT_HERE = "the network or the router drops it: move closer to the access point; see `t2 hz`"
 ONE_DRIVER = "stop one of the two programs; `t2 services` lists them"
-LONG_STOPS = (
-    "drive slowly; record stops with `t2 record`, then `t2 checkout stop RECORDING` proposes "
-    "settings; the event long_stop has the distances"
-)
 LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
 LIMIT_SILENT = "start its program, check its network and certificate; see safety.limits"
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"

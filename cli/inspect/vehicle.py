@@ -181,7 +181,3 @@ def safety(seen: Observation) -> Iterator[Finding]:
         yield Finding("safety", level, text, todo)
     if not state.causes:
         yield Finding("safety", "ok", state.text)
-    health = seen.health.get("safety")
-    if health is not None and (count := health.counters.get("long_stops", 0)):
-        text = f"stops since its start that were longer than it reckons with: {count}"
-        yield Finding("safety", "wrong", text, remedies.LONG_STOPS)

@@ -26,15 +26,8 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
-from common.motion import (
-    AWAY_M,
-    AWAY_RAD,
-    DRIFT_RADPS,
-    LEAK_S,
-    STANDING_MPS,
-    STANDING_RADPS,
-    is_standing,
-)
+from common.motion import STANDING_MPS, STANDING_RADPS, is_standing
+from common.standstill import AWAY_M, AWAY_RAD, DRIFT_RADPS, LEAK_S
 
 SLACK_S = 0.5
 

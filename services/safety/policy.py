@@ -31,6 +31,7 @@ from services.safety.causes import BARRING, BY_NAME, Clears, bars_motion, clears
 from services.safety.channel import Admission
 from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
+from services.safety.core.motion_watch import MotionWatch, Supervisor
 from services.safety.inputs import (
     DriveRequest,
     Inputs,
@@ -42,16 +43,11 @@ from services.safety.latches import Latches, Observation, latched, observe, orde
 from services.safety.limits import SpeedLimits
 from services.safety.motion import Plan, Planner, observations
 from services.safety.operator_requests import handle, is_creeping
-from services.safety.runaway import Bounds
 from services.safety.sonar import Rules
 from services.safety.sonar_array import SonarFilter
-from services.safety.standstill import Measured, Standstill, supervisor
 from services.safety.state import State, Verdict
-from services.safety.stop_distance import StopDistance, stop_gauge
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
-AGAINST_MPS = 0.1  # against the command; above noise and lag
-AGAINST_RADPS = 0.2
 
 COMMANDS: dict[VerdictName, Command] = {
     "run": RUN,
@@ -71,15 +67,7 @@ class Policy:
         self._sonar_filter = SonarFilter(
             self.planner.zones, rules, settings.ultrasonic_age, self.planner.creep_room
         )
-        self._supervisor = supervisor(settings)
-        self._stop_gauge = stop_gauge(settings)
-        patience_s = settings.runaway_time
-        self._linear = Bounds(
-            settings.deceleration, settings.runaway_linear, AGAINST_MPS, patience_s
-        )
-        self._angular = Bounds(
-            settings.angular_deceleration, settings.runaway_angular, AGAINST_RADPS, patience_s
-        )
+        self._supervisor = Supervisor(settings)
 
     def start(self) -> State:
         """Return the state of a service that has just started."""
@@ -105,7 +93,6 @@ class Policy:
             state,
             decided_ns=now_ns,
             verdict=verdict,
-            stop_distance=self._stop_distance(state, inputs, verdict, now_ns),
             estop_connection=inputs.estop_connection or state.estop_connection,
             estop=inputs.link.value.estop if inputs.link else None,
         )
@@ -134,7 +121,6 @@ class Policy:
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         settings, sent = self.settings, state.verdict
         known = inputs.known_velocity(now_ns, settings.velocity_age)
-        measured = known or STILL
         sonar_array = self._sonar_filter.update(state.sonar_array, inputs.ultrasonic, known, now_ns)
         trajectory, counter = state.trajectory, inputs.counter
         if inputs.mileage and counter:
@@ -147,48 +133,41 @@ class Policy:
         return replace(
             state,
             sonar_array=sonar_array,
-            linear=state.linear.follow(sent.twist.linear, measured.linear, step_s, self._linear),
-            angular=state.angular.follow(
-                sent.twist.angular, measured.angular, step_s, self._angular
-            ),
-            standstill=self._standstill(state, inputs, known, now_ns),
+            motion=self._watch(state, inputs, known, step_s, now_ns),
             release=release,
             trajectory=trajectory,
         )
 
-    def _standstill(
-        self, state: State, inputs: Inputs, known: Twist | None, now_ns: int
-    ) -> Standstill:
-        sent, velocity = state.verdict, inputs.velocity
-        commanded = sent.command is not RUN or sent.twist.rounds_to_zero
-        latest = Latest(known, velocity.received_ns) if known and velocity else None
-        seen = Measured(latest, inputs.mileage if inputs.counter else None)
-        return self._supervisor.follow(state.standstill, commanded, seen, now_ns)
-
-    def _stop_distance(
-        self, state: State, inputs: Inputs, verdict: Verdict, now_ns: int
-    ) -> StopDistance:
-        sent = state.verdict.twist if state.verdict.command is RUN else None
-        running = verdict.command is RUN
-        return self._stop_gauge.follow(state.stop_distance, sent, running, inputs, now_ns)
+    def _watch(
+        self, state: State, inputs: Inputs, known: Twist | None, step_s: float, now_ns: int
+    ) -> MotionWatch:
+        velocity = inputs.velocity
+        return self._supervisor.follow(
+            state.motion,
+            state.verdict.twist,
+            Latest(known, velocity.received_ns) if known and velocity else None,
+            inputs.mileage if inputs.counter else None,
+            step_s=step_s,
+            now_ns=now_ns,
+        )
 
     def _observe(self, state: State, inputs: Inputs, now_ns: int) -> State:
         settle_ns = round(self.settings.settle * NS_PER_S)
         tick = (0, now_ns)
-        bad_s = max(state.linear.bad_s, state.angular.bad_s)
+        standstill = state.motion.standstill
         names = state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns)
         conflicts = ", ".join(names)
         seen = [
             *observe_inputs(inputs, self.settings, state, now_ns),
             *state.speed_limits.observations(now_ns),
-            Observation("runaway", bad_s >= self.settings.runaway_time, tick),
-            Observation("uncommanded_motion", state.standstill.left, tick),
+            Observation("runaway", self._supervisor.runs_away(state.motion), tick),
+            Observation("uncommanded_motion", standstill.left, tick),
             Observation(
                 "not_stopping",
-                state.standstill.is_late(now_ns),
+                standstill.is_late(now_ns),
                 # 1 equivalent mutant: this cause clears by time, without a token.
                 tick,
-                state.standstill.text,
+                standstill.text,
             ),
             Observation(
                 "two_publishers", bool(conflicts), tick, f"Two publishers use {conflicts}."
@@ -234,7 +213,7 @@ class Policy:
         state = replace(state, latches=held)
         worst = _worst(set(held) - suspended)
         command = COMMANDS[worst]
-        if command is STOP and state.standstill.rolls:
+        if command is STOP and state.motion.standstill.rolls:
             command = BRAKE
         source = requested.source if requested else None
         verdict = Verdict(

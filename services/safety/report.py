@@ -147,9 +147,6 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         yield Transition(
             "source", "info", _source_text(new.control), {"from": old.control, "to": new.control}
         )
-    long_stop = after.stop_distance.long
-    if long_stop is not None and long_stop is not before.stop_distance.long:
-        yield Transition("long_stop", "warning", long_stop.text, {})
     if ("release" in before.latches) != ("release" in after.latches):
         began = "release" in after.latches
         text = "Creeping off the bumper." if began else "No longer creeping off the bumper."

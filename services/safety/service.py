@@ -230,7 +230,6 @@ class SafetyService:
             if transition.name == "release_refused" and self._refusal.continues(text, now_ns):
                 continue
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
-            self._node.counters["long_stops"] += transition.name == "long_stop"
 
     def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))

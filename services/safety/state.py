@@ -6,14 +6,12 @@ from common.heartbeat import Heartbeat
 from common.messages import Verdict as VerdictName
 from common.motion import STILL, STOP, Command, Twist
 from services.safety.arbiter import Arbiter
+from services.safety.core.motion_watch import MotionWatch
 from services.safety.keepalive import Keepalives
 from services.safety.latches import FaultBudget, Latches, Token
 from services.safety.limits import SpeedLimits
 from services.safety.release import Release
-from services.safety.runaway import Axis
 from services.safety.sonar_array import SonarArray, SonarOverrides
-from services.safety.standstill import Standstill
-from services.safety.stop_distance import StopDistance
 from services.safety.trajectory import Trajectory
 
 
@@ -49,10 +47,7 @@ class State(Struct, frozen=True):
     latches: Latches = {}
     sonar_array: SonarArray = SonarArray()
     overrides: SonarOverrides = SonarOverrides()
-    linear: Axis = Axis()
-    angular: Axis = Axis()
-    standstill: Standstill = Standstill()
-    stop_distance: StopDistance = StopDistance()
+    motion: MotionWatch = MotionWatch()
     fault_budget: FaultBudget = FaultBudget()
     release: Release = Release()
     trajectory: Trajectory = Trajectory()

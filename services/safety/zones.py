@@ -57,7 +57,7 @@ class Zones(Struct, frozen=True):
 
     def room(self, speed: float) -> float:
         """Return the distance (m) at which this speed is allowed."""
-        return self.margin + speed * self.react + speed * speed / (2 * self.deceleration)
+        return self.margin + stopping_distance(speed, self.react, self.deceleration)
 
     def along(self, sonar: int, twist: Twist) -> float:
         """Return the speed (m/s) of this sonar along its axis."""
@@ -89,6 +89,11 @@ class Zones(Struct, frozen=True):
             if self.approach(sonar, measured) > bound:
                 return sonar
         return None
+
+
+def stopping_distance(speed: float, react: float, deceleration: float) -> float:
+    """Return the distance (m) from the command to standstill that safety reckons with."""
+    return speed * react + speed * speed / (2 * deceleration)
 
 
 def zones(vehicle: Vehicle, settings: Safety) -> Zones:

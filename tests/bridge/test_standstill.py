@@ -4,7 +4,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
-from common.motion import AWAY_M, AWAY_RAD, DRIFT_RADPS
+from common.standstill import AWAY_M, AWAY_RAD, DRIFT_RADPS
 from services.bridge.standstill import Standstill
 
 MS = NS_PER_S // 1000

@@ -12,12 +12,12 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
+from common.standstill import Displacement
 from services.safety.arbiter import DriveChannel
 from services.safety.channel import Channel
+from services.safety.core.motion_watch import Axis, Phase, Standstill
 from services.safety.keepalive import Keepalives
 from services.safety.latches import FaultBudget
-from services.safety.runaway import Axis
-from services.safety.standstill import Phase, Standstill
 from services.safety.state import State
 from tests.safety.policy_fixture import PolicyFixture
 
@@ -73,17 +73,21 @@ def spent(fixture: PolicyFixture) -> None:
 
 
 def ran_away(fixture: PolicyFixture) -> None:
-    fixture.state = replace(fixture.state, linear=Axis(bad_s=0.3))
+    fixture.state = replace(
+        fixture.state, motion=replace(fixture.state.motion, linear=Axis(bad_s=0.3))
+    )
     sample("velocity", linear=2.0)(fixture)
 
 
 def supervised(fixture: PolicyFixture, standstill: Standstill) -> None:
     verdict = replace(fixture.state.verdict, command="stop", twist=STILL)
-    fixture.state = replace(fixture.state, standstill=standstill, verdict=verdict)
+    fixture.state = replace(
+        fixture.state, motion=replace(fixture.state.motion, standstill=standstill), verdict=verdict
+    )
 
 
 def left_its_place(fixture: PolicyFixture) -> None:
-    supervised(fixture, Standstill(Phase.STANDING, counted=Twist(0.06)))
+    supervised(fixture, Standstill(Phase.STANDING, displacement=Displacement(counted=Twist(0.06))))
 
 
 def does_not_stop(fixture: PolicyFixture) -> None:

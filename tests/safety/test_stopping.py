@@ -120,7 +120,6 @@ def test_a_board_that_starts_anew_latches_nothing() -> None:
     fixture.drive(seconds=2.0)
     fixture.tick(50)
     fixture.distance = fixture.heading = 0.0
-    fixture.tick()
     fixture.epoch += 1
     assert fixture.tick(50).command == "stop"
     assert "uncommanded_motion" not in fixture.state.latches

@@ -16,10 +16,10 @@ from common.messages import SONAR_NAMES, Direction
 from common.motion import STILL, Command, Twist
 from common.verdict import RELEASE_SOURCE
 from services.safety.causes import RULES, Clears
+from services.safety.core.motion_watch import MotionWatch
 from services.safety.inputs import Estop, Event, Hold, Reset
 from services.safety.latches import FaultBudget, Held, latched, ordered
 from services.safety.release import Release
-from services.safety.runaway import Axis
 from services.safety.state import State, Verdict
 from tests.safety.cause_sets import (
     AHEAD,
@@ -76,7 +76,7 @@ def later(fixture: PolicyFixture, raised: set[str]) -> None:
     """An hour later, all inputs are good and a source requests motion: latches persist."""
     fixture.now_ns += HOUR_NS
     state = replace(
-        fixture.state, decided_ns=fixture.now_ns, linear=Axis(), fault_budget=FaultBudget()
+        fixture.state, decided_ns=fixture.now_ns, motion=MotionWatch(), fault_budget=FaultBudget()
     )
     wished = {"teleop": replace(state.arbiter.channels["teleop"], received_ns=fixture.now_ns)}
     fixture.state = replace(state, arbiter=replace(state.arbiter, channels=wished))

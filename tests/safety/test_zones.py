@@ -11,7 +11,7 @@ from common.messages import SONAR_NAMES
 from common.motion import Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
-from services.safety.zones import GRAZING_MPS, Zones, zones
+from services.safety.zones import GRAZING_MPS, Zones, stopping_distance, zones
 
 FREE = (math.inf,) * 8
 ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
@@ -183,3 +183,8 @@ def test_measured_motion_has_its_own_bounds(
 ) -> None:
     sonar = field.too_fast(Twist(measured, 0.0), only("front", distance))
     assert sonar == (SONAR_NAMES.index("front") if stops else None)
+
+
+def test_stopping_distance() -> None:
+    assert stopping_distance(1.0, 0.25, 0.5) == pytest.approx(1.25)
+    assert stopping_distance(0.5, 0.2, 0.5) == pytest.approx(0.35)

@@ -15,6 +15,7 @@ from common import messages as m
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.motion import Command
+from common.standstill import Displacement
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
@@ -23,12 +24,12 @@ from services.bridge.lease import Lease
 from services.safety import arbiter, causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
 from services.safety.config import LimitSource
+from services.safety.core.motion_watch import Standstill
 from services.safety.inputs import Inputs
 from services.safety.latches import Held, Observation
 from services.safety.release import Release
 from services.safety.service import SafetyService
 from services.safety.sonar_array import SonarOverrides
-from services.safety.standstill import Standstill, Supervisor
 from services.safety.state import State
 from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
@@ -405,7 +406,7 @@ MUTATIONS: dict[str, Mutation] = {
         "no BRAKE while",
     ),
     "a standstill is not supervised": (
-        (Supervisor, "_stay", lambda self, standstill, *_: standstill),
+        (Displacement, "has_left", property(never)),
         (lambda s: s.request(None, 2500), lambda s: s.measure(0.28)), "no BRAKE while",
     ),
     "a limit does not slow": (

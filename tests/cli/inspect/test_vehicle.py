@@ -212,15 +212,6 @@ def test_every_cause_and_every_fault_has_a_remedy() -> None:
     assert remedies.FAULTS.keys() == set(get_args(FaultName))
 
 
-@pytest.mark.parametrize(("count", "levels"), [(0, []), (3, ["wrong"])])
-def test_stops_that_were_longer_than_reckoned(count: int, levels: list[str]) -> None:
-    state = seen(health={"safety": replace(health("safety"), counters={"long_stops": count})})
-    found = [each for each in safety(state) if "reckons with" in each.text]
-    assert [each.level for each in found] == levels
-    assert all(each.text.endswith("longer than it reckons with: 3") for each in found)
-    assert all("t2 checkout stop" in each.todo for each in found)
-
-
 def relay_of(state: Any = "up", **given: Any) -> m.Relay:
     usual: dict[str, Any] = {"version": "1", "braking": "", "uptime": 60.0, "counters": {}}
     return m.Relay(state=state, **(usual | given))

@@ -1,0 +1,1 @@
+"""What safety decides: pure, with the time as `now_ns`."""

@@ -1,0 +1,310 @@
+"""Motion watch: runaway on one axis, and the phases of a standstill."""
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from common.freshness import NS_PER_S, Latest
+from common.messages import Mileage
+from common.motion import STILL, Twist
+from common.standstill import GRACE_NS, Displacement
+from services.safety.config import Safety
+from services.safety.core.motion_watch import (
+    CONFIRM_NS,
+    Axis,
+    Bounds,
+    MotionWatch,
+    Phase,
+    Standstill,
+    Supervisor,
+)
+from tests.safety.policy_fixture import TICK_S
+
+TICK_NS = round(TICK_S * NS_PER_S)
+BOUNDS = Bounds(deceleration=0.6, tolerance=0.3, against=0.1, patience_s=0.3)
+SETTINGS = Safety()  # slows down at 0.6 m/s^2 and 1.0 rad/s^2
+
+
+def follow(axis: Axis, commanded: float, measured: float, seconds: float) -> Axis:
+    for _ in range(round(seconds / TICK_S)):
+        axis = axis.follow(commanded, measured, TICK_S, BOUNDS)
+    return axis
+
+
+@pytest.mark.parametrize(
+    ("commanded", "measured", "bad"),
+    [
+        (0.5, 0.5, False), (0.5, 0.8, False), (0.5, 0.81, True), (-0.5, -0.81, True),
+        (-0.5, -0.79, False), (0.5, 0.0, False), (0.5, -0.1, False), (0.5, -0.11, True),
+        (-0.5, 0.11, True), (-0.5, 0.1, False), (0.0, 0.3, False), (0.0, 0.31, True),
+        (0.0, -0.31, True),
+    ],
+)  # fmt: skip
+def test_runaway_bounds(commanded: float, measured: float, bad: bool) -> None:
+    assert (follow(Axis(), commanded, measured, 0.28).bad_s > 0.27) == bad
+
+
+def test_slowing_down_as_guaranteed_is_no_runaway() -> None:
+    axis = follow(Axis(), 1.0, 1.0, 1.0)
+    for step in range(100):
+        late_s = max(0.0, step * TICK_S - 0.25)
+        axis = axis.follow(0.0, max(0.0, 1.0 - 0.6 * late_s), TICK_S, BOUNDS)
+        assert axis.bad_s == 0
+
+
+def test_bad_time_is_forgiven_half_as_fast_and_is_capped() -> None:
+    axis = follow(Axis(), 0.0, 1.0, 9.0)
+    assert axis.bad_s == BOUNDS.patience_s
+    assert follow(axis, 0.0, 0.0, 0.2).bad_s == pytest.approx(0.2)
+    axis = Axis()
+    for _ in range(20):  # flapping
+        axis = follow(follow(axis, 0.0, 1.0, 0.04), 0.0, 0.0, 0.04)
+    assert axis.bad_s > 0.27
+
+
+@pytest.mark.parametrize("axes", [(Axis(bad_s=0.3), Axis()), (Axis(), Axis(bad_s=0.3))])
+def test_each_axis_runs_away(axes: tuple[Axis, Axis]) -> None:
+    supervisor = Supervisor(SETTINGS)
+    assert supervisor.runs_away(MotionWatch(*axes))
+    assert not supervisor.runs_away(MotionWatch(Axis(bad_s=0.29), Axis(bad_s=0.29)))
+
+
+# --- standstill -----------------------------------------------------------------------------
+
+
+class Board:
+    """A vehicle for the supervisor: velocities and counters by hand."""
+
+    def __init__(self, settings: Safety = SETTINGS) -> None:
+        self.watch = MotionWatch()
+        self.now_ns = 10 * NS_PER_S
+        self.distance = self.heading = 0.0
+        self.supervisor = Supervisor(settings)
+
+    @property
+    def state(self) -> Standstill:
+        return self.watch.standstill
+
+    def step(
+        self, linear: float | None = 0.0, angular: float = 0.0, *, moves: bool = False
+    ) -> Standstill:
+        """Run a tick with one velocity, or without one; ``moves``: a motion is commanded."""
+        self.now_ns += TICK_NS
+        known = None if linear is None else Latest(Twist(linear, angular), self.now_ns)
+        heading = math.remainder(self.heading, math.tau)
+        counters = Mileage(distance=self.distance, heading=heading, epoch=0)
+        self.watch = self.supervisor.follow(
+            self.watch,
+            Twist(linear or 0.3, angular) if moves else STILL,
+            known,
+            Latest(counters, self.now_ns),
+            step_s=TICK_S,
+            now_ns=self.now_ns,
+        )
+        return self.state
+
+    def run(self, seconds: float, linear: float | None = 0.0, angular: float = 0.0) -> bool:
+        """Report the same for a while; return whether the place was left meanwhile."""
+        steps = [self.step(linear, angular).left for _ in range(round(seconds / TICK_S))]
+        return any(steps)
+
+    def late(self) -> bool:
+        return self.state.is_late(self.now_ns)
+
+
+def standing() -> Board:
+    board = Board()
+    assert not board.run(1.0)
+    assert board.state.phase is Phase.STANDING
+    return board
+
+
+def stopping(linear: float | None, angular: float = 0.0) -> Board:
+    """Return a vehicle whose motion has just ended."""
+    board = Board()
+    board.step(linear, angular, moves=True)
+    assert board.state.phase is Phase.MOVING
+    return board
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "due_s"),
+    [(0.28, 0.0, 0.28 / 0.6 + 0.5), (0.0, 0.49, 0.99), (-0.28, 0.0, 0.28 / 0.6 + 0.5),
+     (0.6, -0.1, 1.5), (0.06, -0.9, 1.4)],
+)  # fmt: skip
+def test_time_to_stop_by_speed(linear: float, angular: float, due_s: float) -> None:
+    board = stopping(linear, angular)
+    began_ns = board.now_ns
+    while not board.late():
+        board.step(linear, angular)
+        assert board.now_ns < began_ns + 3 * NS_PER_S
+    took_s = (board.now_ns - began_ns) / NS_PER_S
+    assert due_s < took_s <= due_s + 3 * TICK_S
+    assert board.state.rolls
+
+
+@pytest.mark.parametrize("slow", [{"deceleration": 0.1}, {"angular_deceleration": 0.1}])
+def test_time_to_stop_is_at_most_3_s(slow: dict[str, float]) -> None:
+    board = Board(replace(SETTINGS, **slow))
+    board.step(1.0, 1.0, moves=True)
+    board.run(3.0, 1.0, 1.0)
+    assert not board.late()
+    board.run(2 * TICK_S, 1.0, 1.0)
+    assert board.late()
+
+
+def test_late_from_the_first_moment_after_the_limit() -> None:
+    moves = Displacement(Latest(Twist(0.1), 5), Twist(0.1))
+    state = Standstill(Phase.STOPPING, due_ns=100, displacement=moves)
+    assert [state.is_late(at_ns) for at_ns in (100, 101)] == [False, True]
+    assert not replace(state, phase=Phase.STANDING).is_late(101)
+    assert not replace(state, due_ns=None).is_late(101)
+    assert not replace(state, displacement=Displacement(steady=STILL)).is_late(101)
+
+
+def test_an_unknown_velocity_counts_as_the_fastest() -> None:
+    board = Board(replace(SETTINGS, max_linear=0.7, max_angular=0.4))
+    board.step(None, moves=True)
+    board.step(None)
+    assert board.state.due_ns == board.now_ns + round(0.7 / 0.6 * NS_PER_S) + GRACE_NS
+    board.run(0.7 / 0.6 + 0.5, None)
+    assert not board.late()
+    board.run(2 * TICK_S, None)
+    assert board.late()
+    assert not board.state.rolls
+    assert board.state.text == "Standstill is not confirmed: no velocity is received."
+
+
+def test_the_first_known_velocity_shortens_the_limit_once() -> None:
+    board = stopping(1.0)
+    board.step(None)
+    began_ns = board.now_ns
+    assert board.state.due_ns == began_ns + round(NS_PER_S / 0.6) + GRACE_NS
+    due_ns = board.step(0.3).due_ns
+    assert due_ns == board.now_ns + NS_PER_S
+    board.step(None)  # a later gap does not extend the limit
+    assert board.step(1.0).due_ns == due_ns
+
+
+def test_at_start_the_limit_counts_from_the_first_velocity() -> None:
+    board = Board()
+    board.run(60.0, None)
+    assert not board.late()
+    board.run(1.0, 0.3)
+    assert not board.late()
+    board.run(2 * TICK_S, 0.3)
+    assert board.late()
+    assert board.state.text == "The vehicle does not stop: 0.30 m/s, 0.00 rad/s."
+
+
+def dither(board: Board, seconds: float, linear: float | None) -> float | None:
+    """Alternate motions of 0.04 s and stops of 0.4 s; return when it is late."""
+    began_ns = board.now_ns
+    while board.now_ns - began_ns < seconds * NS_PER_S:
+        for tick in range(22):
+            board.step(linear, moves=tick < 2)
+            if board.late():
+                return (board.now_ns - began_ns) / NS_PER_S
+    return None
+
+
+@pytest.mark.parametrize("linear", [0.3, None])
+def test_short_motions_do_not_postpone_the_limit(linear: float | None) -> None:
+    board = stopping(0.3)
+    board.run(0.1, 0.3)
+    late_s = dither(board, 60.0, linear)
+    assert late_s is not None
+    assert late_s < 1.2
+    assert dither(Board(), 2.0, None) is None  # no velocity was known yet
+
+
+@pytest.mark.parametrize(("ticks", "renewed"), [(1, False), (24, False), (25, True)])
+def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -> None:
+    board = stopping(0.3)
+    due_ns = board.step(0.3).due_ns
+    assert due_ns is not None
+    for _ in range(ticks):
+        board.step(0.9, moves=True)
+    after_ns = board.step(0.9).due_ns
+    assert after_ns is not None
+    assert (after_ns - board.now_ns == round(0.9 / 0.6 * NS_PER_S) + GRACE_NS) == renewed
+    assert (after_ns == due_ns + ticks * TICK_NS) != renewed
+
+
+def test_a_vehicle_that_stood_has_a_new_limit() -> None:
+    board = stopping(0.3)
+    board.run(0.1, 0.3)
+    board.step(0.0, moves=True)
+    board.step(0.3, moves=True)
+    assert board.state.due_ns is None
+    assert board.step(0.3).due_ns == board.now_ns + NS_PER_S
+
+
+def test_standstill_is_confirmed_after_exactly_its_time() -> None:
+    board = Board()
+    board.step()
+    for _ in range(CONFIRM_NS // TICK_NS):
+        assert board.state.phase is Phase.STOPPING
+        board.step()
+    assert board.state.phase is Phase.STANDING
+    board.run(5.0)
+    assert not board.late()
+
+
+def test_a_motion_between_begins_the_confirmation_anew() -> None:
+    board = stopping(0.4)
+    board.run(0.1, 0.4)
+    board.run(0.1, 0.0)
+    board.run(0.1, -0.1)  # the rebound of a contact
+    assert board.state.still_ns is None
+    board.run(0.18)
+    assert board.state.still_ns is not None
+    board.run(0.1)
+    assert board.state.phase is Phase.STANDING
+    assert board.state.displacement.integrated == STILL
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular"), [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1), (1.0, 0.0)]
+)
+def test_velocities_alone_detect_an_uncommanded_motion(linear: float, angular: float) -> None:
+    board = standing()
+    took_s = 0.0
+    while not board.run(TICK_S, linear, angular):
+        took_s += TICK_S
+        assert took_s < 1.0
+    away = max(abs(linear), abs(angular)) * took_s
+    assert away < 0.05 + 0.02 * max(1.0, abs(linear) * 2)
+
+
+@pytest.mark.parametrize(
+    ("field", "away", "left"),
+    [("distance", 0.049, False), ("distance", -0.051, True), ("distance", 3.0, True),
+     ("heading", -0.048, False), ("heading", 0.052, True), ("heading", -1.9, True)],
+)  # fmt: skip
+def test_counters_alone_detect_an_uncommanded_motion(field: str, away: float, left: bool) -> None:
+    board = standing()
+    setattr(board, field, away)
+    assert board.step().left is left
+
+
+def test_a_vehicle_that_left_has_to_stop_anew_and_is_held_until_it_drives() -> None:
+    board = standing()
+    assert board.run(0.2, 0.5)
+    assert not board.state.left
+    assert board.state.due_ns is not None
+    board.run(0.5 / 0.6 + 0.5, 0.5)
+    assert board.late()
+    board.run(0.3)
+    assert board.state.phase is Phase.STANDING
+    assert not board.run(5.0)
+    assert board.state.rolls
+    assert not board.step(0.3, moves=True).rolls
+
+
+def test_a_commanded_motion_is_no_uncommanded_one() -> None:
+    board = standing()
+    for _ in range(50):
+        board.distance += 0.02
+        assert not board.step(1.0, moves=True).left
