@@ -1,5 +1,6 @@
 """Plain Zenoh clients, written from ``docs/bus.md`` alone: they import nothing of the project."""
 
+import contextlib
 import itertools
 import json
 import random
@@ -42,8 +43,10 @@ class Client:
         ]
 
     def _on_sample(self, sample: "zenoh.Sample") -> None:
-        key = str(sample.key_expr).removeprefix(f"{ROOT}/")
-        self.newest[key] = sample.payload.to_bytes()
+        payload = sample.payload.to_bytes()
+        with contextlib.suppress(ValueError, TypeError):  # anybody may publish anything
+            if isinstance(msgpack.unpackb(payload), dict):
+                self.newest[str(sample.key_expr).removeprefix(f"{ROOT}/")] = payload
 
     def last(self, key: str) -> Map:
         """Return the newest message of a key; empty before the first one."""
