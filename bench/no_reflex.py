@@ -23,7 +23,7 @@ def main() -> int:
         patch.multiple(Core, reflex=lambda *_: None, datagram=unbraked),
         patch.object(MotionOutput, "on_hit", lambda *_: None),
     ):
-        return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE, in_place=True, links=2)
+        return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE)
 
 
 def unbraked(core: Core, datagram: bytes, port: int, now_ns: int, *, reported: bool) -> Output:

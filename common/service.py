@@ -33,7 +33,6 @@ from common.verdict import MAX_TEXT
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
 QUERY_PERIOD_S = 0.02  # one query of each key
-HOLD_TIMEOUT_S = 0.1  # limit for a handler of another thread, before the exit actions
 NICENESS = 10  # of services that do not drive
 
 
@@ -45,13 +44,12 @@ class Node(Generic[C]):
 
     drive: DriveLink  # of bridge and safety, see ``open_drive``
 
-    def __init__(self, name: str, loaded: Loaded[C], *, in_place: bool = False) -> None:
-        """Set up; ``in_place``: handlers of the bus run in Zenoh's threads (``Loop.submit``)."""
+    def __init__(self, name: str, loaded: Loaded[C]) -> None:
         self.name = name
         self.config: C = loaded.config
         self.loop = Loop()
-        self._submit = self.loop.submit if in_place else self.loop.post
         self.log = log.Logger()
+        self.buses: list[Bus] = []
         self.bus = self.open_bus()
         self.counters: Counter[str] = Counter()
         self.is_stopped: Callable[[], bool] = lambda: True  # polled while stopping
@@ -64,10 +62,24 @@ class Node(Generic[C]):
         self._counted: Counter[str] = Counter()
 
     def open_bus(self) -> Bus:
-        """Return a bus with its own session, not yet open; the first one is ``bus``."""
-        bus = Bus(self.config.bus, self.config.robot.id, self.loop.post, self._submit)
+        """Return a bus with a session of its own; all open and close together."""
+        bus = Bus(self.config.bus, self.config.robot.id, self.loop.post)
+        self.buses.append(bus)
         self.loop.every(QUERY_PERIOD_S, lambda _: bus.answer_queries())
         return bus
+
+    def open(self) -> None:
+        """Start connecting all sessions; returns at once."""
+        links = sum(len(bus.sessions) for bus in self.buses)
+        os.environ.setdefault(RUNTIME_ENV, ONE_POOL.format(links=links))
+        for bus in self.buses:
+            bus.open()
+
+    def close(self) -> None:
+        """Close all sessions, and the loop."""
+        for bus in self.buses:
+            bus.close()
+        self.loop.close()
 
     def open_drive(self, *, listens: bool) -> DriveLink:
         """Create this service's end of the drive link; it opens and closes with ``bus``."""
@@ -135,22 +147,15 @@ def run(
     argv: Sequence[str] | None = None,
     *,
     priority: int = 0,
-    in_place: bool = False,
-    links: int = 1,
 ) -> int:
-    """Run a service with this number of Zenoh sessions; return its exit code.
-
-    ``priority`` is one of ``realtime``'s. With ``in_place`` handlers of the bus also run in Zenoh's
-    threads, while the loop sleeps; they must not wait for files or for other hosts.
-    """
-    os.environ.setdefault(RUNTIME_ENV, ONE_POOL.format(links=links))
+    """Run a service; return its exit code. ``priority`` is one of ``realtime``'s."""
     try:
         loaded = load(root, sources(arguments(name).parse_args(argv)))
         if priority and loaded.config.robot.realtime:
             realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
         log.configure(loaded.config.log, name)
-        node = Node(name, loaded, in_place=in_place)
+        node = Node(name, loaded)
     except ConfigError as error:
         print(f"{name}: {error}", file=sys.stderr)  # noqa: T201 - whatever the log's format
         return EXIT_CONFIG
@@ -195,7 +200,7 @@ def serve(node: Node[C]) -> int:
     if systemd.enabled:
         node.loop.every(CHECK_PERIOD_S, systemd.ready)
     try:
-        node.bus.open()
+        node.open()
         node.log.info("started", robot=node.config.robot.id)
         node.loop.run()
         node.log.info("stopping")
@@ -204,8 +209,7 @@ def serve(node: Node[C]) -> int:
     finally:
         exit_actions.run()
         # Also after a crash: an open session keeps a failed process from ending.
-        node.bus.close()
-        node.loop.close()
+        node.close()
     node.log.info("stopped")
     return 0
 
@@ -262,7 +266,6 @@ def _on_signal(node: Node[C], exit_actions: ExitActions) -> None:
     def leave(number: int, _: FrameType | None) -> None:
         if exit_actions.running:
             return  # the interrupted call ends the process
-        node.loop.hold(HOLD_TIMEOUT_S)
         try:
             exit_actions.run()
         finally:

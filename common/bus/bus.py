@@ -1,10 +1,11 @@
-"""One Zenoh session of one process, with its declarations."""
+"""One process on the bus: what it publishes, subscribes to, answers and calls."""
 
 import contextlib
 import os
 import time
 from collections import Counter
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 import zenoh
@@ -12,18 +13,21 @@ import zenoh.ext
 from msgspec import Struct
 
 from common import clock, codec, settings
-from common.bus.calls import Answers, Caller
+from common.bus.calls import Caller, is_timeout, refusal_of
+from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
-from common.bus.session import Opener, copied
-from common.bus.subscriber import Post, Subscriber, Take
+from common.bus.session import Session, client
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
+from common.loop import Post
 from common.messages import Message
+from common.operator import no_answer
 from common.sample import Sample
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
 R = TypeVar("R", bound=Struct)
+Stamped = tuple[zenoh.Sample, int]  # with its receive time, in monotonic nanoseconds
 
 QUERIES = 8  # of each key that wait for ``answer_queries``
 
@@ -38,18 +42,14 @@ class Arrival(Struct, Generic[M], frozen=True):
 
 
 class Bus:
-    """One Zenoh session of one process.
+    """A client of a router: declare first, then ``open``.
 
-    Declare first, then ``open``: a thread retries until a router answers, and the declarations are
-    made as soon as the session is open. Zenoh renews them after a router's restart.
-
-    ``post`` passes a call to the owner's thread. ``submit`` passes it the handling of a sample or
-    an answer, which by default is the same.
+    All handlers are called in the owner's thread: ``post`` passes a call to it. Zenoh's threads
+    only stamp and queue what arrives.
     """
 
-    def __init__(
-        self, where: settings.BusSettings, robot: str, post: Post, submit: Post | None = None
-    ) -> None:
+    def __init__(self, where: settings.BusSettings, robot: str, post: Post) -> None:
+        self.where = where
         self.robot = robot
         # Not by `secrets`: it loads OpenSSL, 5 ms and 5 MB in each process.
         self.boot = int.from_bytes(os.urandom(8), "big") >> 1
@@ -60,25 +60,42 @@ class Bus:
         self.counters: Counter[str] = Counter(overrun=0, undecodable=0)
         self.publishers: list[Publisher[Any]] = []
         self.post = post
-        self.submit = submit or post
-        self._declarations: list[Callable[[zenoh.Session], Any]] = []
-        self._declared: list[Any] = []  # references keep them alive
+        self._session = client(where, post)
+        self.sessions = [self._session]  # with private ones, which open and close with it
         self._queries: list[tuple[zenoh.Queryable[Any], Callable[[zenoh.Query], None]]] = []
-        self._session: zenoh.Session | None = None
-        self._transports = self._opened = 0  # open now; opened since the start
         self._closed = False
-        self.where = where
-        self.links: list[Bus] = []  # private sessions that open and close with this one
-        self._opener = self.opener(lambda session: post(lambda: self._adopt(session)))
 
-    # --- declarations ---------------------------------------------------------------------
+    def open(self) -> None:
+        """Start connecting; returns at once."""
+        for session in self.sessions:
+            session.open()
+
+    def close(self) -> None:
+        """Close the session; no handler is called after that."""
+        self._closed = True
+        for publisher in self.publishers:
+            publisher.withdraw()
+        for session in self.sessions:
+            session.close()
+
+    @property
+    def connection(self) -> int:
+        """Number of the connection to a router, rising; 0: none."""
+        return self._session.connection
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection now."""
+        return self.connection > 0
+
+    # --- samples ----------------------------------------------------------------------------
 
     def publisher(self, topic: Topic[M], **names: str) -> Publisher[M]:
         """Return a publisher for a topic of this robot."""
         key = topic.on(self.robot, **names)
         publisher = Publisher(topic, key, self.boot, self.counts, self.host)
         self.publishers.append(publisher)
-        self._declare(publisher.declare)
+        self._session.declare(publisher.declare)
         return publisher
 
     def subscribe(
@@ -89,6 +106,7 @@ class Bus:
         depth: int = 1,
         refused: Callable[[str, MessageError], None] | None = None,
         known: Collection[str] = (),
+        session: Session | None = None,
         **names: str,
     ) -> None:
         """Call the handler for each message, with a queue of ``depth``.
@@ -101,7 +119,8 @@ class Bus:
         only = "" if "*" in expression else expression  # reading the key of a sample takes time
         single = topic.known(self.robot, names, known) | {expression}
 
-        def take(sample: zenoh.Sample, received_ns: int) -> None:
+        def take(stamped: Stamped) -> None:
+            sample, received_ns = stamped
             key = only or str(sample.key_expr)
             self.counts[key if key in single else expression] += 1
             try:
@@ -114,7 +133,7 @@ class Bus:
             raw = sample.attachment.to_bytes() if sample.attachment else None
             handler(Arrival(message, key, received_ns, raw))
 
-        self._subscribe(expression, take, depth, topic.service.history)
+        self._subscribe(expression, take, depth, topic.service.history, session)
 
     def tap(self, expression: str, handler: Callable[[Sample], None], *, depth: int) -> None:
         """Call the handler with each raw sample on these keys; see ``subscribe``.
@@ -122,19 +141,44 @@ class Bus:
         ``**`` in an expression does not match chunks that begin with ``@``.
         """
 
-        def take(sample: zenoh.Sample, received_ns: int) -> None:
+        def take(stamped: Stamped) -> None:
+            sample, received_ns = stamped
             late_ns = clock.now_ns() - received_ns
             handler(copied(sample, received_ns, time.time_ns() - late_ns))
 
-        self._subscribe(expression, take, depth, history=0)
+        self._subscribe(expression, take, depth)
 
     def on_any(self, key: str, handler: Callable[[int], None]) -> None:
         """Call the handler with the receive time for any PUT or DELETE on a key."""
-        self._subscribe(key, lambda _, received_ns: handler(received_ns), depth=1, history=0)
+        self._subscribe(key, lambda stamped: handler(stamped[1]), depth=1)
 
     def announce(self, key: str) -> None:
         """Declare a subscriber of a key whose samples another subscription handles."""
-        self._declare(lambda session: session.declare_subscriber(key, lambda _: None))
+        self._session.declare(lambda session: session.declare_subscriber(key, lambda _: None))
+
+    def estop(self) -> None:
+        """Stop this robot; latches in safety."""
+        if self._session.zenoh is not None:
+            self._session.zenoh.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
+
+    # --- liveliness ---------------------------------------------------------------------------
+
+    def live(self, key: str) -> None:
+        """Declare a liveliness token."""
+        self._session.declare(lambda session: session.liveliness().declare_token(key))
+
+    def watch_live(self, expression: str, handler: Callable[[str, bool], None]) -> None:
+        """Call the handler with each liveliness key that appears or disappears."""
+
+        def queue(sample: zenoh.Sample) -> None:
+            key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
+            self._hand_over(lambda: handler(key, alive))
+
+        self._session.declare(
+            lambda session: session.liveliness().declare_subscriber(expression, queue, history=True)
+        )
+
+    # --- queries ------------------------------------------------------------------------------
 
     def serve(self, call: Call[Q, R], handler: Callable[[Q, Caller[R]], None]) -> None:
         """Answer a call: the handler replies or refuses, at once or later."""
@@ -175,21 +219,6 @@ class Bus:
                 if query := queryable.try_recv():
                     take(query)
 
-    def live(self, key: str) -> None:
-        """Declare a liveliness token."""
-        self._declare(lambda session: session.liveliness().declare_token(key))
-
-    def watch_live(self, expression: str, handler: Callable[[str, bool], None]) -> None:
-        """Call the handler with each liveliness key that appears or disappears."""
-
-        def queue(sample: zenoh.Sample) -> None:
-            key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-            self._hand_over(lambda: handler(key, alive))
-
-        self._declare(
-            lambda session: session.liveliness().declare_subscriber(expression, queue, history=True)
-        )
-
     def call(
         self,
         call: Call[Q, R],
@@ -200,11 +229,19 @@ class Bus:
     ) -> None:
         """Make a call; exactly one of both handlers is called."""
 
-        def read(payload: bytes) -> R:
-            return codec.decode(payload, call.reply)
+        def read(payload: bytes) -> None:
+            try:
+                reply = codec.decode(payload, call.reply)
+            except MessageError as error:
+                on_refusal(str(error))
+            else:
+                on_reply(reply)
 
-        answers = Answers(call.server, read, on_reply, on_refusal, self._hand_over)
-        self._query(call.on(self.robot), codec.encode(request), answers, timeout_s)
+        payload = codec.encode(request)
+        self._query(
+            call.on(self.robot), payload, timeout_s,
+            server=call.server, on_answer=read, on_refusal=on_refusal,
+        )  # fmt: skip
 
     def look_up(
         self,
@@ -215,91 +252,106 @@ class Bus:
         timeout_s: float = 2.0,
     ) -> None:
         """Query a service's ``schema``, ``config`` or ``last`` as JSON; calls one handler."""
-        answers = Answers(service, bytes, on_answer, on_refusal, self._hand_over)
-        self._query(info_key(self.robot, service, part), None, answers, timeout_s)
-
-    def estop(self) -> None:
-        """Stop this robot; latches in safety."""
-        if self._session is not None:
-            self._session.put(estop_key(self.robot), b"", **qos(ESTOP_CLASS))
-
-    # --- session -----------------------------------------------------------------------------
-
-    def opener(self, adopt: Callable[[zenoh.Session], None]) -> Opener:
-        """Return the opener of the session."""
-        return Opener(self.where, adopt)
-
-    def open(self) -> None:
-        """Start connecting; returns at once."""
-        for bus in (self, *self.links):
-            bus._opener.start()
-
-    @property
-    def connection(self) -> int:
-        """Number of the connection to a router or a drive link's other end, rising; 0: none."""
-        return self._opened if self._session is not None and self._transports else 0
-
-    @property
-    def connected(self) -> bool:
-        """Whether there is a connection now."""
-        return self.connection > 0
-
-    def close(self) -> None:
-        """Close the session; no handler is called after that."""
-        self._closed = True
-        for publisher in self.publishers:
-            publisher.withdraw()
-        self._session = None
-        self._opener.close()
-        for link in self.links:
-            link.close()
-
-    def _adopt(self, session: zenoh.Session) -> None:
-        if self._closed:
-            return
-        self._declared.append(
-            session.info.declare_transport_events_listener(self._on_transport, history=True)
+        key = info_key(self.robot, service, part)
+        self._query(
+            key, None, timeout_s, server=service, on_answer=on_answer, on_refusal=on_refusal
         )
-        self._declared += [declare(session) for declare in self._declarations]
-        self._session = session
 
-    def _on_transport(self, event: zenoh.TransportEvent) -> None:
-        """Count a transport that was opened or closed, on a thread of Zenoh."""
-        opened = event.kind == zenoh.SampleKind.PUT
-        self._transports += 1 if opened else -1
-        self._opened += opened
-
-    def _declare(self, declare: Callable[[zenoh.Session], Any]) -> None:
-        self._declarations.append(declare)
-        if self._session is not None:
-            self._declared.append(declare(self._session))
+    # --- on Zenoh's threads -------------------------------------------------------------------
 
     def _hand_over(self, call: Callable[[], None]) -> None:
-        """Submit the call, unless the bus is closed by then."""
-        self.submit(lambda: None if self._closed else call())
+        """Pass a call to the owner's thread, which skips it once the bus is closed."""
+        self.post(lambda: None if self._closed else call())
 
-    def _subscribe(self, key: str, take: Take, depth: int, history: int) -> None:
-        def take_if_open(sample: zenoh.Sample, received_ns: int) -> None:
-            if not self._closed:
-                take(sample, received_ns)
-
-        made = Subscriber(key, take_if_open, depth, history, self.counters)
-        self._declare(lambda session: made.declare(session, self.post, self.submit))
-
-    def _query(
-        self, key: str, payload: bytes | None, answers: Answers[Any], timeout_s: float
+    def _subscribe(
+        self,
+        key: str,
+        take: Callable[[Stamped], None],
+        depth: int,
+        history: int = 0,
+        session: Session | None = None,
     ) -> None:
-        if self._session is None:
-            answers.fail("not connected to a router")
-            return
-        callback = zenoh.handlers.Callback(answers.queue, answers.end)
-        self._session.get(
-            key, callback, payload=payload, timeout=timeout_s, congestion_control=QUERY_CONGESTION
-        )
+        def take_if_open(stamped: Stamped) -> None:
+            if not self._closed:
+                take(stamped)
+
+        items = OverwritingQueue(depth, take_if_open, self.post, self.counters)
+
+        def queue(sample: zenoh.Sample) -> None:
+            items.put((sample, clock.now_ns()))
+
+        (session or self._session).declare(partial(_subscriber, key, queue, history))
 
     def _queryable(self, key: str, take: Callable[[zenoh.Query], None]) -> None:
         def declare(session: zenoh.Session) -> None:
             queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(QUERIES))
             self._queries.append((queryable, take))
 
-        self._declare(declare)
+        self._session.declare(declare)
+
+    def _query(
+        self,
+        key: str,
+        payload: bytes | None,
+        timeout_s: float,
+        *,
+        server: str,
+        on_answer: Callable[[bytes], None],
+        on_refusal: Callable[[str], None],
+    ) -> None:
+        if self._session.zenoh is None:
+            self._hand_over(lambda: on_refusal("not connected to a router"))
+            return
+        ended = False
+
+        def end(reply: zenoh.Reply | None) -> None:
+            nonlocal ended
+            if ended:
+                return
+            ended = True
+            if reply is None:
+                on_refusal(no_answer(server))
+            elif reply.ok is None:
+                on_refusal(refusal_of(reply))
+            else:
+                on_answer(reply.ok.payload.to_bytes())
+
+        def queue(reply: zenoh.Reply) -> None:
+            if not is_timeout(reply):
+                self._hand_over(lambda: end(reply))
+
+        self._session.zenoh.get(
+            key,
+            zenoh.handlers.Callback(queue, lambda: self._hand_over(lambda: end(None))),
+            payload=payload,
+            timeout=timeout_s,
+            congestion_control=QUERY_CONGESTION,
+        )
+
+
+def copied(sample: zenoh.Sample, received_ns: int, wall_ns: int) -> Sample:
+    """Return a copy of a sample, without Zenoh's buffers."""
+    return Sample(
+        key=str(sample.key_expr),
+        payload=sample.payload.to_bytes(),
+        encoding=str(sample.encoding),
+        deleted=sample.kind == zenoh.SampleKind.DELETE,
+        raw=sample.attachment.to_bytes() if sample.attachment else None,
+        received_ns=received_ns,
+        wall_ns=wall_ns,
+    )
+
+
+def _subscriber(
+    key: str, queue: Callable[[zenoh.Sample], None], history: int, session: zenoh.Session
+) -> Any:
+    """Declare a subscriber; with ``history`` it gets samples from before, and lost ones."""
+    if not history:
+        return session.declare_subscriber(key, queue)
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        queue,
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+    )

@@ -1,31 +1,36 @@
-"""Bounded queue between Zenoh's threads and a handler; it overwrites the oldest item."""
+"""Bounded queue from Zenoh's threads to a handler in the owner's thread; drops the oldest item."""
 
-import threading
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Callable
 from typing import Generic, TypeVar
+
+from common.loop import Post
 
 T = TypeVar("T")
 
 
 class OverwritingQueue(Generic[T]):
-    """Queue of up to ``depth`` items.
+    """Queue of up to ``depth`` items for ``take``; overwritten ones count as ``overrun``."""
 
-    Check and append are one step, under a lock: the producer wakes the consumer only for an item
-    that overwrote none, so an item lost between both steps would stall the queue.
-    """
-
-    def __init__(self, depth: int) -> None:
+    def __init__(
+        self, depth: int, take: Callable[[T], None], post: Post, counters: Counter[str]
+    ) -> None:
         self._items: deque[T] = deque(maxlen=depth)
-        self._lock = threading.Lock()
+        self._take = take
+        self._post = post
+        self._counters = counters
+        self._posted = False
 
-    def add(self, item: T) -> bool:
-        """Append an item; return whether the oldest one was dropped."""
-        with self._lock:
-            full = len(self._items) == self._items.maxlen
-            self._items.append(item)
-        return full
+    def put(self, item: T) -> None:
+        """Append an item, on a thread of Zenoh; never waits."""
+        if len(self._items) == self._items.maxlen:
+            self._counters["overrun"] += 1
+        self._items.append(item)
+        if not self._posted:
+            self._posted = True
+            self._post(self._drain)
 
-    def take(self) -> T | None:
-        """Remove and return the oldest item, or None."""
-        with self._lock:
-            return self._items.popleft() if self._items else None
+    def _drain(self) -> None:
+        self._posted = False  # first: an item that comes now posts again
+        for _ in range(len(self._items)):  # in a flood, timers and sockets have their turn, too
+            self._take(self._items.popleft())

@@ -15,9 +15,10 @@ import zenoh
 import zenoh.ext
 
 from common import clock
-from common.bus.calls import is_timeout
+from common.bus.bus import copied
+from common.bus.calls import is_timeout, refusal_of
 from common.bus.publisher import QUERY_CONGESTION, qos
-from common.bus.session import check_files, client_config, copied
+from common.bus.session import check_files, client_config
 from common.errors import LinkError
 from common.keys import ClassOfService
 from common.sample import Sample
@@ -50,14 +51,14 @@ class Probe:
 
     def listen(self, expression: str, *, history: bool = False) -> None:
         """Subscribe to these keys; with ``history`` also to samples that publishers kept."""
-        if history:
-            kept = zenoh.ext.HistoryConfig(detect_late_publishers=True)
-            made: Any = zenoh.ext.declare_advanced_subscriber(
-                self._session, expression, self._queue, history=kept
+        self._declared.append(
+            zenoh.ext.declare_advanced_subscriber(
+                self._session, expression, self._queue,
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
             )
-        else:
-            made = self._session.declare_subscriber(expression, self._queue)
-        self._declared.append(made)
+            if history
+            else self._session.declare_subscriber(expression, self._queue)
+        )  # fmt: skip
 
     def take(self, wait_s: float) -> Sample | None:
         """Return the oldest queued sample; None after ``wait_s``."""
@@ -70,8 +71,7 @@ class Probe:
         """Yield samples, for ``seconds`` or without end."""
         end_s = time.monotonic() + (float("inf") if seconds is None else seconds)
         while (left_s := end_s - time.monotonic()) > 0:
-            sample = self.take(min(left_s, 1.0))
-            if sample:
+            if sample := self.take(min(left_s, 1.0)):
                 yield sample
 
     def put(
@@ -186,5 +186,4 @@ def _answer(reply: zenoh.Reply) -> Answer:
     if reply.ok is not None:
         sample = reply.ok
         return Answer(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
-    payload = reply.err.payload.to_bytes() if reply.err else b""
-    return Answer("", b"", refusal=payload.decode(errors="replace") or "refused without a reason")
+    return Answer("", b"", refusal=refusal_of(reply))

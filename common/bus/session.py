@@ -6,15 +6,17 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 import zenoh
 from msgspec.structs import replace
 
-from common.bus.downsampling import downsampling_rules
 from common.errors import ConfigError, LinkError
+from common.keys import FAST, MOTION, TOPICS
 from common.log import Logger
-from common.sample import Sample
+from common.loop import Post
 from common.settings import BusSettings, is_encrypted
 
 RETRY_PERIOD_S = 0.5  # between two attempts to connect
@@ -34,7 +36,7 @@ ONE_POOL = (
     "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),"
     "app:(worker_threads:{links}))"
 )
-RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, on first use
+RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, when the first session opens
 # Timeout of one connection attempt: five round trips of a bad link. After a change of address, a
 # host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000
@@ -48,110 +50,96 @@ RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 
 BURST = {"queue": {"size": {"interactive_high": 16}}, "batch_size": 8192}
 # Connecting to a missing socket is cheap, and a restarted bridge is found within 100 ms.
 REDIAL = {"period_init_ms": 100, "period_max_ms": 100, "period_increase_factor": 1.0}
+# Links of laptops, which may be slow; services on board never use these.
+DOWNSAMPLED = ("tls", "quic")
 
 
-class Opener:
-    """Connects to a router in its own thread, and passes the session on once.
+class Session:
+    """One Zenoh session: declare first, then ``open``.
 
-    ``zenoh.open`` must not wait (it ignores SIGINT then), so the retries are made here.
+    ``zenoh.open`` must not wait (it ignores SIGINT then), so a thread retries it. The owner's
+    thread makes the declarations as soon as it is open; Zenoh renews them after a lost connection.
     """
 
-    def __init__(self, where: BusSettings, adopt: Callable[[zenoh.Session], None]) -> None:
-        check_files(where, where.endpoints)
-        self._where = where
-        self._adopt = adopt
+    def __init__(
+        self, connect: Callable[[int], zenoh.Session], post: Post, missing: str, **about: object
+    ) -> None:
+        """``connect`` gets the number of the attempt; ``missing`` is logged while it fails."""
+        self.zenoh: zenoh.Session | None = None  # once it is open, in the owner's thread
+        self._connect = connect
+        self._post = post
+        self._missing, self._about = missing, about
+        self._declarations: list[Callable[[zenoh.Session], Any]] = []
+        self._declared: list[Any] = []  # references keep them alive
+        self._transports = self._opened = 0  # open now; opened since the start
+        self._found: zenoh.Session | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bus-open", daemon=True)
-        self._session: zenoh.Session | None = None
 
-    def start(self) -> None:
+    def declare(self, declare: Callable[[zenoh.Session], Any]) -> None:
+        """Make a declaration, now or when the session opens."""
+        self._declarations.append(declare)
+        if self.zenoh is not None:
+            self._declared.append(declare(self.zenoh))
+
+    def open(self) -> None:
         """Start connecting; returns at once."""
         self._thread.start()
+
+    @property
+    def connection(self) -> int:
+        """Number of the connection to a router or a drive link's other end, rising; 0: none."""
+        return self._opened if self.zenoh is not None and self._transports else 0
 
     def close(self) -> None:
         """Stop connecting, and close the session if there is one."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()
-        if self._session is not None:
-            self._session.close()
+        self.zenoh = None
+        if self._found is not None:
+            self._found.close()
 
     def _run(self) -> None:
         warned_s = -WARN_PERIOD_S
-        for turn in itertools.count():
+        for attempt in itertools.count():
             if self._closing.is_set():
                 return
             try:
-                self._session = self.opened(turn)
+                self._found = self._connect(attempt)
             except zenoh.ZError:
                 if time.monotonic() - warned_s >= WARN_PERIOD_S:
                     warned_s = time.monotonic()
-                    self.warn()
+                    Logger().warning(self._missing, **self._about)
                 self._closing.wait(RETRY_PERIOD_S)
                 continue
-            self._adopt(self._session)
+            self._post(self._adopt)
             return
 
-    def opened(self, turn: int) -> zenoh.Session:
-        """Open a session, once; raise ``ZError`` on failure."""
-        return zenoh.open(client_config(self._where, turn))
+    def _adopt(self) -> None:
+        if self._closing.is_set() or self._found is None:
+            return
+        listener = self._found.info.declare_transport_events_listener
+        self._declared.append(listener(self._on_transport, history=True))
+        self._declared += [declare(self._found) for declare in self._declarations]
+        self.zenoh = self._found
 
-    def warn(self) -> None:
-        """Log that there is no session yet."""
-        Logger().warning(
-            "waiting for a router; run `t2 doctor`", endpoints=list(self._where.endpoints)
-        )
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        """Count a transport that was opened or closed, on a thread of Zenoh."""
+        opened = event.kind == zenoh.SampleKind.PUT
+        self._transports += 1 if opened else -1
+        self._opened += opened
 
 
-def client_config(where: BusSettings, turn: int = 0) -> zenoh.Config:
-    """Return the configuration of a client of one of these routers, without scouting.
-
-    Zenoh spends the whole timeout on a first endpoint that is silent, so each attempt begins with
-    another one.
-    """
-    first = turn % len(where.endpoints)
-    endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
-    connect = {"endpoints": endpoints, "timeout_ms": 1500, "retry": RETRY}
-    return zenoh.Config.from_json5(
-        json.dumps(_common(where, {}) | {"mode": "client", "connect": connect})
+def client(where: BusSettings, post: Post) -> Session:
+    """Return a client's session; raise ``ConfigError`` for an unreadable certificate."""
+    check_files(where, where.endpoints)
+    return Session(
+        lambda attempt: zenoh.open(client_config(where, attempt)),
+        post,
+        "waiting for a router; run `t2 doctor`",
+        endpoints=list(where.endpoints),
     )
-
-
-def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Config:
-    """Return the configuration of one end of the drive link: one socket and no other endpoint."""
-    ends: dict[str, object] = {"listen": {"endpoints": []}, "connect": {"endpoints": []}}
-    endpoint = [f"unixsock-stream/{socket}"]
-    if listens:
-        ends["listen"] = {"endpoints": endpoint}
-    else:
-        ends["connect"] = {"endpoints": endpoint, "retry": REDIAL}
-    whole = _common(where, BURST) | {"mode": "peer"} | ends
-    return zenoh.Config.from_json5(json.dumps(whole))
-
-
-def router_config(
-    where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
-) -> dict[str, object]:
-    """Return a router's configuration, as JSON.
-
-    ``access`` is its ``access_control``; streams of ``robot`` are downsampled towards laptops.
-    """
-    parts: dict[str, object] = {
-        "mode": "router",
-        "listen": {"endpoints": list(where.listen)},
-        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
-    }
-    if where.uplink:
-        parts["connect"] = {"endpoints": list(where.uplink), "retry": RETRY}
-        # Routers exchange all declarations of all; a peer exchanges only its own. The region name
-        # identifies robots to a site's router that has an uplink of its own.
-        parts |= {"mode": "peer", "region_name": "robot"}
-    if access is not None:
-        parts["access_control"] = access
-    if robot:
-        parts |= downsampling_rules(robot, where.laptop_rate)
-    full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
-    return _common(where, {"queue": full}, ROUTER_MAX) | parts
 
 
 @contextlib.contextmanager
@@ -164,77 +152,13 @@ def router(
         with contextlib.suppress(OSError):  # Zenoh reports the error
             Path(socket.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
     try:
-        config = json.dumps(router_config(where, access, robot))
-        session = zenoh.open(zenoh.Config.from_json5(config))
+        session = zenoh.open(_parsed(router_config(where, access, robot)))
     except zenoh.ZError as error:
         reason = str(error).split(" at /")[0]
         listen = ", ".join(where.listen)
         raise LinkError(f"the router cannot listen on {listen}: {reason}") from None
     with session:
         yield
-
-
-def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
-    """Raise ``ConfigError`` for an unreadable certificate file of these endpoints."""
-    if not any(map(is_encrypted, endpoints)):
-        return
-    for name in ("ca", "certificate", "private_key"):
-        file = Path(getattr(where, name))
-        try:
-            file.read_bytes()
-        except OSError as error:
-            raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
-
-
-def _common(
-    where: BusSettings, sending: Mapping[str, object], largest: int = CLIENT_MAX
-) -> dict[str, object]:
-    link: dict[str, object] = {
-        "tx": {
-            "lease": round(where.lease * 1000),
-            "keep_alive": 4,
-            **sending,
-        },
-        "rx": {"max_message_size": largest},
-    }
-    if where.ca:
-        link["tls"] = _tls(where)
-    return {
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        # The advanced publishers of evt/** need timestamps.
-        "timestamping": {"enabled": True},
-        "transport": {
-            "link": link,
-            "shared_memory": {"enabled": False},  # our frames are tiny
-            "unicast": {"open_timeout": OPEN_MS},
-        },
-    }
-
-
-def _tls(where: BusSettings) -> dict[str, object]:
-    """Return the mutual TLS settings: both ends present a certificate of the site's CA."""
-    return {
-        "root_ca_certificate": where.ca,
-        "listen_certificate": where.certificate,
-        "listen_private_key": where.private_key,
-        "connect_certificate": where.certificate,
-        "connect_private_key": where.private_key,
-        "enable_mtls": True,
-        "close_link_on_expiration": True,
-    }
-
-
-def copied(sample: zenoh.Sample, received_ns: int, wall_ns: int) -> Sample:
-    """Return a copy of a sample, without Zenoh's buffers."""
-    return Sample(
-        key=str(sample.key_expr),
-        payload=sample.payload.to_bytes(),
-        encoding=str(sample.encoding),
-        deleted=sample.kind == zenoh.SampleKind.DELETE,
-        raw=sample.attachment.to_bytes() if sample.attachment else None,
-        received_ns=received_ns,
-        wall_ns=wall_ns,
-    )
 
 
 def router_at(where: BusSettings) -> BusSettings:
@@ -256,3 +180,115 @@ def answers(where: BusSettings) -> bool:
             for reply in session.get(f"@/{zid}/*", timeout=where.probe_deadline)
         )
     return False
+
+
+def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
+    """Raise ``ConfigError`` for an unreadable certificate file of these endpoints."""
+    if not any(map(is_encrypted, endpoints)):
+        return
+    for name in ("ca", "certificate", "private_key"):
+        file = Path(getattr(where, name))
+        try:
+            file.read_bytes()
+        except OSError as error:
+            raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
+
+
+# --- configurations -----------------------------------------------------------------------------
+
+
+def client_config(where: BusSettings, attempt: int = 0) -> zenoh.Config:
+    """Return the configuration of a client of one of these routers, without scouting.
+
+    Zenoh spends the whole timeout on a first endpoint that is silent, so each attempt begins with
+    another one.
+    """
+    first = attempt % len(where.endpoints)
+    endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
+    connect = {"endpoints": endpoints, "timeout_ms": 1500, "retry": RETRY}
+    return _parsed(_common(where) | {"mode": "client", "connect": connect})
+
+
+def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Config:
+    """Return the configuration of one end of the drive link: one socket and no other endpoint."""
+    here, nowhere = {"endpoints": [f"unixsock-stream/{socket}"]}, {"endpoints": list[str]()}
+    ends: dict[str, object] = {"listen": here, "connect": nowhere}
+    if not listens:
+        ends = {"listen": nowhere, "connect": {**here, "retry": REDIAL}}
+    return _parsed(_common(where, BURST) | {"mode": "peer"} | ends)
+
+
+def router_config(
+    where: BusSettings, access: Mapping[str, object] | None = None, robot: str = ""
+) -> dict[str, object]:
+    """Return a router's configuration, as JSON.
+
+    ``access`` is its ``access_control``; streams of ``robot`` are downsampled towards laptops.
+    """
+    parts: dict[str, object] = {
+        "mode": "router",
+        "listen": {"endpoints": list(where.listen)},
+        "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}},
+    }
+    if where.uplink:
+        parts["connect"] = {"endpoints": list(where.uplink), "retry": RETRY}
+        # Routers exchange all declarations of all; a peer exchanges only its own. The region name
+        # identifies robots to a site's router that has an uplink of its own.
+        parts |= {"mode": "peer", "region_name": "robot"}
+    if access is not None:
+        parts["access_control"] = access
+    if robot and (rules := downsampling_rules(robot, where.laptop_rate)):
+        parts["downsampling"] = rules
+    full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
+    return _common(where, {"queue": full}, ROUTER_MAX) | parts
+
+
+def downsampling_rules(robot: str, rate_hz: float) -> list[dict[str, Any]]:
+    """Return the rules that limit each stream of a robot to ``rate_hz`` on a laptop's link.
+
+    The state, events, answers and everything *from* laptops are not limited. Zenoh applies a limit
+    per rule, not per key: a rule is for one robot.
+    """
+    streams = [topic for topic in TOPICS if topic.service is FAST or topic is MOTION]
+    rules: list[dict[str, Any]] = []
+    for topic in streams:
+        if topic.rate_hz > rate_hz:
+            # Zenoh passes a sample when 1 / freq has elapsed: half a period earlier than due, so
+            # that one that is slightly early passes, too.
+            every = ceil(topic.rate_hz / rate_hz)
+            rules.append({"key_expr": topic.on(robot), "freq": topic.rate_hz / (every - 0.5)})
+    egress = {"id": "laptops", "flows": ["egress"], "messages": ["put"], "rules": rules}
+    return [egress | {"link_protocols": list(DOWNSAMPLED)}] if rules else []
+
+
+def _parsed(config: Mapping[str, object]) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(config))
+
+
+def _common(
+    where: BusSettings, sending: Mapping[str, object] | None = None, largest: int = CLIENT_MAX
+) -> dict[str, object]:
+    link: dict[str, object] = {
+        "tx": {"lease": round(where.lease * 1000), "keep_alive": 4, **(sending or {})},
+        "rx": {"max_message_size": largest},
+    }
+    if where.ca:  # mutual TLS: both ends present a certificate of the site's CA
+        link["tls"] = {
+            "root_ca_certificate": where.ca,
+            "listen_certificate": where.certificate,
+            "listen_private_key": where.private_key,
+            "connect_certificate": where.certificate,
+            "connect_private_key": where.private_key,
+            "enable_mtls": True,
+            "close_link_on_expiration": True,
+        }
+    return {
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        # The advanced publishers of evt/** need timestamps.
+        "timestamping": {"enabled": True},
+        "transport": {
+            "link": link,
+            "shared_memory": {"enabled": False},  # our frames are tiny
+            "unicast": {"open_timeout": OPEN_MS},
+        },
+    }

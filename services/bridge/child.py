@@ -22,14 +22,7 @@ def main() -> int:
     inherited = received(os.environ)
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run(
-        "bridge",
-        BridgeConfig,
-        lambda node: Bridge(node, inherited),
-        priority=ahead,
-        in_place=True,
-        links=2,  # to the router and to safety
-    )
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, inherited), priority=ahead)
 
 
 if __name__ == "__main__":

@@ -7,4 +7,4 @@ from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
 
 if __name__ == "__main__":
-    sys.exit(run("odom", OdomConfig, Odometer, in_place=True))
+    sys.exit(run("odom", OdomConfig, Odometer))

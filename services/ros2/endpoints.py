@@ -1,7 +1,7 @@
 """The gateway's node on the wire of ROS 2: publishers, subscriptions, services and their tokens.
 
 A Zenoh session of its own, so that a gateway that is stopped takes all its tokens with it. Zenoh's
-threads only stamp what arrives; ``submit`` passes it to the service's loop.
+threads only stamp and queue what arrives; the service's loop handles it.
 """
 
 import contextlib
@@ -14,15 +14,15 @@ import xxhash
 import zenoh
 import zenoh.ext
 
+from common import clock
 from common.bus.overwriting_queue import OverwritingQueue
-from common.bus.session import Opener
-from common.bus.subscriber import Subscriber
+from common.bus.session import client
+from common.loop import Post
 from common.settings import BusSettings
 from services.ros2 import attachment, cdr, names
 from services.ros2.attachment import Attachment
 from services.ros2.cdr import CdrError, Value
 
-Post = Callable[[Callable[[], None]], None]
 Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time (monotonic, ns)
 Answer = Callable[[Value], None]
 Serve = Callable[[Attachment, Value, Answer], None]  # the client, its request
@@ -79,20 +79,17 @@ class Endpoints:
         counters.update(undecodable=0, overrun=0)  # Zenoh's threads must not add names
         self._node = node
         self._post = post
-        self._session: zenoh.Session | None = None
-        self._declare: list[Callable[[zenoh.Session], Any]] = []
-        self._declared: list[Any] = []  # references keep them alive
         self._number = 0
-        self._opener = Opener(where, lambda session: post(lambda: self._adopt(session)))
+        self._session = client(where, post)
+        self._session.declare(self._join)
 
     def open(self) -> None:
         """Start connecting; returns at once."""
-        self._opener.start()
+        self._session.open()
 
     def close(self) -> None:
         """Close the session: all tokens disappear."""
-        self._session = None
-        self._opener.close()
+        self._session.close()
 
     def publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
         """Return a publisher of an absolute topic."""
@@ -109,7 +106,7 @@ class Endpoints:
             made.declared(sent, gid(token))
             return sent, session.liveliness().declare_token(token)
 
-        self._declare.append(declare)
+        self._session.declare(declare)
         return made
 
     def subscribe(
@@ -118,7 +115,8 @@ class Endpoints:
         """Call ``take`` for each message; ``refused`` gets the error of unreadable ones."""
         key, number = names.data_key(self._node.domain, topic, interface), self._next()
 
-        def read(sample: zenoh.Sample, received_ns: int) -> None:
+        def read(stamped: tuple[zenoh.Sample, int]) -> None:
+            sample, received_ns = stamped
             try:
                 raw = sample.attachment.to_bytes() if sample.attachment else b""
                 about = attachment.decode(raw)
@@ -129,41 +127,37 @@ class Endpoints:
             else:
                 take(about, message, received_ns)
 
-        made = Subscriber(key, read, DEPTH, 0, self.counters)
+        waiting = OverwritingQueue(DEPTH, read, self._post, self.counters)
+
+        def queue(sample: zenoh.Sample) -> None:
+            waiting.put((sample, clock.now_ns()))
 
         def declare(session: zenoh.Session) -> Any:
             token = self._token(number, "MS", topic, interface, names.QOS)
             return (
-                made.declare(session, self._post, self._post),
+                session.declare_subscriber(key, queue),
                 session.liveliness().declare_token(token),
             )
 
-        self._declare.append(declare)
+        self._session.declare(declare)
 
     def serve(self, service: str, interface: str, handle: Serve) -> None:
         """Answer the requests of a service; ``handle`` calls the answer once, now or later."""
         key, number = names.data_key(self._node.domain, service, interface), self._next()
 
-        waiting: OverwritingQueue[zenoh.Query] = OverwritingQueue(DEPTH)
+        def answer(query: zenoh.Query) -> None:
+            self._answer(query, key, interface, handle)
 
-        def next_query() -> None:
-            if query := waiting.take():
-                self._answer(query, key, interface, handle)
-
-        def queue(query: zenoh.Query) -> None:
-            if waiting.add(query):
-                self.counters["overrun"] += 1
-            else:
-                self._post(next_query)
+        waiting = OverwritingQueue(DEPTH, answer, self._post, self.counters)
 
         def declare(session: zenoh.Session) -> Any:
             token = self._token(number, "SS", service, interface, names.QOS)
             return (
-                session.declare_queryable(key, queue, complete=True),
+                session.declare_queryable(key, waiting.put, complete=True),
                 session.liveliness().declare_token(token),
             )
 
-        self._declare.append(declare)
+        self._session.declare(declare)
 
     def _answer(self, query: zenoh.Query, key: str, interface: str, handle: Serve) -> None:
         try:
@@ -198,15 +192,13 @@ class Endpoints:
             self._post(lambda: seen(token, appeared))
 
         key = f"{names.LIVELINESS}/{self._node.domain}/**"
-        self._declare.append(
+        self._session.declare(
             lambda session: session.liveliness().declare_subscriber(key, queue, history=True)
         )
 
-    def _adopt(self, session: zenoh.Session) -> None:
+    def _join(self, session: zenoh.Session) -> Any:
         self._node = self._node._replace(zid=str(session.info.zid()))
-        self._declared.append(session.liveliness().declare_token(self._node.token))
-        self._declared += [declare(session) for declare in self._declare]
-        self._session = session
+        return session.liveliness().declare_token(self._node.token)
 
     def _token(self, number: int, kind: str, topic: str, interface: str, qos: str) -> str:
         return self._node.endpoint_token(number, kind, topic, interface, qos)

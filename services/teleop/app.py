@@ -16,8 +16,8 @@ from textual.containers import Horizontal
 from textual.widgets import Static
 
 from common import clock
-from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
+from common.loop import Post
 from common.text import printable
 from services.teleop import panels
 from services.teleop.config import Teleop

@@ -169,7 +169,7 @@ def test_what_is_not_finite_never_reaches_the_board(bridge: BridgeFixture, hosti
 
 def test_wrong_types_and_garbage_on_motion_are_dropped(bridge: BridgeFixture) -> None:
     bridge.drive()
-    session = bridge.bus.links[0]._session  # the drive link's
+    session = bridge.bus.sessions[1].zenoh  # the drive link's
     assert session is not None
     for payload in (b"", b"\xc1", msgpack.packb({"command": "fly"}), msgpack.packb([1] * 1000)):
         session.put("t2/v1/001/@cmd/motion", payload)
@@ -281,7 +281,7 @@ def test_a_motion_from_the_router_is_not_even_read(bridge: BridgeFixture) -> Non
     bridge.drive()
     rejected = m.Motion(command=Command.RUN, linear=0.9, boot=bridge.bus.boot, seq=2**62)
     with running(Loop()) as loop, bus_on(bridge.endpoint, loop, lambda _: None) as foreign:
-        session = foreign._session
+        session = foreign.sessions[0].zenoh
         assert session is not None
         for _ in range(50):
             session.put(keys.MOTION.on("001"), codec.encode(rejected))

@@ -3,6 +3,7 @@
 import contextlib
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from functools import partial
 
@@ -51,36 +52,28 @@ def turn(loop: Loop) -> None:
 # --- timers, on a clock of the test's own -------------------------------------------------------
 
 
-def test_a_timer_is_due_at_once_and_then_every_period(loop: Loop, clock: Clock) -> None:
+@pytest.mark.parametrize(
+    ("after_s", "calls_s"),
+    [
+        ([], [0.0]),  # due at once
+        ([0.99], [0.0]),
+        ([0.99, 0.01], [0.0, 1.0]),
+        ([5.4, 0.0, 0.6], [0.0, 5.4, 6.0]),  # late: once, without a burst, and on its beat again
+    ],
+)
+def test_a_timer_is_due_every_period(
+    loop: Loop, clock: Clock, after_s: list[float], calls_s: list[float]
+) -> None:
     calls: list[int] = []
     loop.every(1.0, calls.append)
     turn(loop)
-    assert calls == [100 * NS_PER_S]
-    clock.pass_s(0.99)
-    turn(loop)
-    assert len(calls) == 1
-    clock.pass_s(0.01)
-    turn(loop)
-    assert calls == [100 * NS_PER_S, 101 * NS_PER_S]
+    for seconds in after_s:
+        clock.pass_s(seconds)
+        turn(loop)
+    assert calls == [round((100 + at_s) * NS_PER_S) for at_s in calls_s]
 
 
-def test_a_late_timer_is_called_once_and_keeps_its_beat(loop: Loop, clock: Clock) -> None:
-    calls: list[int] = []
-    loop.every(1.0, calls.append)
-    turn(loop)
-    clock.pass_s(5.4)
-    turn(loop)
-    turn(loop)
-    assert calls == [
-        100 * NS_PER_S,
-        round(105.4 * NS_PER_S),
-    ]  # no burst for the four that were missed
-    clock.pass_s(0.6)
-    turn(loop)
-    assert calls[2:] == [106 * NS_PER_S]
-
-
-def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock) -> None:
+def test_a_deferred_timer_is_due_a_period_later(loop: Loop, clock: Clock) -> None:
     calls: list[int] = []
     timer = loop.every(1.0, calls.append)
     turn(loop)
@@ -94,23 +87,17 @@ def test_a_timer_that_is_put_off_is_due_a_period_later(loop: Loop, clock: Clock)
     assert calls[1:] == [round(103.7 * NS_PER_S)]
 
 
-def test_who_is_put_off_too_late_was_late(loop: Loop, clock: Clock) -> None:
+def test_lateness_is_the_worst_since_the_last_report(loop: Loop, clock: Clock) -> None:
     timer = loop.every(1.0, lambda _: None)
-    turn(loop)
-    clock.pass_s(1.5)
-    loop.post(lambda: timer.defer(clock.now_ns()))
-    turn(loop)
-    assert loop.take_lateness_s() == 0.5
-
-
-def test_lateness_is_the_worst_since_it_was_asked_for(loop: Loop, clock: Clock) -> None:
-    loop.every(1.0, lambda _: None)
     loop.every(0.5, lambda _: None)
     turn(loop)
     clock.pass_s(1.25)
     turn(loop)
     assert loop.take_lateness_s() == 0.75  # of the timer that was due at 0.5
     assert loop.take_lateness_s() == 0.0
+    clock.pass_s(1.75)
+    timer.defer(clock.now_ns())  # one that is deferred too late was late, too
+    assert loop.take_lateness_s() == 1.0
 
 
 def test_a_timer_may_set_a_timer(loop: Loop, clock: Clock) -> None:
@@ -121,7 +108,7 @@ def test_a_timer_may_set_a_timer(loop: Loop, clock: Clock) -> None:
     assert calls == ["inner"]
 
 
-def test_what_was_posted_is_done_before_timers_judge_its_age(loop: Loop, clock: Clock) -> None:
+def test_posted_calls_are_made_before_timers_judge_their_age(loop: Loop, clock: Clock) -> None:
     order: list[str] = []
     loop.every(1.0, lambda _: order.append("timer"))
     loop.post(lambda: order.append("posted"))
@@ -140,16 +127,21 @@ def test_an_idle_loop_sleeps_until_the_next_timer(loop: Loop, clock: Clock) -> N
     assert loop._until_due_s() == 0
 
 
-# --- its end ------------------------------------------------------------------------------------
+def test_a_call_that_posts_again_does_not_starve_timers(loop: Loop) -> None:
+    def again() -> None:
+        loop.post(again)
 
-
-def test_a_stop_before_run_is_kept(loop: Loop) -> None:
-    loop.stop()
+    loop.every(1.0, lambda _: loop.stop())
+    again()
     loop.run()  # returns, or the test times out
 
 
-def test_it_runs_again_after_a_stop(loop: Loop) -> None:
-    turn(loop)
+# --- its end ------------------------------------------------------------------------------------
+
+
+def test_a_stop_before_run_is_kept_and_it_runs_again_after_that(loop: Loop) -> None:
+    loop.stop()
+    loop.run()
     calls: list[int] = []
     loop.post(lambda: calls.append(1))
     turn(loop)
@@ -159,6 +151,7 @@ def test_it_runs_again_after_a_stop(loop: Loop) -> None:
 def test_a_stop_from_another_thread_ends_an_idle_loop(loop: Loop) -> None:
     thread = threading.Thread(target=loop.run)
     thread.start()
+    time.sleep(0.05)  # it sleeps
     loop.stop()
     thread.join(20)
     assert not thread.is_alive()
@@ -171,7 +164,7 @@ def test_posting_after_the_end_is_harmless() -> None:
     loop.stop()
 
 
-def test_an_error_of_ours_is_not_swallowed(loop: Loop) -> None:
+def test_an_error_of_a_call_ends_the_run(loop: Loop) -> None:
     loop.post(lambda: [][0])
     with pytest.raises(IndexError):
         loop.run()
@@ -184,13 +177,15 @@ def test_posts_of_many_threads_arrive_all_and_in_order_in_one_thread() -> None:
     seen: list[tuple[int, int]] = []
     homes: set[int] = set()
 
-    def hear(sender: int, number: int) -> None:
+    def take(sender: int, number: int) -> None:
         seen.append((sender, number))
         homes.add(threading.get_ident())
 
     def send(sender: int) -> None:
-        for number in range(2000):  # more than the wake-up pipe holds
-            busy.post(partial(hear, sender, number))
+        for number in range(2000):
+            busy.post(partial(take, sender, number))
+            if number % 7 == 0:
+                time.sleep(0)  # the loop may fall asleep in between
 
     with running(Loop()) as busy:
         senders = [threading.Thread(target=send, args=(sender,)) for sender in range(3)]
@@ -204,21 +199,15 @@ def test_posts_of_many_threads_arrive_all_and_in_order_in_one_thread() -> None:
         assert [number for who, number in seen if who == sender] == list(range(2000))
 
 
-def test_a_call_that_posts_again_does_not_starve_timers(loop: Loop, clock: Clock) -> None:
-    calls = 0
-
-    def again() -> None:
-        loop.post(again)
-
-    def tick(_: int) -> None:
-        nonlocal calls
-        calls += 1
-        loop.stop()
-
-    loop.every(1.0, tick)
-    again()
-    loop.run()
-    assert calls == 1
+def test_many_posts_wake_the_loop_once(loop: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
+    wakes: list[int] = []
+    monkeypatch.setattr(loop, "_wake", lambda: wakes.append(1))
+    loop.post(lambda: None)
+    assert wakes == []  # it does not sleep: it sees the call before it does
+    loop._sleeps = True
+    loop.post(lambda: None)
+    loop.post(lambda: None)
+    assert wakes == [1]
 
 
 def test_a_socket_is_read_when_there_is_something(loop: Loop) -> None:

@@ -44,8 +44,7 @@ def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
     reader = node.open_bus()
     SafetyService(node, reader)
     with running(node.loop):
-        for bus in (node.bus, reader):
-            bus.open()
+        node.open()
         wait_until(lambda: node.bus.connected and reader.connected, "both sessions")
         yield node
         closed = threading.Event()
@@ -162,27 +161,6 @@ def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
         )
 
 
-def test_a_request_is_posted_to_the_loop_once(endpoint: str) -> None:
-    loop, posts = Loop(), 0
-    with running(loop), safety_on(endpoint) as node, bus_on(endpoint, loop, lambda _: None) as bus:
-        drive = bus.publisher(keys.DRIVE, source="demo")
-        post = node.bus.post
-
-        def counted(call: Callable[[], None]) -> None:
-            nonlocal posts
-            posts += 1
-            post(call)
-
-        node.bus.post = counted
-        repeat_until(
-            lambda: drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
-            lambda: node.counters["refused_late"] >= 30,
-            "requests",
-        )
-        assert posts <= node.counters["refused_late"] + 5  # others on the bus, and what waits
-        assert node.bus.counters["overrun"] == 0
-
-
 def test_an_estop_by_delete_latches(endpoint: str) -> None:
     loop, seen = Loop(), Seen()
     with (
@@ -233,11 +211,9 @@ def test_the_source_is_the_last_part_of_the_key() -> None:
     assert source_of(keys.DRIVE.on("001", source="nav")) == "nav"
 
 
-def test_the_program_opens_a_reader_and_closes_it(
+def test_the_emergency_stop_has_a_session_of_its_own(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened: list[Bus] = []
-
     def run(
         name: str,
         root: object,
@@ -245,21 +221,16 @@ def test_the_program_opens_a_reader_and_closes_it(
         argv: object,
         *,
         priority: int,
-        in_place: bool,
-        links: int,
     ) -> int:
-        assert (priority, in_place, links) == (realtime.SAFETY, True, 3)
+        assert priority == realtime.SAFETY
         node = make_node(endpoint, "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]')
-        opened.append(node.open_bus())
-        monkeypatch.setattr(node, "open_bus", lambda: opened[0])
         build(node)
-        with running(node.loop):
-            wait_until(lambda: opened[0].connected, "the reader")
+        assert [len(bus.sessions) for bus in node.buses] == [2, 1]  # one is the drive link
+        node.loop.close()
         return 5
 
     monkeypatch.setattr(program, "run", run)
     assert program.main([]) == 5
-    assert not opened[0].connected
 
 
 def test_what_the_bridge_measures_is_not_taken_from_the_router(endpoint: str) -> None:

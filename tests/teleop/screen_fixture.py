@@ -8,8 +8,8 @@ from contextlib import asynccontextmanager
 from textual.pilot import Pilot
 
 from common import keys
-from common.bus.subscriber import Post
 from common.freshness import NS_PER_S
+from common.loop import Post
 from services.teleop.app import Panel
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller

@@ -1,6 +1,7 @@
 """Publish and subscribe over a real router: what arrives, and what is refused."""
 
 import threading
+import time
 from collections.abc import Callable
 
 import msgpack
@@ -170,6 +171,31 @@ def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int)
     wait_until(lambda: received[-1] == last + 1, "the one after")
 
 
+@pytest.mark.timed
+def test_in_a_flood_samples_are_stamped_at_once_and_handled_by_the_owner(
+    buses: BusFixture,
+) -> None:
+    """A thousand samples a second, of which two hundred can be handled."""
+    late_s: list[float] = []
+    threads: set[int] = set()
+
+    def take(arrival: Arrival[Bumper]) -> None:
+        threads.add(threading.get_ident())
+        late_s.append((arrival.received_ns - arrival.message.mono_ns) / 1e9)
+        time.sleep(0.005)
+
+    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, take))
+    publisher = buses.bus().publisher(keys.BUMPER)
+    wait_until(lambda: publisher.passed_on, "a subscriber")
+    end_s = time.monotonic() + 2.0
+    while time.monotonic() < end_s:
+        publisher.put(Bumper(pressed=False))
+        time.sleep(0.001)
+    assert len(late_s) > 50
+    assert sorted(late_s)[len(late_s) // 2] < 0.25
+    assert len(threads) == 1
+
+
 def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:
     stops: list[int] = []
     buses.bus(lambda bus: bus.on_any(keys.estop_key(buses.robot), stops.append))
@@ -218,9 +244,10 @@ def test_a_session_that_is_found_but_not_taken_over_is_closed(buses: BusFixture)
     bus.live(keys.live_key(buses.robot, "bridge", "1"))
     bus.open()
     wait_until(lambda: posted, "a session")
+    (session,) = bus.sessions
     bus.close()
     for call in posted:
         call()
-    assert bus._opener._session is not None
-    assert bus._opener._session.is_closed()
+    assert session._found is not None
+    assert session._found.is_closed()
     assert not bus.connected

@@ -1,48 +1,53 @@
-"""The items between two threads."""
+"""The queue between Zenoh's threads and the owner's: what is kept, and when the owner is woken."""
 
-import threading
-from collections import deque
+from collections import Counter
+from collections.abc import Callable
 
 import pytest
 
 from common.bus.overwriting_queue import OverwritingQueue
 
 
-def test_what_came_first_goes_first() -> None:
-    items: OverwritingQueue[int] = OverwritingQueue(3)
-    assert [items.add(number) for number in (1, 2, 3)] == [False] * 3
-    assert [items.take() for _ in range(4)] == [1, 2, 3, None]
+class Owner:
+    """An owner that makes the posted calls when the test says so."""
+
+    def __init__(self, depth: int) -> None:
+        self.posted: list[Callable[[], None]] = []
+        self.taken: list[int] = []
+        self.counters: Counter[str] = Counter()
+        self.on_take: Callable[[int], None] = lambda _: None
+        self.queue = OverwritingQueue(depth, self.take, self.posted.append, self.counters)
+
+    def take(self, item: int) -> None:
+        self.taken.append(item)
+        self.on_take(item)
+
+    def turn(self) -> None:
+        calls, self.posted[:] = self.posted[:], []
+        for call in calls:
+            call()
 
 
 @pytest.mark.parametrize("depth", [1, 3])
-def test_a_newer_one_pushes_the_oldest_out(depth: int) -> None:
-    items: OverwritingQueue[int] = OverwritingQueue(depth)
-    pushed = [items.add(number) for number in range(10)]
-    assert pushed == [False] * depth + [True] * (10 - depth)
-    assert [items.take() for _ in range(depth)] == list(range(10 - depth, 10))
+def test_newer_items_overwrite_the_oldest_and_wake_the_owner_once(depth: int) -> None:
+    owner = Owner(depth)
+    for number in range(10):
+        owner.queue.put(number)
+    assert len(owner.posted) == 1
+    owner.turn()
+    assert owner.taken == list(range(10 - depth, 10))
+    assert owner.counters["overrun"] == 10 - depth
+    owner.queue.put(10)
+    owner.turn()
+    assert owner.taken[-1] == 10
 
 
-class Meddled(deque[int]):
-    """Lets another thread try to take in the middle of an ``add``."""
-
-    def __init__(self, items: OverwritingQueue[int], depth: int) -> None:
-        super().__init__(maxlen=depth)
-        self.taken: list[int | None] = []
-        self.taker = threading.Thread(target=lambda: self.taken.append(items.take()))
-
-    def append(self, item: int) -> None:
-        if self:
-            self.taker.start()
-            self.taker.join(0.2)  # it cannot end in here: it has to wait
-        super().append(item)
-
-
-def test_what_is_taken_while_another_is_added_is_the_newest() -> None:
-    """Otherwise ``add`` wakes no consumer, and the newest item stays in the queue."""
-    items: OverwritingQueue[int] = OverwritingQueue(1)
-    meddled = items._items = Meddled(items, 1)
-    assert not items.add(1)
-    assert items.add(2)
-    meddled.taker.join(20)
-    assert meddled.taken == [2]
-    assert items.take() is None
+def test_an_item_that_comes_during_a_turn_is_of_the_next_turn() -> None:
+    """Also the newest one is never left in the queue, and a flood does not hold the owner."""
+    owner = Owner(3)
+    owner.on_take = lambda item: owner.queue.put(item + 1) if item < 3 else None
+    owner.queue.put(0)
+    for taken in ([0], [0, 1], [0, 1, 2], [0, 1, 2, 3]):
+        owner.turn()
+        assert owner.taken == taken
+    assert not owner.posted

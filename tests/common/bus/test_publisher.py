@@ -1,6 +1,9 @@
 """Publishing: the message header, the stored samples and the Zenoh settings."""
 
+import subprocess
+import sys
 from collections import Counter
+from pathlib import Path
 from typing import Any, cast
 
 import msgpack
@@ -8,7 +11,7 @@ import pytest
 import zenoh
 
 from common import keys
-from common.bus.publisher import Publisher, qos
+from common.bus.publisher import BOOT_ID, Publisher, host_id, qos
 from common.keys import ClassOfService
 from common.messages import Bumper, Motion
 from common.motion import Command
@@ -76,3 +79,30 @@ def test_a_motion_never_waits_for_a_bus() -> None:
     publisher.put(Motion(command=Command.RUN))
     publisher.declare(cast(zenoh.Session, session))
     assert counts["k"] == len(session.sent) == 1
+
+
+# --- the host, whose clock a message names ------------------------------------------------------
+
+
+@pytest.mark.skipif(not BOOT_ID.exists(), reason="this system does not name its boot")
+def test_another_process_of_this_host_has_the_same_id() -> None:
+    code = "from common.bus.publisher import host_id; print(host_id())"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(ran.stdout) == host_id() != 0
+
+
+@pytest.mark.parametrize(
+    ("text", "host"),
+    [
+        ("ffffffff-ffff-ffff-0000-000000000000\n", 2**63 - 1),
+        ("00000000-0000-0002-ffff-ffffffffffff\n", 1),
+        (None, 0),
+        ("", 0),
+        ("no such thing", 0),
+    ],
+)
+def test_the_id_is_made_of_the_boots_own_name(tmp_path: Path, text: str | None, host: int) -> None:
+    file = tmp_path / "boot_id"
+    if text is not None:
+        file.write_text(text, encoding="ascii")
+    assert host_id(file) == host

@@ -12,7 +12,14 @@ from common import keys, settings
 from common.bus import session as session_module
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
-from common.bus.session import CLIENT_MAX, ROUTER_MAX, client_config, router
+from common.bus.session import (
+    CLIENT_MAX,
+    ROUTER_MAX,
+    client_config,
+    downsampling_rules,
+    router,
+    router_config,
+)
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
@@ -141,7 +148,7 @@ def test_closing_while_it_looks_for_a_router_does_not_wait_for_one() -> None:
     bus = Bus(at(nowhere()), "001", lambda call: call())
     bus.open()
     bus.close()
-    assert not bus._opener._thread.is_alive()
+    assert not bus.sessions[0]._thread.is_alive()
 
 
 def test_a_bus_that_was_never_opened_can_be_closed() -> None:
@@ -186,16 +193,63 @@ def test_a_larger_message_is_dropped_and_its_link_stays() -> None:
             ours.declare_subscriber("x", lambda sample: received.append(len(sample.payload))),
             plain_reader.declare_subscriber("x", lambda got: forwarded.append(len(got.payload))),
         )
-        until_received(lambda: sender.put("x", b"1"), lambda: received and forwarded, "a sample")
-        links = sender.info.zid(), [str(zid) for zid in sender.info.routers_zid()]
+        fits, forwarded_only = CLIENT_MAX - 1000, (CLIENT_MAX + 1000, ROUTER_MAX - 1000)
         block = zenoh.CongestionControl.BLOCK
-        sizes = (CLIENT_MAX - 1000, CLIENT_MAX + 1000, ROUTER_MAX - 1000, ROUTER_MAX + 1000, 10**8)
-        for size in (*sizes, 2):
+
+        def put(size: int, *sizes: list[int]) -> None:
+            """Put until these have it: a busy router drops large messages."""
+            until_received(
+                lambda: sender.put("x", bytes(size), congestion_control=block),
+                lambda: all(size in each for each in sizes),
+                f"{size} bytes",
+            )
+
+        put(1, received, forwarded)
+        links = sender.info.zid(), [str(zid) for zid in sender.info.routers_zid()]
+        put(fits, received, forwarded)
+        for size in forwarded_only:
+            put(size, forwarded)
+        for size in (ROUTER_MAX + 1000, 10**8):
             sender.put("x", bytes(size), congestion_control=block)
-        wait_until(lambda: received[-1] == forwarded[-1] == 2, "the last one, on the same links")
-        assert [size for size in received if size > 1] == [sizes[0], 2]
-        assert [size for size in forwarded if size > 1] == [*sizes[:3], 2]
+        put(2, received, forwarded)
+        assert set(received) == {1, fits, 2}
+        assert set(forwarded) == {1, fits, *forwarded_only, 2}
         assert links == (sender.info.zid(), [str(zid) for zid in sender.info.routers_zid()])
         status = Path(f"/proc/{process.pid}/status").read_text("utf-8")
         assert int(status.partition("VmHWM:")[2].split()[0]) < 150_000  # kB
         del kept
+
+
+# --- downsampling for laptops -------------------------------------------------------------------
+
+
+def rules(rate_hz: float) -> dict[str, float]:
+    (egress,) = downsampling_rules("007", rate_hz)
+    return {rule["key_expr"]: rule["freq"] for rule in egress["rules"]}
+
+
+def test_fast_streams_and_motions_alone_are_downsampled() -> None:
+    fast = {t.on("007") for t in keys.TOPICS if t.service is keys.FAST and t.rate_hz > 10}
+    assert set(rules(10.0)) == {*fast, keys.MOTION.on("007")}
+    assert downsampling_rules("007", 50.0) == []
+
+
+@pytest.mark.parametrize(
+    ("wanted_hz", "every"), [(10.0, 5), (5.0, 10), (12.0, 5), (25.0, 2), (49.0, 2)]
+)
+def test_every_nth_sample_passes_early_or_late_by_less_than_half(
+    wanted_hz: float, every: int
+) -> None:
+    held_s = 1 / rules(wanted_hz)[keys.BUMPER.on("007")]
+    assert (every - 1) / 50 < held_s < every / 50
+
+
+def test_a_robots_router_downsamples_towards_laptops_and_nothing_on_board() -> None:
+    config = router_config(settings.BusSettings(), robot="007")
+    zenoh.Config.from_json5(json.dumps(config))  # refuses unknown fields
+    rate_hz = settings.BusSettings().laptop_rate
+    assert config["downsampling"] == downsampling_rules("007", rate_hz)
+    (egress,) = downsampling_rules("007", rate_hz)
+    assert (egress["flows"], egress["messages"]) == (["egress"], ["put"])
+    assert egress["link_protocols"] == ["tls", "quic"]
+    assert "downsampling" not in router_config(settings.BusSettings())
