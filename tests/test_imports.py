@@ -7,7 +7,7 @@ import sys
 import pytest
 
 ON_BOARD = (
-    "cli.run.router", "services.bridge.__main__", "services.bridge.child",
+    "cli.run.router", "services.bridge.__main__", "services.bridge.bridge",
     "services.safety.__main__", "services.odom.__main__",
 )  # fmt: skip
 # What each of them costs stands where it is done without. The rest is for laptops.
@@ -38,4 +38,4 @@ def test_it_would_be_seen() -> None:
 
 def test_the_guard_knows_no_bus() -> None:
     assert "zenoh" not in imported("services.bridge.__main__")
-    assert "zenoh" in imported("services.bridge.child")
+    assert "zenoh" in imported("services.bridge.bridge")

@@ -20,9 +20,9 @@ from common.operator import reset_request
 from common.service import Node
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
-from services.bridge.core import Core
-from services.bridge.motion_output import MotionOutput
-from services.bridge.operator import Operator
+from services.bridge.core.calls import Calls
+from services.bridge.core.core import Core
+from services.bridge.core.motion_output import MotionOutput
 from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator
 from services.odom.odometer import Odometer
@@ -36,7 +36,7 @@ from verification.harness.waiting import wait_until
 pytestmark = pytest.mark.timed
 
 CORES: dict[type, str] = {
-    Core: "bridge", MotionOutput: "bridge", Operator: "bridge", Policy: "safety", Estimator: "odom",
+    Core: "bridge", MotionOutput: "bridge", Calls: "bridge", Policy: "safety", Estimator: "odom",
 }  # fmt: skip
 LASTS_S = 4.0
 

@@ -27,7 +27,7 @@ from common.motion import Twist
 from common.wire import commands, reports
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
-from services.bridge.translate import Translator
+from services.bridge.core.translate import Translator
 from services.bridge.udp import Sockets
 
 POLL_S = 0.005

@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except LinkError as error:
         log.Logger().error(str(error))
         return EXIT_LINK
-    return Guard(config, sockets, child_process.command("services.bridge.child", *given)).run()
+    return Guard(config, sockets, child_process.command("services.bridge.bridge", *given)).run()
 
 
 def bound(board: Board) -> Sockets:

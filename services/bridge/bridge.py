@@ -1,33 +1,54 @@
-"""The bridge's shell: sockets, bus and clock around the core.
+"""``python -m services.bridge.bridge``: the bridge process, started by ``services.bridge.guard``.
 
-The shell carries out what the core returns. The reflex has priority: BRAKE is sent, and the hit is
-published, before the rest of its datagram is read.
+The shell of the core: sockets, bus, clock and the guard's pipe. It carries out the outputs of the
+core one by one, so that BRAKE leaves before anything else of its datagram is processed.
 """
 
+import os
+import signal
+import sys
 from bisect import bisect_left
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from common import clock, keys
+from common import clock, keys, realtime
 from common import messages as m
 from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
-from common.motion import Command
-from common.service import Node
-from services.bridge.config import BridgeConfig, tick_s
-from services.bridge.core import Core
-from services.bridge.guard_ipc import Heartbeat, Inherited
-from services.bridge.output import Output, Send
+from common.motion import BRAKE
+from common.service import Node, run
+from services.bridge.config import BridgeConfig
+from services.bridge.core.core import Core, tick_s
+from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
+from services.bridge.guard import NAME, Heartbeat, Inherited, inherited
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
-LINK_S = 0.2
 MOTIONS = 8  # queue length
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
-
 # Bounds of the histograms: 10 us to 1 s, four a decade.
 BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 4)) for step in range(21))
+
+
+def main() -> int:
+    """Run the bridge until a signal, or until its guard has died."""
+    if NAME not in os.environ:
+        print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
+        return 2
+    # systemd sends these to guard and bridge alike; the guard passes them on.
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    given = inherited(os.environ)
+    # The guard needs the higher priority: it brakes for this process.
+    ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
+    return run(
+        "bridge",
+        BridgeConfig,
+        lambda node: Bridge(node, given),
+        priority=ahead,
+    )
 
 
 class Histogram:
@@ -52,17 +73,15 @@ class Histogram:
 class Bridge:
     """Passes inputs to the core and carries out its outputs."""
 
-    def __init__(self, node: Node[BridgeConfig], inherited: Inherited | None = None) -> None:
+    def __init__(self, node: Node[BridgeConfig], given: Inherited | None = None) -> None:
         self._node = node
         drive = node.open_drive(listens=True)  # safety accepts samples only from this link
-        self._sockets = Sockets(node.config.board, inherited.sockets if inherited else ())
-        self._heartbeat = Heartbeat(inherited.heartbeat, self._on_no_guard) if inherited else None
-        # From the read of a hit: until BRAKE is sent, and until safety's motion acknowledges it.
+        self._sockets = Sockets(node.config.board, given.sockets if given else ())
+        self._heartbeat = Heartbeat(given.heartbeat, self._on_no_guard) if given else None
         self._reactions = {"reflex": Histogram(), "judged_stop": Histogram()}
-        self._hit_ns = 0
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
-        self._unsent: Send | None = None  # the BRAKE that the system did not send
+        self._unsent = False  # whether the system did not send the last order, a BRAKE
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
             "mileage": drive.publisher(keys.MILEAGE),
@@ -73,7 +92,7 @@ class Bridge:
             "link": drive.publisher(keys.LINK),
             "switches": drive.publisher(keys.SWITCHES),
         }
-        self._do(self._core.start())
+        self._send(self._core.start())
         drive.subscribe(keys.MOTION, self._on_motion, depth=MOTIONS)
         node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         # Safety receives it, too, unless it hangs, restarts or is cut off.
@@ -90,7 +109,6 @@ class Bridge:
         period_s = tick_s(self._node.config.bridge)
         self._late_ns = round(1.5 * period_s * NS_PER_S)
         loop.every(period_s, self._on_tick)
-        loop.every(LINK_S, self._on_link)
         loop.every(1.0, self._on_second)
         self._node.reactions = lambda: {n: one.message() for n, one in self._reactions.items()}
         self._node.is_stopped = self._is_stopped
@@ -98,31 +116,22 @@ class Bridge:
 
     # --- in -----------------------------------------------------------------------------------
 
-    def _on_readable(self, port: int, now_ns: int) -> None:
-        self._read(now_ns, port)
+    def _on_readable(self, port: int, _: int) -> None:
+        self._read(port)
 
-    def _read(self, now_ns: int, *ports: int) -> None:
+    def _read(self, *ports: int) -> None:
         """Process the datagrams waiting in the sockets of these ports."""
         # The port of the commands first: after a stall both ports have datagrams, and the other one
         # must not take over only because it is read first.
         first = self._core.motions.port
         for port, datagram, read_ns in self._sockets.read(first, *ports):
-            hit = self._core.reflex(datagram)
-            if hit is not None:
-                self._brake(hit.brake)
-                self._reactions["reflex"].add(clock.now_ns() - read_ns)
-                self._hit_ns = read_ns
-                self._do(self._core.hit(hit, now_ns))
-            self._do(self._core.datagram(datagram, port, now_ns, reported=hit is not None))
+            self._do(self._core.datagram(datagram, port, read_ns))
 
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
-        out = self._core.motion(arrival.message, arrival.received_ns, clock.now_ns())
-        self._do(out)
-        if out.acked:
-            self._reactions["judged_stop"].add(clock.now_ns() - self._hit_ns)
+        self._do(self._core.motion(arrival.message, arrival.received_ns, clock.now_ns()))
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
-        self._core.operator.on_safety(arrival.message, arrival.received_ns)
+        self._core.safety(arrival.message, arrival.received_ns)
 
     def _on_switches(self, request: m.SwitchesRequest, caller: Caller[m.Switches]) -> None:
         self._do(self._core.switches(request, caller, clock.now_ns()))
@@ -134,21 +143,15 @@ class Bridge:
         if now_ns - self._ticked_ns > self._late_ns:
             # Read the sockets first: after a stall of this loop, queued datagrams are not yet
             # counted, and the board would seem silent.
-            self._read(now_ns, *range(len(self._sockets.sockets)))
+            self._read(*range(len(self._sockets.sockets)))
         self._ticked_ns = now_ns
-        report = self._sockets.take_relay_report()
-        if report and not self._core.readiness.relay.take(report, now_ns):
-            self._core.report.rejected["relay_report"] += 1
-        unsent = self._unsent
-        out = self._core.tick(now_ns, self._sockets.send_errors)
-        self._do(out)
-        if unsent is not None and self._unsent is unsent:  # no newer order
-            self._brake(self._core.motions.brake())
+        if report := self._sockets.take_relay_report():
+            self._core.relay_report(report, now_ns)
+        if self._unsent:
+            self._send(self._core.motions.order(BRAKE))
+        self._do(self._core.tick(now_ns))
         if self._heartbeat is not None:
             self._heartbeat.beat(self._core.motions.port)
-
-    def _on_link(self, now_ns: int) -> None:
-        self._do(self._core.link(now_ns, self._sockets.send_errors))
 
     def _on_second(self, _: int) -> None:
         self._report_sockets()
@@ -156,40 +159,35 @@ class Bridge:
 
     # --- out ----------------------------------------------------------------------------------
 
-    def _do(self, out: Output) -> None:
-        """Carry out what the core returned, frames first."""
-        for send in out.sends:
-            self._send(send)
-        for stream, message, raw in out.messages:
-            self._publishers[stream].put(message, raw)
-        for event in out.events:
-            self._node.event(event.name, event.level, event.text, **event.about)
-        for warning in out.warnings:
-            self._node.log.warning(warning)
-        for answer in out.answers:
-            answer.give()
+    def _do(self, outputs: Iterable[Output]) -> None:
+        """Carry out what the core yields."""
+        for output in outputs:
+            match output:
+                case Send():
+                    self._send(output)
+                case Publish(stream, message, raw):
+                    self._publishers[stream].put(message, raw)
+                case Event(name, level, text, about):
+                    self._node.event(name, level, text, **about)
+                case Reply(caller, reply):
+                    caller.reply(reply)
+                case Refuse(caller, reason):
+                    caller.refuse(reason)
+                case Reacted(name, since_ns):
+                    self._reactions[name].add(clock.now_ns() - since_ns)
 
     def _send(self, send: Send) -> None:
-        if send.order is Command.BRAKE:
-            self._brake(send)
-            return
-        self._sockets.send(send.datagram, send.port)
+        """Send; a BRAKE that the system refuses is sent again, at once and at each tick."""
+        is_brake = send.order is BRAKE
+        sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
-            self._unsent = None
-
-    def _brake(self, brake: Send) -> None:
-        """Send BRAKE, retrying when the system refuses.
-
-        A BRAKE that could not be sent is sent again at each tick.
-        """
-        sent = self._sockets.send(brake.datagram, brake.port, BRAKE_ATTEMPTS)
-        self._unsent = None if sent else brake
+            self._unsent = is_brake and not sent
 
     # --- counters ---------------------------------------------------------------------------
 
     def _report_sockets(self) -> None:
         sockets, counters = self._sockets, self._node.counters
-        rejected = self._core.report.rejected
+        rejected = self._core.rejected
         foreign = sockets.last_foreign_source
         if sockets.refused > rejected["wrong_address"] and foreign is not None:
             board = self._node.config.board
@@ -220,6 +218,10 @@ class Bridge:
         return self._core.motions.is_stopped(now_ns)
 
     def _on_exit(self) -> None:
-        self._do(self._core.exit(clock.now_ns()))
+        self._send(self._core.exit(clock.now_ns()))
         if self._heartbeat is not None:
             self._heartbeat.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

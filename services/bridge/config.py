@@ -1,26 +1,10 @@
-"""Settings of the bridge, and the queries and ports that follow from them."""
+"""Settings of the bridge."""
 
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
 from common import settings
-from common.freshness import NS_PER_S
-from common.wire import commands, reports
-from common.wire.frame import Frame, Side
-from services.bridge.ports import Ports
-
-ECHO_HZ = 5.0
-STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
-ASKED: dict[str, type[Frame]] = {
-    "bumper": reports.BumperReport,
-    "mileage": reports.DistanceReport,
-    "ultrasonic": reports.UltrasonicReport,
-}
-ANSWERS = {kind.frame.ID: kind.frame for kind in reports.FROM_BOARD.values()}
-
-# The lease, the silence of the board and the guard's patience are ten ticks each.
-TICK_MAX_S = 0.02
 
 Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
@@ -84,34 +68,3 @@ class BridgeConfig(settings.Shared, frozen=True, kw_only=True):
                 f"board.relay_port wants wire.crc {known.crc} over the {known.crc_covers}: "
                 "the relay knows no other"
             )
-
-
-def queries(bridge: Bridge) -> list[tuple[str, Frame, float]]:
-    """Return the queries to the board: name, frame, rate in Hz."""
-    return [
-        ("bumper", commands.BumperQuery(), bridge.bumper_rate),
-        ("mileage", commands.DistanceQuery(), bridge.mileage_rate),
-        ("ultrasonic", commands.UltrasonicQuery(), bridge.ultrasonic_rate),
-        ("driver_left", commands.DriverQuery(Side.LEFT), bridge.driver_rate),
-        ("driver_right", commands.DriverQuery(Side.RIGHT), bridge.driver_rate),
-    ]
-
-
-def tick_s(bridge: Bridge) -> float:
-    """Return the period of the bridge's tick in seconds: each query finds its tick."""
-    return min(TICK_MAX_S, *(1 / rate_hz for _, _, rate_hz in queries(bridge)))
-
-
-def ports_of(config: BridgeConfig, now_ns: int) -> Ports:
-    """Return the port selection, with the poll rate of each kind of frame."""
-    bridge = config.bridge
-    rates_hz: dict[type[Frame], float] = {
-        reports.BumperReport: bridge.bumper_rate,
-        reports.DistanceReport: bridge.mileage_rate,
-        reports.UltrasonicReport: bridge.ultrasonic_rate,
-        reports.DriverReport: bridge.driver_rate,
-        reports.UltrasonicBrakeReport: ECHO_HZ,
-        reports.BumperBrakeReport: ECHO_HZ,
-    }
-    count = len(config.board.listen_ports)
-    return Ports(count, round(bridge.failover * NS_PER_S), rates_hz, now_ns)

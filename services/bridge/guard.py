@@ -17,6 +17,10 @@ not started    until it could be started       started; retried after 0 to 5 s (
 SIGTERM, SIGINT and SIGHUP are passed on; a bridge that stops the vehicle sends its last frame
 itself. A signal after the parent has died means that the supervisor was killed: the system sends it
 then (see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
+
+The bridge inherits the sockets and the write end of a pipe. A byte on the pipe is a heartbeat of
+the bridge's event loop; its value is the index of the port that commands leave from. End of file
+means that the bridge exits or has died.
 """
 
 import os
@@ -24,8 +28,11 @@ import select
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from types import FrameType
+
+from msgspec import Struct
 
 from common import child_process, clock
 from common.child_process import Backoff
@@ -35,7 +42,6 @@ from common.systemd import Systemd
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.config import BridgeConfig
-from services.bridge.guard_ipc import Inherited
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
@@ -44,6 +50,55 @@ START_BRAKES_MAX = 200
 EXIT_BRAKES_MAX = 20  # BRAKEs after the bridge closed its pipe, until it is killed
 NOT_STARTED = 1  # exit code when the bridge could not be started
 STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
+NAME = "T2_BRIDGE_HANDOVER"  # environment variable with the inherited descriptors
+
+
+class Inherited(Struct, frozen=True):
+    """File descriptors that the bridge inherits from its guard."""
+
+    sockets: tuple[int, ...]  # in the order of ``board.listen_ports``
+    heartbeat: int  # write end of the pipe
+
+    @property
+    def descriptors(self) -> tuple[int, ...]:
+        """All descriptors."""
+        return *self.sockets, self.heartbeat
+
+    def environ(self) -> dict[str, str]:
+        """Return the environment variable that lists them."""
+        return {NAME: ",".join(map(str, self.descriptors))}
+
+
+def inherited(environ: Mapping[str, str]) -> Inherited:
+    """Read the inherited descriptors from the environment; KeyError without a guard."""
+    *sockets, heartbeat = map(int, environ[NAME].split(","))
+    return Inherited(tuple(sockets), heartbeat)
+
+
+class Heartbeat:
+    """The bridge's end of the pipe."""
+
+    def __init__(self, descriptor: int, on_gone: Callable[[], None]) -> None:
+        self._descriptor: int | None = descriptor
+        self._on_gone = on_gone
+        os.set_blocking(descriptor, False)
+
+    def beat(self, port: int) -> None:
+        """Send a heartbeat; ``on_gone`` is called once when the guard has died."""
+        if self._descriptor is None:
+            return
+        try:
+            with suppress(BlockingIOError):  # the pipe is full: the guard has heartbeats to read
+                os.write(self._descriptor, bytes((port,)))
+        except OSError:
+            self.end()
+            self._on_gone()
+
+    def end(self) -> None:
+        """Close the pipe: no frame follows."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
 
 
 class Guard:
@@ -95,13 +150,13 @@ class Guard:
         self._child = None
         heartbeat, to_guard = os.pipe()
         try:
-            inherited = Inherited(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
+            given = Inherited(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
             # Own session: ctrl-c reaches only the guard, which passes it on once; a kill of the
             # guard's session spares the bridge, which stops the vehicle.
             self._child = subprocess.Popen(
                 self._command,
-                env=child_process.environ() | inherited.environ(),
-                pass_fds=inherited.descriptors,
+                env=child_process.environ() | given.environ(),
+                pass_fds=given.descriptors,
                 start_new_session=True,
             )
         except BaseException:

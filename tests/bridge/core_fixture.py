@@ -1,20 +1,24 @@
 """The bridge's core and its output so far, without sockets or a bus."""
 
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any
+
+from msgspec import Struct
 
 from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
-from common.motion import Command
+from common.motion import RUN, Command
 from common.wire import reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
 from common.wire.reports import BumperReport, DistanceReport, VelocityReport
 from services.bridge.config import BridgeConfig
-from services.bridge.core import Core
-from services.bridge.output import Output
+from services.bridge.core.core import Core
+from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
 
 MS = NS_PER_S // 1000
 NOW = 1_000 * NS_PER_S
@@ -27,7 +31,7 @@ HIT, CLEAR, STANDS = map(
 
 
 class Bench:
-    """A core and its output so far."""
+    """A core and its outputs so far."""
 
     def __init__(self, *sets: str) -> None:
         self.counters: Counter[str] = Counter()
@@ -35,46 +39,57 @@ class Bench:
         self.core = Core(config, BOOT, self.counters, NOW)
         self.now_ns = NOW
         self.seq = 0
-        self.outs: list[Output] = [self.core.start()]
+        self.outputs: list[Output] = []
+        self.carried_out([self.core.start()])
 
-    def receive(self, *datagrams: bytes, port: int = 0) -> Output:
-        """Pass datagrams to the core as the shell does; return the combined output."""
-        made = Output()
-        for datagram in datagrams:
-            hit = self.core.reflex(datagram)
-            outs = []
-            if hit is not None:
-                made.sends.append(hit.brake)
-                outs.append(self.core.hit(hit, self.now_ns))
-            reported = hit is not None
-            outs.append(self.core.datagram(datagram, port, self.now_ns, reported=reported))
-            for out in outs:
-                made.sends += out.sends
-                made.messages += out.messages
-                made.events += out.events
-                made.answers += out.answers
-                made.hit = made.hit or out.hit
-        self.outs.append(made)
+    def carried_out(self, outputs: Iterable[Output]) -> list[Output]:
+        """Carry out outputs as the shell does; return them."""
+        made = []
+        for output in outputs:
+            made.append(output)
+            if isinstance(output, Reply):
+                output.caller.replies.append(output.reply)
+            elif isinstance(output, Refuse):
+                output.caller.refusals.append(output.reason)
+        self.outputs += made
         return made
 
-    def answer(self, *frames: Frame, port: int = 0) -> Output:
+    def receive(self, *datagrams: bytes, port: int = 0) -> list[Output]:
+        """Receive datagrams now."""
+        return self.carried_out(
+            output
+            for datagram in datagrams
+            for output in self.core.datagram(datagram, port, self.now_ns)
+        )
+
+    def answer(self, *frames: Frame, port: int = 0) -> list[Output]:
         """Receive these frames, one datagram for each."""
         return self.receive(*map(FRAMING.pack, frames), port=port)
 
-    def tick(self, after_ns: int = 10 * MS, send_errors: int = 0) -> Output:
+    def tick(self, after_ns: int = 10 * MS) -> list[Output]:
         """Advance the time, and tick."""
         self.now_ns += after_ns
-        out = self.core.tick(self.now_ns, send_errors)
-        self.outs.append(out)
-        return out
+        return self.carried_out(self.core.tick(self.now_ns))
 
-    def move(self, command: Command = Command.RUN, linear: float = 0.0, **fields: Any) -> Output:
+    def move(self, command: Command = RUN, linear: float = 0.0, **fields: Any) -> list[Output]:
         """Receive a motion from safety."""
         self.seq += 1
         values = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
-        out = self.core.motion(m.Motion(command=command, **values), self.now_ns, self.now_ns)
-        self.outs.append(out)
-        return out
+        motion = m.Motion(command=command, **values)
+        return self.carried_out(self.core.motion(motion, self.now_ns, self.now_ns))
+
+    def estop(self) -> list[Output]:
+        """Receive an emergency stop."""
+        return self.carried_out(self.core.estop(self.now_ns))
+
+    def switch(self, caller: "Caller", **request: Any) -> list[Output]:
+        """Receive a call that sets the brakes."""
+        call = m.SwitchesRequest(**request)
+        return self.carried_out(self.core.switches(call, caller, self.now_ns))
+
+    def lamp(self, caller: "Caller") -> list[Output]:
+        """Receive a call that sets a lamp."""
+        return self.carried_out(self.core.led(m.LedRequest(channel=1, mode=0), caller, self.now_ns))
 
     def arm(self) -> None:
         """Receive all answers and echoes of the board, then a stop from safety."""
@@ -87,33 +102,46 @@ class Bench:
 
     def link(self) -> m.Link:
         """Return the link message of now."""
-        (message,) = published(self.core.link(self.now_ns, 0), "link")
-        assert isinstance(message, m.Link)
-        return message
+        return self.core.link(self.now_ns)
 
 
-def frames(out: Output) -> list[Frame]:
+@dataclass
+class Caller:
+    """Records what it is answered."""
+
+    replies: list[Struct] = field(default_factory=list)
+    refusals: list[str] = field(default_factory=list)
+
+
+def frames(outputs: Iterable[Output]) -> list[Frame]:
     """Return what was sent, read as the board reads it."""
-    parts = [part for send in out.sends for part in FRAMING.read(send.datagram, TO_BOARD)]
+    sends = [output for output in outputs if isinstance(output, Send)]
+    parts = [part for send in sends for part in FRAMING.read(send.datagram, TO_BOARD)]
     assert all(isinstance(part, Received) for part in parts)
     return [part.frame for part in parts if isinstance(part, Received)]
 
 
-def motions(out: Output) -> list[MotionKind]:
+def motions(outputs: Iterable[Output]) -> list[MotionKind]:
     """Return the motion commands that were sent."""
-    return [frame.kind for frame in frames(out) if isinstance(frame, MotionCommand)]
+    return [frame.kind for frame in frames(outputs) if isinstance(frame, MotionCommand)]
 
 
-def published(out: Output, stream: str) -> list[Any]:
+def published(outputs: Iterable[Output], stream: str) -> list[Any]:
     """Return the messages of one stream."""
-    return [message for name, message, _ in out.messages if name == stream]
+    publishes = [output for output in outputs if isinstance(output, Publish)]
+    return [output.message for output in publishes if output.stream == stream]
 
 
-def pressed(out: Output) -> list[bool]:
+def pressed(outputs: Iterable[Output]) -> list[bool]:
     """Return the contents of the bumper messages."""
-    return [message.pressed for message in published(out, "bumper")]
+    return [message.pressed for message in published(outputs, "bumper")]
 
 
-def events(out: Output) -> list[str]:
+def events(outputs: Iterable[Output]) -> list[str]:
     """Return the names of the events."""
-    return [event.name for event in out.events]
+    return [output.name for output in outputs if isinstance(output, Event)]
+
+
+def reactions(outputs: Iterable[Output]) -> list[str]:
+    """Return the names of the reactions."""
+    return [output.name for output in outputs if isinstance(output, Reacted)]

@@ -1,48 +1,165 @@
-"""The bridge's core through its entries: what each input leads to."""
+"""The bridge's core: what each datagram, motion and call leads to, and in which order."""
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
 from common import messages as m
 from common.freshness import NS_PER_S
-from common.motion import Command
+from common.motion import BRAKE, STOP, Command
 from common.wire import commands, reports
 from common.wire.commands import MotionKind
-from common.wire.frame import Frame, Side
-from common.wire.reports import DistanceReport, DriverReport, VelocityReport
-from services.bridge.output import Output
+from common.wire.frame import HEADER, Frame, Side
+from common.wire.framing import crc_function
+from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
+from services.bridge.core.output import Event, Output, Publish, Reacted, Send
 from tests.bridge.core_fixture import (
     BOOT,
     CLEAR,
     FRAMING,
     HIT,
     MS,
+    NOW,
     SAFETY,
     STANDS,
     Bench,
+    Caller,
     events,
     frames,
     motions,
     pressed,
     published,
+    reactions,
 )
+from tests.factories import safety_state
 
 
 def test_the_first_frame_is_a_stop(bench: Bench) -> None:
-    assert motions(bench.outs[0]) == [MotionKind.STOP]
+    assert motions(bench.outputs) == [MotionKind.STOP]
 
 
-# --- what comes from the board ------------------------------------------------------------------
+# --- a hit ----------------------------------------------------------------------------------------
 
 
-def test_a_driver_fault_that_is_reported_on_the_other_port_alone_counts(bench: Bench) -> None:
-    reported = []
+@pytest.mark.parametrize("datagram", [HIT, STANDS + HIT, HIT + STANDS, HIT + HIT, CLEAR + HIT])
+def test_brake_comes_first_then_the_report_of_the_hit_then_the_rest(
+    bench: Bench, datagram: bytes
+) -> None:
+    bench.receive(CLEAR, CLEAR, CLEAR)
+    out = bench.receive(datagram, HIT, HIT)
+    assert isinstance(out[0], Send)
+    assert out[1] == Reacted("reflex", NOW)
+    assert isinstance(out[2], Publish)
+    assert isinstance(out[2].message, m.Bumper)
+    assert out[2].message.pressed
+    assert isinstance(out[3], Event)
+    assert (motions(out), events(out), reactions(out)) == (
+        [MotionKind.BREAK], ["contact"], ["reflex"],
+    )  # fmt: skip
+    assert all(pressed(out))
+    assert len(pressed(out)) == 3 + (datagram in (HIT + HIT, CLEAR + HIT))
+    assert bench.core.motions.lease.hit == 2
+
+
+def test_brake_leaves_before_the_rest_is_read(bench: Bench) -> None:
+    datagram = HIT + b"damaged"
+    for output in bench.core.datagram(datagram, 0, NOW):
+        assert isinstance(output, Send)
+        assert not bench.core.rejected
+        break
+
+
+def hit_of(byte: int) -> bytes:
+    """Return a datagram of a pressed bumper with this byte."""
+    payload = bytes((byte,))
+    return HEADER.pack(BumperReport.OPENING, crc_function("crc-16")(payload)) + payload
+
+
+@pytest.mark.parametrize("byte", [1, 2, 0x80, 0xFF])
+@pytest.mark.parametrize("form", ["alone", "behind", "before"])
+def test_a_hit_on_the_other_port_counts_at_once(bench: Bench, byte: int, form: str) -> None:
+    hit = hit_of(byte)
+    datagram = {"alone": hit, "behind": STANDS + hit, "before": hit + CLEAR}[form]
+    bench.receive(CLEAR, CLEAR, CLEAR)
+    out = bench.receive(datagram, datagram, port=1)
+    assert motions(out) == [MotionKind.BREAK]
+    assert pressed(out)[0]
+    assert bench.core.motions.lease.hit is not None
+    assert pressed(bench.receive(CLEAR, CLEAR, CLEAR, CLEAR)) == [], "the hit's port is active"
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_hit_that_both_ports_deliver_is_published_once(bench: Bench, first: int) -> None:
+    out = bench.receive(HIT, port=first)
+    assert pressed(out) + pressed(bench.receive(HIT, port=1 - first)) == [True]
+
+
+def test_clear_samples_do_not_count_while_the_other_port_shows_the_hit(bench: Bench) -> None:
+    bench.receive(HIT)
+    for _ in range(5):
+        bench.receive(CLEAR, CLEAR)
+        bench.receive(HIT, port=1)
+    bench.move(BRAKE, judged=99, judged_boot=BOOT)
+    assert pressed(bench.receive(CLEAR, CLEAR)) == [True, True]
+    assert pressed(bench.receive(CLEAR)) == [False]
+
+
+def test_a_clear_sample_before_the_hit_does_not_count(bench: Bench) -> None:
+    bench.receive(CLEAR + HIT, CLEAR, CLEAR)
+    bench.move(BRAKE, judged=99, judged_boot=BOOT)
+    assert bench.core._bumper.pressed
+
+
+def test_a_short_hit_is_reported_until_safety_has_acknowledged_it(bench: Bench) -> None:
+    assert pressed(bench.receive(HIT, *[CLEAR] * 5)) == [True] * 6
+    bench.move(BRAKE, judged=1, judged_boot=BOOT)
+    assert pressed(bench.receive(CLEAR)) == [False]
+
+
+@pytest.mark.parametrize(("command", "found"), [(STOP, []), (BRAKE, ["judged_stop"])])
+def test_the_judged_stop_is_a_brake_that_acknowledges_the_hit(
+    bench: Bench, command: Command, found: list[str]
+) -> None:
+    bench.receive(HIT)
+    bench.now_ns += MS
+    outs = [bench.move(command, judged=seq, judged_boot=BOOT) for seq in (0, 1, 1)]
+    assert [reactions(out) for out in outs] == [[], found, []]
+    assert all(motions(out) for out in outs)
+    if found:
+        assert outs[1][1] == Reacted("judged_stop", NOW)
+
+
+# --- other frames ---------------------------------------------------------------------------------
+
+
+def test_each_frame_is_published_with_its_raw_bytes(bench: Bench) -> None:
+    for frame, stream in (
+        (VelocityReport(100, 0), "velocity"),
+        (DistanceReport(1000, 0), "mileage"),
+        (reports.UltrasonicReport((1000, *(2500,) * 7)), "ultrasonic"),
+        (DriverReport(Side.RIGHT, 0), "driver_right"),
+        (BumperReport(True), "bumper"),
+    ):
+        (made,) = [out for out in bench.answer(frame) if isinstance(out, Publish)]
+        assert (made.stream, made.raw) == (stream, FRAMING.pack(frame))
+    (ranges,) = published(bench.outputs, "ultrasonic")
+    assert ranges.ranges == (1.0, *(2.5,) * 7)
+    bench.carried_out(bench.core.second())
+    assert bench.link().rates["VelocityReport"] == 1.0
+    bench.carried_out(bench.core.second())
+    assert bench.link().rates == {}
+
+
+def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
+    reported, seen = [], []
     for port, bits in ((0, 0), (1, 1), (0, 0), (0, 1), (1, 0), (0, 3), (1, 3)):
         out = bench.answer(DriverReport(Side.LEFT, bits), port=port)
         reported += [message.bits for message in published(out, "driver_left")]
+        seen += [out for out in out if isinstance(out, Event) and out.name == "driver_fault"]
     assert reported == [0, 1, 0, 3]
+    assert [event.level for event in seen] == ["error", "info", "error"]
+    assert "no fault" in seen[1].text
 
 
 def test_copies_are_dropped_and_counted(bench: Bench) -> None:
@@ -54,68 +171,65 @@ def test_copies_are_dropped_and_counted(bench: Bench) -> None:
     assert bench.counters["other_port"] == 2
 
 
+def test_a_dead_port_is_left_and_reported(bench: Bench) -> None:
+    bench.receive(STANDS)
+    bench.now_ns += 101 * MS
+    out = bench.receive(STANDS, STANDS, port=1)
+    assert len(published(out, "velocity")) == 2
+    (event,) = [one for one in out if isinstance(one, Event)]
+    assert event == Event(
+        "port_changed", "warning", "VelocityReport is now taken from UDP port 4001",
+        {"port": 4001, "frame": "VelocityReport"},
+    )  # fmt: skip
+    assert bench.core.motions.port == 1
+    bench.answer(reports.BumperBrakeReport(True))
+    out = bench.answer(reports.BumperBrakeReport(False), port=1)
+    assert events(out) == [], "asked for and rare"
+
+
 def test_what_no_vehicle_can_mean_is_dropped_and_counted(bench: Bench) -> None:
     out = bench.receive(b"nonsense", FRAMING.pack(VelocityReport(30_000, 0)))
-    assert out.messages == []
-    assert bench.link().rejected == {"no_magic": 1, "implausible": 1}
-    assert bench.core.readiness.link.state == "never"
+    assert out == []
+    bench.core.relay_report(b"nonsense", NOW)
+    assert bench.link().rejected == {"no_magic": 1, "implausible": 1, "relay_report": 1}
+    assert bench.core.readiness.link == "never"
 
 
 def link_lost(bench: Bench) -> None:
-    out = bench.tick(NS_PER_S)
-    assert "link_lost" in events(out)
+    assert "link_lost" in events(bench.tick(NS_PER_S))
 
 
 def board_restarted(bench: Bench) -> None:
     bench.answer(DistanceReport(1000, 0))
-    out = bench.answer(DistanceReport(0, 0))
-    assert "board_restarted" in events(out)
+    assert "board_restarted" in events(bench.answer(DistanceReport(0, 0)))
 
 
 @pytest.mark.parametrize("gap", [link_lost, board_restarted])
 @pytest.mark.parametrize("first", [True, False])
 def test_a_row_of_clear_samples_begins_anew_after_a_gap(
-    bench: Bench, gap: Any, first: bool
+    bench: Bench, gap: Callable[[Bench], None], first: bool
 ) -> None:
     bench.receive(HIT if first else CLEAR, CLEAR, CLEAR, *[CLEAR] * (not first))
-    bench.move(Command.BRAKE, judged=99, judged_boot=BOOT)
+    bench.move(BRAKE, judged=99, judged_boot=BOOT)
     gap(bench)
     assert pressed(bench.receive(CLEAR, CLEAR)) == []
     assert pressed(bench.receive(CLEAR)) == [False]
     gap(bench)
-    assert bench.receive(HIT).hit is not None
+    assert motions(bench.receive(HIT)) == [MotionKind.BREAK]
 
 
 @pytest.mark.parametrize("echoes", [True, False])
-def test_a_board_that_restarts_disarms_at_once(bench: Bench, echoes: bool) -> None:
-    if not echoes:
-        sets = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
-        bench = Bench(*sets)
+def test_a_board_that_restarts_disarms_at_once(echoes: bool) -> None:
+    unsafe = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
+    bench = Bench(*(() if echoes else unsafe))
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     board_restarted(bench)
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
-    assert bench.link().epoch == 1
+    assert bench.link().epoch == published(bench.outputs, "mileage")[-1].epoch == 1
 
 
-# --- readiness ----------------------------------------------------------------------------------
-
-
-def settings_asked(out: Output) -> int:
-    """Return how many commands for the emergency brakes were sent."""
-    kinds = commands.UltrasonicBrakeSet, commands.BumperBrakeSet
-    return sum(isinstance(frame, kinds) for frame in frames(out))
-
-
-def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench) -> None:
-    bench.arm()
-    reported: list[m.Switches] = []
-    for _ in range(5):
-        assert bench.core.readiness.ready
-        bench.receive(STANDS)
-        reported += published(bench.tick(NS_PER_S // 5), "switches")
-    assert not bench.core.readiness.ready
-    assert reported == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
+# --- readiness ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("port", [0, 1])
@@ -125,96 +239,103 @@ def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench
 def test_a_brake_that_is_off_disarms_at_once(bench: Bench, off: Frame, port: int) -> None:
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
-    bench.receive(FRAMING.pack(off), port=port)
+    assert len(published(bench.answer(off, port=port), "switches")) == 1
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
+    assert not bench.link().armed
 
 
-def test_a_gap_of_some_velocity_periods_sends_the_brakes_again_at_once(bench: Bench) -> None:
-    """A board that restarts within 120 ms with counters near zero shows nothing else."""
+def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench) -> None:
     bench.arm()
+    reported: list[m.Switches] = []
+    for _ in range(5):
+        assert bench.core.readiness.ready
+        bench.receive(STANDS)
+        reported += published(bench.tick(NS_PER_S // 5), "switches")
+    assert not bench.core.motions.lease.ready
+    assert reported == [m.Switches(ultrasonic_brake=None, bumper_brake=None)]
+
+
+def test_the_link_message_comes_at_5_hz_and_on_a_change(bench: Bench) -> None:
+    assert len(published(bench.tick(), "link")) == 1
+    counts = [len(published(bench.tick(20 * MS), "link")) for _ in range(20)]
+    assert counts == [*[0] * 9, 1] * 2
     bench.receive(STANDS)
-    assert settings_asked(bench.tick(60 * MS)) == 0
-    bench.receive(STANDS)
-    bench.now_ns += 61 * MS
-    bench.receive(STANDS)
-    assert settings_asked(bench.tick(0)) == 2
-    assert bench.core.readiness.ready
+    (link,) = published(bench.tick(20 * MS), "link")
+    assert (link.state, link.board) == ("up", "127.0.0.1:4003")
+    assert link.waiting.endswith("; no answers to: bumper, mileage, ultrasonic")
 
 
-@pytest.mark.parametrize(
-    ("ultrasonic", "bumper", "ready"),
-    [(None, None, True), (True, None, True), (False, None, False), (None, False, False)],
-)
-def test_a_firmware_without_echoes_is_driven_when_that_is_accepted(
-    ultrasonic: bool | None, bumper: bool | None, ready: bool
-) -> None:
-    bench = Bench("bridge.require_switches=false", "bridge.unsafe_overrides=require_switches")
-    readiness = bench.core.readiness
-    assert not readiness.ready
-    bench.receive(STANDS)
-    for position, kind in (
-        (ultrasonic, reports.UltrasonicBrakeReport), (bumper, reports.BumperBrakeReport),
-    ):  # fmt: skip
-        if position is not None:
-            bench.answer(kind(position))
-    assert readiness.ready is ready
-    assert (readiness.waiting() == "") is ready
-    assert settings_asked(bench.tick()), "the settings are requested in any case"
-    readiness.want(None, False, bench.now_ns)
-    assert not readiness.ready
+# --- motions --------------------------------------------------------------------------------------
 
 
-# --- motions ------------------------------------------------------------------------------------
-
-
-def test_only_the_first_jump_of_a_sender_is_an_event(bench: Bench) -> None:
+def test_a_second_authority_is_an_event_once(bench: Bench) -> None:
     bench.arm()
-    logged = [
-        event
-        for boot in (SAFETY, SAFETY, 2, 2)
-        for event in events(bench.move(Command.STOP, seq=2**40, boot=boot))
-    ]
-    assert logged == ["seq_jump", "second_authority"]
-    assert bench.counters["motion_seq_jumps"] == 2
+    names = [events(bench.move(STOP, boot=boot)) for boot in (SAFETY, 2, 2, SAFETY, 2, 3)]
+    assert names == [[], ["second_authority"], [], [], [], ["second_authority"]]
+    assert bench.counters["motion_second_authority"] == 4
 
 
-@pytest.mark.parametrize("field", ["linear", "angular"])
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_number_that_is_not_finite_is_dropped_and_logged(
-    bench: Bench, field: str, value: float
-) -> None:
+def test_a_run_that_is_not_finite_is_dropped_and_counted(bench: Bench) -> None:
     bench.arm()
-    fields: dict[str, Any] = {field: value}
-    out = bench.move(**fields)
-    assert out.sends == []
-    assert "not finite" in out.warnings[0]
-    assert bench.counters["motion_not_finite"] == 1
-
-
-def test_a_brake_does_not_depend_on_numbers_that_are_not_finite(bench: Bench) -> None:
-    bench.arm()
-    out = bench.move(Command.BRAKE, linear=math.nan)
-    assert motions(out) == [MotionKind.BREAK]
+    for value in (math.nan, math.inf, -math.inf):
+        assert bench.move(linear=value) == bench.move(angular=value) == []
+    assert bench.counters["motion_not_finite"] == 6
+    assert motions(bench.move(BRAKE, linear=math.nan)) == [MotionKind.BREAK]
 
 
 def test_an_emergency_stop_brakes_at_once_until_safety_has_latched_it(bench: Bench) -> None:
     bench.arm()
-    bench.move(Command.RUN)
-    assert motions(bench.core.estop(bench.now_ns)) == [MotionKind.BREAK]
-    assert motions(bench.core.estop(bench.now_ns)) == []  # repeated until it is confirmed
-    assert MotionKind.RUN not in motions(bench.move(Command.RUN, linear=0.5))
-    bench.move(Command.BRAKE, estop=bench.now_ns)
-    bench.move(Command.STOP)
-    assert motions(bench.move(Command.RUN, linear=0.5)) == [MotionKind.RUN]
+    bench.move()
+    assert motions(bench.estop()) == [MotionKind.BREAK]
+    assert bench.estop() == [], "repeated until it is confirmed"
+    assert bench.link().estop == bench.now_ns
+    assert motions(bench.move(linear=0.5)) == [MotionKind.BREAK]
+    bench.move(BRAKE, estop=bench.now_ns)
+    bench.move(STOP)
+    assert motions(bench.move(linear=0.5)) == [MotionKind.RUN]
 
 
-@pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])
+def test_motion_without_a_command_brakes_and_is_an_event(bench: Bench) -> None:
+    bench.tick()
+    for speed in (0, 0, *[100] * 80):
+        bench.answer(VelocityReport(speed, 0))
+        bench.tick(20 * MS)
+    assert events(bench.outputs).count("uncommanded_motion") == 1
+    assert motions(bench.outputs).count(MotionKind.BREAK) > 10
+    assert bench.link().latched_by == BOOT
+
+
+def test_counters_that_move_without_a_command_brake(bench: Bench) -> None:
+    bench.arm()
+    for millimetres in (0, 0, 30, 49, 50):
+        assert "uncommanded_motion" not in events(bench.outputs)
+        bench.answer(VelocityReport(0, 0), DistanceReport(1000 + millimetres, 0))
+        bench.tick(201 * MS)
+    assert "uncommanded_motion" in events(bench.outputs)
+
+
+@pytest.mark.parametrize(("speed", "kind"), [(0, MotionKind.STOP), (100, MotionKind.BREAK)])
+def test_a_vehicle_that_goes_on_after_the_lease_is_braked(
+    bench: Bench, speed: int, kind: MotionKind
+) -> None:
+    bench.arm()
+    for _ in range(60):
+        bench.answer(VelocityReport(speed, 0))
+        bench.tick(20 * MS)
+    assert motions(bench.outputs)[-1] is kind
+    link_lost(bench)
+    assert motions(bench.tick(2 * NS_PER_S)) == [MotionKind.BREAK], "not known to stand"
+
+
+@pytest.mark.parametrize("command", [STOP, BRAKE])
 def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: Command) -> None:
     bench.arm()
     bench.move(command)
-    kind = MotionKind.BREAK if command is Command.BRAKE else MotionKind.STOP
-    assert motions(bench.core.stop(bench.now_ns)) == [kind]
-    assert motions(bench.core.stop(bench.now_ns)) == [], "said once"
+    kind = MotionKind.BREAK if command is BRAKE else MotionKind.STOP
+    assert motions(bench.carried_out(bench.core.stop(bench.now_ns))) == [kind]
+    assert bench.carried_out(bench.core.stop(bench.now_ns)) == [], "once"
+    bench.tick()
+    assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
 
 
 @pytest.mark.parametrize(("speed", "kind"), [(0, MotionKind.STOP), (300, MotionKind.BREAK)])
@@ -222,45 +343,109 @@ def test_the_last_frame_brakes_unless_the_vehicle_stands(
     bench: Bench, speed: int, kind: MotionKind
 ) -> None:
     bench.arm()
-    bench.core.stop(bench.now_ns)
-    assert not bench.core.motions.is_stopped(bench.now_ns)
+    core = bench.core
+    assert not core.motions.is_stopped(bench.now_ns + 9 * NS_PER_S), "nobody has asked"
+    assert motions([core.exit(bench.now_ns)]) == [MotionKind.BREAK]
+    bench.carried_out(core.stop(bench.now_ns))
+    assert not core.motions.is_stopped(bench.now_ns), "measured before the stop"
     bench.now_ns += MS
     bench.answer(VelocityReport(speed, 0))
-    assert bench.core.motions.is_stopped(bench.now_ns) is (speed == 0)
-    assert motions(bench.core.exit(bench.now_ns)) == [kind]
-    assert bench.core.motions.is_stopped(bench.now_ns + NS_PER_S + MS), "it waits no longer"
+    assert core.motions.is_stopped(bench.now_ns) is (speed == 0)
+    assert motions([core.exit(bench.now_ns)]) == [kind]
+    assert not core.motions.is_stopped(bench.now_ns + NS_PER_S - MS) or speed == 0
+    assert core.motions.is_stopped(bench.now_ns + NS_PER_S), "it waits no longer"
 
 
-# --- calls --------------------------------------------------------------------------------------
+# --- calls ----------------------------------------------------------------------------------------
 
 
-def test_a_lamp_answers_with_the_boards_echo(bench: Bench) -> None:
+def nothing(_: Bench) -> None:
+    """Leave the board silent."""
+
+
+def echo(frame: Frame) -> Callable[[Bench], object]:
+    return lambda bench: bench.answer(frame, frame)
+
+
+def late(bench: Bench) -> None:
+    """Keep the board connected until the echo is overdue."""
+    for _ in range(30):
+        bench.receive(STANDS)
+        bench.tick(20 * MS)
+
+
+def lamp(bench: Bench, caller: Caller) -> list[Output]:
+    return bench.lamp(caller)
+
+
+def brakes(bench: Bench, caller: Caller) -> list[Output]:
+    return bench.switch(caller, bumper_brake=False, echo=7)
+
+
+Call = Callable[[Bench, Caller], list[Output]]
+ONE_OFF = m.Switches(ultrasonic_brake=True, bumper_brake=False)
+
+
+@pytest.mark.parametrize(
+    ("call", "then", "reply", "refusal"),
+    [
+        (lamp, echo(reports.LedReport(True)), m.Done(text="the lamp is set"), None),
+        (lamp, echo(reports.LedReport(False)), None, "the board reports a failure (0xAA)"),
+        (lamp, late, None, "the board did not echo within 0.5 s"),
+        (lamp, lambda bench: lamp(bench, Caller()), None, None),
+        (brakes, echo(reports.BumperBrakeReport(False)), ONE_OFF, None),
+        (brakes, late, None, "the board did not echo within 0.5 s"),
+    ],
+)
+def test_a_call_is_answered_by_the_boards_echo(
+    bench: Bench, call: Call, then: Callable[[Bench], object], reply: object, refusal: str | None
+) -> None:
     bench.arm()
-    out = bench.core.led(m.LedRequest(channel=1, mode=0), "caller", bench.now_ns)
-    assert isinstance(frames(out)[0], commands.LedSet)
-    (answer,) = bench.answer(reports.LedReport(True)).answers
-    assert (answer.caller, answer.reply, answer.refusal) == (
-        "caller", m.Done(text="the lamp is set"), "",
-    )  # fmt: skip
+    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    caller = Caller()
+    sent = [*call(bench, caller), *bench.tick()]
+    assert {type(frame) for frame in frames(sent)} & {commands.LedSet, commands.BumperBrakeSet}
+    assert (caller.replies, caller.refusals) == ([], [])
+    then(bench)
+    bench.tick()
+    assert caller.replies == ([reply] if reply else [])
+    assert caller.refusals == ([refusal] if refusal else [])
 
 
-def test_a_lamp_that_the_board_does_not_echo_is_refused(bench: Bench) -> None:
+@pytest.mark.parametrize(
+    ("before", "call", "refusal"),
+    [
+        (nothing, lamp, "the board is absent (link never)"),
+        (nothing, brakes, "the board is absent (link never)"),
+        (Bench.arm, lambda bench, to: bench.switch(to, bumper_brake=False), "no echo"),
+        (Bench.arm, lambda bench, to: bench.switch(to, echo=1), "unknown heartbeat"),
+    ],
+)
+def test_a_call_is_refused_with_the_reason(
+    bench: Bench, before: Callable[[Bench], None], call: Call, refusal: str
+) -> None:
+    before(bench)
+    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    caller = Caller()
+    assert frames(call(bench, caller)) == []
+    assert refusal in caller.refusals[0]
+
+
+@pytest.mark.parametrize(("call", "what"), [(lamp, "lamps"), (brakes, "switches")])
+def test_one_call_of_each_is_pending(bench: Bench, call: Call, what: str) -> None:
     bench.arm()
-    bench.core.led(m.LedRequest(channel=1, mode=0), "caller", bench.now_ns)
-    (answer,) = bench.tick(NS_PER_S).answers
-    assert answer.refusal == "the board did not echo within 0.5 s"
-    (refused,) = bench.core.led(m.LedRequest(channel=1, mode=0), 2, bench.now_ns).answers
-    assert refused.refusal == "the board is absent (link lost)"
+    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    first, second = Caller(), Caller()
+    call(bench, first)
+    call(bench, second)
+    assert (first.refusals, second.refusals) == ([], [f"another call for the {what} is pending"])
 
 
-def test_a_lamps_echo_that_nobody_waits_for_answers_nobody(bench: Bench) -> None:
+def test_lost_polls_are_counted_each_second(bench: Bench) -> None:
     bench.arm()
-    assert bench.answer(reports.LedReport(True)).answers == []
-
-
-def test_ranges_are_published_in_metres(bench: Bench) -> None:
-    bench.arm()
-    (message,) = published(
-        bench.receive(FRAMING.pack(reports.UltrasonicReport((1000, *(2500,) * 7)))), "ultrasonic"
-    )
-    assert message.ranges == (1.0, *(2.5,) * 7)
+    for _ in range(100):
+        bench.tick()
+    bench.carried_out(bench.core.second())
+    assert bench.counters["missed_bumper"] > 0
+    bench.receive(HIT)
+    assert published(bench.outputs, "bumper")[-1].lost > 5

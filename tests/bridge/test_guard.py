@@ -1,5 +1,6 @@
 """The guard with real processes: the board receives BRAKE whenever the bridge fails."""
 
+import contextlib
 import errno
 import itertools
 import os
@@ -21,9 +22,9 @@ from common.config import Sources, load
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
-from services.bridge import child
+from services.bridge import bridge as child
 from services.bridge.config import BridgeConfig
-from services.bridge.guard import Guard
+from services.bridge.guard import Guard, Heartbeat, Inherited, inherited
 from services.bridge.udp import Sockets
 from tests.bridge.bridge_fixture import (
     PROC,
@@ -260,6 +261,51 @@ def test_it_brakes_while_it_waits(made: Board) -> None:
     guard._await_restart(1, 0.0)
     guard._sockets.close()
     wait_until(lambda: breaks_since(made, count) >= 5, "BRAKE at 20 Hz for half a second")
+
+
+# --- the pipe -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    out, into = os.pipe()
+    yield out, into
+    for descriptor in (out, into):
+        with contextlib.suppress(OSError):
+            os.close(descriptor)
+
+
+@pytest.mark.parametrize("given", [Inherited((3, 4), 5), Inherited((7,), 6)])
+def test_the_child_gets_what_the_parent_leaves_open(given: Inherited) -> None:
+    assert inherited(given.environ()) == given
+    assert given.descriptors == (*given.sockets, given.heartbeat)
+
+
+def test_a_beat_names_the_port_and_the_end_is_final(pipe: tuple[int, int]) -> None:
+    heartbeat = Heartbeat(pipe[1], pytest.fail)
+    for port in (0, 1, 0):
+        heartbeat.beat(port)
+    assert os.read(pipe[0], 10) == b"\0\1\0"
+    heartbeat.end()
+    heartbeat.end()
+    heartbeat.beat(0)
+    assert os.read(pipe[0], 10) == b""
+
+
+def test_a_guard_that_does_not_read_delays_no_beat(pipe: tuple[int, int]) -> None:
+    heartbeat = Heartbeat(pipe[1], pytest.fail)
+    for _ in range(100_000):
+        heartbeat.beat(0)
+
+
+def test_a_dead_guard_is_noticed_once(pipe: tuple[int, int]) -> None:
+    gone: list[None] = []
+    heartbeat = Heartbeat(pipe[1], lambda: gone.append(None))
+    heartbeat.beat(0)
+    os.close(pipe[0])
+    for _ in range(3):
+        heartbeat.beat(0)
+    assert gone == [None]
 
 
 # --- the program --------------------------------------------------------------------------------

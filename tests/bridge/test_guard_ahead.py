@@ -13,10 +13,10 @@ from verification.harness.waiting import wait_until
 SPIN = """
 import os
 from common import realtime
-from services.bridge.guard_ipc import received
+from services.bridge.guard import inherited
 realtime.request(realtime.BRIDGE)
 realtime.limit()
-os.write(received(os.environ).heartbeat, b"\\0")
+os.write(inherited(os.environ).heartbeat, b"\\0")
 while True:
     pass
 """

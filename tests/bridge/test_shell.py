@@ -51,7 +51,7 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     made.say_bytes(HIT)
 
     def brakes() -> bool:
-        bridge._read(clock.now_ns(), 0, 1)
+        bridge._read(0, 1)
         return made.motions[-1:] != [] and made.motions[-1].kind is MotionKind.BREAK
 
     wait_until(brakes, "BRAKE")
@@ -159,7 +159,7 @@ def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
     for seq in (1, 2, 3):
         receive_motion(bridge, Command.STOP, seq)
     bridge._on_second(0)
-    bridge._on_link(clock.now_ns())
+    bridge._on_tick(clock.now_ns())
     assert bridge._node.counters["send_errors"] == 3
     link = bridge._publishers["link"].last
     assert isinstance(link, Link)

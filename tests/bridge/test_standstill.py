@@ -5,7 +5,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.messages import Mileage, Velocity
 from common.standstill import AWAY_M, AWAY_RAD, DRIFT_RADPS
-from services.bridge.standstill import Standstill
+from services.bridge.core.standstill import Standstill
 
 MS = NS_PER_S // 1000
 COAST, SILENCE = NS_PER_S, 200 * MS

@@ -20,7 +20,7 @@ from common.loop import Loop
 from common.messages import Message
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
-from services.bridge.translate import BumperFilter
+from services.bridge.core.translate import BumperFilter
 from services.recorder.reader import Reader
 from tests.bridge.bridge_fixture import bridge_process
 from tests.recorder.make import KEPT

@@ -19,8 +19,8 @@ from common.standstill import Displacement
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
-from services.bridge import lease as leases
-from services.bridge.lease import Lease
+from services.bridge.core import lease as leases
+from services.bridge.core.lease import Lease
 from services.safety import arbiter, causes, conditions, latches, policy
 from services.safety.arbiter import Arbiter
 from services.safety.config import LimitSource

@@ -1,0 +1,91 @@
+"""Operator calls to the board: emergency brakes and lamps. Pure.
+
+Both are answered with the board's echo, or with the reason for its absence. The call for the brakes
+must also echo safety's heartbeat, so that a delayed call is refused.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import asdict
+
+from common import messages as m
+from common.freshness import NS_PER_S
+from common.operator import Echoes
+from common.wire.commands import LedSet
+from common.wire.frame import Frame
+from services.bridge.core.output import Outputs, Refuse, Reply, Send
+from services.bridge.core.readiness import Readiness
+
+
+class Pending(Struct, frozen=True):
+    """A call that waits for the board's echo."""
+
+    caller: Any
+    until_ns: int
+
+
+class Calls:
+    """The calls ``srv/bridge/switches`` and ``srv/bridge/led``; one of each at a time."""
+
+    def __init__(
+        self, readiness: Readiness, timeout_s: float, ask: Callable[[Frame, int], Send]
+    ) -> None:
+        """Set up with the timeout of the board's echo (s), and what sends it a frame."""
+        self._readiness = readiness
+        self._timeout_s = timeout_s
+        self._ask = ask
+        self._pending: dict[str, Pending] = {}  # by what is called
+        self._echoes = Echoes()
+
+    def on_safety(self, state: m.SafetyState, received_ns: int) -> None:
+        """Process a safety state with its heartbeat."""
+        self._echoes = self._echoes.received(state, received_ns)
+
+    def on_switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Outputs:
+        """Request positions of the board's brakes; their echo answers the caller."""
+        late = self._echoes.refusal(request.echo, now_ns)
+        if reason := late or self._refusal("switches"):
+            yield Refuse(caller, reason)
+            return
+        self._begin("switches", caller, now_ns)
+        for brake, on in (
+            (self._readiness.ultrasonic, request.ultrasonic_brake),
+            (self._readiness.bumper, request.bumper_brake),
+        ):
+            if on is not None:
+                brake.want(on, now_ns)
+
+    def on_led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Outputs:
+        """Set a lamp channel; the echo answers the caller."""
+        if reason := self._refusal("lamps"):
+            yield Refuse(caller, reason)
+            return
+        self._begin("lamps", caller, now_ns)
+        yield self._ask(LedSet(**asdict(request)), now_ns)
+
+    def on_led_echo(self, done: bool) -> Outputs:
+        """Process the board's answer to a lamp command."""
+        if call := self._pending.pop("lamps", None):
+            if done:
+                yield Reply(call.caller, m.Done(text="the lamp is set"))
+            else:
+                yield Refuse(call.caller, "the board reports a failure (0xAA)")
+
+    def on_tick(self, now_ns: int) -> Outputs:
+        """Answer the calls whose echo was received or is overdue."""
+        if "switches" in self._pending and self._readiness.settled:
+            yield Reply(self._pending.pop("switches").caller, self._readiness.message())
+        for what, call in list(self._pending.items()):
+            if now_ns > call.until_ns:
+                del self._pending[what]
+                yield Refuse(call.caller, f"the board did not echo within {self._timeout_s:g} s")
+
+    def _begin(self, what: str, caller: Any, now_ns: int) -> None:
+        self._pending[what] = Pending(caller, now_ns + round(self._timeout_s * NS_PER_S))
+
+    def _refusal(self, what: str) -> str:
+        if self._readiness.link != "up":
+            return f"the board is absent (link {self._readiness.link})"
+        return f"another call for the {what} is pending" if what in self._pending else ""

@@ -1,0 +1,352 @@
+"""The bridge's core: datagrams, motions, calls and ticks in; outputs in their order out. Pure.
+
+============ ================================== ==================================================
+entry        called by the shell for            yields
+============ ================================== ==================================================
+datagram     each datagram of the board         BRAKE for a new hit, before all else; then the
+                                                report of the hit; then what its frames lead to
+motion       each message on ``@cmd/motion``    the frame that the lease allows
+estop        an emergency stop                  BRAKE
+safety       each state of safety               nothing: calls echo its heartbeat
+switches,    an operator's call                 a frame or a refusal; the board's echo answers it
+led                                             later
+relay_report a report of the relay              nothing
+start        the start of the process           STOP
+tick         every 20 ms                        STOP or BRAKE if due; queries; events; the link
+                                                message, 5 times a second and on a change
+second       once a second                      the brakes' message
+stop, exit   the end of the process             STOP or BRAKE
+============ ================================== ==================================================
+
+An entry changes the state while its outputs are carried out one by one: take all of them. Times are
+of the monotonic clock.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from common import messages as m
+from common.errors import WireError
+from common.freshness import NS_PER_S, Latest
+from common.motion import STOP
+from common.wire import commands, reports
+from common.wire.frame import Frame, Side
+from common.wire.framing import Framing, Received
+from services.bridge.config import Bridge as Settings
+from services.bridge.config import BridgeConfig
+from services.bridge.core.calls import Calls
+from services.bridge.core.motion_output import MotionOutput
+from services.bridge.core.output import Event, Outputs, Publish, Send
+from services.bridge.core.polling import Polling
+from services.bridge.core.ports import Ports
+from services.bridge.core.readiness import Readiness
+from services.bridge.core.translate import BumperFilter, Translator, driver, restarted
+
+Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
+
+# The lease, the silence of the board and the guard's patience are ten ticks each.
+TICK_MAX_S = 0.02
+LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
+ECHO_HZ = 5.0
+STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
+ASKED: dict[str, type[Frame]] = {
+    "bumper": reports.BumperReport,
+    "mileage": reports.DistanceReport,
+    "ultrasonic": reports.UltrasonicReport,
+}
+ANSWERS = {kind.frame.ID: kind.frame for kind in reports.FROM_BOARD.values()}
+# Continuous frames: a change of their port is an event.
+CONTINUOUS = frozenset((reports.VelocityReport, *ASKED.values(), reports.DriverReport))
+
+
+def queries(settings: Settings) -> list[tuple[str, Frame, float]]:
+    """Return the queries to the board: name, frame, rate in Hz."""
+    return [
+        ("bumper", commands.BumperQuery(), settings.bumper_rate),
+        ("mileage", commands.DistanceQuery(), settings.mileage_rate),
+        ("ultrasonic", commands.UltrasonicQuery(), settings.ultrasonic_rate),
+        ("driver_left", commands.DriverQuery(Side.LEFT), settings.driver_rate),
+        ("driver_right", commands.DriverQuery(Side.RIGHT), settings.driver_rate),
+    ]
+
+
+def tick_s(settings: Settings) -> float:
+    """Return the period of the tick in seconds: each query finds its tick."""
+    return min(TICK_MAX_S, *(1 / rate_hz for _, _, rate_hz in queries(settings)))
+
+
+def ports_of(config: BridgeConfig, now_ns: int) -> Ports:
+    """Return the port selection, with the poll rate of each kind of frame."""
+    rates_hz = {ANSWERS[frame.ID]: rate_hz for _, frame, rate_hz in queries(config.bridge)}
+    rates_hz[reports.UltrasonicBrakeReport] = rates_hz[reports.BumperBrakeReport] = ECHO_HZ
+    failover_ns = round(config.bridge.failover * NS_PER_S)
+    return Ports(len(config.board.listen_ports), failover_ns, rates_hz, now_ns)
+
+
+class Core:
+    """Processes the board's frames, polls it, and sends the commands that the lease allows."""
+
+    def __init__(
+        self, config: BridgeConfig, boot: int, counters: Counter[str], now_ns: int
+    ) -> None:
+        """Set up with the boot of our messages and the counters of the health message."""
+        self.rejected: Counter[str] = Counter()  # frames and datagrams, by reason
+        self._config, settings = config, config.bridge
+        self._counters = counters
+        self._framing = Framing(config.wire.crc, config.wire.crc_covers)
+        limits = settings.max_linear, settings.max_angular
+        self._translator = Translator(config.wire, config.vehicle, *limits)
+        self.motions = MotionOutput(
+            settings, self._framing, self._translator, boot=boot, counters=counters, now_ns=now_ns
+        )
+        self.readiness = readiness = Readiness(settings, config.board)
+        self._calls = Calls(readiness, settings.echo_timeout, self._ask)
+        self._ports = ports_of(config, now_ns)
+        self._polling = Polling(
+            queries(settings), settings.answer_timeout, STEADY, tick_s(settings)
+        )
+        self._bumper = BumperFilter()
+        self._bumper_seq = 0  # of the newest bumper message
+        pressed = reports.BumperReport(True)
+        self._hit = Received(pressed, self._framing.pack(pressed))
+        self._clear_raw = self._framing.pack(reports.BumperReport(False))
+        self._mileage: Latest[m.Mileage] | None = None
+        self._faults: dict[Side, int] = {}
+        self._frames: Counter[str] = Counter()  # since the last second
+        self._rates: dict[str, float] = {}  # of the last second, in Hz
+        self._linked: tuple[object, ...] = ()  # what the newest link message says
+        self._linked_ns = now_ns - LINK_NS
+        self._handlers: dict[type[Frame], Handler] = {
+            reports.VelocityReport: self._on_velocity,
+            reports.BumperReport: self._on_bumper,
+            reports.DistanceReport: self._on_distance,
+            reports.UltrasonicReport: self._on_ultrasonic,
+            reports.DriverReport: self._on_driver,
+            reports.UltrasonicBrakeReport: lambda frame, *_: readiness.on_echo(
+                readiness.ultrasonic, frame.on
+            ),
+            reports.BumperBrakeReport: lambda frame, *_: readiness.on_echo(
+                readiness.bumper, frame.on
+            ),
+            reports.LedReport: lambda frame, *_: self._calls.on_led_echo(frame.done),
+        }
+
+    # --- input from the board ----------------------------------------------------------
+
+    def datagram(self, datagram: bytes, port: int, now_ns: int) -> Outputs:
+        """Process a datagram: BRAKE for a new hit, its report, then the other frames."""
+        hit = self._new_hit(datagram)
+        if hit is not None:
+            yield from self._on_frame(hit, port, now_ns)
+        for part in self._framing.read(datagram, reports.FROM_BOARD):
+            if part == hit:
+                hit = None  # processed already
+                self._bumper.take(True)  # clear samples before it do not count
+            elif isinstance(part, Received):
+                yield from self._on_frame(part, port, now_ns)
+            else:
+                self.rejected[part.reason] += 1
+
+    def _new_hit(self, datagram: bytes) -> Received | None:
+        """Return the first frame with a pressed bumper, unless it is known to be pressed."""
+        if self._bumper.pressed:
+            return None
+        if datagram == self._hit.raw:  # the usual one needs no reading
+            return self._hit
+        if datagram == self._clear_raw or reports.BumperReport.OPENING not in datagram:
+            return None
+        for part in self._framing.read(datagram, reports.FROM_BOARD):
+            if isinstance(part, Received) and part.frame == self._hit.frame:
+                return part
+        return None
+
+    def _on_frame(self, part: Received, port: int, now_ns: int) -> Outputs:
+        frame, kind = part.frame, type(part.frame)
+        before = self._ports.of(kind)
+        if not self._ports.takes(kind, port, now_ns, urgent=self._is_urgent(frame)):
+            self._counters["other_port"] += 1
+            if frame == self._hit.frame:
+                self._bumper.take(True)  # clear samples count only if neither port shows a hit
+            return
+        self.motions.port = self._ports.main
+        try:
+            yield from self._handlers[kind](frame, part.raw, now_ns)
+        except WireError:
+            self.rejected["implausible"] += 1
+            return
+        self._frames[kind.__name__] += 1
+        yield from self.readiness.on_frame(now_ns)
+        if not self.readiness.ready:
+            self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
+        if before not in (None, port) and kind in CONTINUOUS:
+            number = self._config.board.listen_ports[port]
+            text = f"{kind.__name__} is now taken from UDP port {number}"
+            yield Event("port_changed", "warning", text, {"port": number, "frame": kind.__name__})
+
+    def _is_urgent(self, frame: Frame) -> bool:
+        """Return whether a frame counts from either port: a new hit or fault, or a brake as off."""
+        match frame:
+            case reports.BumperReport(on=True):
+                return not self._bumper.pressed
+            case reports.DriverReport(side=side, fault_bits=bits):
+                return bool(bits & ~self._faults.get(side, 0))
+            case reports.UltrasonicBrakeReport(on=False) | reports.BumperBrakeReport(on=False):
+                return True
+        return False
+
+    def _on_velocity(self, frame: reports.VelocityReport, raw: bytes, now_ns: int) -> Outputs:
+        velocity = self._translator.velocity(frame)
+        self.motions.on_velocity(velocity, now_ns)
+        yield Publish("velocity", velocity, raw)
+
+    def _on_ultrasonic(self, frame: reports.UltrasonicReport, raw: bytes, now_ns: int) -> Outputs:
+        self._polling.answered("ultrasonic", now_ns)
+        yield Publish("ultrasonic", self._translator.ultrasonic(frame), raw)
+
+    def _on_bumper(self, frame: reports.BumperReport, raw: bytes, now_ns: int) -> Outputs:
+        hit = self._bumper.take(frame.on)
+        if hit:
+            yield from self.motions.on_hit(self._bumper_seq + 1, now_ns)
+        self._polling.answered("bumper", now_ns)
+        if self._bumper.pressed is not None:
+            self._bumper_seq += 1
+            # A short hit stays in the samples until safety has acknowledged one: some may be lost.
+            pressed = self._bumper.pressed or self.motions.lease.hit is not None
+            lost = self._polling.lost("bumper", now_ns)
+            yield Publish("bumper", m.Bumper(pressed=pressed, lost=lost), raw)
+        if hit:
+            yield Event("contact", "error", "the bumper is hit: BRAKE")
+
+    def _on_distance(self, frame: reports.DistanceReport, raw: bytes, now_ns: int) -> Outputs:
+        asked_ns = self._polling.answered("mileage", now_ns)  # the answer may be read late
+        after = self._translator.mileage(frame, self.readiness.epoch)
+        before = self._mileage
+        if before is not None and restarted(
+            before.value,
+            after,
+            before.age_s(now_ns),
+            unbroken=self.readiness.up_ns <= before.received_ns,
+            silent=self.readiness.gap_ns > before.received_ns,
+        ):
+            yield from self.readiness.on_restart(now_ns)
+            self._bumper = BumperFilter()
+            self.motions.on_ready(False)  # also where a firmware without echoes stays ready
+            after = self._translator.mileage(frame, self.readiness.epoch)
+        self._mileage = Latest(after, asked_ns)
+        self.motions.on_mileage(after, now_ns)
+        yield Publish("mileage", after, raw)
+
+    def _on_driver(self, frame: reports.DriverReport, raw: bytes, now_ns: int) -> Outputs:
+        side = frame.side.name.lower()
+        self._polling.answered(f"driver_{side}", now_ns)
+        message = driver(frame)
+        if frame.fault_bits != self._faults.get(frame.side, 0):
+            text = f"{side} motor driver: {', '.join(message.faults) or 'no fault'}"
+            level: m.Level = "error" if message.faults else "info"
+            yield Event("driver_fault", level, text, {"side": side, "bits": frame.fault_bits})
+        self._faults[frame.side] = frame.fault_bits
+        yield Publish(f"driver_{side}", message, raw)
+
+    def relay_report(self, report: bytes, now_ns: int) -> None:
+        """Process a report of the relay."""
+        if not self.readiness.relay.take(report, now_ns):
+            self.rejected["relay_report"] += 1
+
+    # --- input from the bus ------------------------------------------------------------
+
+    def motion(self, motion: m.Motion, received_ns: int, now_ns: int) -> Outputs:
+        """Process a motion message of safety."""
+        return self.motions.on_motion(motion, received_ns, now_ns)
+
+    def estop(self, received_ns: int) -> Outputs:
+        """Process an emergency stop."""
+        return self.motions.on_estop(received_ns)
+
+    def safety(self, state: m.SafetyState, received_ns: int) -> None:
+        """Process a state of safety, with its heartbeat."""
+        self._calls.on_safety(state, received_ns)
+
+    def switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Outputs:
+        """Process a call that sets the board's emergency brakes; the answer names ``caller``."""
+        return self._calls.on_switches(request, caller, now_ns)
+
+    def led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Outputs:
+        """Process a call that sets a lamp channel; the answer names ``caller``."""
+        return self._calls.on_led(request, caller, now_ns)
+
+    # --- timers ----------------------------------------------------------------
+
+    def start(self) -> Send:
+        """Return the first frame: STOP."""
+        return self.motions.order(STOP)
+
+    def tick(self, now_ns: int) -> Outputs:
+        """Yield what is due."""
+        yield from self.readiness.on_tick(now_ns)
+        if self.readiness.link != "up":
+            self._bumper = BumperFilter()  # samples from before the gap do not count as consecutive
+        frames = (*self.readiness.due(now_ns), *self._polling.due(now_ns))
+        self.motions.on_ready(self.readiness.ready)
+        yield from self.motions.on_tick(now_ns)
+        for frame in frames:
+            yield self._ask(frame, now_ns)
+        yield from self.readiness.changes()
+        yield from self._calls.on_tick(now_ns)
+        if self._link_state(now_ns) != self._linked or now_ns - self._linked_ns >= LINK_NS:
+            yield Publish("link", self.link(now_ns))
+
+    def _ask(self, frame: Frame, now_ns: int) -> Send:
+        """Return a query or a setting, from the port that receives its answers."""
+        port = self._ports.to_ask(ANSWERS[frame.ID], now_ns)
+        return Send(self._framing.pack(frame), port)
+
+    def second(self) -> Outputs:
+        """Update the rates and counters of the last second; publish the brakes."""
+        self._rates = {name: float(count) for name, count in sorted(self._frames.items())}
+        self._frames.clear()
+        for name, count in self._polling.missed().items():
+            self._counters[f"missed_{name}"] = count
+        yield Publish("switches", self.readiness.message())
+
+    def stop(self, now_ns: int) -> Outputs:
+        """Stop the vehicle before exit; ``motions.is_stopped`` reports standstill."""
+        return self.motions.stop(now_ns)
+
+    def exit(self, now_ns: int) -> Send:
+        """Return the last frame: STOP at standstill, otherwise BRAKE."""
+        return self.motions.on_exit(now_ns)
+
+    # --- the link message ----------------------------------------------------------------
+
+    def link(self, now_ns: int) -> m.Link:
+        """Return the link message: rates, rejected frames, and why a RUN would be refused."""
+        self._linked, self._linked_ns = self._link_state(now_ns), now_ns
+        waiting = self._waiting(now_ns)
+        board = self._config.board
+        return m.Link(
+            state=self.readiness.link,
+            board=f"{board.address}:{board.port}",
+            epoch=self.readiness.epoch,
+            armed=not waiting,
+            waiting=waiting,
+            rates=self._rates,
+            rejected={reason: count for reason, count in self.rejected.items() if count},
+            round_trip=self._polling.round_trip_s(),
+            latched_by=self.motions.lease.latched_by,
+            ports={name: board.listen_ports[port] for name, port in self._ports.by_name().items()},
+            send_errors=self._counters["send_errors"],
+            relay=self.readiness.relay.message(),
+            estop=self.motions.lease.estop,
+        )
+
+    def _link_state(self, now_ns: int) -> tuple[object, ...]:
+        return self.readiness.link, self.readiness.epoch, self._waiting(now_ns)
+
+    def _waiting(self, now_ns: int) -> str:
+        """Describe why a RUN would be refused, and which queries get no answer."""
+        waiting = self.readiness.waiting() or self.motions.lease.waiting
+        if not waiting or self.readiness.link != "up":
+            return waiting
+        silent = [name for name, kind in ASKED.items() if not self._ports.is_received(kind, now_ns)]
+        return f"{waiting}; no answers to: {', '.join(silent)}" if silent else waiting

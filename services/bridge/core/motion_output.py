@@ -1,0 +1,148 @@
+"""Motion output: the lease's orders as frames, from the command port. Pure."""
+
+from collections import Counter
+
+from common.freshness import NS_PER_S
+from common.messages import Mileage, Motion, Velocity
+from common.motion import BRAKE, STOP, Command, is_standing
+from common.wire.framing import Framing
+from services.bridge.config import Bridge as Settings
+from services.bridge.core import lease as leases
+from services.bridge.core.lease import Lease, Refusal
+from services.bridge.core.output import Event, Outputs, Reacted, Send
+from services.bridge.core.standstill import Standstill
+from services.bridge.core.translate import Translator
+
+STOP_TIMEOUT_NS = NS_PER_S  # until a stopping bridge no longer waits for standstill
+
+
+class MotionOutput:
+    """Sends the commands of ``@cmd/motion`` that the lease allows, otherwise STOP or BRAKE."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        framing: Framing,
+        translator: Translator,
+        *,
+        boot: int,
+        counters: Counter[str],
+        now_ns: int,
+    ) -> None:
+        """Set up with the bridge's own ``boot`` and the counters of refused motions."""
+        self.lease = Lease(over_since_ns=now_ns)
+        self.port = 0
+        self._boot = boot
+        self._framing = framing
+        self._translator = translator
+        self._counters = counters
+        self._velocity: tuple[Velocity, int] | None = None
+        self._hit_ns = 0  # when the hit was read that the lease waits for
+        self._stopping_ns: int | None = None
+        self._refused: int | None = None  # ``boot`` of the second authority that was reported
+        self._valid_ns = round(settings.lease * NS_PER_S)
+        self._silence_ns = round(settings.silence * NS_PER_S)
+        self._standstill = Standstill(
+            settings.deceleration,
+            settings.angular_deceleration,
+            round(settings.coast * NS_PER_S),
+            self._silence_ns,
+        )
+
+    def on_motion(self, motion: Motion, received_ns: int, now_ns: int) -> Outputs:
+        """Process a motion message and send one frame."""
+        before = self.lease
+        self.lease, order, refusal = leases.on_motion(
+            before, motion, now_ns, self._valid_ns, self._boot, received_ns=received_ns
+        )
+        if order is not None:
+            yield self.order(order, motion)
+        if order is BRAKE and before.hit is not None and self.lease.hit is None:
+            yield Reacted("judged_stop", self._hit_ns)
+        if refusal is not None:
+            self._counters[f"motion_{refusal}"] += 1
+        if refusal is Refusal.SECOND_AUTHORITY and motion.boot != self._refused:
+            self._refused = motion.boot
+            text = "a second sender on @cmd/motion is refused"
+            yield Event("second_authority", "error", text, {"boot": motion.boot})
+
+    def on_hit(self, seq: int, now_ns: int) -> Outputs:
+        """Brake for a hit, in the sample that will be published as ``seq``: the reflex."""
+        self._hit_ns = now_ns
+        self.lease, order = leases.on_hit(self.lease, seq, now_ns)
+        yield self.order(order)
+        yield Reacted("reflex", now_ns)
+
+    def on_estop(self, received_ns: int) -> Outputs:
+        """Process an emergency stop."""
+        self.lease, order = leases.on_estop(self.lease, received_ns)
+        if order is not None:
+            yield self.order(order)
+
+    def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
+        """Process a measured velocity."""
+        self._velocity = velocity, now_ns
+        self._standstill.on_velocity(velocity, now_ns)
+
+    def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
+        """Process the board's counters."""
+        self._standstill.on_mileage(mileage, now_ns)
+
+    def on_ready(self, ready: bool) -> None:
+        """Set whether the board may be driven."""
+        self.lease = leases.on_ready(self.lease, ready and self._stopping_ns is None)
+
+    def on_tick(self, now_ns: int) -> Outputs:
+        """Send the order that is due."""
+        limit_ns, standing = self._standstill.limit_ns, self._standing(now_ns)
+        self.lease, order = leases.on_tick(self.lease, now_ns, self._valid_ns, limit_ns, standing)
+        self._standstill.on_lease(self.lease.over_since_ns)
+        if self._standstill.moved_away:
+            yield from self._on_uncommanded(now_ns)
+        if order is not None:
+            yield self.order(order)
+
+    def _on_uncommanded(self, now_ns: int) -> Outputs:
+        self.lease, order = leases.on_uncommanded(self.lease, now_ns, self._boot)
+        if order is not None:
+            yield self.order(order)
+            text = "moved from standstill without a command: BRAKE"
+            yield Event("uncommanded_motion", "error", text)
+
+    def stop(self, now_ns: int) -> Outputs:
+        """Stop the vehicle before exit; only the first call sends a frame."""
+        if self._stopping_ns is None:
+            self._stopping_ns = now_ns
+            self.on_ready(False)
+            yield self.order(BRAKE if self.lease.braking else STOP)
+
+    def is_stopped(self, now_ns: int) -> bool:
+        """Return whether the vehicle is at standstill after ``stop``, or a second has passed."""
+        since_ns = now_ns if self._stopping_ns is None else self._stopping_ns
+        return self._is_at_standstill(now_ns) or now_ns - since_ns > STOP_TIMEOUT_NS
+
+    def on_exit(self, now_ns: int) -> Send:
+        """Return the last frame, on every exit: the board does not stop by itself."""
+        return self.order(STOP if self._is_at_standstill(now_ns) else BRAKE)
+
+    def order(self, order: Command, motion: Motion | None = None) -> Send:
+        """Return the frame of an order, from the command port."""
+        datagram = self._framing.pack(self._translator.command(order, motion))
+        return Send(datagram, self.port, order)
+
+    def _is_at_standstill(self, now_ns: int) -> bool:
+        """Return whether standstill was measured after ``stop``."""
+        measured_ns = self._velocity[1] if self._velocity else 0
+        stopped = self._stopping_ns is not None and measured_ns > self._stopping_ns
+        return stopped and self._standing(now_ns)
+
+    def _standing(self, now_ns: int) -> bool:
+        """Return whether the measured velocity shows standstill; False if it is too old.
+
+        Without any velocity so far it is True: this bridge has commanded no motion yet.
+        """
+        if self._velocity is None:
+            return True
+        velocity, measured_ns = self._velocity
+        fresh = now_ns - measured_ns <= self._silence_ns
+        return fresh and is_standing(velocity.linear, velocity.angular)

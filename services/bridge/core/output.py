@@ -1,0 +1,59 @@
+"""What the core wants carried out, one output at a time. Pure."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from msgspec import Struct
+
+from common.messages import Level, Message
+from common.motion import Command
+
+
+class Send(Struct, frozen=True):
+    """A datagram to the board, from the UDP port of this index."""
+
+    datagram: bytes
+    port: int
+    order: Command | None = None  # of a motion command
+
+
+class Publish(Struct, frozen=True):
+    """A message for the bus; ``stream`` names its publisher."""
+
+    stream: str
+    message: Message
+    raw: bytes | None = None
+
+
+class Event(Struct, frozen=True):
+    """A transition, for the bus and the log."""
+
+    name: str
+    level: Level
+    text: str
+    about: dict[str, str | float | bool | None] = {}
+
+
+class Reply(Struct, frozen=True):
+    """The answer to a call."""
+
+    caller: Any  # a ``common.bus.calls.Caller``
+    reply: Struct
+
+
+class Refuse(Struct, frozen=True):
+    """The refusal of a call, with its reason."""
+
+    caller: Any
+    reason: str
+
+
+class Reacted(Struct, frozen=True):
+    """A reaction that ends now: all outputs before it are carried out."""
+
+    name: str
+    since_ns: int
+
+
+Output = Send | Publish | Event | Reply | Refuse | Reacted
+Outputs = Iterator[Output]
