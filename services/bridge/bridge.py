@@ -43,12 +43,7 @@ def main() -> int:
     given = inherited(os.environ)
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run(
-        "bridge",
-        BridgeConfig,
-        lambda node: Bridge(node, given),
-        priority=ahead,
-    )
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, given), priority=ahead)
 
 
 class Histogram:
