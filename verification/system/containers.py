@@ -1,4 +1,4 @@
-"""The containers of compose.yaml: isolation, crashes, upgrade; ``T2_BASE`` names a base image."""
+"""The containers of compose.yaml: isolation and crashes; ``T2_BASE`` names a base image."""
 
 import json
 import os
