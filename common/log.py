@@ -1,32 +1,25 @@
 """Structured logs on standard error: text on a terminal, JSON lines otherwise.
 
 ``Logger().warning("link lost", epoch=2)`` logs an event with fields. It goes through the standard
-library's ``logging``, so warnings and errors of libraries arrive in the same form. ``configure``
-puts a queue between the callers and standard error: when a dead parent's pipe or a terminal after
-ctrl-S takes no more lines, lines are lost and the service goes on.
+library's ``logging``, so warnings and errors of libraries arrive in the same form.
 """
 
-import atexit
-import contextlib
 import json
 import logging
 import os
 import queue
 import sys
-import time
+import threading
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from logging.handlers import QueueHandler, QueueListener
-from typing import Any, TextIO, TypeAlias
+from functools import partialmethod
+from typing import Any, Literal, TextIO, TypeAlias
 
 from common.settings import Log, LogLevel
 
-# What no line shows need not be collected for each.
-logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
-
 NAME = "t2"  # of the logger of all our lines; others are of libraries
 QUEUE_MAX = 1000  # lines
-DRAIN_S = 0.5  # how long the end of a program waits for its last lines
+FLUSH_S = 0.5  # how long the end of a program waits for its last lines
 COLOURS = {"debug": 2, "info": 32, "warning": 33, "error": 31}  # of a terminal, by ECMA-48
 
 Fields: TypeAlias = Mapping[str, object]
@@ -39,117 +32,82 @@ class Logger:
     def __init__(self, **fields: object) -> None:
         self._fields = fields
 
-    def debug(self, event: str, /, **fields: object) -> None:
-        """Log what a developer wants to know."""
-        self._log(logging.DEBUG, event, fields)
-
-    def info(self, event: str, /, **fields: object) -> None:
-        """Log a normal transition."""
-        self._log(logging.INFO, event, fields)
-
-    def warning(self, event: str, /, **fields: object) -> None:
-        """Log what an operator should look at."""
-        self._log(logging.WARNING, event, fields)
-
-    def error(self, event: str, /, **fields: object) -> None:
-        """Log a failure."""
-        self._log(logging.ERROR, event, fields)
-
-    def _log(self, level: int, event: str, fields: Fields) -> None:
+    def log(self, level: int, event: str, /, **fields: object) -> None:
+        """Log an event of this level."""
         _logger.log(level, event, extra={"fields": {**self._fields, **fields}})
 
+    debug = partialmethod(log, logging.DEBUG)  # what a developer wants to know
+    info = partialmethod(log, logging.INFO)  # a normal transition
+    warning = partialmethod(log, logging.WARNING)  # what an operator should look at
+    error = partialmethod(log, logging.ERROR)  # a failure
 
-class JsonFormatter(logging.Formatter):
-    """One JSON object a line, with the time in UTC."""
 
-    def __init__(self, service: str) -> None:
+class Formatter(logging.Formatter):
+    """Returns a line: a JSON object with the time in UTC, or text with the local time."""
+
+    def __init__(self, service: str = "", form: Literal["json", "text", "coloured"] = "text"):
         super().__init__()
-        self._service = service
+        self._service, self._form = service, form
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line, without its end."""
-        at = datetime.fromtimestamp(record.created, UTC).replace(tzinfo=None)
-        line = {
-            "service": self._service,
-            **fields_of(record),
-            "event": record.getMessage(),
-            "level": record.levelname.lower(),
-            "timestamp": f"{at.isoformat(timespec='microseconds')}Z",
-        }
-        return json.dumps(line, default=repr)
-
-
-class TextFormatter(logging.Formatter):
-    """A line for people, with the local time."""
-
-    def __init__(self, service: str = "", *, coloured: bool = False) -> None:
-        super().__init__()
-        self._service, self._coloured = service, coloured
-
-    def format(self, record: logging.LogRecord) -> str:
-        """Return the line, without its end."""
-        at = datetime.fromtimestamp(record.created).isoformat(timespec="milliseconds")
-        level = record.levelname.lower()
-        colour = COLOURS.get(level, COLOURS["error"])
-        word = f"\x1b[{colour}m{level:7}\x1b[0m" if self._coloured else f"{level:7}"
-        named = fields_of(record)
-        if self._service:
-            named = {"service": self._service, **named}
-        fields = " ".join(f"{name}={_shown(value)}" for name, value in named.items())
-        event = record.getMessage()
-        return f"{at} [{word}] {event if event.isprintable() else repr(event):30} {fields}".rstrip()
+        fields = ({"service": self._service} if self._service else {}) | fields_of(record)
+        event, level = record.getMessage(), record.levelname.lower()
+        if self._form == "json":
+            at = datetime.fromtimestamp(record.created, UTC).replace(tzinfo=None)
+            stamp = f"{at.isoformat(timespec='microseconds')}Z"
+            line = {**fields, "event": event, "level": level, "timestamp": stamp}
+            return json.dumps(line, default=repr)
+        at = datetime.fromtimestamp(record.created)
+        word = f"{level:7}"
+        if self._form == "coloured":
+            word = f"\x1b[{COLOURS.get(level, COLOURS['error'])}m{word}\x1b[0m"
+        shown = " ".join(f"{name}={_shown(value)}" for name, value in fields.items())
+        event = event if event.isprintable() else repr(event)
+        return f"{at.isoformat(timespec='milliseconds')} [{word}] {event:30} {shown}".rstrip()
 
 
 class Output(logging.Handler):
-    """Writes to a file that may be closed or blocked; only the queue's thread uses it."""
+    """Writes lines to a file in a thread of its own, so that no caller waits for it.
 
-    def __init__(self, file: TextIO) -> None:
-        super().__init__()
-        self._file = file
-
-    def createLock(self) -> None:  # noqa: N802 - logging's name
-        """Take no lock: ``logging`` would wait for it at exit while a write blocks."""
-        self.lock = None
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Write a line and its end at once: the processes of `t2 up` share one standard error."""
-        with contextlib.suppress(OSError, ValueError):
-            self._write(f"{self.format(record)}\n")
-
-    def _write(self, line: str) -> None:
-        try:
-            self._file.write(line)
-            self._file.flush()
-        except BrokenPipeError:
-            # The reader is gone. On exit, Python would write the rest again and fail; that failure
-            # would be the exit code.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._file.fileno())
-
-
-class LossyQueue(QueueHandler):
-    """Queue of lines on their way to a file: a line is lost when too many wait."""
+    When a dead parent's pipe or a terminal after ctrl-S takes no more lines, lines are lost.
+    """
 
     def __init__(self, file: TextIO, formatter: logging.Formatter) -> None:
-        self._lines: queue.Queue[logging.LogRecord] = queue.Queue(QUEUE_MAX)
-        super().__init__(self._lines)
-        output = Output(file)
-        output.setFormatter(formatter)
-        QueueListener(self._lines, output).start()
+        super().__init__()
+        self.setFormatter(formatter)
+        self._file = file
+        # Reentrant: a signal handler may log while its thread logs.
+        self._lines: queue.SimpleQueue[logging.LogRecord | threading.Event] = queue.SimpleQueue()
+        threading.Thread(target=self._write_lines, name="log", daemon=True).start()
 
-    def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
-        """Return the record as it is: the queue's thread formats it."""
-        return record
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue a line, or drop it."""
+        if self._lines.qsize() < QUEUE_MAX:
+            self._lines.put(record)
 
-    def enqueue(self, record: logging.LogRecord) -> None:
-        """Append a record, or drop it."""
-        with contextlib.suppress(queue.Full):
-            self._lines.put_nowait(record)
+    def flush(self) -> None:
+        """Wait until all lines are written, or ``FLUSH_S``; ``logging`` calls it at exit."""
+        written = threading.Event()
+        self._lines.put(written)
+        written.wait(FLUSH_S)
 
-    def drain(self, patience_s: float = DRAIN_S) -> None:
-        """Wait until all lines are written, at most this long."""
-        deadline_s = time.monotonic() + patience_s
-        while self._lines.unfinished_tasks and time.monotonic() < deadline_s:
-            time.sleep(0.001)
+    def _write_lines(self) -> None:
+        while True:
+            line = self._lines.get()
+            if isinstance(line, threading.Event):
+                line.set()
+                continue
+            try:
+                # With its end at once: the processes of `t2 up` share one standard error.
+                self._file.write(f"{self.format(line)}\n")
+                self._file.flush()
+            except BrokenPipeError:
+                # The reader is gone. On exit, Python would write the rest again and fail; that
+                # failure would be the exit code.
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self._file.fileno())
+            except (OSError, ValueError):
+                pass  # closed
 
 
 class Callback(logging.Handler):
@@ -165,20 +123,18 @@ class Callback(logging.Handler):
         self._receive(level, record.getMessage(), fields_of(record))
 
 
-def configure(settings: Log, service: str) -> LossyQueue:
-    """Send lines of the set level to standard error, with the service's name; return their queue.
+def configure(settings: Log, service: str) -> Output:
+    """Send lines of the set level to standard error, with the service's name.
 
     Of libraries, only warnings and errors are logged.
     """
     terminal = sys.stderr.isatty()
-    text = settings.format == "text" or (settings.format == "auto" and terminal)
-    coloured = terminal and "NO_COLOR" not in os.environ
-    lines = LossyQueue(
-        sys.stderr, TextFormatter(service, coloured=coloured) if text else JsonFormatter(service)
-    )
-    atexit.register(lines.drain)
-    _install(lines, settings.level)
-    return lines
+    form: Literal["json", "text", "coloured"] = "json"
+    if settings.format == "text" or (settings.format == "auto" and terminal):
+        form = "coloured" if terminal and "NO_COLOR" not in os.environ else "text"
+    output = Output(sys.stderr, Formatter(service, form))
+    _install(output, settings.level)
+    return output
 
 
 def redirect(receive: Receiver, level: LogLevel) -> None:
@@ -197,7 +153,7 @@ def fields_of(record: logging.LogRecord) -> dict[str, object]:
 def _install(handler: logging.Handler, level: LogLevel) -> None:
     root, least = logging.getLogger(), logging.getLevelNamesMapping()[level.upper()]
     for old in root.handlers[:]:
-        if isinstance(old, LossyQueue | Callback):
+        if isinstance(old, Output | Callback):
             root.removeHandler(old)
     root.addHandler(handler)
     root.setLevel(max(least, logging.WARNING))
@@ -212,4 +168,4 @@ def _shown(value: object) -> str:
 
 _logger = logging.getLogger(NAME)
 if logging.lastResort:  # before ``configure``: warnings and errors, as text
-    logging.lastResort.setFormatter(TextFormatter())
+    logging.lastResort.setFormatter(Formatter())

@@ -26,7 +26,7 @@ def _own_logs() -> Iterator[None]:
     before = root.handlers[:], root.level, ours.level
     yield
     for handler in root.handlers[:]:
-        if isinstance(handler, log.LossyQueue | log.Callback) and handler not in before[0]:
+        if isinstance(handler, log.Output | log.Callback) and handler not in before[0]:
             root.removeHandler(handler)
     root.setLevel(before[1])
     ours.setLevel(before[2])

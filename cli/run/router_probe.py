@@ -103,7 +103,7 @@ def main(text: str) -> int:
             unanswered=MISSES,
             seconds=setup.bus.probe_deadline,
         )
-    written.drain()
+    written.flush()
     os._exit(0)  # an attempt may hang in Zenoh
 
 

@@ -19,7 +19,7 @@ import pytest
 from common import log
 from common.settings import Log
 from verification.harness.bus import Lines
-from verification.harness.waiting import PATIENCE_S, wait_until
+from verification.harness.waiting import wait_until
 
 
 class Screen(io.StringIO):
@@ -34,54 +34,23 @@ class Screen(io.StringIO):
 
 
 def written(
-    monkeypatch: pytest.MonkeyPatch, settings: Log, *, tty: bool, level: str = "warning"
+    monkeypatch: pytest.MonkeyPatch,
+    settings: Log,
+    level: str = "warning",
+    *,
+    tty: bool = False,
+    library: str = "",
 ) -> str:
+    """Return what one line of ours, or of a library, looks like on standard error."""
     screen = Screen(tty)
     monkeypatch.setattr(sys, "stderr", screen)
-    lines = log.configure(settings, "bridge")
-    getattr(log.Logger(), level)("link lost", epoch=2)
-    lines.drain(PATIENCE_S)
+    output = log.configure(settings, "bridge")
+    if library:
+        getattr(logging.getLogger(library), level)("%d connections", 3)
+    else:
+        getattr(log.Logger(), level)("link lost", epoch=2)
+    output.flush()
     return screen.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("settings", "tty"), [(Log(), False), (Log(format="json"), True)], ids=["auto", "asked for"]
-)
-def test_json_is_one_object_a_line(
-    monkeypatch: pytest.MonkeyPatch, settings: Log, tty: bool
-) -> None:
-    line = written(monkeypatch, settings, tty=tty)
-    assert line.endswith("}\n")
-    entry = json.loads(line)
-    assert entry.pop("timestamp").endswith("Z")
-    assert entry == {"service": "bridge", "event": "link lost", "level": "warning", "epoch": 2}
-
-
-@pytest.mark.parametrize(
-    ("settings", "tty"), [(Log(), True), (Log(format="text"), False)], ids=["auto", "asked for"]
-)
-def test_text_is_readable(monkeypatch: pytest.MonkeyPatch, settings: Log, tty: bool) -> None:
-    line = written(monkeypatch, settings, tty=tty)
-    assert "link lost" in line
-    assert "bridge" in line
-    assert not line.startswith("{")
-
-
-@pytest.mark.parametrize(
-    ("level", "given", "shown"),
-    [
-        ("info", "debug", False),
-        ("info", "info", True),
-        ("error", "warning", False),
-        ("error", "error", True),
-        ("debug", "debug", True),
-    ],
-)
-def test_the_level_decides(
-    monkeypatch: pytest.MonkeyPatch, level: str, given: str, shown: bool
-) -> None:
-    settings = Log(level=level)  # type: ignore[arg-type]
-    assert bool(written(monkeypatch, settings, tty=False, level=given)) is shown
 
 
 def record(level: int, event: str, **fields: object) -> logging.LogRecord:
@@ -90,8 +59,57 @@ def record(level: int, event: str, **fields: object) -> logging.LogRecord:
     return made
 
 
+@pytest.mark.parametrize(
+    ("form", "tty", "text"),
+    [("auto", False, False), ("json", True, False), ("auto", True, True), ("text", False, True)],
+)
+def test_a_terminal_gets_text_and_a_file_json(
+    monkeypatch: pytest.MonkeyPatch, form: str, tty: bool, text: bool
+) -> None:
+    line = written(monkeypatch, Log(format=form), tty=tty)  # type: ignore[arg-type]
+    if text:
+        assert re.search(r"link lost +service=bridge epoch=2\n$", line)
+        return
+    entry = json.loads(line)
+    assert line.endswith("}\n")
+    assert entry.pop("timestamp").endswith("Z")
+    assert entry == {"service": "bridge", "event": "link lost", "level": "warning", "epoch": 2}
+
+
+@pytest.mark.parametrize(
+    ("level", "given", "library", "shown"),
+    [
+        ("info", "debug", "", False),
+        ("info", "info", "", True),
+        ("error", "warning", "", False),
+        ("error", "error", "", True),
+        ("debug", "debug", "", True),
+        ("debug", "info", "uvicorn.error", False),
+        ("debug", "warning", "uvicorn.error", True),
+        ("debug", "error", "uvicorn.error", True),
+    ],
+)
+def test_the_level_decides_and_of_libraries_warnings_count(
+    monkeypatch: pytest.MonkeyPatch, level: str, given: str, library: str, shown: bool
+) -> None:
+    line = written(monkeypatch, Log(level=level), given, library=library)  # type: ignore[arg-type]
+    assert bool(line) is shown
+    if library and shown:
+        entry = json.loads(line)
+        assert (entry["event"], entry["logger"]) == ("3 connections", "uvicorn.error")
+        assert entry["service"] == "bridge"
+
+
+def test_an_exception_is_one_field_of_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    try:
+        raise ValueError("broken")
+    except ValueError:
+        line = written(monkeypatch, Log(), "exception", library="asyncio")
+    assert json.loads(line)["exception"].endswith("ValueError: broken")
+
+
 def test_what_json_cannot_hold_is_written_as_its_repr() -> None:
-    line = log.JsonFormatter("up").format(
+    line = log.Formatter("up", "json").format(
         record(logging.INFO, "Größe × 2 %s", at=Path("a"), values=(1, None))
     )
     entry = json.loads(line)
@@ -99,44 +117,12 @@ def test_what_json_cannot_hold_is_written_as_its_repr() -> None:
     assert entry["values"] == [1, None]
 
 
-def test_the_text_holds_the_fields() -> None:
+def test_text_has_the_local_time_and_the_fields() -> None:
     made = record(logging.ERROR, "ended", code=1, why="no room", world="")
-    stamp, line = log.TextFormatter("up").format(made).split(" ", 1)
+    stamp, line = log.Formatter("up").format(made).split(" ", 1)
     assert datetime.fromisoformat(stamp).tzinfo is None
     assert line == "[error  ] ended" + 26 * " " + "service=up code=1 why='no room' world=''"
-
-
-def test_an_event_that_is_not_printable_is_written_as_its_repr() -> None:
-    line = log.TextFormatter("up").format(record(logging.INFO, "a\x1b[2J"))
-    assert "'a\\x1b[2J'" in line
-
-
-@pytest.mark.parametrize(("level", "shown"), [("info", False), ("warning", True), ("error", True)])
-def test_lines_of_libraries_arrive_from_warnings_on(
-    monkeypatch: pytest.MonkeyPatch, level: str, shown: bool
-) -> None:
-    screen = Screen(tty=False)
-    monkeypatch.setattr(sys, "stderr", screen)
-    lines = log.configure(Log(level="debug"), "dashboard")
-    getattr(logging.getLogger("uvicorn.error"), level)("%d connections", 3)
-    lines.drain(PATIENCE_S)
-    assert bool(screen.getvalue()) is shown
-    if shown:
-        entry = json.loads(screen.getvalue())
-        assert entry["service"] == "dashboard"
-        assert (entry["event"], entry["logger"]) == ("3 connections", "uvicorn.error")
-
-
-def test_an_exception_is_one_field_of_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(tty=False)
-    monkeypatch.setattr(sys, "stderr", screen)
-    lines = log.configure(Log(), "dashboard")
-    try:
-        raise ValueError("broken")
-    except ValueError:
-        logging.getLogger("asyncio").exception("Task failed")
-    lines.drain(PATIENCE_S)
-    assert json.loads(screen.getvalue())["exception"].endswith("ValueError: broken")
+    assert "'a\\x1b[2J'" in log.Formatter("up").format(record(logging.INFO, "a\x1b[2J"))
 
 
 @pytest.mark.parametrize(("refused", "coloured"), [(False, True), (True, False)])
@@ -148,18 +134,26 @@ def test_a_terminal_shows_the_level_in_colour(
         monkeypatch.setenv("NO_COLOR", "1")
     line = written(monkeypatch, Log(), tty=True)
     assert ("\x1b[33mwarning\x1b[0m" in line) is coloured
-    assert "\x1b" not in written(monkeypatch, Log(format="text"), tty=False)
+    assert "\x1b" not in written(monkeypatch, Log(format="text"))
 
 
-def test_a_logger_says_what_it_is_about_itself(lines: Lines) -> None:
+def test_a_logger_adds_its_own_fields(lines: Lines) -> None:
     log.Logger(robot="007").info("stopped", asked_by="hall")
     assert lines == [("info", "stopped", {"robot": "007", "asked_by": "hall"})]
 
 
-def test_before_it_is_configured_warnings_are_text_on_standard_error() -> None:
-    code = "from common.log import Logger; Logger().warning('early', epoch=2)"
+@pytest.mark.parametrize(
+    ("configured", "shown"),
+    [
+        ("", r"\[warning\] early +epoch=2\n$"),
+        ("log.configure(Log(), 'up'); ", r'"epoch": 2, .*}\n$'),
+    ],
+)
+def test_the_last_line_of_a_program_is_written(configured: str, shown: str) -> None:
+    imports = "from common import log; from common.settings import Log; "
+    code = f"{imports}{configured}log.Logger().warning('early', epoch=2)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert re.search(r"\[warning\] early +epoch=2\n$", done.stderr)
+    assert re.search(shown, done.stderr)
     assert not done.stdout
 
 
@@ -175,26 +169,26 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
         file.close()
 
 
-def test_a_file_that_nobody_reads_holds_up_nobody(pipe: tuple[int, TextIO]) -> None:
-    said = threading.Event()
+def test_a_file_that_nobody_reads_delays_no_caller(pipe: tuple[int, TextIO]) -> None:
+    done = threading.Event()
 
-    def say() -> None:
-        lines = log.LossyQueue(pipe[1], logging.Formatter())
+    def log_much() -> None:
+        output = log.Output(pipe[1], logging.Formatter())
         for _ in range(10 * log.QUEUE_MAX):
-            lines.handle(record(logging.INFO, "x" * 100))
-        lines.drain(0.0)
-        said.set()
+            output.handle(record(logging.INFO, "x" * 100))
+        assert output._lines.qsize() <= log.QUEUE_MAX
+        output.flush()
+        done.set()
 
-    threading.Thread(target=say, daemon=True).start()
-    wait_until(said.is_set, "all is said, though the pipe is full")
+    threading.Thread(target=log_much, daemon=True).start()
+    wait_until(done.is_set, "the end, though the pipe is full")
 
 
 def test_a_file_that_is_gone_loses_lines_only(pipe: tuple[int, TextIO]) -> None:
     os.close(pipe[0])
-    lines = log.LossyQueue(pipe[1], logging.Formatter())
-    lines.handle(record(logging.INFO, "nobody reads this"))
-    lines.drain(PATIENCE_S)
-    lines.handle(record(logging.INFO, "nor this"))
-    lines.drain(PATIENCE_S)
+    output = log.Output(pipe[1], logging.Formatter())
+    for text in ("nobody reads this", "nor this"):
+        output.handle(record(logging.INFO, text))
+        output.flush()
     assert not pipe[1].closed
     pipe[1].flush()  # as Python does on exit: an error here would change the exit code
