@@ -1,16 +1,30 @@
-"""Motion output: the lease's orders as frames, from the command port. Pure."""
+"""Motion output: the lease's orders as frames, and the standstill after its end. Pure.
+
+STOP coasts, and the board may not obey it. So the bridge supervises it while no safety commands:
+
+=========== ==================================== ===================================================
+phase       ends with                            BRAKE
+=========== ==================================== ===================================================
+stopping    a velocity that counts as standstill no standstill after v / a + 0.5 s, or after the
+                                                 coast limit if that is sooner
+standstill  a valid lease                        the vehicle has left its place
+                                                 (``common.standstill``)
+=========== ==================================== ===================================================
+
+The first BRAKE lasts until standstill, the second one until safety has latched it (see ``lease``).
+"""
 
 from collections import Counter
 
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Mileage, Motion, Velocity
-from common.motion import BRAKE, STOP, Command, is_standing
+from common.motion import BRAKE, STOP, Command, Twist
+from common.standstill import Displacement, stopping_ns
 from common.wire.framing import Framing
 from services.bridge.config import Bridge as Settings
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease, Refusal
 from services.bridge.core.output import Event, Outputs, Reacted, Send
-from services.bridge.core.standstill import Standstill
 from services.bridge.core.translate import Translator
 
 STOP_TIMEOUT_NS = NS_PER_S  # until a stopping bridge no longer waits for standstill
@@ -36,18 +50,15 @@ class MotionOutput:
         self._framing = framing
         self._translator = translator
         self._counters = counters
-        self._velocity: tuple[Velocity, int] | None = None
+        self._velocity: Latest[Twist] | None = None
         self._hit_ns = 0  # when the hit was read that the lease waits for
         self._stopping_ns: int | None = None
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
+        self._settings = settings
         self._valid_ns = round(settings.lease * NS_PER_S)
-        self._silence_ns = round(settings.silence * NS_PER_S)
-        self._standstill = Standstill(
-            settings.deceleration,
-            settings.angular_deceleration,
-            round(settings.coast * NS_PER_S),
-            self._silence_ns,
-        )
+        self._over_since_ns: int | None = None  # the end of the lease that is supervised
+        self._limit_ns = round(settings.coast * NS_PER_S)  # from then until it must stand
+        self._displacement: Displacement | None = None  # None until standstill after that end
 
     def on_motion(self, motion: Motion, received_ns: int, now_ns: int) -> Outputs:
         """Process a motion message and send one frame."""
@@ -81,12 +92,19 @@ class MotionOutput:
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
         """Process a measured velocity."""
-        self._velocity = velocity, now_ns
-        self._standstill.on_velocity(velocity, now_ns)
+        measured = Latest(Twist(velocity.linear, velocity.angular), now_ns)
+        self._velocity = measured
+        if self._over_since_ns is None:
+            return
+        if self._displacement is not None:
+            self._displacement = self._displacement.with_velocity(measured)
+        elif measured.value.is_standing:
+            self._displacement = Displacement().with_velocity(measured)
 
     def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
         """Process the board's counters."""
-        self._standstill.on_mileage(mileage, now_ns)
+        if self._displacement is not None:
+            self._displacement = self._displacement.with_mileage(Latest(mileage, now_ns))
 
     def on_ready(self, ready: bool) -> None:
         """Set whether the board may be driven."""
@@ -94,20 +112,32 @@ class MotionOutput:
 
     def on_tick(self, now_ns: int) -> Outputs:
         """Send the order that is due."""
-        limit_ns, standing = self._standstill.limit_ns, self._standing(now_ns)
-        self.lease, order = leases.on_tick(self.lease, now_ns, self._valid_ns, limit_ns, standing)
-        self._standstill.on_lease(self.lease.over_since_ns)
-        if self._standstill.moved_away:
-            yield from self._on_uncommanded(now_ns)
+        self.lease, order = leases.on_tick(
+            self.lease, now_ns, self._valid_ns, self._limit_ns, self._standing(now_ns)
+        )
+        self._supervise(self.lease.over_since_ns)
+        if self._displacement is not None and self._displacement.has_left:
+            self.lease, brake = leases.on_uncommanded(self.lease, now_ns, self._boot)
+            if brake is not None:
+                yield self.order(brake)
+                text = "moved from standstill without a command: BRAKE"
+                yield Event("uncommanded_motion", "error", text)
         if order is not None:
             yield self.order(order)
 
-    def _on_uncommanded(self, now_ns: int) -> Outputs:
-        self.lease, order = leases.on_uncommanded(self.lease, now_ns, self._boot)
-        if order is not None:
-            yield self.order(order)
-            text = "moved from standstill without a command: BRAKE"
-            yield Event("uncommanded_motion", "error", text)
+    def _supervise(self, over_since_ns: int | None) -> None:
+        """Begin anew with each end of a lease; None while it is valid."""
+        if over_since_ns == self._over_since_ns:
+            return
+        self._over_since_ns = over_since_ns
+        self._displacement = None
+        settings, velocity = self._settings, self._velocity
+        self._limit_ns = round(settings.coast * NS_PER_S)
+        if velocity and over_since_ns and fresh(velocity, over_since_ns, settings.silence):
+            limit_ns = stopping_ns(
+                velocity.value, settings.deceleration, settings.angular_deceleration
+            )
+            self._limit_ns = min(self._limit_ns, limit_ns)
 
     def stop(self, now_ns: int) -> Outputs:
         """Stop the vehicle before exit; only the first call sends a frame."""
@@ -132,17 +162,17 @@ class MotionOutput:
 
     def _is_at_standstill(self, now_ns: int) -> bool:
         """Return whether standstill was measured after ``stop``."""
-        measured_ns = self._velocity[1] if self._velocity else 0
-        stopped = self._stopping_ns is not None and measured_ns > self._stopping_ns
-        return stopped and self._standing(now_ns)
+        since_ns, velocity = self._stopping_ns, self._velocity
+        if since_ns is None or velocity is None or velocity.received_ns <= since_ns:
+            return False
+        return self._standing(now_ns)
 
     def _standing(self, now_ns: int) -> bool:
         """Return whether the measured velocity shows standstill; False if it is too old.
 
         Without any velocity so far it is True: this bridge has commanded no motion yet.
         """
-        if self._velocity is None:
+        velocity = self._velocity
+        if velocity is None:
             return True
-        velocity, measured_ns = self._velocity
-        fresh = now_ns - measured_ns <= self._silence_ns
-        return fresh and is_standing(velocity.linear, velocity.angular)
+        return velocity.value.is_standing and fresh(velocity, now_ns, self._settings.silence)

@@ -1,0 +1,152 @@
+"""Supervision by the bridge while no safety commands: until standstill, and of it."""
+
+from collections import Counter
+
+import pytest
+
+from common.freshness import NS_PER_S
+from common.messages import Mileage, Motion, Velocity
+from common.motion import BRAKE, STOP, Command
+from common.settings import Vehicle, Wire
+from common.wire.framing import Framing
+from services.bridge.config import Bridge
+from services.bridge.core.motion_output import MotionOutput
+from services.bridge.core.output import Event, Send
+from services.bridge.core.translate import Translator
+from tests.bridge.core_fixture import BOOT, MS, NOW, SAFETY
+
+SETTINGS = Bridge(deceleration=0.6, angular_deceleration=2.0)
+END = NOW + 200 * MS + 1  # of a lease from NOW on
+
+
+class Output:
+    """A motion output whose lease began at NOW."""
+
+    def __init__(self) -> None:
+        translator = Translator(Wire(), Vehicle(), 1.0, 1.0)
+        self.made = MotionOutput(
+            SETTINGS, Framing(), translator, boot=BOOT, counters=Counter(), now_ns=NOW
+        )
+        self.seq = 0
+        self.events: list[str] = []
+        self.renew(NOW)
+
+    def renew(self, now_ns: int) -> None:
+        """Begin a lease."""
+        self.seq += 1
+        motion = Motion(command=STOP, boot=SAFETY, seq=self.seq)
+        list(self.made.on_motion(motion, now_ns, now_ns))
+
+    def moves(self, linear: float, now_ns: int, angular: float = 0.0) -> None:
+        self.made.on_velocity(Velocity(linear=linear, angular=angular), now_ns)
+
+    def counts(self, distance: float, now_ns: int, epoch: int = 0) -> None:
+        self.made.on_mileage(Mileage(distance=distance, heading=0.0, epoch=epoch), now_ns)
+
+    def tick(self, now_ns: int) -> list[Command]:
+        """Return the orders of a tick."""
+        outputs = list(self.made.on_tick(now_ns))
+        self.events += [one.name for one in outputs if isinstance(one, Event)]
+        return [one.order for one in outputs if isinstance(one, Send) and one.order]
+
+
+@pytest.fixture
+def output() -> Output:
+    return Output()
+
+
+@pytest.fixture
+def stood(output: Output) -> Output:
+    """Return an output whose lease is over, and whose vehicle has stood since then."""
+    output.moves(0.0, NOW)
+    assert output.tick(END) == [STOP]
+    output.moves(0.0, END)
+    return output
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "age", "limit_s"),
+    [
+        (0.12, 0.0, 0, 0.7),
+        (-0.12, 0.0, 200 * MS, 0.7),
+        (0.0, -0.2, 0, 0.6),
+        (0.12, 0.6, 0, 0.8),
+        (0.8, 0.0, 0, 1.0),  # the coast limit is sooner
+        (0.12, 0.0, 200 * MS + 1, 1.0),  # too old
+    ],
+)
+def test_it_must_stand_by_then(
+    output: Output, linear: float, angular: float, age: int, limit_s: float
+) -> None:
+    output.moves(linear, END - age, angular)
+    assert output.tick(END) == [STOP]
+    due_ns = END + round(limit_s * NS_PER_S)
+    for now_ns, order in ((due_ns - 40 * MS, STOP), (due_ns, STOP), (due_ns + 40 * MS, BRAKE)):
+        output.moves(linear, now_ns, angular)
+        assert output.tick(now_ns) == [order]
+    output.moves(0.0, due_ns + 80 * MS)
+    assert output.tick(due_ns + 80 * MS) == [STOP]
+    assert output.events == []
+
+
+def test_before_the_first_lease_the_coast_limit_counts() -> None:
+    made = Output()
+    made.made.lease = type(made.made.lease)(over_since_ns=NOW)
+    made.moves(0.5, NOW)
+    assert made.tick(NOW + 40 * MS) == [STOP]
+    made.moves(0.5, NOW + NS_PER_S)
+    assert made.tick(NOW + NS_PER_S) == [STOP]
+    assert made.tick(NOW + NS_PER_S + 40 * MS) == [BRAKE]
+
+
+@pytest.mark.parametrize(("distance", "left"), [(0.05, False), (0.0501, True), (-0.0501, True)])
+def test_away_by_the_counters(stood: Output, distance: float, left: bool) -> None:
+    stood.counts(3.0, END)
+    stood.counts(3.0 + distance, END + 40 * MS)
+    stood.counts(9.0, END + 40 * MS, epoch=1)  # a restart of the board is no motion
+    stood.moves(0.0, END + 40 * MS)
+    assert stood.tick(END + 40 * MS) == ([BRAKE, STOP] if left else [STOP])
+    assert stood.events == ["uncommanded_motion"] * left
+    assert stood.tick(END + 80 * MS) == [BRAKE if left else STOP]
+    assert stood.events == ["uncommanded_motion"] * left, "once"
+
+
+def test_away_by_the_velocities(stood: Output) -> None:
+    for number in range(1, 8):
+        assert stood.events == []
+        stood.moves(0.5, END + number * 20 * MS)
+        stood.tick(END + number * 20 * MS)
+    assert stood.events == ["uncommanded_motion"]
+
+
+def test_what_it_did_before_it_stood_does_not_count(output: Output) -> None:
+    output.moves(1.0, NOW)
+    output.counts(0.0, NOW)
+    output.tick(END)
+    for number in range(10):
+        output.moves(1.0, END + number * 20 * MS)
+        output.counts(0.1 * number, END + number * 20 * MS)
+    output.moves(0.0, END + 200 * MS)
+    output.counts(5.0, END + 200 * MS)
+    output.moves(0.1, END + 220 * MS)
+    output.tick(END + 220 * MS)
+    assert output.events == []
+
+
+def test_while_the_lease_is_valid_safety_supervises_it(stood: Output) -> None:
+    stood.counts(0.0, END)
+    stood.renew(END)
+    stood.tick(END + MS)
+    stood.moves(0.0, END + MS)
+    stood.counts(9.0, END + MS)
+    stood.tick(END + 2 * MS)
+    over = END + 201 * MS
+    stood.tick(over)
+    stood.moves(0.0, over)
+    stood.counts(11.0, over)
+    stood.counts(11.04, over + MS)
+    stood.tick(over + 40 * MS)
+    assert stood.events == []
+    stood.counts(11.06, over + 40 * MS)
+    stood.tick(over + 80 * MS)
+    assert stood.events == ["uncommanded_motion"]
