@@ -97,12 +97,16 @@ class Node(Generic[C]):
         """Declare the liveliness token, the info queryables and the health timer."""
         robot, bus = self.config.robot.id, self.bus
         bus.live(keys.live_key(robot, self.name, f"{bus.boot:x}"))
-        schema, settings = self._schema(), self._settings()  # encoded once
-        for part, make in (
-            ("schema", lambda: schema),
-            ("config", lambda: settings),
-            ("last", self._last),
-        ):
+        # Encoded once, so that a flood of queries costs little.
+        schema = msgspec.json.encode(keys.schemas({each.topic for each in bus.publishers}))
+        settings = msgspec.json.encode(
+            {
+                path: {"value": setting.value, "origin": setting.origin}
+                for path, setting in self._loaded.settings.items()
+            }
+        )
+        parts = {"schema": lambda: schema, "config": lambda: settings, "last": self._last}
+        for part, make in parts.items():
             bus.answer(keys.info_key(robot, self.name, part), make, "application/json")
         self.loop.every(1.0, self._report)
 
@@ -124,17 +128,6 @@ class Node(Generic[C]):
                 reactions=self.reactions(),
             )
         )
-
-    def _schema(self) -> bytes:
-        mine = {publisher.topic for publisher in self.bus.publishers}
-        return msgspec.json.encode(keys.schemas(mine))
-
-    def _settings(self) -> bytes:
-        settings = {
-            path: {"value": setting.value, "origin": setting.origin}
-            for path, setting in self._loaded.settings.items()
-        }
-        return msgspec.json.encode(settings)
 
     def _last(self) -> bytes:
         return msgspec.json.encode({p.key: p.last for p in self.bus.publishers if p.last})
@@ -194,8 +187,7 @@ def run_optional_service(
 
 def serve(node: Node[C]) -> int:
     """Run the loop until a signal, stop the service in order, and exit."""
-    exit_actions = ExitActions(node)
-    _on_signal(node, exit_actions)
+    end = Exit(node)
     systemd = Systemd()
     if systemd.enabled:
         node.loop.every(CHECK_PERIOD_S, systemd.ready)
@@ -207,7 +199,7 @@ def serve(node: Node[C]) -> int:
         systemd.stopping()
         _await_stop(node)
     finally:
-        exit_actions.run()
+        end.run_actions()
         # Also after a crash: an open session keeps a failed process from ending.
         node.close()
     node.log.info("stopped")
@@ -234,20 +226,19 @@ def resident_bytes() -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-class ExitActions:
-    """Exit actions of a service; they run once."""
+class Exit:
+    """End of a service: the first signal stops its loop, the second one ends the process.
+
+    The exit actions run once, whatever ends it.
+    """
 
     def __init__(self, node: Node[C]) -> None:
         self._node = node
         self._begun = self._over = False
+        self._on_signals(self._stop)
 
-    @property
-    def running(self) -> bool:
-        """Whether they have begun and are not finished."""
-        return self._begun and not self._over
-
-    def run(self) -> None:
-        """Run them once."""
+    def run_actions(self) -> None:
+        """Run the exit actions, once."""
         if self._begun:
             return
         self._begun = True
@@ -256,20 +247,18 @@ class ExitActions:
         finally:
             self._over = True
 
+    def _on_signals(self, handler: Callable[[int, FrameType | None], None]) -> None:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, handler)
 
-def _on_signal(node: Node[C], exit_actions: ExitActions) -> None:
-    def stop(number: int, _: FrameType | None) -> None:
-        for name in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(name, leave)
-        node.loop.stop()
+    def _stop(self, _: int, __: FrameType | None) -> None:
+        self._on_signals(self._leave)
+        self._node.loop.stop()
 
-    def leave(number: int, _: FrameType | None) -> None:
-        if exit_actions.running:
+    def _leave(self, number: int, _: FrameType | None) -> None:
+        if self._begun and not self._over:
             return  # the interrupted call ends the process
         try:
-            exit_actions.run()
+            self.run_actions()
         finally:
             os._exit(128 + number)
-
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, stop)
