@@ -1,8 +1,9 @@
 """The probe of a router: a process that kills the router when it hangs.
 
 A working old session is no evidence for a new one: key expressions can keep Zenoh busy for minutes,
-and ``t2 estop`` then gets no session. So the probe opens a new session for each attempt. It is a
-process of its own with the next higher priority, because hung threads may use a whole processor.
+whatever the access rules, and ``t2 estop`` then gets no session. So each attempt of the probe is a
+new session and one query, with a deadline (``bus.probe_deadline``). The probe is a process of its
+own with the next higher priority, because hung threads may use a whole processor.
 
 The router starts its probe with ``RouterProbe``: ``python -m cli.run.router_probe SETUP``. The
 probe writes a byte to its standard output for each answer in time, and ends with its parent.
@@ -19,15 +20,14 @@ from collections.abc import Callable
 
 import msgspec
 
-from cli.run.router_attempts import MISSES, Attempts
-from common import child_process, clock, realtime
+from common import child_process, realtime
 from common import log as logs
 from common.bus.session import RUNTIME_ENV, answers, router_at
 from common.child_process import Backoff
-from common.freshness import NS_PER_S
 from common.settings import BusSettings, Log
 
-LOOK_S = 0.1
+MISSES = 2  # in a row: a hang; a single one may be a stall
+STALL_S = 0.5  # beyond the deadline of an attempt: the host stalled the probe and the router
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # they reach the group; the parent decides
 # One thread pool for the probe: further threads only cost wake-ups.
 POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
@@ -109,26 +109,46 @@ def main(text: str) -> int:
 
 def watch(parent: int, where: BusSettings) -> bool:
     """Return whether the parent was killed; False if it ended by itself."""
-    attempts = Attempts(clock.now_ns(), round(where.probe_deadline * NS_PER_S))
-    ended: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
+    attempts, deadline_s = Attempts(), where.probe_deadline
     while os.getppid() == parent:
-        number = attempts.begin(clock.now_ns())
-        if number is not None:
-            threading.Thread(target=attempt, args=(number, where, ended), daemon=True).start()
-        try:
-            if attempts.end(*ended.get(timeout=LOOK_S)):
-                os.write(sys.stdout.fileno(), b".")
-        except queue.Empty:
-            pass
-        if attempts.hung(clock.now_ns()) and os.getppid() == parent:
+        began_s = time.monotonic()
+        answered = answers_in_time(where)
+        took_s = time.monotonic() - began_s
+        if answered:
+            os.write(sys.stdout.fileno(), b".")
+        if attempts.hung(answered, stalled=took_s > deadline_s + STALL_S):
             os.kill(parent, signal.SIGKILL)
             return True
+        time.sleep(max(0.0, deadline_s / 2 - took_s))
     return False
 
 
-def attempt(number: int, where: BusSettings, ended: "queue.SimpleQueue[tuple[int, bool]]") -> None:
-    """Try once, and report the result."""
-    ended.put((number, answers(where)))
+def answers_in_time(where: BusSettings) -> bool:
+    """Return whether the router answers a new session within the deadline."""
+    ended: queue.SimpleQueue[bool] = queue.SimpleQueue()
+    threading.Thread(target=lambda: ended.put(answers(where)), daemon=True).start()
+    try:
+        return ended.get(timeout=where.probe_deadline)
+    except queue.Empty:
+        return False
+
+
+class Attempts:
+    """Counts the attempts without an answer."""
+
+    def __init__(self) -> None:
+        self._missed = 0
+        self._forgiven = False
+
+    def hung(self, answered: bool, *, stalled: bool) -> bool:
+        """Return whether the router hangs, after an attempt; ``stalled``: so was the probe."""
+        if answered:
+            self._missed, self._forgiven = 0, False
+        elif stalled and not self._forgiven:  # only once: a starved probe must still act
+            self._missed, self._forgiven = 0, True
+        else:
+            self._missed += 1
+        return self._missed >= MISSES
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from cli.run.router_probe import RouterProbe
+from cli.run.router_probe import Attempts, RouterProbe
 from common.bus.session import answers, client_config, router, router_at
 from common.settings import BusSettings, Log
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
@@ -26,7 +26,7 @@ from verification.harness.waiting import wait_until
 EXPLODES = "t2/v1/001/evt/dashboard/@adv/" + "**/a/" * 7 + "b"
 LONG = "t2/v1/001/evt/dashboard/@adv/" + "/".join("a" * 40)
 DEADLINE_S = 1.0
-DETECTED_S = 2 * DEADLINE_S
+DETECTED_S = 2.5 * DEADLINE_S
 NOISE_S = 3.0  # delay of a busy host
 
 
@@ -134,6 +134,32 @@ def test_a_frozen_router_is_killed(endpoint: str) -> None:
         wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
         process.send_signal(signal.SIGSTOP)
         assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
+
+
+YES, NO, STALLED = (True, False), (False, False), (False, True)  # answered, stalled
+
+
+@pytest.mark.parametrize(
+    ("attempts", "hung"),
+    [
+        ([NO], False),
+        ([NO, NO], True),
+        ([NO, YES, NO], False),
+        ([NO, YES, NO, NO], True),
+        ([NO, STALLED, NO], False),  # the stall may have been the host's, also of the first one
+        ([STALLED, NO, NO], True),
+        ([STALLED, NO, STALLED], True),  # forgiven once
+        ([STALLED, YES, STALLED, NO], False),  # an answer proves that the router works
+        ([STALLED, STALLED, STALLED], True),
+    ],
+)
+def test_two_missed_attempts_in_a_row_are_a_hang(
+    attempts: list[tuple[bool, bool]], hung: bool
+) -> None:
+    made = Attempts()
+    *before, last = [made.hung(answered, stalled=stalled) for answered, stalled in attempts]
+    assert not any(before)
+    assert last is hung
 
 
 def test_no_router_no_answer(endpoint: str) -> None:
